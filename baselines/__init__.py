@@ -1,0 +1,1 @@
+"""The paper's controllers as scripted policies."""

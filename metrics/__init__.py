@@ -1,0 +1,1 @@
+"""Measures of swarm behaviour: arrays in, numbers out."""

@@ -1,0 +1,1 @@
+"""Swarm foraging as a PettingZoo environment."""

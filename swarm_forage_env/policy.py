@@ -1,0 +1,197 @@
+"""What controls a swarm: the Policy protocol, the words it speaks (Grip, Event, Task) and how policies are found.
+
+A policy, scripted or trained, sees observations and never the world. `baselines` and learned policies import from
+here, `layout`, `detection`, `quirks` and `types`, and from nothing else of the environment.
+"""
+
+import difflib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from importlib.metadata import entry_points
+from typing import Any, ClassVar, Protocol, runtime_checkable
+
+import numpy as np
+
+from swarm_forage_env.layout import ObservationLayout
+from swarm_forage_env.quirks import Quirks
+from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
+
+POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
+"""Entry-point group under which installed packages offer policies by name."""
+
+
+class Grip:
+    """Gripper commands: write the constant, the environment compares bands around it."""
+
+    GRASP: ClassVar[float] = 1.0
+    """Empty: pick up what lies under the centre. Carrying: hold."""
+    RELEASE: ClassVar[float] = -0.125
+    """Carrying: let go here, whatever is here. Empty: nothing."""
+    DELIVER: ClassVar[float] = -0.375
+    """Carrying: drop only into the nest or a cache."""
+    SITE: ClassVar[float] = -0.625
+    """Carrying: lay on the floor, unless a cache is near."""
+    FOUND: ClassVar[float] = -1.0
+    """Carrying: as SITE, then the world tries to form a cache."""
+
+
+class Event(IntEnum):
+    """What happened to a robot in the last step; at most one each."""
+
+    NONE = 0
+    PICKED_UP = 1
+    PICKED_FROM_CACHE = 2
+    DELIVERED = 3
+    DROPPED = 4
+    DROPPED_ELSEWHERE = 5
+    JOINED_CACHE = 6
+    NOTHING_HERE = 7
+    VANISHED = 8
+    CACHE_TOO_NEAR = 9
+
+
+class Task(IntEnum):
+    """Task codes that a policy may expose in `task`, an (N,) int8 array."""
+
+    NONE = 0
+    GENERALIST = 1
+    HARVESTER = 2
+    COLLECTOR = 3
+    STARTER = 4
+    FINISHER = 5
+    TRANSFERER = 6
+    CACHE_COLLECTOR = 7
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SwarmTask:
+    """What every policy knows before a run: constants of robot and world, no state."""
+
+    n_robots: int
+    n_objects: int
+    dt_s: float
+    horizon_s: float
+    layout: ObservationLayout
+    max_speed_mps: float
+    """Limit of the centre speed."""
+    max_wheel_difference_mps: float
+    """Limit of right minus left wheel speed."""
+    wheel_scale_mps: float
+    """Wheel speed that an action of 1.0 commands."""
+    wheel_base_m: float
+    arena_size_m: tuple[float, float]
+    cell_m: float
+    nest_centre_m: tuple[float, float]
+    nest_size_m: tuple[float, float]
+    distributable_box_m: tuple[float, float, float, float]
+    """x low, y low, x high, y high of the area where objects may lie."""
+    placement: str
+    caches: str
+    """"none", "static" or "dynamic"."""
+    cache_side_m: float
+    """Side of a cache as built, an odd number of cells."""
+    cache_side_nominal_m: float
+    """0.2 max(X, Y); distances are derived from it."""
+    min_dist_m: float
+    """0.2 min(X, Y)."""
+    cache_proximity_m: float
+    """SITE and FOUND drops are refused within this distance of a cache centre."""
+    quirks: Quirks
+
+
+@runtime_checkable
+class Policy(Protocol):
+    """Controls every robot at once. An instance drives one run; its memory is created by `reset`.
+
+    Optional attributes: `task`, an (N,) int8 array of `Task` codes; the class attributes `caches` ("none", "static",
+    "dynamic": the world the policy is made for) and `reads` (names of the slices it looks at; default all).
+    """
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Prepare for one run."""
+        ...
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Choose actions.
+
+        Args:
+            obs: (N, D) float32. The array is reused by the environment: copy what must be kept.
+            active: (N,) bool, robots of the tasked swarm; rows of others are ignored.
+
+        Returns:
+            (N, 3) float32 in [-1, 1]: left wheel, right wheel, gripper.
+        """
+        ...
+
+
+class RandomPolicy:
+    """Uniformly random actions: the floor that every other policy has to beat."""
+
+    reads: ClassVar[tuple[str, ...]] = ()
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Keep the swarm size and the generator."""
+        self._shape = (task.n_robots, 3)
+        self._rng = rng
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Return (N, 3) actions drawn uniformly from [-1, 1]."""
+        return self._rng.uniform(-1.0, 1.0, self._shape).astype(np.float32)
+
+
+class CallablePolicy:
+    """A plain function `obs -> actions` in policy clothes; see `from_callable`."""
+
+    def __init__(self, function: Callable[[ObsArray], ActionArray], name: str) -> None:
+        self.function = function
+        self.name = name
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Remember the expected shape of actions."""
+        self._shape = (task.n_robots, 3)
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Return the function's actions, checked for shape; raises ValueError otherwise."""
+        actions = np.asarray(self.function(obs), dtype=np.float32)
+        if actions.shape != self._shape:
+            raise ValueError(
+                f"Expected policy {self.name!r} to return actions with shape (n_robots, 3) = {self._shape}, "
+                f"got {actions.shape}; return one row per robot."
+            )
+        return actions
+
+
+def from_callable(function: Callable[[ObsArray], ActionArray], *, name: str | None = None) -> CallablePolicy:
+    """Wrap `function(obs) -> actions` as a Policy.
+
+    Args:
+        function: Takes (N, D) observations, returns (N, 3) actions.
+        name: Name under which results are stored; default the function's own name.
+    """
+    return CallablePolicy(function, name or getattr(function, "__name__", type(function).__name__))
+
+
+def policy_names() -> tuple[str, ...]:
+    """Return the names of all installed policies, sorted."""
+    return tuple(sorted({point.name for point in entry_points(group=POLICY_ENTRY_POINTS)}))
+
+
+def policy_class(name: str) -> Callable[..., Policy]:
+    """Return the class (or factory) registered under `name`.
+
+    Raises:
+        ValueError: no installed policy has that name; the message lists the known ones.
+    """
+    for point in entry_points(group=POLICY_ENTRY_POINTS):
+        if point.name == name:
+            return point.load()
+    known = policy_names()
+    close = difflib.get_close_matches(name, known, n=1)
+    hint = f" Did you mean {close[0]!r}?" if close else ""
+    raise ValueError(f"Unknown policy {name!r}.{hint} Installed policies: {', '.join(known) or 'none'}.")
+
+
+def load_policy(name: str, parameters: Mapping[str, Any] | None = None) -> Policy:
+    """Return a fresh policy by registered name, built with keyword `parameters`."""
+    return policy_class(name)(**dict(parameters or {}))

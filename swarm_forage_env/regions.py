@@ -1,0 +1,58 @@
+"""Which cells objects may lie on: pure integer geometry of the floor grid.
+
+A box is (x low, y low, x high, y high) in cells, half-open: x low <= x < x high.
+Integer arithmetic throughout, because 0.2 m and the shares below are not exact in binary.
+"""
+
+from typing import TypeAlias
+
+Box: TypeAlias = tuple[int, int, int, int]
+
+PLACEMENTS = ("single_source", "dual_source", "quad_source", "random", "power_law")
+
+
+def distributable_box(nx: int, ny: int) -> Box:
+    """Cells on which objects may lie at all: 15 % to 85 % of each axis, both end cells included."""
+    return (15 * nx // 100, 15 * ny // 100, 85 * nx // 100 + 1, 85 * ny // 100 + 1)
+
+
+def source_boxes(placement: str, nx: int, ny: int) -> tuple[Box, ...]:
+    """Return the source regions of a placement on an nx x ny grid.
+
+    Power-law clusters are drawn at reset; for them the answer is the whole distributable range.
+    The bands are 0.75/0.85 and 0.25/0.85 of the upper distributable index, as in the paper's study.
+    """
+    x_low, y_low, x_end, y_end = distributable_box(nx, ny)
+    x_high, y_high = x_end - 1, y_end - 1
+    right = (75 * x_high // 85, y_low, x_high, y_high)
+    left = (x_low, y_low, 25 * x_high // 85, y_high)
+    bottom = (x_low, y_low, x_high, 25 * y_high // 85)
+    top = (x_low, 75 * y_high // 85, x_high, y_high)
+    boxes: dict[str, tuple[Box, ...]] = {
+        "single_source": (right,),
+        "dual_source": (right, left),
+        "quad_source": (right, left, bottom, top),
+        "random": ((x_low, y_low, x_high, y_high),),
+        "power_law": ((x_low, y_low, x_end, y_end),),
+    }
+    return boxes[placement]
+
+
+def overlap_cells(a: Box, b: Box) -> int:
+    """Number of cells that two boxes share."""
+    return max(0, min(a[2], b[2]) - max(a[0], b[0])) * max(0, min(a[3], b[3]) - max(a[1], b[1]))
+
+
+def capacity(placement: str, nx: int, ny: int, nest: Box) -> int:
+    """Number of objects that fit the source regions when the nest cells are left free.
+
+    Regions of the quad source overlap in their corners; those cells count once.
+    """
+    cells: set[tuple[int, int]] = set()
+    boxes = source_boxes(placement, nx, ny)
+    if len(boxes) == 1:
+        box = boxes[0]
+        return overlap_cells(box, box) - overlap_cells(box, nest)
+    for x_low, y_low, x_high, y_high in boxes:
+        cells.update((x, y) for x in range(x_low, x_high) for y in range(y_low, y_high))
+    return sum(1 for x, y in cells if not (nest[0] <= x < nest[2] and nest[1] <= y < nest[3]))

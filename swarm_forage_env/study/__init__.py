@@ -1,0 +1,1 @@
+"""Runs and studies: specification, execution, storage."""

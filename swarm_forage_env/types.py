@@ -1,0 +1,20 @@
+"""Array aliases and the axis letters used in every docstring.
+
+Axes: N robots, M objects, K cache slots, D observation columns, T recording intervals.
+Units are SI (metres, seconds, radians) unless a docstring says otherwise; a *tick* is one control
+step of `dt_s`, a *cell* is one square of the floor grid (`config.CELL_M` wide).
+"""
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int32]
+CodeArray: TypeAlias = NDArray[np.int8]
+BoolArray: TypeAlias = NDArray[np.bool_]
+ObsArray: TypeAlias = NDArray[np.float32]
+"""Observations, (N, D) float32 in [-1, 1]."""
+ActionArray: TypeAlias = NDArray[np.float32]
+"""Actions, (N, 3) float32 in [-1, 1]: left wheel, right wheel, gripper."""
