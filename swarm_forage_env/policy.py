@@ -7,61 +7,20 @@ here, `layout`, `detection`, `quirks` and `types`, and from nothing else of the 
 import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 from importlib.metadata import entry_points
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
+from swarm_forage_env.codes import Event as Event
+from swarm_forage_env.codes import Grip as Grip
+from swarm_forage_env.codes import Task as Task
 from swarm_forage_env.layout import ObservationLayout
 from swarm_forage_env.quirks import Quirks
 from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
 
 POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
 """Entry-point group under which installed packages offer policies by name."""
-
-
-class Grip:
-    """Gripper commands: write the constant, the environment compares bands around it."""
-
-    GRASP: ClassVar[float] = 1.0
-    """Empty: pick up what lies under the centre. Carrying: hold."""
-    RELEASE: ClassVar[float] = -0.125
-    """Carrying: let go here, whatever is here. Empty: nothing."""
-    DELIVER: ClassVar[float] = -0.375
-    """Carrying: drop only into the nest or a cache."""
-    SITE: ClassVar[float] = -0.625
-    """Carrying: lay on the floor, unless a cache is near."""
-    FOUND: ClassVar[float] = -1.0
-    """Carrying: as SITE, then the world tries to form a cache."""
-
-
-class Event(IntEnum):
-    """What happened to a robot in the last step; at most one each."""
-
-    NONE = 0
-    PICKED_UP = 1
-    PICKED_FROM_CACHE = 2
-    DELIVERED = 3
-    DROPPED = 4
-    DROPPED_ELSEWHERE = 5
-    JOINED_CACHE = 6
-    NOTHING_HERE = 7
-    VANISHED = 8
-    CACHE_TOO_NEAR = 9
-
-
-class Task(IntEnum):
-    """Task codes that a policy may expose in `task`, an (N,) int8 array."""
-
-    NONE = 0
-    GENERALIST = 1
-    HARVESTER = 2
-    COLLECTOR = 3
-    STARTER = 4
-    FINISHER = 5
-    TRANSFERER = 6
-    CACHE_COLLECTOR = 7
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -4,59 +4,16 @@ No behaviour lives here; every rule is a function in another room that edits the
 """
 
 from dataclasses import dataclass, field
-from enum import IntEnum
 
 import numpy as np
 
+from swarm_forage_env.codes import CELL_CACHE as CELL_CACHE
+from swarm_forage_env.codes import CELL_EMPTY as CELL_EMPTY
+from swarm_forage_env.codes import CELL_NEST as CELL_NEST
+from swarm_forage_env.codes import Counter as Counter
+from swarm_forage_env.codes import ObjectStatus as ObjectStatus
 from swarm_forage_env.config import ScenarioConfig
 from swarm_forage_env.types import BoolArray, CodeArray, FloatArray, IntArray
-
-CELL_EMPTY = -1
-"""Floor code of a cell that holds nothing. Codes >= 0 are the row of the free object lying there."""
-CELL_NEST = -2
-CELL_CACHE = -3
-"""Floor code of cache slot 0; slot k paints its cells with CELL_CACHE - k."""
-
-
-class ObjectStatus(IntEnum):
-    """Where an object is; at any time exactly one of these."""
-
-    FREE = 0
-    CARRIED = 1
-    CACHED = 2
-    WAITING = 3
-    """Found no free cell; re-enters the world with the next re-placement that succeeds."""
-
-
-class Counter(IntEnum):
-    """Cumulative counts since reset, indices into `StepEvents.counters`; intervals are differences."""
-
-    COLLECTED = 0
-    """Objects delivered to the nest."""
-    FREE_PICKUPS = 1
-    """Objects picked up from the floor."""
-    FIRST_PICKED = 2
-    """Pick-ups of an object that nobody had carried since it was placed."""
-    CACHE_PICKUPS = 3
-    CACHE_DROPS = 4
-    FLOOR_DROPS = 5
-    """Objects laid on the floor by robots."""
-    DISPLACED_DROPS = 6
-    """Drops without a free cell: the object was re-placed elsewhere."""
-    OBJECTS_MOVED = 7
-    """Random-walk steps taken by objects."""
-    CACHES_CREATED = 8
-    CACHES_DEPLETED = 9
-    INTERFERING = 10
-    """Robot-ticks in interference."""
-    ACTIVE = 11
-    """Robot-ticks of active robots."""
-    PRESENT = 12
-    """Robot-ticks of robots that are born and alive."""
-    CACHES_ALIVE = 13
-    """Cache-ticks."""
-    OBJECTS_CACHED = 14
-    """Object-ticks inside caches."""
 
 
 @dataclass(slots=True)
@@ -74,7 +31,9 @@ class SwarmState:
     cargo_from_cache: BoolArray
     """(N,) whether the carried object was taken out of a cache."""
     pending_kind: CodeArray
-    """(N,) interaction in progress (`interactions.Request`), 0 = none."""
+    """(N,) interaction in progress (codes of `kernels.interact`), 0 = none."""
+    pending_band: CodeArray
+    """(N,) gripper band that started it; another band cancels it."""
     pending_target: IntArray
     """(N,) object row or cache serial that the interaction in progress is about, -1 = none."""
     present: BoolArray
@@ -92,6 +51,7 @@ class SwarmState:
             carried_object=np.full(n_robots, -1, np.int32),
             cargo_from_cache=np.zeros(n_robots, np.bool_),
             pending_kind=np.zeros(n_robots, np.int8),
+            pending_band=np.zeros(n_robots, np.int8),
             pending_target=np.full(n_robots, -1, np.int32),
             present=np.ones(n_robots, np.bool_),
             active=np.ones(n_robots, np.bool_),

@@ -1,0 +1,57 @@
+"""From actions to body motion: limits of the drive, wheel gains of wrappers, held wheels."""
+
+import numpy as np
+
+from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env.kernels.drive import drive
+from swarm_forage_env.layout import WHEEL_SCALE_MPS
+from swarm_forage_env.state import SwarmState
+from swarm_forage_env.types import ActionArray, FloatArray
+
+
+class ActionError(ValueError):
+    """Actions of the wrong shape, or not finite."""
+
+
+class Drive:
+    """Differential drive of a swarm: wheel speed = limit(command) x gain, not limited again."""
+
+    def __init__(self, config: ScenarioConfig) -> None:
+        """Take the limits from `config`."""
+        robots = config.robots
+        self._dt_s = config.dt_s
+        self._limits = np.array(
+            [WHEEL_SCALE_MPS, robots.max_speed_mps, robots.max_wheel_difference_mps, robots.wheel_base_m]
+        )
+        self._unit_gain = np.ones((robots.n_robots, 2))
+
+    def apply(self, actions: ActionArray, wheel_gain: FloatArray | None, swarm: SwarmState, twist: FloatArray) -> None:
+        """Write `swarm.wheel_speed` and body twists.
+
+        Commands beyond [-1, 1] are clipped. Centre speed and wheel difference are limited each by clipping. Wheels of
+        inactive robots and of robots in an interaction stand still.
+
+        Args:
+            actions: (N, 3) float32; rows of inactive robots are ignored.
+            wheel_gain: (N, 2) factor per wheel, or None for 1.
+            swarm: Read: active, pending_kind, heading. Written: wheel_speed.
+            twist: (N + 1, 3) written: world velocity x, y in m/s and turn rate in rad/s.
+
+        Raises:
+            ActionError: an active robot's action is NaN or infinite.
+        """
+        bad = drive(
+            actions,
+            self._unit_gain if wheel_gain is None else wheel_gain,
+            swarm.active,
+            swarm.pending_kind,
+            swarm.heading,
+            self._limits,
+            self._dt_s,
+            swarm.wheel_speed,
+            twist,
+        )
+        if bad >= 0:
+            raise ActionError(
+                f"Expected finite actions, got {actions[bad].tolist()} for robot_{bad}; nothing was stepped."
+            )

@@ -1,0 +1,367 @@
+"""ForageEnv: the PettingZoo skin over the arena. Arrays inside, per-agent dicts built once at the outermost layer."""
+
+from collections.abc import Callable, Collection
+from functools import cached_property
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+from gymnasium import spaces
+from pettingzoo import ParallelEnv
+from pettingzoo.utils.conversions import parallel_to_aec
+
+from swarm_forage_env.actuators import ActionError
+from swarm_forage_env.arena import ForagingArena
+from swarm_forage_env.config import CELL_M, ScenarioConfig, with_overrides
+from swarm_forage_env.layout import WHEEL_SCALE_MPS, ObservationLayout
+from swarm_forage_env.policy import SwarmTask
+from swarm_forage_env.rewards import RewardModel
+from swarm_forage_env.scenarios import scenario as preset
+from swarm_forage_env.state import CacheState, ObjectState, ObjectStatus, StepEvents, SwarmState
+from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+
+BatchStep: TypeAlias = tuple[ObsArray, np.ndarray, BoolArray, bool]
+"""Observations (N, D), rewards (N,) float32, terminated (N,), truncated."""
+
+
+class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
+    """A swarm that forages: one agent per robot, named robot_0, robot_1, ...
+
+    Observations are flat float32 rows in named slices (`env.layout`, printed by `env.layout.describe()`); actions are
+    (left wheel, right wheel, gripper) in [-1, 1], values beyond are clipped. Robots that are away in repair stay in
+    `agents` with the observation column `active` at 0; only permanent death terminates, only the horizon truncates.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {
+        "name": "swarm_forage_v0",
+        "render_modes": ["rgb_array"],
+        "render_fps": 5,
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        scenario: ScenarioConfig,
+        *,
+        max_cycles: int | None = None,
+        render_mode: str | None = None,
+        reads: Collection[str] | None = None,
+    ) -> None:
+        """Create the environment of one scenario.
+
+        Args:
+            scenario: The world.
+            max_cycles: Steps until truncation; default the scenario's horizon.
+            render_mode: None or "rgb_array".
+            reads: Observation slices that will be looked at; others may stay zero (faster). Default: all.
+
+        Raises:
+            ValueError: max_cycles below 1 or an unknown render mode.
+        """
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"Expected render_mode None or 'rgb_array', got {render_mode!r}.")
+        if max_cycles is not None and max_cycles < 1:
+            raise ValueError(f"Expected max_cycles >= 1, got {max_cycles}.")
+        self.scenario = scenario
+        self.render_mode = render_mode
+        self.max_cycles = scenario.horizon_ticks if max_cycles is None else max_cycles
+        self.arena = ForagingArena(scenario, reads=reads)
+        n_robots = scenario.robots.n_robots
+        self._rewards = RewardModel(scenario.reward, scenario.arena.nest_centre_m, n_robots)
+        self._terminated = np.zeros(n_robots, np.bool_)
+        self.possible_agents = [f"robot_{row}" for row in range(n_robots)]
+        self._row_of = {agent: row for row, agent in enumerate(self.possible_agents)}
+        self.agents: list[str] = []
+        self._actions = np.zeros((n_robots, 3), np.float32)
+        self._seeds = np.random.default_rng()
+        self.seed_value: int | None = None
+
+        columns = self.layout.size
+        self._observation_space = {
+            agent: spaces.Box(-1.0, 1.0, (columns,), np.float32) for agent in self.possible_agents
+        }
+        self._action_space = {agent: spaces.Box(-1.0, 1.0, (3,), np.float32) for agent in self.possible_agents}
+
+    # Spaces and constants
+
+    @property
+    def layout(self) -> ObservationLayout:
+        """Named slices of an observation row."""
+        return self.arena.layout
+
+    def observation_space(self, agent: str) -> spaces.Box:
+        """(D,) float32 in [-1, 1]; one space object per agent."""
+        return self._observation_space[agent]
+
+    def action_space(self, agent: str) -> spaces.Box:
+        """(3,) float32 in [-1, 1]: left wheel, right wheel, gripper; one space object per agent."""
+        return self._action_space[agent]
+
+    @cached_property
+    def state_space(self) -> spaces.Box:
+        """Space of `state()`: (6 N + 3 M,) float32 in [-1, 1]."""
+        size = 6 * self.scenario.robots.n_robots + 3 * self.scenario.objects.n_objects
+        return spaces.Box(-1.0, 1.0, (size,), np.float32)
+
+    @cached_property
+    def task(self) -> SwarmTask:
+        """What every policy may know before a run."""
+        scenario = self.scenario
+        arena, robots = scenario.arena, scenario.robots
+        x_low, y_low, x_high, y_high = arena.nest_box_m
+        area = arena.distributable_cells
+        return SwarmTask(
+            n_robots=robots.n_robots,
+            n_objects=scenario.objects.n_objects,
+            dt_s=scenario.dt_s,
+            horizon_s=self.max_cycles * scenario.dt_s,
+            layout=self.layout,
+            max_speed_mps=robots.max_speed_mps,
+            max_wheel_difference_mps=robots.max_wheel_difference_mps,
+            wheel_scale_mps=WHEEL_SCALE_MPS,
+            wheel_base_m=robots.wheel_base_m,
+            arena_size_m=(arena.width_m, arena.height_m),
+            cell_m=CELL_M,
+            nest_centre_m=((x_low + x_high) / 2, (y_low + y_high) / 2),
+            nest_size_m=(x_high - x_low, y_high - y_low),
+            distributable_box_m=(area[0] / 5, area[1] / 5, area[2] / 5, area[3] / 5),
+            placement=scenario.objects.placement,
+            caches=scenario.caches,
+            cache_side_m=scenario.cache_side_cells / 5,
+            cache_side_nominal_m=scenario.cache_side_nominal_m,
+            min_dist_m=scenario.min_dist_m,
+            cache_proximity_m=scenario.cache_proximity_m,
+            quirks=scenario.quirks,
+        )
+
+    # Truth, for wrappers, recorders and pictures
+
+    @property
+    def swarm(self) -> SwarmState:
+        """Robots; read only."""
+        return self.arena.swarm
+
+    @property
+    def objects(self) -> ObjectState:
+        """Objects and the floor; read only."""
+        return self.arena.objects
+
+    @property
+    def caches(self) -> CacheState:
+        """Caches; read only."""
+        return self.arena.caches
+
+    @property
+    def events(self) -> StepEvents:
+        """This tick's events and the cumulative counters; read only."""
+        return self.arena.events
+
+    @property
+    def active(self) -> BoolArray:
+        """(N,) robots of the tasked swarm; read only."""
+        return self.arena.swarm.active
+
+    @property
+    def tick(self) -> int:
+        """Ticks done since reset."""
+        return self.arena.tick
+
+    def set_population(self, *, active: BoolArray, present: BoolArray, terminated: BoolArray | None = None) -> None:
+        """Say who is at work and who is in the world; see `ForagingArena.set_population`.
+
+        `terminated` (N,) names the robots that learners shall see as terminated from the next step on.
+        """
+        self.arena.set_population(active=active, present=present)
+        if terminated is not None:
+            self._terminated[:] = terminated
+
+    # Array level
+
+    def reset_batch(self, seed: int | None = None) -> ObsArray:
+        """Start a run and return observations (N, D).
+
+        Args:
+            seed: Non-negative integer; None continues a sequence of seeds that the last given seed (or the
+                operating system) started.
+        """
+        if seed is None:
+            seed = int(self._seeds.integers(2**31))
+        elif isinstance(seed, bool) or int(seed) != seed or seed < 0:
+            raise ValueError(f"Expected seed to be a non-negative integer or None, got {seed!r}.")
+        else:
+            self._seeds = np.random.default_rng(seed)
+        self.seed_value = int(seed)
+        self._terminated[:] = False
+        self.agents = list(self.possible_agents)
+        return self.arena.reset(self.seed_value)
+
+    def step_batch(
+        self,
+        actions: ActionArray,
+        *,
+        wheel_gain: FloatArray | None = None,
+        tasks: CodeArray | None = None,
+    ) -> BatchStep:
+        """Advance one tick at array level.
+
+        Args:
+            actions: (N, 3) float32, rows of robots that are away included (and ignored).
+            wheel_gain: (N, 2) factor per wheel on the limited speed; wrappers multiply theirs in.
+            tasks: (N,) int8 `policy.Task` codes, if the policy tells them.
+
+        Returns:
+            Observations (N, D) and rewards (N,) in reused buffers, terminated (N,) for the dead, truncated.
+
+        Raises:
+            ActionError: wrong shape or an active robot's action that is not finite.
+        """
+        expected = self._actions.shape
+        if actions.shape != expected:
+            raise ActionError(
+                f"Expected actions with shape (n_robots, 3) = {expected}, got {actions.shape}; "
+                "pass one row per robot, inactive ones included."
+            )
+        if self.seed_value is None:
+            raise RuntimeError("Call reset before step.")
+        arena = self.arena
+        self._rewards.remember(arena.swarm)
+        obs = arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
+        reward = self._rewards.reward(arena.swarm, arena.events)
+        return obs, reward, self._terminated, arena.tick >= self.max_cycles
+
+    # Dict level
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, Any]]]:
+        """Start a run; returns observations and infos per agent. `options` is accepted and ignored."""
+        return self.reset_through(self.reset_batch, seed)
+
+    def step(
+        self, actions: dict[str, np.ndarray]
+    ) -> tuple[dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Advance one tick with one action per agent in `agents`."""
+        return self.step_through(self.step_batch, actions)
+
+    def reset_through(
+        self, reset_batch: Callable[[int | None], ObsArray], seed: int | None
+    ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, Any]]]:
+        """Reset by `reset_batch` (a wrapper's or our own) and unpack per agent."""
+        obs = reset_batch(seed).copy()
+        return dict(zip(self.possible_agents, obs, strict=True)), self._infos(self.agents)
+
+    def step_through(
+        self, step_batch: Callable[[ActionArray], BatchStep], actions: dict[str, np.ndarray]
+    ) -> tuple[dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Pack actions, step by `step_batch` (a wrapper's or our own) and unpack per agent."""
+        agents = self.agents
+        obs, reward, terminated, truncated = step_batch(self._pack(actions))
+        # One copy of the whole batch; the agents' rows are views of it and stay valid.
+        rows = dict(zip(self.possible_agents, obs.copy(), strict=True))
+        rewards = dict(zip(self.possible_agents, reward.tolist(), strict=True))
+        terminations = dict(zip(self.possible_agents, terminated.tolist(), strict=True))
+        if len(agents) < len(self.possible_agents):
+            rows = {agent: rows[agent] for agent in agents}
+            rewards = {agent: rewards[agent] for agent in agents}
+            terminations = {agent: terminations[agent] for agent in agents}
+        truncations = dict.fromkeys(agents, truncated)
+        infos = self._infos(agents)
+        if truncated:
+            self.agents = []
+        elif terminated.any():
+            self.agents = [agent for agent in agents if not terminations[agent]]
+        return rows, rewards, terminations, truncations, infos
+
+    def _pack(self, actions: dict[str, np.ndarray]) -> ActionArray:
+        agents = self.agents
+        if not agents:
+            raise RuntimeError("All agents are done; call reset to start another run.")
+        if actions.keys() != self._row_of.keys() and set(actions) != set(agents):
+            missing = [agent for agent in agents if agent not in actions]
+            foreign = [agent for agent in actions if agent not in agents]
+            raise ActionError(
+                f"Expected one action for each of the {len(agents)} agents in env.agents, "
+                f"missing {missing[:3] or 'none'}, not in env.agents {foreign[:3] or 'none'}."
+            )
+        packed = self._actions
+        try:
+            if len(agents) == len(self.possible_agents):
+                np.stack([actions[agent] for agent in agents], out=packed, casting="same_kind")
+            else:
+                packed[:] = 0.0
+                for agent in agents:
+                    packed[self._row_of[agent]] = actions[agent]
+        except ValueError as error:
+            shapes = {np.shape(action) for action in actions.values()}
+            raise ActionError(f"Expected each action with shape (3,), got shapes {sorted(shapes)}.") from error
+        return packed
+
+    def _infos(self, agents: list[str]) -> dict[str, dict[str, Any]]:
+        active = dict(zip(self.possible_agents, self.active.tolist(), strict=True))
+        return {agent: {"active": active[agent]} for agent in agents}
+
+    def state(self) -> np.ndarray:
+        """Global view of fixed size, (6 N + 3 M,) float32 in [-1, 1].
+
+        Per robot: x, y as in the observation, cos and sin of the heading, carrying, active (zeros when not present).
+        Then per object: x, y of its cell (of its carrier while carried, zeros while waiting), status / 3.
+        """
+        swarm, objects, arena = self.swarm, self.objects, self.scenario.arena
+        size = np.array([arena.width_m, arena.height_m])
+        robots = np.column_stack(
+            [
+                2.0 * swarm.position / size - 1.0,
+                np.cos(swarm.heading),
+                np.sin(swarm.heading),
+                swarm.carried_object >= 0,
+                swarm.active,
+            ]
+        )
+        robots[~swarm.present] = 0.0
+        places = 2.0 * (objects.cell + 0.5) * CELL_M / size - 1.0
+        places[objects.status == ObjectStatus.WAITING] = 0.0
+        carriers = np.flatnonzero(swarm.carried_object >= 0)
+        places[swarm.carried_object[carriers]] = robots[carriers, :2]
+        things = np.column_stack([places, objects.status / 3.0])
+        flat = np.concatenate([robots.ravel(), things.ravel()])
+        return np.clip(flat, -1.0, 1.0).astype(np.float32)
+
+    def render(self) -> np.ndarray | None:
+        """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
+        if self.render_mode is None:
+            return None
+        from swarm_forage_env.rendering import render_frame  # optional extra: only when a picture is asked for
+
+        return render_frame(self.scenario, self.swarm, self.objects, self.caches, self.events, tick=self.tick)
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+
+def parallel_env(
+    scenario: str | ScenarioConfig = "warehouse_small",
+    *,
+    max_cycles: int | None = None,
+    render_mode: str | None = None,
+    **overrides: Any,
+) -> ForageEnv:
+    """Create a parallel environment.
+
+    Args:
+        scenario: Name of a preset, or a complete configuration.
+        max_cycles: Steps until truncation; default the scenario's horizon.
+        render_mode: None or "rgb_array".
+        overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
+
+    Raises:
+        ConfigError: unknown preset or field, or values that describe no world.
+    """
+    if isinstance(scenario, ScenarioConfig):
+        config = with_overrides(scenario, **overrides)
+    else:
+        config = preset(scenario, **overrides)
+    return ForageEnv(config, max_cycles=max_cycles, render_mode=render_mode)
+
+
+def env(scenario: str | ScenarioConfig = "warehouse_small", **options: Any) -> Any:
+    """Create the agent-by-agent (AEC) form by PettingZoo's own conversion; arguments as `parallel_env`."""
+    return parallel_to_aec(parallel_env(scenario, **options))

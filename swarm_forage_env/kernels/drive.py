@@ -1,0 +1,65 @@
+"""Wheel commands to body velocities, and body poses back to positions and headings."""
+
+import math
+
+from numba import njit
+
+from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray
+
+
+@njit(cache=True)
+def drive(
+    actions: ActionArray,
+    wheel_gain: FloatArray,
+    active: BoolArray,
+    pending_kind: CodeArray,
+    heading: FloatArray,
+    limits: FloatArray,
+    dt_s: float,
+    wheel_speed: FloatArray,
+    twist: FloatArray,
+) -> int:
+    """Fill wheel speeds (N, 2) m/s and twists (N + 1, 3): world velocity x, y in m/s and turn rate in rad/s.
+
+    `limits` holds wheel scale, centre-speed limit, wheel-difference limit (m/s) and wheel base (m). The velocity is
+    the chord of the exact arc over one tick, so that free motion is exact however the tick is divided.
+    Returns the first active row with a command that is not finite, or -1.
+    """
+    scale, max_speed, max_difference, wheel_base = limits[0], limits[1], limits[2], limits[3]
+    for i in range(heading.shape[0]):
+        left = 0.0
+        right = 0.0
+        if active[i]:
+            command_left = float(actions[i, 0])
+            command_right = float(actions[i, 1])
+            if not math.isfinite(command_left + command_right + actions[i, 2]):
+                return i
+            if pending_kind[i] == 0:
+                command_left = min(1.0, max(-1.0, command_left)) * scale
+                command_right = min(1.0, max(-1.0, command_right)) * scale
+                speed = min(max_speed, max(-max_speed, 0.5 * (command_left + command_right)))
+                difference = min(max_difference, max(-max_difference, command_right - command_left))
+                left = (speed - 0.5 * difference) * wheel_gain[i, 0]
+                right = (speed + 0.5 * difference) * wheel_gain[i, 1]
+        wheel_speed[i, 0] = left
+        wheel_speed[i, 1] = right
+        turn = (right - left) / wheel_base
+        half_angle = 0.5 * turn * dt_s
+        chord = 0.5 * (left + right)
+        if half_angle != 0.0:
+            chord *= math.sin(half_angle) / half_angle
+        twist[i, 0] = chord * math.cos(heading[i] + half_angle)
+        twist[i, 1] = chord * math.sin(heading[i] + half_angle)
+        twist[i, 2] = turn
+    return -1
+
+
+@njit(cache=True)
+def unpack_poses(poses: FloatArray, present: BoolArray, position: FloatArray, heading: FloatArray) -> None:
+    """Copy body poses (>= N, 3: x, y, angle) of present robots; angles are wrapped to (-pi, pi]."""
+    for i in range(heading.shape[0]):
+        if present[i]:
+            position[i, 0] = poses[i, 0]
+            position[i, 1] = poses[i, 1]
+            angle = poses[i, 2]
+            heading[i] = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))

@@ -1,0 +1,186 @@
+"""What robots sense of the floor and the light above it: ground readings, nest light, line-of-sight window."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from swarm_forage_env.detection import BEAM_ANGLES_RAD
+from swarm_forage_env.layout import SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
+from swarm_forage_env.types import BoolArray, FloatArray, IntArray, ObsArray
+
+CELLS_PER_M = 5.0
+"""Cell index = floor(coordinate * 5); dividing by 0.2 would truncate 0.6 m to cell 2."""
+_GROUND_X = np.array([0.063, 0.063, -0.063, -0.063])
+_GROUND_Y = np.array([0.0116, -0.0116, 0.0116, -0.0116])
+_GREY_OBJECT = 0.0
+_GREY_EMPTY = 1.0
+_GREY_NEST = 179.0 / 255.0
+_GREY_CACHE = 102.0 / 255.0
+_LIGHT_CUTOFF = 2.5
+"""Scaled distance beyond which a light is not seen."""
+_FIRST_SENSOR_RAD = BEAM_ANGLES_RAD[0]
+_SENSOR_STEP_RAD = BEAM_ANGLES_RAD[1] - BEAM_ANGLES_RAD[0]
+_HALF_WINDOW = WINDOW_CELLS // 2
+
+
+@njit(cache=True)
+def grey_of(code: int) -> float:
+    """Grey level of a floor code (state.CELL_*): object 0, nest 0.70, cache 0.40, empty 1."""
+    if code >= 0:
+        return _GREY_OBJECT
+    if code == -1:
+        return _GREY_EMPTY
+    if code == -2:
+        return _GREY_NEST
+    return _GREY_CACHE
+
+
+@njit(cache=True)
+def ground(
+    position: FloatArray, heading: FloatArray, present: BoolArray, floor: IntArray, obs: ObsArray, start: int
+) -> None:
+    """Write four grey readings per robot into obs[:, start:start + 4]; outside the grid reads empty."""
+    ny, nx = floor.shape
+    for i in range(position.shape[0]):
+        if not present[i]:
+            obs[i, start : start + 4] = 0.0
+            continue
+        cos = math.cos(heading[i])
+        sin = math.sin(heading[i])
+        for k in range(4):
+            x = position[i, 0] + cos * _GROUND_X[k] - sin * _GROUND_Y[k]
+            y = position[i, 1] + sin * _GROUND_X[k] + cos * _GROUND_Y[k]
+            cell_x = int(math.floor(x * CELLS_PER_M))
+            cell_y = int(math.floor(y * CELLS_PER_M))
+            inside = 0 <= cell_x < nx and 0 <= cell_y < ny
+            obs[i, start + k] = grey_of(floor[cell_y, cell_x]) if inside else _GREY_EMPTY
+
+
+@njit(cache=True)
+def light(
+    position: FloatArray,
+    heading: FloatArray,
+    present: BoolArray,
+    lights: FloatArray,
+    intensity: float,
+    obs: ObsArray,
+    start: int,
+) -> None:
+    """Write 24 light readings per robot into obs[:, start:start + 24].
+
+    Per light of `lights` (L, 3: x, y, height in m): exp(-2 distance / intensity), falling linearly to 0 at
+    90 degrees between sensor axis and light; lights add up; clamped to 1.
+    """
+    for i in range(position.shape[0]):
+        row = obs[i, start : start + 24]
+        row[:] = 0.0
+        if not present[i]:
+            continue
+        for lamp in range(lights.shape[0]):
+            dx = lights[lamp, 0] - position[i, 0]
+            dy = lights[lamp, 1] - position[i, 1]
+            height = lights[lamp, 2]
+            scaled = math.sqrt(dx * dx + dy * dy + height * height) / intensity
+            if scaled > _LIGHT_CUTOFF:
+                continue
+            base = math.exp(-2.0 * scaled)
+            bearing = math.atan2(dy, dx) - heading[i]
+            # Sensor angle minus bearing, kept within half a turn while k runs around the ring.
+            offset = _FIRST_SENSOR_RAD - bearing
+            offset -= 2.0 * math.pi * math.floor(offset / (2.0 * math.pi) + 0.5)
+            for k in range(24):
+                away = abs(offset)
+                if away < 0.5 * math.pi:
+                    row[k] += base * (1.0 - away / (0.5 * math.pi))
+                offset += _SENSOR_STEP_RAD
+                if offset > math.pi:
+                    offset -= 2.0 * math.pi
+        for k in range(24):
+            row[k] = min(row[k], 1.0)
+
+
+@njit(cache=True)
+def line_of_sight(
+    position: FloatArray,
+    present: BoolArray,
+    floor: IntArray,
+    n_objects: int,
+    caches: tuple[BoolArray, IntArray, IntArray, IntArray],
+    half_side: int,
+    obs: ObsArray,
+    starts: tuple[int, int, int],
+) -> None:
+    """Write the robot's cell, the objects of its 5 x 5 window and the caches that meet it.
+
+    `caches` = alive, centre cell, serial, count per slot; `half_side` = (cache side in cells - 1) / 2;
+    `starts` = first columns of los_cell, los_object, los_cache.
+    """
+    ny, nx = floor.shape
+    cell_start, object_start, cache_start = starts
+    for i in range(position.shape[0]):
+        obs[i, cell_start : cell_start + 2] = 0.0
+        obs[i, object_start : cache_start + 4 * VISIBLE_CACHES] = 0.0
+        if not present[i]:
+            continue
+        cell_x = min(nx - 1, max(0, int(position[i, 0] * CELLS_PER_M)))
+        cell_y = min(ny - 1, max(0, int(position[i, 1] * CELLS_PER_M)))
+        obs[i, cell_start] = (2 * cell_x + 1) / nx - 1.0
+        obs[i, cell_start + 1] = (2 * cell_y + 1) / ny - 1.0
+        column = object_start
+        for y in range(cell_y - _HALF_WINDOW, cell_y + _HALF_WINDOW + 1):
+            for x in range(cell_x - _HALF_WINDOW, cell_x + _HALF_WINDOW + 1):
+                if 0 <= x < nx and 0 <= y < ny and floor[y, x] >= 0:
+                    obs[i, column] = (floor[y, x] + 1) / n_objects
+                column += 1
+        _visible_caches(obs[i, cache_start:], cell_x, cell_y, nx, ny, n_objects, caches, half_side, position[i])
+
+
+@njit(cache=True)
+def _visible_caches(
+    row: ObsArray,
+    cell_x: int,
+    cell_y: int,
+    nx: int,
+    ny: int,
+    n_objects: int,
+    caches: tuple[BoolArray, IntArray, IntArray, IntArray],
+    half_side: int,
+    position: FloatArray,
+) -> None:
+    """List up to VISIBLE_CACHES caches whose square meets the window, nearest centre first, ties by slot."""
+    alive, centre, serial, count = caches
+    last_distance = -1.0
+    last_slot = -1
+    for place in range(VISIBLE_CACHES):
+        best = -1
+        best_distance = math.inf
+        for slot in range(alive.shape[0]):
+            if not alive[slot]:
+                continue
+            reach = half_side + _HALF_WINDOW
+            if abs(centre[slot, 0] - cell_x) > reach or abs(centre[slot, 1] - cell_y) > reach:
+                continue
+            dx = (centre[slot, 0] + 0.5) / CELLS_PER_M - position[0]
+            dy = (centre[slot, 1] + 0.5) / CELLS_PER_M - position[1]
+            distance = dx * dx + dy * dy
+            listed = distance < last_distance or (distance == last_distance and slot <= last_slot)
+            if not listed and distance < best_distance:
+                best = slot
+                best_distance = distance
+        if best < 0:
+            return
+        write_cache(row[4 * place :], serial[best], centre[best, 0], centre[best, 1], count[best], nx, ny, n_objects)
+        last_distance = best_distance
+        last_slot = best
+
+
+@njit(cache=True)
+def write_cache(
+    row: ObsArray, serial: int, cell_x: int, cell_y: int, count: int, nx: int, ny: int, n_objects: int
+) -> None:
+    """Write the four fields of a cache: serial x 2^-24, centre x, y as position, count / M."""
+    row[0] = serial / SERIAL_SCALE
+    row[1] = (2 * cell_x + 1) / nx - 1.0
+    row[2] = (2 * cell_y + 1) / ny - 1.0
+    row[3] = count / n_objects

@@ -1,0 +1,71 @@
+"""What a robot knows of itself: wheels, pose, cargo, and the event of this tick."""
+
+import math
+
+from numba import njit
+
+from swarm_forage_env.kernels.floor import write_cache
+from swarm_forage_env.types import BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+
+
+@njit(cache=True)
+def own_motion(
+    position: FloatArray,
+    heading: FloatArray,
+    wheel_speed: FloatArray,
+    present: BoolArray,
+    scales: FloatArray,
+    obs: ObsArray,
+    start: int,
+) -> None:
+    """Write wheel_speed, position and heading, six columns from `start`.
+
+    `scales` = wheel scale in m/s, arena width and height in m.
+    """
+    for i in range(heading.shape[0]):
+        if not present[i]:
+            obs[i, start : start + 6] = 0.0
+            continue
+        obs[i, start] = wheel_speed[i, 0] / scales[0]
+        obs[i, start + 1] = wheel_speed[i, 1] / scales[0]
+        obs[i, start + 2] = 2.0 * position[i, 0] / scales[1] - 1.0
+        obs[i, start + 3] = 2.0 * position[i, 1] / scales[2] - 1.0
+        obs[i, start + 4] = math.cos(heading[i])
+        obs[i, start + 5] = math.sin(heading[i])
+
+
+@njit(cache=True)
+def own_status(
+    carried_object: IntArray,
+    pending_kind: CodeArray,
+    active: BoolArray,
+    events: tuple[CodeArray, IntArray, IntArray],
+    sizes: tuple[int, int, int],
+    present: BoolArray,
+    obs: ObsArray,
+    start: int,
+) -> None:
+    """Write carrying, interacting, active, cargo, event_object, event, event_cache, ten columns from `start`.
+
+    `events` = code (N,), event_object (N,), event_cache (N, 4); `sizes` = cells along x, along y, objects.
+    """
+    code, event_object, event_cache = events
+    nx, ny, n_objects = sizes
+    for i in range(carried_object.shape[0]):
+        row = obs[i, start : start + 10]
+        row[:] = 0.0
+        if not present[i]:
+            continue
+        if carried_object[i] >= 0:
+            row[0] = 1.0
+            row[3] = (carried_object[i] + 1) / n_objects
+        if pending_kind[i] != 0:
+            row[1] = 1.0
+        if active[i]:
+            row[2] = 1.0
+        if code[i] != 0:
+            row[4] = (event_object[i] + 1) / n_objects
+            row[5] = code[i] / 16.0
+            if event_cache[i, 0] > 0:
+                cache = event_cache[i]
+                write_cache(row[6:], cache[0], cache[1], cache[2], cache[3], nx, ny, n_objects)
