@@ -34,7 +34,7 @@ class Drive:
         Args:
             actions: (N, 3) float32; rows of inactive robots are ignored.
             wheel_gain: (N, 2) factor per wheel, or None for 1.
-            swarm: Read: active, pending_kind, heading. Written: wheel_speed.
+            swarm: Read: active, pending_kind, facing. Written: wheel_speed.
             twist: (N + 1, 3) written: world velocity x, y in m/s and turn rate in rad/s.
 
         Raises:
@@ -45,7 +45,7 @@ class Drive:
             self._unit_gain if wheel_gain is None else wheel_gain,
             swarm.active,
             swarm.pending_kind,
-            swarm.heading,
+            swarm.facing,
             self._limits,
             self._dt_s,
             swarm.wheel_speed,

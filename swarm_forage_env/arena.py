@@ -68,6 +68,7 @@ class ForagingArena:
         self._furnish()
         position, heading = draw_start_poses(config, stream_rng(seed, Stream.START_POSE))
         self.swarm.position[:], self.swarm.heading[:] = position, heading
+        self.swarm.facing[:] = np.column_stack((np.cos(heading), np.sin(heading)))
         self._physics = Physics(config, position, heading)
         sense_proximity(self.swarm, self._suite)
         return sense(self.swarm, self.objects, self.caches, self.events, self._suite)
@@ -100,7 +101,7 @@ class ForagingArena:
         swarm, objects, caches, events, suite = self.swarm, self.objects, self.caches, self.events, self._suite
         self._drive.apply(actions, wheel_gain, swarm, self._physics.twist)
         self.tick += 1
-        self._physics.advance(swarm.present, swarm.position, swarm.heading)
+        self._physics.advance(swarm)
         sense_proximity(swarm, suite)
         mark_interference(swarm, events, suite.obs, suite.near)
         if self._serve_requests(actions):

@@ -25,6 +25,7 @@ class Interactions:
     ) -> None:
         """Bind the state arrays; they must not be replaced afterwards, only edited."""
         n_robots = config.robots.n_robots
+        self._happened = events.happened
         self.world = kernel.World(
             position=swarm.position,
             carried_object=swarm.carried_object,
@@ -75,6 +76,7 @@ class Interactions:
         busy = kernel.clear_events(
             actions, world.carried_object, world.pending_kind, world.active, world.code, world.first_picked
         )
+        self._happened[0] = busy
         if busy:
             kernel.interact(world, self.rules, actions, tick, chance)
         return busy

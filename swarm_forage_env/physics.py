@@ -17,7 +17,8 @@ import pymunk.batch
 
 from swarm_forage_env.config import ScenarioConfig
 from swarm_forage_env.kernels.drive import unpack_poses
-from swarm_forage_env.types import BoolArray, FloatArray
+from swarm_forage_env.state import SwarmState
+from swarm_forage_env.types import FloatArray
 
 TIME_UNIT_S = 40.0
 """Seconds per Chipmunk time unit."""
@@ -77,13 +78,13 @@ class Physics:
             wall.friction = FRICTION
             self._space.add(wall)
 
-    def advance(self, present: BoolArray, position: FloatArray, heading: FloatArray) -> None:
-        """Move all bodies by one tick along `twist` and write the poses of `present` robots."""
+    def advance(self, swarm: SwarmState) -> None:
+        """Move all bodies by one tick along `twist` and write position, heading and facing of present robots."""
         np.multiply(self.twist, TIME_UNIT_S, out=self._scaled)
         pymunk.batch.set_space_bodies(self._space, _TWIST, self._write)
         for _ in range(self._substeps):
             self._space.step(self._substep)
-        unpack_poses(self.poses(), present, position, heading)
+        unpack_poses(self.poses(), swarm.present, swarm.position, swarm.heading, swarm.facing)
 
     def poses(self) -> FloatArray:
         """Poses of all bodies, (N + 1, 3): x, y in m and unwrapped angle in rad; valid until the next call."""

@@ -38,6 +38,7 @@ class RewardModel:
     def __init__(self, config: RewardConfig, nest_centre_m: tuple[float, float], n_robots: int) -> None:
         """Allocate the reward buffer."""
         self._config = config
+        self._dense = bool(config.nest_progress or config.interference or config.tick)
         self._nest_centre_m = np.array(nest_centre_m)
         self._reward = np.zeros(n_robots, np.float32)
         self._previous_position = np.zeros((n_robots, 2))
@@ -53,6 +54,9 @@ class RewardModel:
         With `team`, every active robot receives the mean over active robots.
         """
         config = self._config
+        if not (events.happened[0] or self._dense):
+            self._reward[:] = 0.0
+            return self._reward
         total = config.delivery * delivered(events) + config.first_pickup * first_picked(events)
         if config.nest_progress:
             total += config.nest_progress * nest_progress(swarm, self._previous_position, self._nest_centre_m)

@@ -68,7 +68,7 @@ def sense_proximity(swarm: SwarmState, suite: SensorSuite) -> None:
     neighbours.bin_robots(swarm.position, swarm.present, suite.bin_m, suite.first_in_bin, suite.next_in_bin)
     beams.proximity(
         swarm.position,
-        swarm.heading,
+        swarm.facing,
         swarm.present,
         (suite.bin_m, suite.first_in_bin, suite.next_in_bin),
         suite.interior,
@@ -85,12 +85,12 @@ def sense(
     """Complete the observation after `sense_proximity`; returns the (N, D) buffer."""
     columns, obs = suite.columns, suite.obs
     if "light" in suite.reads:
-        floor.light(swarm.position, swarm.heading, swarm.present, suite.lights, suite.intensity, obs, columns["light"])
+        floor.light(swarm.position, swarm.facing, swarm.present, suite.lights, suite.intensity, obs, columns["light"])
     if "ground" in suite.reads:
-        floor.ground(swarm.position, swarm.heading, swarm.present, objects.floor, obs, columns["ground"])
+        floor.ground(swarm.position, swarm.facing, swarm.present, objects.floor, obs, columns["ground"])
     proprioception.own_motion(
         swarm.position,
-        swarm.heading,
+        swarm.facing,
         swarm.wheel_speed,
         swarm.present,
         suite.scales,

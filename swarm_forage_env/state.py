@@ -24,6 +24,8 @@ class SwarmState:
     """(N, 2) m."""
     heading: FloatArray
     """(N,) rad in (-pi, pi], 0 = +x, counter-clockwise."""
+    facing: FloatArray
+    """(N, 2) cosine and sine of the heading."""
     wheel_speed: FloatArray
     """(N, 2) m/s, left and right, as applied in the last tick (after limits, throttle and noise)."""
     carried_object: IntArray
@@ -47,6 +49,7 @@ class SwarmState:
         return cls(
             position=np.zeros((n_robots, 2)),
             heading=np.zeros(n_robots),
+            facing=np.tile([1.0, 0.0], (n_robots, 1)),
             wheel_speed=np.zeros((n_robots, 2)),
             carried_object=np.full(n_robots, -1, np.int32),
             cargo_from_cache=np.zeros(n_robots, np.bool_),
@@ -132,6 +135,8 @@ class StepEvents:
     """(N,) picked up an object that nobody had carried since it was placed."""
     interfering: BoolArray
     """(N,) active and the obstacle rule holds on true readings."""
+    happened: BoolArray
+    """(1,) whether any robot asked for or was in an interaction: if not, no code is set."""
     counters: np.ndarray
     """(len(Counter),) int64, cumulative since reset."""
     interference_sum: FloatArray
@@ -146,6 +151,7 @@ class StepEvents:
             event_cache=np.zeros((n_robots, 4), np.int32),
             first_picked=np.zeros(n_robots, np.bool_),
             interfering=np.zeros(n_robots, np.bool_),
+            happened=np.zeros(1, np.bool_),
             counters=np.zeros(len(Counter), np.int64),
             interference_sum=np.zeros(1),
         )

@@ -50,7 +50,7 @@ def _beam_to_wall(to_low: float, to_high: float, direction: float, radius: float
 @njit(cache=True)
 def proximity(
     position: FloatArray,
-    heading: FloatArray,
+    facing: FloatArray,
     present: BoolArray,
     bins: tuple[float, IntArray, IntArray],
     interior: FloatArray,
@@ -79,12 +79,10 @@ def proximity(
         y = position[i, 1]
         west, east = x - interior[0], interior[2] - x
         south, north = y - interior[1], interior[3] - y
-        cos_h = 0.0
-        sin_h = 0.0
+        cos_h = facing[i, 0]
+        sin_h = facing[i, 1]
         if min(west, east, south, north) < wall_sight:
             near[i] = True
-            cos_h = math.cos(heading[i])
-            sin_h = math.sin(heading[i])
             for k in range(24):
                 cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
                 sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
@@ -100,10 +98,7 @@ def proximity(
                     dx = position[j, 0] - x
                     dy = position[j, 1] - y
                     if j != i and dx * dx + dy * dy <= sight_squared:
-                        if not near[i]:
-                            near[i] = True
-                            cos_h = math.cos(heading[i])
-                            sin_h = math.sin(heading[i])
+                        near[i] = True
                         for k in range(24):
                             cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
                             sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]

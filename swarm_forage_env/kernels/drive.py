@@ -13,7 +13,7 @@ def drive(
     wheel_gain: FloatArray,
     active: BoolArray,
     pending_kind: CodeArray,
-    heading: FloatArray,
+    facing: FloatArray,
     limits: FloatArray,
     dt_s: float,
     wheel_speed: FloatArray,
@@ -26,7 +26,7 @@ def drive(
     Returns the first active row with a command that is not finite, or -1.
     """
     scale, max_speed, max_difference, wheel_base = limits[0], limits[1], limits[2], limits[3]
-    for i in range(heading.shape[0]):
+    for i in range(facing.shape[0]):
         left = 0.0
         right = 0.0
         if active[i]:
@@ -46,20 +46,26 @@ def drive(
         turn = (right - left) / wheel_base
         half_angle = 0.5 * turn * dt_s
         chord = 0.5 * (left + right)
+        sin_half = math.sin(half_angle)
+        cos_half = math.cos(half_angle)
         if half_angle != 0.0:
-            chord *= math.sin(half_angle) / half_angle
-        twist[i, 0] = chord * math.cos(heading[i] + half_angle)
-        twist[i, 1] = chord * math.sin(heading[i] + half_angle)
+            chord *= sin_half / half_angle
+        twist[i, 0] = chord * (facing[i, 0] * cos_half - facing[i, 1] * sin_half)
+        twist[i, 1] = chord * (facing[i, 1] * cos_half + facing[i, 0] * sin_half)
         twist[i, 2] = turn
     return -1
 
 
 @njit(cache=True)
-def unpack_poses(poses: FloatArray, present: BoolArray, position: FloatArray, heading: FloatArray) -> None:
+def unpack_poses(
+    poses: FloatArray, present: BoolArray, position: FloatArray, heading: FloatArray, facing: FloatArray
+) -> None:
     """Copy body poses (>= N, 3: x, y, angle) of present robots; angles are wrapped to (-pi, pi]."""
     for i in range(heading.shape[0]):
         if present[i]:
             position[i, 0] = poses[i, 0]
             position[i, 1] = poses[i, 1]
             angle = poses[i, 2]
+            facing[i, 0] = math.cos(angle)
+            facing[i, 1] = math.sin(angle)
             heading[i] = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))

@@ -38,7 +38,7 @@ def grey_of(code: int) -> float:
 
 @njit(cache=True)
 def ground(
-    position: FloatArray, heading: FloatArray, present: BoolArray, floor: IntArray, obs: ObsArray, start: int
+    position: FloatArray, facing: FloatArray, present: BoolArray, floor: IntArray, obs: ObsArray, start: int
 ) -> None:
     """Write four grey readings per robot into obs[:, start:start + 4]; outside the grid reads empty."""
     ny, nx = floor.shape
@@ -46,8 +46,8 @@ def ground(
         if not present[i]:
             obs[i, start : start + 4] = 0.0
             continue
-        cos = math.cos(heading[i])
-        sin = math.sin(heading[i])
+        cos = facing[i, 0]
+        sin = facing[i, 1]
         for k in range(4):
             x = position[i, 0] + cos * _GROUND_X[k] - sin * _GROUND_Y[k]
             y = position[i, 1] + sin * _GROUND_X[k] + cos * _GROUND_Y[k]
@@ -60,7 +60,7 @@ def ground(
 @njit(cache=True)
 def light(
     position: FloatArray,
-    heading: FloatArray,
+    facing: FloatArray,
     present: BoolArray,
     lights: FloatArray,
     intensity: float,
@@ -85,19 +85,17 @@ def light(
             if scaled > _LIGHT_CUTOFF:
                 continue
             base = math.exp(-2.0 * scaled)
-            bearing = math.atan2(dy, dx) - heading[i]
-            # Sensor angle minus bearing, kept within half a turn while k runs around the ring.
-            offset = _FIRST_SENSOR_RAD - bearing
-            offset -= 2.0 * math.pi * math.floor(offset / (2.0 * math.pi) + 0.5)
-            for k in range(24):
-                away = abs(offset)
-                if away < 0.5 * math.pi:
-                    row[k] += base * (1.0 - away / (0.5 * math.pi))
-                offset += _SENSOR_STEP_RAD
-                if offset > math.pi:
-                    offset -= 2.0 * math.pi
-        for k in range(24):
-            row[k] = min(row[k], 1.0)
+            cos = facing[i, 0]
+            sin = facing[i, 1]
+            bearing = math.atan2(dy * cos - dx * sin, dx * cos + dy * sin)
+            # Only the sensors within a quarter turn of the light: 12 or 13 in a row, counted round the ring.
+            first = math.ceil((bearing - 0.5 * math.pi - _FIRST_SENSOR_RAD) / _SENSOR_STEP_RAD)
+            away = _FIRST_SENSOR_RAD + first * _SENSOR_STEP_RAD - bearing
+            k = int(first) % 24
+            while away < 0.5 * math.pi:
+                row[k] = min(1.0, row[k] + base * (1.0 - abs(away) / (0.5 * math.pi)))
+                away += _SENSOR_STEP_RAD
+                k = 0 if k == 23 else k + 1
 
 
 @njit(cache=True)

@@ -458,9 +458,10 @@ def interact(world: World, rules: Rules, gripper: ActionArray, tick: int, chance
     n_queued = 0
     for k in range(n_robots):
         i = (tick + k) % n_robots
+        if world.pending_kind[i] == NO_REQUEST:
+            if not world.active[i] or (world.carried_object[i] >= 0) == (gripper[i, 2] > 0.0):
+                continue  # away, holding, or empty and not grasping: most robots in most ticks
         band = _band_now(world, gripper, i)
-        if band == 0:
-            continue
         kind, _ = request_of(world, rules, band, i)
         if kind != NO_REQUEST or world.pending_kind[i] != NO_REQUEST:
             world.queue[n_queued] = i

@@ -1,7 +1,5 @@
 """What a robot knows of itself: wheels, pose, cargo, and the event of this tick."""
 
-import math
-
 from numba import njit
 
 from swarm_forage_env.kernels.floor import write_cache
@@ -11,7 +9,7 @@ from swarm_forage_env.types import BoolArray, CodeArray, FloatArray, IntArray, O
 @njit(cache=True)
 def own_motion(
     position: FloatArray,
-    heading: FloatArray,
+    facing: FloatArray,
     wheel_speed: FloatArray,
     present: BoolArray,
     scales: FloatArray,
@@ -22,7 +20,7 @@ def own_motion(
 
     `scales` = wheel scale in m/s, arena width and height in m.
     """
-    for i in range(heading.shape[0]):
+    for i in range(facing.shape[0]):
         if not present[i]:
             obs[i, start : start + 6] = 0.0
             continue
@@ -30,8 +28,8 @@ def own_motion(
         obs[i, start + 1] = wheel_speed[i, 1] / scales[0]
         obs[i, start + 2] = 2.0 * position[i, 0] / scales[1] - 1.0
         obs[i, start + 3] = 2.0 * position[i, 1] / scales[2] - 1.0
-        obs[i, start + 4] = math.cos(heading[i])
-        obs[i, start + 5] = math.sin(heading[i])
+        obs[i, start + 4] = facing[i, 0]
+        obs[i, start + 5] = facing[i, 1]
 
 
 @njit(cache=True)
