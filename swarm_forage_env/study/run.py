@@ -1,0 +1,99 @@
+"""One run: from a specification to its record."""
+
+import time
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policy import Policy, load_policy
+from swarm_forage_env.recording import RunRecord, software_versions
+from swarm_forage_env.rng import Stream, stream_rng
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.wrappers.recorder import RunRecorder
+
+if TYPE_CHECKING:
+    from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+
+WARM_UP_TICKS = 5
+"""Ticks of a warm-up run: enough to reach every kernel that a tick always calls."""
+
+
+def build_stack(
+    scenario: ScenarioConfig, wrappers: "Iterable[WrapperConfig]" = (), *, reads: tuple[str, ...] | None = None
+) -> RunRecorder:
+    """Build the environment with its wrappers, in the documented order, and a recorder around them.
+
+    Args:
+        scenario: The world.
+        wrappers: Wrapper configurations in any order, each kind at most once.
+        reads: Observation slices that the policy looks at; default all.
+    """
+    env: ForageEnv | SwarmWrapper = ForageEnv(scenario, reads=reads)
+    for config in sorted(wrappers, key=lambda config: config.stack_position, reverse=True):
+        env = config.wrap(env)
+    return RunRecorder(env)
+
+
+def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:
+    """Drive a policy object through the run that `spec` describes.
+
+    For policies that cannot be named, such as a closure over a trained model; `spec.policy` is then only the name
+    under which the result is stored.
+
+    Args:
+        policy: A fresh instance; it drives this one run.
+        spec: The run.
+    """
+    started = time.perf_counter()
+    recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
+    _drive(recorder, policy, spec.seed)
+    recorder.close()
+    columns: dict[str, Any] = recorder.columns()
+    origin = {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "wall_time_s": f"{time.perf_counter() - started:.3f}",
+    }
+    return RunRecord(
+        run_id=spec.run_id,
+        scenario=spec.scenario.name,
+        controller=spec.policy,
+        n_robots=spec.scenario.robots.n_robots,
+        criterion=spec.criterion,
+        criterion_value=spec.criterion_value,
+        seed=spec.seed,
+        **columns,
+        contributed=recorder.contributed(),
+        spec=spec.to_json(),
+        provenance=software_versions() | origin,
+    )
+
+
+def run_one(spec: RunSpec) -> RunRecord:
+    """Run a specification; a function of nothing but `spec`, the machine and the installed versions.
+
+    Raises:
+        ValueError: no installed policy has the name, or it refuses its parameters.
+    """
+    return run_policy(load_policy(spec.policy, spec.parameters), spec)
+
+
+def warm_up(specs: Iterable[RunSpec]) -> None:
+    """Step each run a few ticks, so that its kernels are compiled and cached before many processes need them."""
+    for spec in specs:
+        policy = load_policy(spec.policy, spec.parameters)
+        recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
+        _drive(recorder, policy, spec.seed, max_ticks=WARM_UP_TICKS)
+        recorder.close()
+
+
+def _drive(recorder: RunRecorder, policy: Policy, seed: int, *, max_ticks: int | None = None) -> None:
+    """Run the loop of policy and world until the run ends or `max_ticks` have passed."""
+    world = recorder.world
+    policy.reset(world.task, stream_rng(seed, Stream.POLICY))
+    obs = recorder.reset_batch(seed)
+    has_tasks = hasattr(policy, "task")
+    while not recorder.complete and world.tick != max_ticks:
+        tasks = policy.task if has_tasks else None  # type: ignore[attr-defined]
+        obs, _, _, _ = recorder.step_batch(policy.act(obs, world.active), tasks=tasks)

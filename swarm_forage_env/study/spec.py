@@ -1,0 +1,158 @@
+"""RunSpec: everything that determines a run, as frozen data with an identity."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from swarm_forage_env.config import ConfigError, ScenarioConfig, from_mapping, suggestion, to_mapping
+from swarm_forage_env.policy import policy_class
+from swarm_forage_env.recording import whole_intervals
+from swarm_forage_env.wrappers.registry import wrapper_config_class
+
+if TYPE_CHECKING:
+    from swarm_forage_env.wrappers.base import WrapperConfig
+
+RUN_ID_DIGITS = 16
+"""Hexadecimal digits of a run_id: 64 bits, so that a million runs collide with probability 3e-8."""
+_MAX_SEED = 2**63
+_KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion_value", "seed")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RunSpec:
+    """One run as data: the world, who controls it, what disturbs it, and the seed.
+
+    Raises:
+        ConfigError: parameters that JSON cannot hold, two wrappers of one kind, a bad seed, or a horizon that is
+            not a whole number of recording intervals.
+    """
+
+    scenario: ScenarioConfig
+    policy: str
+    """Registered name, or the name under which the runs of a policy object are stored."""
+    parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Keyword arguments of the policy, plain JSON values; tuples become lists."""
+    wrappers: "tuple[WrapperConfig, ...]" = ()
+    """What stands between recorder and environment, in any order; kept in the documented stack order."""
+    criterion: str = "none"
+    """What a study varies."""
+    criterion_value: float = 0.0
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < _MAX_SEED:
+            raise ConfigError(f"Expected seed to be a whole number in [0, 2^63), got {self.seed!r}.")
+        whole_intervals(self.scenario)
+        try:
+            plain = json.loads(json.dumps(dict(self.parameters), allow_nan=False))
+        except (TypeError, ValueError) as error:
+            raise ConfigError(f"Expected policy parameters to be plain JSON values: {error}.") from error
+        object.__setattr__(self, "parameters", plain)
+        object.__setattr__(self, "criterion_value", float(self.criterion_value))
+        ordered = tuple(sorted(self.wrappers, key=lambda config: config.stack_position))
+        positions = [config.stack_position for config in ordered]
+        if len(set(positions)) < len(positions):
+            names = ", ".join(config.name for config in ordered)
+            raise ConfigError(f"Expected each wrapper at most once, got {names}.")
+        object.__setattr__(self, "wrappers", ordered)
+
+    @property
+    def run_id(self) -> str:
+        """Short hexadecimal hash of the specification; equal specifications have equal ids."""
+        canonical = json.dumps(_canonical(self.to_mapping()), sort_keys=True, separators=(",", ":"))
+        return hashlib.blake2b(canonical.encode(), digest_size=RUN_ID_DIGITS // 2).hexdigest()
+
+    def describe(self) -> str:
+        """Return one line for people."""
+        varied = "" if self.criterion == "none" else f", {self.criterion} = {self.criterion_value:g}"
+        robots = self.scenario.robots.n_robots
+        return f"{self.run_id}: {self.policy} in {self.scenario.name}, {robots} robots, seed {self.seed}{varied}"
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the specification as nested plain values."""
+        return {
+            "scenario": to_mapping(self.scenario),
+            "policy": self.policy,
+            "parameters": dict(self.parameters),
+            "wrappers": [{"wrapper": config.name, **config.to_mapping()} for config in self.wrappers],
+            "criterion": self.criterion,
+            "criterion_value": self.criterion_value,
+            "seed": self.seed,
+        }
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "RunSpec":
+        """Build a specification back from `to_mapping`.
+
+        Raises:
+            ConfigError: unknown or missing keys, or values that describe no run.
+        """
+        for key in mapping:
+            if key not in _KEYS:
+                raise ConfigError(f"Unknown key {key!r} in a run specification.{suggestion(key, _KEYS)}")
+        missing = [key for key in ("scenario", "policy") if key not in mapping]
+        if missing:
+            raise ConfigError(f"Missing key {missing[0]!r} in a run specification.")
+        values = dict(mapping)
+        values["scenario"] = from_mapping(ScenarioConfig, values["scenario"], where="scenario.")
+        values["wrappers"] = tuple(_wrapper_from_mapping(entry) for entry in values.get("wrappers", ()))
+        return cls(**values)
+
+    def to_json(self) -> str:
+        """Return the specification as one line of JSON."""
+        return json.dumps(self.to_mapping(), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> "RunSpec":
+        """Build a specification back from `to_json`.
+
+        Raises:
+            ConfigError: no JSON object, or one that describes no run.
+        """
+        try:
+            mapping = json.loads(text)
+        except ValueError as error:
+            raise ConfigError(f"Expected a run specification as JSON: {error}.") from error
+        if not isinstance(mapping, dict):
+            raise ConfigError(f"Expected a run specification as a JSON object, got {type(mapping).__name__}.")
+        return cls.from_mapping(mapping)
+
+
+def plan_run(scenario: ScenarioConfig, policy: str, *, caches: str | None = None, **fields: Any) -> RunSpec:
+    """Plan a run of a registered policy in the world that the policy is made for.
+
+    Args:
+        scenario: The world, but for its caches.
+        policy: Registered name.
+        caches: Which caches the world has; default what the policy's class states in `caches`, or what the
+            scenario has where the class states nothing.
+        fields: Further fields of `RunSpec`.
+
+    Raises:
+        ConfigError: see `RunSpec`.
+        ValueError: no installed policy has that name.
+    """
+    if caches is None:
+        caches = getattr(policy_class(policy), "caches", scenario.caches)
+    return RunSpec(scenario=replace(scenario, caches=caches), policy=policy, **fields)
+
+
+def _wrapper_from_mapping(entry: Mapping[str, Any]) -> "WrapperConfig":
+    values = dict(entry)
+    name = values.pop("wrapper", None)
+    if not isinstance(name, str):
+        raise ConfigError(f"Missing key 'wrapper' (its name) in the wrapper {values!r}.")
+    return wrapper_config_class(name).from_mapping(values)
+
+
+def _canonical(value: Any) -> Any:
+    """Spell equal numbers alike (2000.0 as 2000), so that they hash alike."""
+    if isinstance(value, Mapping):
+        return {key: _canonical(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_canonical(item) for item in value]
+    if isinstance(value, float) and value.is_integer():
+        return int(value)
+    return value

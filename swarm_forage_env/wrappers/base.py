@@ -1,0 +1,167 @@
+"""SwarmWrapper: wrappers that are ordinary PettingZoo wrappers outside and array-level inside.
+
+The dict API packs actions once, the whole stack runs on arrays, and observations are unpacked once, so a further
+wrapper costs microseconds, not a pass over all agents.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from pettingzoo.utils import BaseParallelWrapper
+
+from swarm_forage_env import config as configs
+from swarm_forage_env.env import BatchStep, ForageEnv
+from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+
+STACK_ORDER = ("RunRecorder", "SensorNoise", "PopulationDynamics", "Throttle", "ActuatorNoise", "ForageEnv")
+"""The documented stack, outermost first; `SwarmWrapper.stack_position` counts along it."""
+
+
+class SwarmWrapper(BaseParallelWrapper):
+    """Base of all wrappers of this package; a subclass sets `stack_position` and overrides the hooks it needs.
+
+    Hooks of one step, each called once per tick: `before_step` and `gain` from the outermost wrapper inwards, then
+    the environment steps, then `observe` and `after_step` from the innermost wrapper outwards. A reset calls
+    `on_reset` and `observe` from the innermost wrapper outwards. Wrappers never rewrite actions. They read truth
+    from `self.world` (`swarm`, `events`, `tick` ...) and write it only through `self.world.set_population`.
+
+    Attributes:
+        env: What is wrapped.
+        world: The ForageEnv at the bottom of the stack.
+    """
+
+    stack_position: ClassVar[int]
+    """Place in `STACK_ORDER`; each place is taken at most once."""
+
+    def __init__(self, env: "ForageEnv | SwarmWrapper") -> None:
+        """Wrap `env`.
+
+        Raises:
+            TypeError: `env` is neither a ForageEnv nor a SwarmWrapper. A foreign wrapper in between would be
+                skipped without notice; wrap it around the whole stack instead.
+            ValueError: the stack would not be in the documented order.
+        """
+        if not isinstance(env, ForageEnv | SwarmWrapper):
+            raise TypeError(
+                f"Expected {type(self).__name__} to wrap a ForageEnv or a SwarmWrapper, got {type(env).__name__}; "
+                "put other wrappers outside of the swarm wrappers."
+            )
+        if isinstance(env, SwarmWrapper) and self.stack_position >= env.stack_position:
+            raise ValueError(
+                f"Expected {type(env).__name__} not inside of {type(self).__name__}; the order, outermost first and "
+                f"each at most once, is {', '.join(STACK_ORDER)}."
+            )
+        super().__init__(env)
+        self._inner = env
+        self.world: ForageEnv = env.world if isinstance(env, SwarmWrapper) else env
+
+    def on_reset(self, seed: int) -> None:
+        """Prepare for a new run, after the world was reset.
+
+        Args:
+            seed: Seed of the run, for `rng.stream_rng`.
+        """
+
+    def before_step(self) -> None:
+        """Act on the world before it steps."""
+
+    def gain(self, wheel_gain: FloatArray | None) -> FloatArray | None:
+        """Return the wheel gain handed to the next wrapper inwards.
+
+        Args:
+            wheel_gain: (N, 2) factors on the left and right wheel speed from the wrappers outside, None = all 1.
+                Multiply into an array of your own; never change this one.
+        """
+        return wheel_gain
+
+    def observe(self, obs: ObsArray) -> ObsArray:
+        """Return what the wrappers outside see instead of `obs`.
+
+        Args:
+            obs: (N, D) float32, rewritten by the environment in every step; may be changed in place.
+        """
+        return obs
+
+    def after_step(self, tasks: CodeArray | None, terminated: BoolArray, truncated: bool) -> None:
+        """Look at the world after it stepped.
+
+        Args:
+            tasks: (N,) `policy.Task` codes as handed to `step_batch`, or None.
+            terminated: (N,) bool, robots that are dead for good.
+            truncated: Whether the horizon is reached.
+        """
+
+    def interval_columns(self) -> dict[str, float]:
+        """Return this wrapper's own columns of the run record for the recording interval that ends now.
+
+        Called once at the end of each interval, after `after_step` of every wrapper inside the recorder; a mean
+        over the interval starts anew with the call. The names must be the same at each call; their meanings are
+        listed in `recording.KNOWN_CONTRIBUTIONS`.
+        """
+        return {}
+
+    def reset_batch(self, seed: int | None = None) -> ObsArray:
+        """Reset the stack and return the first observations, (N, D) float32; see `ForageEnv.reset_batch`."""
+        obs = self._inner.reset_batch(seed)
+        drawn = self.world.seed_value
+        assert drawn is not None, "a reset world has a seed"
+        self.on_reset(drawn)
+        return self.observe(obs)
+
+    def step_batch(
+        self, actions: ActionArray, *, wheel_gain: FloatArray | None = None, tasks: CodeArray | None = None
+    ) -> BatchStep:
+        """Advance the stack by one tick; see `ForageEnv.step_batch`.
+
+        Args:
+            actions: (N, 3) float32 in [-1, 1].
+            wheel_gain: (N, 2) factors on the wheel speeds, None = all 1.
+            tasks: (N,) int8 `policy.Task` codes, None = the policy has no tasks.
+        """
+        self.before_step()
+        obs, reward, terminated, truncated = self._inner.step_batch(
+            actions, wheel_gain=self.gain(wheel_gain), tasks=tasks
+        )
+        obs = self.observe(obs)
+        self.after_step(tasks, terminated, truncated)
+        return obs, reward, terminated, truncated
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        """Reset through the dict API; returns observations and infos by agent. `options` is accepted and ignored."""
+        return self.world.reset_through(self.reset_batch, seed)
+
+    def step(
+        self, actions: dict[str, Any]
+    ) -> tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Step through the dict API; returns observations, rewards, terminations, truncations, infos by agent."""
+        return self.world.step_through(self.step_batch, actions)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class WrapperConfig(ABC):
+    """A wrapper as data, part of a run's specification. Subclasses are frozen dataclasses of plain values."""
+
+    name: ClassVar[str]
+    """Name in stored specifications and in `wrappers.registry.WRAPPERS`."""
+    stack_position: ClassVar[int]
+    """Place of the wrapper in `STACK_ORDER`."""
+
+    @abstractmethod
+    def wrap(self, env: ForageEnv | SwarmWrapper) -> SwarmWrapper:
+        """Build the wrapper around `env`."""
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the fields as plain values, ready for JSON."""
+        return configs.to_mapping(self)
+
+    @classmethod
+    def from_mapping(cls, mapping: dict[str, Any]) -> "WrapperConfig":
+        """Build the configuration back from `to_mapping`; a class with nested dataclasses overrides this.
+
+        Raises:
+            ConfigError: an unknown or missing key, or a value that the class refuses.
+        """
+        return configs.from_mapping(cls, mapping)

@@ -1,0 +1,142 @@
+"""RunRecorder: turns the world's cumulative counters into columns over recording intervals."""
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.kernels.task_shares import add_task_shares
+from swarm_forage_env.policy import Task
+from swarm_forage_env.recording import RecordError, whole_intervals
+from swarm_forage_env.state import Counter
+from swarm_forage_env.types import BoolArray, CodeArray
+from swarm_forage_env.wrappers.base import SwarmWrapper
+
+TOTALS: dict[str, Counter] = {
+    "collected": Counter.COLLECTED,
+    "first_picked": Counter.FIRST_PICKED,
+    "free_pickups": Counter.FREE_PICKUPS,
+    "cache_pickups": Counter.CACHE_PICKUPS,
+    "cache_drops": Counter.CACHE_DROPS,
+    "floor_drops": Counter.FLOOR_DROPS,
+    "displaced_drops": Counter.DISPLACED_DROPS,
+    "objects_moved": Counter.OBJECTS_MOVED,
+    "caches_created": Counter.CACHES_CREATED,
+    "caches_depleted": Counter.CACHES_DEPLETED,
+    "interference_ticks": Counter.INTERFERING,
+}
+"""Columns that are totals per interval."""
+TICK_MEANS: dict[str, Counter] = {
+    "n_active": Counter.ACTIVE,
+    "n_present": Counter.PRESENT,
+    "n_caches": Counter.CACHES_ALIVE,
+    "n_objects_cached": Counter.OBJECTS_CACHED,
+}
+"""Columns that are means over the ticks of an interval."""
+
+
+class RunRecorder(SwarmWrapper):
+    """Outermost wrapper: records a run interval by interval.
+
+    The world counts; the recorder only takes differences at interval ends, so a tick costs it next to nothing.
+    Once every robot is dead the record is complete: what is left of it stays zero, even if the world is stepped on.
+    """
+
+    stack_position: ClassVar[int] = 0
+
+    def __init__(self, env: ForageEnv | SwarmWrapper) -> None:
+        """Wrap `env`; raises ConfigError unless its horizon is a whole number of recording intervals."""
+        super().__init__(env)
+        self._interval_ticks = self.world.scenario.interval_ticks
+        self._n_intervals = whole_intervals(self.world.scenario, self.world.max_cycles)
+        self._complete = False
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run has ended: horizon reached or every robot dead."""
+        return self._complete
+
+    def on_reset(self, seed: int) -> None:
+        """Forget the last run."""
+        self._complete = False
+        self._interval = 0
+        self._ticks_left = self._interval_ticks
+        self._last_counters = self.world.events.counters.copy()
+        self._last_interference = float(self.world.events.interference_sum[0])
+        self._counts = np.zeros((self._n_intervals, len(Counter)), np.int64)
+        self._interference = np.zeros(self._n_intervals)
+        self._contributed: dict[str, np.ndarray] = {}
+        self._task_sums = np.zeros(len(Task))
+
+    def after_step(self, tasks: CodeArray | None, terminated: BoolArray, truncated: bool) -> None:
+        """Count the tick; close the interval at its end and at the end of the run."""
+        if self._complete:
+            return
+        if tasks is not None and not add_task_shares(tasks, self.world.active, self._task_sums):
+            raise ValueError(
+                f"Expected tasks with shape (n_robots,) = {self.world.active.shape} and codes of policy.Task "
+                f"(0 to {len(Task) - 1}), got shape {tasks.shape} with codes {np.unique(tasks).tolist()}."
+            )
+        self._ticks_left -= 1
+        # The first row is looked at alone because in almost every tick it settles the question.
+        self._complete = truncated or bool(terminated[0] and terminated.all())
+        if self._ticks_left == 0 or self._complete:
+            self._close_interval(has_tasks=tasks is not None)
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Return the columns of the finished run by name, (T,) each.
+
+        Raises:
+            RecordError: the run has not ended yet.
+        """
+        self._require_complete()
+        scenario = self.world.scenario
+        interval = np.arange(self._n_intervals, dtype=np.int32)
+        columns: dict[str, np.ndarray] = {
+            "interval": interval,
+            "t_end_s": (interval + 1.0) * scenario.interval_s,
+            "interference_fraction": self._interference,
+            "adversity": self._contributed.get("throttle_mean", np.zeros(self._n_intervals)),
+        }
+        columns |= {name: self._counts[:, counter] for name, counter in TOTALS.items()}
+        columns |= {name: self._counts[:, counter] / self._interval_ticks for name, counter in TICK_MEANS.items()}
+        columns["performance"] = columns[scenario.performance].astype(np.float64)
+        return columns
+
+    def contributed(self) -> dict[str, np.ndarray]:
+        """Return the columns that other wrappers and the policy's tasks add, (T,) each; raises as `columns`."""
+        self._require_complete()
+        return dict(self._contributed)
+
+    def _require_complete(self) -> None:
+        if not self._complete:
+            raise RecordError(
+                "Expected a finished run, got one that has not reached its horizon; step until `complete` is true."
+            )
+
+    def _close_interval(self, *, has_tasks: bool) -> None:
+        row = self._interval
+        counters, interference = self.world.events.counters, float(self.world.events.interference_sum[0])
+        self._counts[row] = counters - self._last_counters
+        self._interference[row] = (interference - self._last_interference) / self._interval_ticks
+        self._last_counters[:] = counters
+        self._last_interference = interference
+        if has_tasks:
+            for code, share in zip(Task, self._task_sums / self._interval_ticks, strict=True):
+                self._contribute(f"task_share_{code.name.lower()}", share)
+            self._task_sums[:] = 0.0
+        for wrapper in self._wrappers_inside():
+            for name, value in wrapper.interval_columns().items():
+                self._contribute(name, value)
+        self._interval += 1
+        self._ticks_left = self._interval_ticks
+
+    def _contribute(self, name: str, value: float) -> None:
+        self._contributed.setdefault(name, np.zeros(self._n_intervals))[self._interval] = value
+
+    def _wrappers_inside(self) -> Iterator[SwarmWrapper]:
+        env = self._inner
+        while isinstance(env, SwarmWrapper):
+            yield env
+            env = env._inner
