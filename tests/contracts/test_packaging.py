@@ -1,0 +1,115 @@
+"""What an installed package promises: light imports, complete names, one version, commands that are pinned."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import entry_points, version
+from pathlib import Path
+
+import gymnasium
+import pettingzoo
+import pytest
+
+import swarm_forage_env
+from swarm_forage_env.policy import POLICY_ENTRY_POINTS, Policy
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+HEAVY = ("numba", "pymunk", "polars", "scipy", "matplotlib", "torch", "swarm_forage_env.env", "baselines", "metrics")
+
+
+def run_python(code: str, *arguments: str, **environment: str) -> str:
+    result = subprocess.run(
+        [sys.executable, *arguments, "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | environment,
+    )
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    code = f"import sys, swarm_forage_env; print(*[name for name in {HEAVY} if name in sys.modules])"
+    assert run_python(code).split() == []
+
+
+@pytest.mark.parametrize("name", swarm_forage_env.__all__)
+def test_every_public_name_loads(name):
+    assert getattr(swarm_forage_env, name) is not None
+
+
+def test_type_checkers_and_the_interpreter_see_the_same_names():
+    tree = ast.parse(Path(swarm_forage_env.__file__).read_text())
+    block = next(node for node in tree.body if isinstance(node, ast.If))
+    homes = {
+        alias.name: (node.module or "").removeprefix("swarm_forage_env.")
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert homes == swarm_forage_env._HOMES
+    assert {*homes, "SCENARIO_NAMES", "scenario"} == set(swarm_forage_env.__all__)
+
+
+def test_unknown_names_are_refused():
+    with pytest.raises(AttributeError, match="no attribute 'ForageEnvironment'"):
+        swarm_forage_env.ForageEnvironment  # noqa: B018 - the access is the test
+
+
+def test_version_comes_from_the_installed_package():
+    assert swarm_forage_env.__version__ == version("swarm-forage-env") == PROJECT["version"]
+
+
+def test_changelog_has_a_section_for_this_version():
+    assert f"## {PROJECT['version']}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+@pytest.mark.parametrize("name", swarm_forage_env.SCENARIO_NAMES)
+def test_every_scenario_is_registered(name):
+    env_id = f"swarm_forage/{name}-v0"
+    world = pettingzoo.make("parallel", env_id, n_robots=2, max_cycles=3)
+    assert world.scenario.name == name
+    assert world.scenario.robots.n_robots == 2
+    turn_based = pettingzoo.make("aec", env_id, n_robots=2, max_cycles=3)
+    turn_based.reset(seed=0)
+    assert turn_based.agents == ["robot_0", "robot_1"]
+    assert gymnasium.spec(env_id).kwargs == {"scenario": name}
+
+
+def test_installed_policies_are_those_of_this_checkout():
+    declared = PROJECT["entry-points"][POLICY_ENTRY_POINTS]
+    installed = {point.name: point.value for point in entry_points(group=POLICY_ENTRY_POINTS)}
+    assert declared.items() <= installed.items(), "install the checkout again: pip install -e ."
+
+
+@pytest.mark.parametrize("name", PROJECT["entry-points"][POLICY_ENTRY_POINTS])
+def test_every_policy_entry_point_loads(name):
+    assert isinstance(swarm_forage_env.load_policy(name), Policy)
+
+
+def test_a_users_own_metrics_module_does_not_disturb_the_environment(tmp_path):
+    for name in ("metrics", "baselines"):
+        (tmp_path / f"{name}.py").write_text("raise ImportError('a file of the user, not ours')\n")
+    code = (
+        "from swarm_forage_env import parallel_env; env = parallel_env('warehouse_small', n_robots=2); "
+        "env.reset(seed=0); env.step({agent: env.action_space(agent).sample() for agent in env.agents}); "
+        "print(env.tick)"
+    )
+    assert run_python(code, PYTHONPATH=str(tmp_path)).strip() == "1"
+
+
+def test_scripts_that_install_torch_pin_it():
+    paths = [ROOT / "README.md", ROOT / ".ci/run", *(ROOT / "scripts").glob("*"), *(ROOT / "docs").glob("**/*.md")]
+    commands = [
+        line
+        for path in paths
+        if path.is_file()
+        for line in path.read_text().splitlines()
+        if re.search(r"pip3? install.*(\btorch\b|\btrain\b)", line)
+    ]
+    assert [line for line in commands if "torch==2.13.0" not in line] == []
