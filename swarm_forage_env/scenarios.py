@@ -66,9 +66,7 @@ def warehouse_medium(**overrides: Any) -> ScenarioConfig:
     return with_overrides(base, **overrides)
 
 
-def search_and_rescue(
-    *, side_m: float | None = None, n_robots: int | None = None, **overrides: Any
-) -> ScenarioConfig:
+def search_and_rescue(*, side_m: float | None = None, n_robots: int | None = None, **overrides: Any) -> ScenarioConfig:
     """Outdoor search and rescue: power-law clusters of slowly moving objects (scenario 2).
 
     Args:
@@ -77,23 +75,27 @@ def search_and_rescue(
         n_robots: Swarm size; default what 5 % density gives for `side_m`.
         overrides: Any other scenario field.
     """
+    robots = None if n_robots is None else RobotConfig(n_robots=n_robots)  # refuses nonsense before a side is chosen
     if side_m is None:
         side_m = 48.0 if n_robots is None else _side_for(n_robots)
-    if n_robots is None:
-        n_robots = robots_at_density(side_m)
-    if "n_objects" not in overrides and side_m not in SEARCH_AND_RESCUE_OBJECTS:
-        sides = ", ".join(str(side) for side in SEARCH_AND_RESCUE_OBJECTS)
-        raise ConfigError(f"Expected side_m to be one of {sides}, got {side_m}; for another side give n_objects too.")
-    n_objects = overrides.pop("n_objects", None) or SEARCH_AND_RESCUE_OBJECTS[int(side_m)]
+    n_objects = overrides.pop("n_objects", None)
+    if n_objects is None:
+        if side_m not in SEARCH_AND_RESCUE_OBJECTS:
+            sides = ", ".join(str(side) for side in SEARCH_AND_RESCUE_OBJECTS)
+            raise ConfigError(
+                f"Expected side_m to be one of {sides}, got {side_m}; for another side give n_objects too."
+            )
+        n_objects = SEARCH_AND_RESCUE_OBJECTS[int(side_m)]
+    arena = ArenaConfig(
+        width_m=float(side_m),
+        height_m=float(side_m),
+        nest_centre_m=(side_m / 2, side_m / 2),  # study: centre of the arena
+        nest_size_m=(0.2 * side_m, 0.2 * side_m),  # study: 0.2 X square
+    )
     base = ScenarioConfig(
         name="search_and_rescue",
-        arena=ArenaConfig(
-            width_m=float(side_m),
-            height_m=float(side_m),
-            nest_centre_m=(side_m / 2, side_m / 2),  # study: centre of the arena
-            nest_size_m=(0.2 * side_m, 0.2 * side_m),  # study: 0.2 X square
-        ),
-        robots=RobotConfig(n_robots=n_robots),
+        arena=arena,
+        robots=robots or RobotConfig(n_robots=robots_at_density(side_m)),
         objects=ObjectConfig(
             n_objects=n_objects,
             placement="power_law",
