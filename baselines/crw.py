@@ -1,0 +1,103 @@
+"""CRW: the correlated random walk controller. No memory: what a robot stumbles on, it carries to the light.
+
+States and exits (`machines.Activity`):
+
+    ACQUIRE         random walk; ground sensors see an object, after 10 s    -> WAIT_PICKUP
+    WAIT_PICKUP     stand, ask; cargo -> HOMING; refused or vanished         -> ACQUIRE
+    HOMING          towards the nest light; sees the nest                    -> HOMING_IN_NEST
+    HOMING_IN_NEST  light and wander; nearer to the centre than a random depth -> WAIT_DROP
+    WAIT_DROP       stand, ask to deliver; delivered -> LEAVE_NEST; refused  -> HOMING
+    LEAVE_NEST      random walk; no longer sees the nest                     -> ACQUIRE
+
+Source: CRW of the paper, section "Candidate Algorithms"; numbers in `parameters`.
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from swarm_forage_env.policy import SwarmTask
+from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+
+from .compiling import kernel
+from .machines import (
+    ACQUIRE,
+    DRAWS,
+    WAIT_PICKUP,
+    command,
+    deliver_and_leave,
+    explore_for_object,
+    follow_cargo,
+    new_robots,
+    sense,
+)
+from .parameters import ControllerParameters, kernel_constants, with_overrides
+
+
+@kernel
+def step_crw(
+    obs: ObsArray,
+    active: BoolArray,
+    draws: FloatArray,
+    constants: np.ndarray,
+    robots: np.ndarray,
+    actions: ActionArray,
+) -> None:
+    """One tick of CRW for all robots: edits `robots` (N,) and writes `actions` (N, 3).
+
+    `draws` is (N, DRAWS) uniform in [0, 1). Inactive robots keep their state; their action is zero.
+    """
+    c = constants[0]
+    for i in range(active.shape[0]):
+        action = actions[i]
+        if not active[i]:
+            action[:] = 0.0
+            continue
+        robot = robots[i]
+        row = obs[i]
+        senses = sense(row, c)
+        follow_cargo(robot, senses)
+        if robot.activity == ACQUIRE:
+            found, x, y = explore_for_object(robot, senses, row, c, draws[i])
+            if found:
+                robot.activity = WAIT_PICKUP
+        else:
+            x, y = deliver_and_leave(robot, senses, row, c, draws[i])
+        command(robot, x, y, c, action)
+
+
+class CRWPolicy:
+    """Correlated random walk for every robot. An instance drives one run.
+
+    Args:
+        parameters: All numbers of the controller; default those of the paper's study.
+        overrides: Single fields of `ControllerParameters` by name.
+
+    Raises:
+        ParameterError: unknown name or a value that makes no sense.
+    """
+
+    caches: ClassVar[str] = "none"
+    reads: ClassVar[tuple[str, ...]] = ("proximity", "light", "ground", "position", "carrying", "event")
+
+    def __init__(self, parameters: ControllerParameters | None = None, **overrides: float) -> None:
+        self.parameters = with_overrides(parameters or ControllerParameters(), overrides)
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Start a run: every robot explores."""
+        self._rng = rng
+        self._constants = kernel_constants(self.parameters, task)
+        self._robots = new_robots(task.n_robots)
+        self._draws = np.zeros((task.n_robots, DRAWS))
+        self._actions = np.zeros((task.n_robots, 3), np.float32)
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
+        self._rng.random(out=self._draws)
+        step_crw(obs, active, self._draws, self._constants, self._robots, self._actions)
+        return self._actions
+
+    @property
+    def activity(self) -> CodeArray:
+        """(N,) `machines.Activity` codes, a copy."""
+        return self._robots["activity"].copy()

@@ -1,0 +1,142 @@
+"""DPO: decaying pheromones for objects. Robots remember every object they have seen and go to the most useful one.
+
+States as in `crw`, but ACQUIRE goes to the best remembered object and explores only while there is none to go to. The
+memory is kept up to date in every state. Source: DPO of the paper, section "Candidate Algorithms".
+"""
+
+from typing import ClassVar
+
+import numpy as np
+
+from swarm_forage_env.policy import SwarmTask
+from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+
+from .compiling import kernel
+from .machines import (
+    ACQUIRE,
+    DRAWS,
+    WAIT_PICKUP,
+    acquire,
+    command,
+    deliver_and_leave,
+    explore_for_object,
+    follow_cargo,
+    new_robots,
+    sense,
+)
+from .memory import ObjectMemory, densities, forget, look_around, memory_of, new_memory, object_row_of
+from .object_choice import MemoryParameters, object_is_known, object_is_reached, select_object
+from .parameters import kernel_constants, with_overrides
+
+
+@kernel
+def step_dpo(
+    obs: ObsArray,
+    active: BoolArray,
+    draws: FloatArray,
+    constants: np.ndarray,
+    robots: np.ndarray,
+    memory: ObjectMemory,
+    actions: ActionArray,
+) -> None:
+    """One tick of DPO for all robots: edits `robots` (N,) and `memory`, writes `actions` (N, 3).
+
+    `draws` is (N, DRAWS) uniform in [0, 1). Inactive robots keep their state; their action is zero.
+    """
+    c = constants[0]
+    for i in range(active.shape[0]):
+        action = actions[i]
+        if not active[i]:
+            action[:] = 0.0
+            continue
+        robot = robots[i]
+        row = obs[i]
+        known = memory_of(memory, i)
+        senses = sense(row, c)
+        look_around(robot, row, c, known)
+        if follow_cargo(robot, senses):
+            forget(robot, known, object_row_of(row[c.cargo], c))
+        if robot.activity == ACQUIRE:
+            found, x, y = acquire(
+                robot,
+                senses,
+                row,
+                c,
+                draws[i],
+                known,
+                select_object,
+                object_is_known,
+                object_is_reached,
+                explore_for_object,
+            )
+            if found:
+                robot.activity = WAIT_PICKUP
+        else:
+            x, y = deliver_and_leave(robot, senses, row, c, draws[i])
+        command(robot, x, y, c, action)
+
+
+class DPOPolicy:
+    """Decaying pheromone objects for every robot. An instance drives one run.
+
+    Args:
+        parameters: All numbers of the controller; default those of the paper's study.
+        overrides: Single fields of `MemoryParameters` by name.
+
+    Raises:
+        ParameterError: unknown name or a value that makes no sense.
+    """
+
+    caches: ClassVar[str] = "none"
+    reads: ClassVar[tuple[str, ...]] = (
+        "proximity",
+        "light",
+        "ground",
+        "wheel_speed",
+        "position",
+        "heading",
+        "carrying",
+        "cargo",
+        "event",
+        "los_cell",
+        "los_object",
+    )
+
+    def __init__(self, parameters: MemoryParameters | None = None, **overrides: float) -> None:
+        self.parameters = with_overrides(parameters or MemoryParameters(), overrides)
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Start a run: every robot explores and remembers nothing."""
+        self._rng = rng
+        self._constants = kernel_constants(self.parameters, task, **self.parameters.derived())
+        self._robots = new_robots(task.n_robots)
+        self._memory = new_memory(task.n_robots, task.n_objects)
+        self._draws = np.zeros((task.n_robots, DRAWS))
+        self._actions = np.zeros((task.n_robots, 3), np.float32)
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
+        self._rng.random(out=self._draws)
+        step_dpo(obs, active, self._draws, self._constants, self._robots, self._memory, self._actions)
+        return self._actions
+
+    @property
+    def activity(self) -> CodeArray:
+        """(N,) `machines.Activity` codes, a copy."""
+        return self._robots["activity"].copy()
+
+    @property
+    def n_known(self) -> IntArray:
+        """(N,) number of objects that each robot remembers, a copy."""
+        return self._robots["n_known"].copy()
+
+    def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
+        """Return what one robot remembers: object row -> (cell x, cell y, pheromone density)."""
+        robot = self._robots[robot_index]
+        count = int(robot["n_known"])
+        rows, cells_x, cells_y, seen = (part[robot_index, :count] for part in self._memory[:4])
+        density = densities(robot["clock"] - seen, self.parameters.evaporation_per_tick)
+        return {
+            int(row): (int(x), int(y), float(value))
+            for row, x, y, value in zip(rows, cells_x, cells_y, density, strict=True)
+        }

@@ -1,0 +1,408 @@
+"""State machines of one robot: sensing, exploring, going to a point, acquiring, homing.
+
+Written once for all controllers. Every function is compiled, handles one robot and returns the steering force
+(forward, left) that it adds this tick; a kernel of a controller loops over the robots. What differs between goals
+(which candidate, is it still valid, was it reached) is passed in as compiled functions.
+
+Conventions: `robot` is one record of `ROBOT`, edited in place; `row` its observation; `c` the record of
+`parameters.kernel_constants`; `draws` its uniform draws of this tick, one column per use, so that no decision
+shifts the randomness of another.
+"""
+
+from collections.abc import Callable
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from swarm_forage_env.detection import is_obstacle_vector, ring_sum, sees_nest, sees_object
+from swarm_forage_env.layout import EVENT_SCALE
+from swarm_forage_env.policy import Event, Grip
+from swarm_forage_env.types import ActionArray, ObsArray
+
+from .compiling import inline_kernel, kernel
+from .motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander
+
+
+class Activity(IntEnum):
+    """What a robot is busy with."""
+
+    ACQUIRE = 0
+    """Looking for an object, or on the way to one."""
+    WAIT_PICKUP = 1
+    """Standing on an object, asking for it."""
+    HOMING = 2
+    """Carrying, outside the nest, towards the light."""
+    HOMING_IN_NEST = 3
+    """Carrying, inside the nest, looking for a place to drop."""
+    WAIT_DROP = 4
+    """Standing in the nest, asking to deliver."""
+    LEAVE_NEST = 5
+    """Empty, wandering until the nest is left."""
+
+
+class VectorState(IntEnum):
+    """Stages of going to a point."""
+
+    IDLE = 0
+    VECTOR = 1
+    AVOIDANCE = 2
+    RECOVERY = 3
+
+
+ACQUIRE = int(Activity.ACQUIRE)
+WAIT_PICKUP = int(Activity.WAIT_PICKUP)
+HOMING = int(Activity.HOMING)
+HOMING_IN_NEST = int(Activity.HOMING_IN_NEST)
+WAIT_DROP = int(Activity.WAIT_DROP)
+LEAVE_NEST = int(Activity.LEAVE_NEST)
+VECTOR_IDLE = int(VectorState.IDLE)
+VECTOR = int(VectorState.VECTOR)
+VECTOR_AVOIDANCE = int(VectorState.AVOIDANCE)
+VECTOR_RECOVERY = int(VectorState.RECOVERY)
+NOTHING_HERE = int(Event.NOTHING_HERE)
+VANISHED = int(Event.VANISHED)
+GRASP = float(Grip.GRASP)
+RELEASE = float(Grip.RELEASE)
+DELIVER = float(Grip.DELIVER)
+
+NOT_EXPLORING = -1
+
+DRAW_DEPTH = 0
+"""Draw column: drop distance from the nest centre."""
+DRAW_WANDER = 1
+"""Draw column: wandering while exploring, in the nest, leaving it."""
+DRAW_RESTART = 2
+"""Draw column: the second wander of an exploration's first tick (quirk `explore_double_start`)."""
+DRAW_VECTOR = 3
+"""Draw column: wandering to break free on the way to a point."""
+DRAWS = 4
+
+ROBOT = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                ("wander_deg", np.float64),  # wander angle
+                ("drop_depth_m", np.float64),  # deliver at most this far from the nest centre
+                ("goal_x_m", np.float64),
+                ("goal_y_m", np.float64),
+                ("goal_tolerance_m", np.float64),
+                ("target", np.int32),  # identity of the goal: object row
+                ("explore_ticks", np.int32),  # since exploration started, or NOT_EXPLORING
+                ("recovery_ticks", np.int32),  # driven straight on after avoiding
+                ("clock", np.int32),  # ticks lived through while active
+                ("n_known", np.int32),  # remembered objects
+                ("window_x", np.int32),  # lower left cell of the window seen last
+                ("window_y", np.int32),
+                ("activity", np.int8),
+                ("vector_state", np.int8),
+                ("is_slowing", np.bool_),  # within the slowing radius at the last arrival force
+            ],
+            align=True,
+        ),
+    )
+)
+"""Inner state of one robot."""
+
+NO_WINDOW = -(2**30)
+
+
+def new_robots(n_robots: int) -> np.ndarray:
+    """Return (n_robots,) records of `ROBOT` that start to acquire and have seen nothing."""
+    robots = np.zeros(n_robots, ROBOT)
+    robots["explore_ticks"] = NOT_EXPLORING
+    robots["target"] = -1
+    robots["window_x"] = NO_WINDOW
+    robots["window_y"] = NO_WINDOW
+    return robots
+
+
+class Senses(NamedTuple):
+    """What a robot makes of its observation in every tick."""
+
+    obstacle: bool
+    obstacle_x: float
+    """Summed proximity vector, body frame, forward."""
+    obstacle_y: float
+    in_nest: bool
+    carrying: bool
+    event: int
+    """Code of `policy.Event`."""
+    x: float
+    """Believed position, m."""
+    y: float
+
+
+@kernel
+def sense(row: ObsArray, c: np.record) -> Senses:
+    """Read one observation row."""
+    obstacle_x, obstacle_y = ring_sum(row[c.proximity : c.proximity + 24])
+    return Senses(
+        is_obstacle_vector(obstacle_x, obstacle_y),
+        obstacle_x,
+        obstacle_y,
+        sees_nest(row[c.ground : c.ground + 4]),
+        row[c.carrying] > 0.5,
+        int(row[c.event] * EVENT_SCALE + 0.5),
+        (row[c.position] + 1.0) * c.half_width_m,
+        (row[c.position + 1] + 1.0) * c.half_height_m,
+    )
+
+
+@kernel
+def restart_acquiring(robot: np.record) -> None:
+    """Begin a new acquisition: no goal, exploration not started."""
+    robot.activity = ACQUIRE
+    robot.explore_ticks = NOT_EXPLORING
+    stop_vector(robot)
+
+
+@kernel
+def follow_cargo(robot: np.record, senses: Senses) -> bool:
+    """Change the activity after what happened to the robot since its last tick, before it acts.
+
+    Cargo is the truth that activities follow, so a robot that missed an event in repair, or whose cargo something
+    else took or gave, still makes sense. Refusals and lost conditions arrive as events: a waiting robot then
+    looks for another object, or resumes homing (with a new drop depth once it sees the nest again).
+
+    Returns:
+        Whether the robot has just got its cargo.
+    """
+    activity = robot.activity
+    failed = senses.event == NOTHING_HERE or senses.event == VANISHED
+    if senses.carrying:
+        if activity in (ACQUIRE, WAIT_PICKUP, LEAVE_NEST):
+            robot.activity = HOMING
+            return True
+        if activity == WAIT_DROP and failed:
+            robot.activity = HOMING
+        return False
+    if activity in (HOMING, HOMING_IN_NEST) or (activity == WAIT_PICKUP and failed):
+        restart_acquiring(robot)
+    elif activity == WAIT_DROP:
+        robot.activity = LEAVE_NEST
+    if robot.activity == LEAVE_NEST and not senses.in_nest:
+        restart_acquiring(robot)
+    return False
+
+
+@kernel
+def avoid(senses: Senses, c: np.record) -> tuple[float, float]:
+    """Avoidance force if there is an obstacle, else nothing."""
+    if senses.obstacle:
+        return avoidance(senses.obstacle_x, senses.obstacle_y, c)
+    return 0.0, 0.0
+
+
+@kernel
+def random_walk(robot: np.record, senses: Senses, c: np.record, u: float) -> tuple[float, float]:
+    """One tick of the correlated random walk: wander, and avoid what is in the way."""
+    wander_x, wander_y = wander(robot, c, u)
+    away_x, away_y = avoid(senses, c)
+    return wander_x + away_x, wander_y + away_y
+
+
+@kernel
+def explore_for_object(
+    robot: np.record, senses: Senses, row: ObsArray, c: np.record, draws: np.ndarray
+) -> tuple[bool, float, float]:
+    """Walk at random until the ground sensors see an object, which is ignored for the first 50 ticks.
+
+    Returns:
+        Whether an object was found (then the robot stands still), and the force.
+    """
+    x = 0.0
+    y = 0.0
+    if robot.explore_ticks == NOT_EXPLORING:
+        robot.explore_ticks = 0
+        if c.explore_double_start:  # quirk: starting runs the strategy once more
+            x, y = random_walk(robot, senses, c, draws[DRAW_RESTART])
+    if robot.explore_ticks >= c.exploration_lock_ticks and sees_object(row[c.ground : c.ground + 4]):
+        robot.explore_ticks = NOT_EXPLORING
+        return True, 0.0, 0.0
+    walk_x, walk_y = random_walk(robot, senses, c, draws[DRAW_WANDER])
+    robot.explore_ticks += 1
+    return False, x + walk_x, y + walk_y
+
+
+@kernel
+def start_vector(robot: np.record) -> None:
+    """Start going to the robot's goal; follow with `go_to_goal` in the same tick."""
+    robot.vector_state = VECTOR
+    robot.recovery_ticks = 0
+
+
+@kernel
+def stop_vector(robot: np.record) -> None:
+    """Give up the goal."""
+    robot.vector_state = VECTOR_IDLE
+    robot.recovery_ticks = 0
+
+
+@kernel
+def go_to_goal(
+    robot: np.record, senses: Senses, row: ObsArray, c: np.record, draws: np.ndarray
+) -> tuple[bool, float, float]:
+    """One tick on the way to the goal: arrival force, avoidance, then 2 s straight on before turning back.
+
+    A change of state acts in the same tick. Obstacles are ignored within the slowing radius, as far as the last
+    arrival force knew, and otherwise win over arriving.
+
+    Returns:
+        Whether the robot is within tolerance of its goal, and the force.
+    """
+    x = 0.0
+    y = 0.0
+    arrived = False
+    if robot.vector_state == VECTOR_RECOVERY:
+        x, y = recovery(c)
+        robot.recovery_ticks += 1
+        if senses.obstacle:
+            robot.recovery_ticks = 0
+            robot.vector_state = VECTOR_AVOIDANCE
+        elif robot.recovery_ticks >= c.recovery_ticks:
+            robot.recovery_ticks = 0
+            robot.vector_state = VECTOR
+    if robot.vector_state == VECTOR:
+        if senses.obstacle and not robot.is_slowing:
+            robot.vector_state = VECTOR_AVOIDANCE
+        else:
+            seek_x, seek_y = arrival(robot, senses.x, senses.y, row[c.heading], row[c.heading + 1], c)
+            x += seek_x
+            y += seek_y
+            dx = robot.goal_x_m - senses.x
+            dy = robot.goal_y_m - senses.y
+            arrived = dx * dx + dy * dy <= robot.goal_tolerance_m * robot.goal_tolerance_m
+    if robot.vector_state == VECTOR_AVOIDANCE:
+        if senses.obstacle:
+            away_x, away_y = avoid(senses, c)
+            x += away_x
+            y += away_y
+            if is_standing(row[c.wheel_speed : c.wheel_speed + 2], c):
+                wander_x, wander_y = wander(robot, c, draws[DRAW_VECTOR])
+                x += wander_x
+                y += wander_y
+        else:
+            robot.vector_state = VECTOR_RECOVERY
+            robot.recovery_ticks = 1
+            ahead_x, ahead_y = recovery(c)
+            x += ahead_x
+            y += ahead_y
+    return arrived, x, y
+
+
+@inline_kernel
+def acquire(
+    robot: np.record,
+    senses: Senses,
+    row: ObsArray,
+    c: np.record,
+    draws: np.ndarray,
+    memory: Any,
+    select: Callable[..., bool],
+    is_known: Callable[..., bool],
+    is_reached: Callable[..., bool],
+    search: Callable[..., tuple[bool, float, float]],
+) -> tuple[bool, float, float]:
+    """One tick towards the best remembered goal, or of the search for one.
+
+    Args:
+        robot: Record of the robot.
+        senses: What it senses.
+        row: Its observation.
+        c: Constants of the run.
+        draws: Its draws of this tick.
+        memory: What the robot remembers, handed to `select` and `is_known`.
+        select: (robot, senses, c, memory) -> found; sets goal, tolerance and target of the robot.
+        is_known: (robot, memory) -> whether the target is still valid.
+        is_reached: (row, c) -> whether the goal is really there.
+        search: (robot, senses, row, c, draws) -> (found, force), while there is nothing to go to.
+
+    Returns:
+        Whether a goal was acquired, by going there or by the search, and the force.
+    """
+    x = 0.0
+    y = 0.0
+    if robot.vector_state == VECTOR_IDLE:
+        if select(robot, senses, c, memory):
+            robot.explore_ticks = NOT_EXPLORING
+            start_vector(robot)
+            arrived, x, y = go_to_goal(robot, senses, row, c, draws)
+            if not arrived:
+                return False, x, y
+            stop_vector(robot)
+            # Quirk finisher_tolerance_mismatch: starting within tolerance never counts as arriving.
+            if c.start_is_arrival and is_reached(row, c):
+                return True, 0.0, 0.0
+    else:
+        arrived, x, y = go_to_goal(robot, senses, row, c, draws)
+        if not is_known(robot, memory):
+            stop_vector(robot)
+        elif not arrived:
+            return False, x, y
+        else:
+            stop_vector(robot)
+            if is_reached(row, c):
+                return True, 0.0, 0.0
+    found, search_x, search_y = search(robot, senses, row, c, draws)
+    return found, x + search_x, y + search_y
+
+
+@kernel
+def home(robot: np.record, senses: Senses, row: ObsArray, c: np.record, draws: np.ndarray) -> tuple[bool, float, float]:
+    """One tick of carrying an object into the nest: towards the light, then deeper by a random amount.
+
+    The drop distance from the nest centre is drawn uniformly between 0.01 m and the distance at entry, which spreads
+    deliveries over the nest; inside, the robot also wanders.
+
+    Returns:
+        Whether the robot has reached its place to drop, and the force.
+    """
+    dx = senses.x - c.nest_x_m
+    dy = senses.y - c.nest_y_m
+    distance = np.sqrt(dx * dx + dy * dy)
+    if robot.activity == HOMING and senses.in_nest:
+        robot.drop_depth_m = c.drop_depth_min_m + (distance - c.drop_depth_min_m) * draws[DRAW_DEPTH]
+        robot.activity = HOMING_IN_NEST
+    if robot.activity == HOMING_IN_NEST and senses.in_nest and distance <= robot.drop_depth_m:
+        return True, 0.0, 0.0
+    x, y = phototaxis(row[c.light : c.light + 24], c)
+    if robot.activity == HOMING_IN_NEST:
+        walk_x, walk_y = random_walk(robot, senses, c, draws[DRAW_WANDER])
+    else:
+        walk_x, walk_y = avoid(senses, c)
+    return False, x + walk_x, y + walk_y
+
+
+@kernel
+def deliver_and_leave(
+    robot: np.record, senses: Senses, row: ObsArray, c: np.record, draws: np.ndarray
+) -> tuple[float, float]:
+    """Act in every activity that moves and is not acquiring: homing, and leaving the nest. Returns the force."""
+    x = 0.0
+    y = 0.0
+    if robot.activity == HOMING or robot.activity == HOMING_IN_NEST:
+        arrived, x, y = home(robot, senses, row, c, draws)
+        if arrived:
+            robot.activity = WAIT_DROP
+    elif robot.activity == LEAVE_NEST:
+        x, y = random_walk(robot, senses, c, draws[DRAW_WANDER])
+    return x, y
+
+
+@kernel
+def command(robot: np.record, x: float, y: float, c: np.record, action: ActionArray) -> None:
+    """Write the action: wheels for the summed force (x, y), gripper for the activity."""
+    activity = robot.activity
+    if activity in (WAIT_PICKUP, WAIT_DROP):
+        action[0] = 0.0
+        action[1] = 0.0
+    else:
+        drive(x, y, c, action)
+    if activity == WAIT_DROP:
+        action[2] = DELIVER
+    elif activity in (WAIT_PICKUP, HOMING, HOMING_IN_NEST):
+        action[2] = GRASP  # empty: asks for the object below; carrying: holds
+    else:
+        action[2] = RELEASE

@@ -1,0 +1,167 @@
+"""Object memory: what each robot remembers of the objects it has seen, with a decaying pheromone.
+
+The rule, for one robot and tick, W being its 5 x 5 window of cells:
+
+1. A remembered object whose cell lies in W, but which is not seen in W, is forgotten.
+2. Every object seen is remembered at its cell with pheromone density 1; what else was remembered there goes.
+3. Every density decays by the factor 1 - rho.
+
+The third step has a closed form: an object last seen a ticks ago has density (1 - rho)^(a + 1), so only the tick
+of last sight is stored. The first two need a look through the memory only when the window has changed;
+otherwise the objects in view are just stamped with the time. Source: object memory of the paper's cognitive
+controllers; there is no limit on its size and no forgetting by age.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from swarm_forage_env.layout import WINDOW_CELLS
+from swarm_forage_env.types import FloatArray, IntArray, ObsArray
+
+from .compiling import kernel
+
+_WINDOW = WINDOW_CELLS * WINDOW_CELLS
+_REACH = WINDOW_CELLS // 2
+
+
+class ObjectMemory(NamedTuple):
+    """Memories of all robots. Row i holds a compact list of `n_known[i]` objects, in no particular order."""
+
+    row: IntArray
+    """(N, M) object row of each list entry."""
+    cell_x: IntArray
+    """(N, M) cell at which it was last seen."""
+    cell_y: IntArray
+    """(N, M)."""
+    seen: IntArray
+    """(N, M) tick of the robot's own clock at which it was last seen."""
+    entry: IntArray
+    """(N, M) by object row: its list entry + 1, or 0 when it is not remembered."""
+    window: ObsArray
+    """(N, 25) readings of the window seen last."""
+
+
+class OneMemory(NamedTuple):
+    """`ObjectMemory` of one robot: the same arrays without their first axis."""
+
+    row: IntArray
+    cell_x: IntArray
+    cell_y: IntArray
+    seen: IntArray
+    entry: IntArray
+    window: ObsArray
+
+
+def new_memory(n_robots: int, n_objects: int) -> ObjectMemory:
+    """Return empty memories of `n_robots` robots for `n_objects` objects.
+
+    20 bytes per robot and object are reserved; zeroed pages are only touched as objects become known.
+    """
+    shape = (n_robots, n_objects)
+    return ObjectMemory(
+        row=np.zeros(shape, np.int32),
+        cell_x=np.zeros(shape, np.int32),
+        cell_y=np.zeros(shape, np.int32),
+        seen=np.zeros(shape, np.int32),
+        entry=np.zeros(shape, np.int32),
+        window=np.zeros((n_robots, _WINDOW), np.float32),
+    )
+
+
+@kernel
+def memory_of(memory: ObjectMemory, robot_index: int) -> OneMemory:
+    """Return views of one robot's memory."""
+    return OneMemory(
+        memory.row[robot_index],
+        memory.cell_x[robot_index],
+        memory.cell_y[robot_index],
+        memory.seen[robot_index],
+        memory.entry[robot_index],
+        memory.window[robot_index],
+    )
+
+
+@kernel
+def object_row_of(reading: float, c: np.record) -> int:
+    """Object row that a reading (row + 1) / M stands for; -1 = none."""
+    return int(reading * c.n_objects + 0.5) - 1
+
+
+@kernel
+def remember(robot: np.record, memory: OneMemory, object_row: int, cell_x: int, cell_y: int) -> None:
+    """Store an object as seen now at a cell, whether known before or not."""
+    entry = memory.entry[object_row] - 1
+    if entry < 0:
+        entry = robot.n_known
+        robot.n_known += 1
+        memory.entry[object_row] = entry + 1
+        memory.row[entry] = object_row
+    memory.cell_x[entry] = cell_x
+    memory.cell_y[entry] = cell_y
+    memory.seen[entry] = robot.clock
+
+
+@kernel
+def forget(robot: np.record, memory: OneMemory, object_row: int) -> None:
+    """Remove an object; nothing happens if it is not remembered. The last list entry takes its place."""
+    entry = memory.entry[object_row] - 1
+    if entry < 0:
+        return
+    last = robot.n_known - 1
+    memory.row[entry] = memory.row[last]
+    memory.cell_x[entry] = memory.cell_x[last]
+    memory.cell_y[entry] = memory.cell_y[last]
+    memory.seen[entry] = memory.seen[last]
+    memory.entry[memory.row[entry]] = entry + 1
+    memory.entry[object_row] = 0
+    robot.n_known = last
+
+
+@kernel
+def look_around(robot: np.record, row: ObsArray, c: np.record, memory: OneMemory) -> None:
+    """One tick of the memory rule above, from the window in observation `row`. Advances the robot's clock."""
+    robot.clock += 1
+    left = int((row[c.los_cell] + 1.0) * c.half_width_m / c.cell_m) - _REACH
+    low = int((row[c.los_cell + 1] + 1.0) * c.half_height_m / c.cell_m) - _REACH
+    changed = left != robot.window_x or low != robot.window_y
+    for k in range(_WINDOW):
+        if row[c.los_object + k] != memory.window[k]:
+            changed = True
+    if changed:
+        for k in range(_WINDOW):
+            memory.window[k] = row[c.los_object + k]
+        robot.window_x = left
+        robot.window_y = low
+        _forget_what_is_gone(robot, c, memory)
+    for k in range(_WINDOW):
+        if memory.window[k] > 0.0:
+            object_row = object_row_of(memory.window[k], c)
+            remember(robot, memory, object_row, left + k % WINDOW_CELLS, low + k // WINDOW_CELLS)
+
+
+@kernel
+def _forget_what_is_gone(robot: np.record, c: np.record, memory: OneMemory) -> None:
+    """Forget objects whose remembered cell is in the window but does not show them.
+
+    One that shows elsewhere in the window comes back at once with its new cell.
+    """
+    for entry in range(robot.n_known - 1, -1, -1):  # backwards: forgetting moves the last entry here
+        x = memory.cell_x[entry] - robot.window_x
+        y = memory.cell_y[entry] - robot.window_y
+        if 0 <= x < WINDOW_CELLS and 0 <= y < WINDOW_CELLS:
+            shown = object_row_of(memory.window[y * WINDOW_CELLS + x], c)
+            if shown != memory.row[entry]:
+                forget(robot, memory, memory.row[entry])
+
+
+@kernel
+def density(robot: np.record, memory: OneMemory, entry: int, log_keep: float) -> float:
+    """Pheromone density of a list entry: (1 - rho)^(ticks since last sight + 1), log_keep = log(1 - rho)."""
+    return math.exp(log_keep * (robot.clock - memory.seen[entry] + 1))
+
+
+def densities(ages_ticks: IntArray, evaporation_per_tick: float) -> FloatArray:
+    """Pheromone densities after `ages_ticks` ticks without sight, for inspection."""
+    return (1.0 - evaporation_per_tick) ** (np.asarray(ages_ticks) + 1.0)

@@ -1,0 +1,104 @@
+"""Which remembered object to go to, and whether it is still worth going: the object goal of `machines.acquire`."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarm_forage_env.detection import sees_object
+from swarm_forage_env.types import ObsArray
+
+from .compiling import kernel
+from .machines import Senses
+from .memory import OneMemory, density
+from .parameters import ControllerParameters, ParameterError
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class MemoryParameters(ControllerParameters):
+    """Numbers of a controller that remembers objects."""
+
+    evaporation_per_tick: float = 0.00001
+    """rho: share of the pheromone density that is lost per tick; study."""
+    object_priority: float = 1.0
+    """Weight of the density in the utility of an object; study: 1 for cubes."""
+    object_exclusion_m: float = 0.2
+    """Objects whose centre is at most this near are not chosen; authors' program: the smallest object side."""
+    object_tolerance_m: float = 0.02
+    """A robot this near to an object's centre has arrived; authors' program."""
+
+    def __post_init__(self) -> None:
+        # super() has no arguments to find in a slots dataclass, which is a new class.
+        ControllerParameters.__post_init__(self)
+        if self.evaporation_per_tick >= 1.0:
+            raise ParameterError(f"Expected evaporation_per_tick < 1, got {self.evaporation_per_tick}.")
+
+    def derived(self) -> dict[str, float]:
+        """Return what kernels need besides the fields: log(1 - rho)."""
+        return {"log_keep": math.log1p(-self.evaporation_per_tick)}
+
+
+@kernel
+def object_utility(anchor_x: float, anchor_y: float, x: float, y: float, pheromone: float, c: np.record) -> float:
+    """Utility of an object: U = |anchor - nest| / |anchor - robot| * exp(density * priority).
+
+    Far from the nest and near the robot is good: what lies near the nest will be met on the way anyway.
+
+    Args:
+        anchor_x: Lower left corner of the object's cell, m.
+        anchor_y: The same along y.
+        x: Robot position, m.
+        y: The same along y.
+        pheromone: Density of the object.
+        c: Constants of the run.
+    """
+    nest_x, nest_y = anchor_x - c.nest_x_m, anchor_y - c.nest_y_m
+    away_x, away_y = anchor_x - x, anchor_y - y
+    ratio = (nest_x * nest_x + nest_y * nest_y) / (away_x * away_x + away_y * away_y)
+    return math.sqrt(ratio) * math.exp(pheromone * c.object_priority)
+
+
+@kernel
+def select_object(robot: np.record, senses: Senses, c: np.record, memory: OneMemory) -> bool:
+    """Choose the remembered object of highest utility as goal; the first one found wins a tie.
+
+    Objects whose centre is within `object_exclusion_m` of the robot are left out.
+
+    Returns:
+        Whether there is one; then goal (its centre), tolerance and target of the robot are set.
+    """
+    best = 0.0
+    best_entry = -1
+    nearest = c.object_exclusion_m * c.object_exclusion_m
+    half = 0.5 * c.cell_m
+    for entry in range(robot.n_known):
+        anchor_x = memory.cell_x[entry] * c.cell_m
+        anchor_y = memory.cell_y[entry] * c.cell_m
+        dx = anchor_x + half - senses.x
+        dy = anchor_y + half - senses.y
+        if dx * dx + dy * dy <= nearest:
+            continue
+        pheromone = density(robot, memory, entry, c.log_keep)
+        utility = object_utility(anchor_x, anchor_y, senses.x, senses.y, pheromone, c)
+        if utility > best:
+            best = utility
+            best_entry = entry
+    if best_entry < 0:
+        return False
+    robot.goal_x_m = memory.cell_x[best_entry] * c.cell_m + half
+    robot.goal_y_m = memory.cell_y[best_entry] * c.cell_m + half
+    robot.goal_tolerance_m = c.object_tolerance_m
+    robot.target = memory.row[best_entry]
+    return True
+
+
+@kernel
+def object_is_known(robot: np.record, memory: OneMemory) -> bool:
+    """Whether the target object is still remembered."""
+    return memory.entry[robot.target] > 0
+
+
+@kernel
+def object_is_reached(row: ObsArray, c: np.record) -> bool:
+    """Whether the ground sensors see an object."""
+    return sees_object(row[c.ground : c.ground + 4])

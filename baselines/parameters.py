@@ -1,0 +1,143 @@
+"""Numbers of the controllers: what is common to all four, and how numbers reach the compiled kernels.
+
+Sources: "study" is the controller configuration published with the paper's experiments. Speeds are the lengths of
+steering forces: the velocity that a force alone would make the robot drive with.
+"""
+
+import dataclasses
+import difflib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from swarm_forage_env.policy import SwarmTask
+
+COLUMNS = (
+    "proximity",
+    "light",
+    "ground",
+    "wheel_speed",
+    "position",
+    "heading",
+    "carrying",
+    "cargo",
+    "event",
+    "los_cell",
+    "los_object",
+)
+"""Observation slices whose first columns the kernels know by name."""
+
+
+class ParameterError(ValueError):
+    """A controller parameter that is unknown or makes no sense; the message says what was expected."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ControllerParameters:
+    """Steering, exploration and homing of a foot-bot, shared by all controllers."""
+
+    wander_speed_mps: float = 0.09
+    """Length of the wander force; study: 9 cm/s."""
+    wander_circle_radius: float = 100.0
+    """Radius of the wander circle; only its ratio to the distance matters; study."""
+    wander_circle_distance: float = 4.0
+    """How far the centre of the wander circle lies behind the robot; study."""
+    wander_max_change_deg: float = 5.0
+    """Largest change of the wander angle per tick, and bound of that angle; study."""
+    avoidance_speed_mps: float = 0.08
+    """Length of the avoidance force; study: 8 cm/s."""
+    phototaxis_speed_mps: float = 0.08
+    """Length of the force towards the nest light; study: 8 cm/s."""
+    arrival_speed_mps: float = 0.08
+    """Length of the force towards a point outside the slowing radius; study: 8 cm/s."""
+    slowest_arrival_mps: float = 0.01
+    """Shortest force towards a point; study: 1 cm/s."""
+    slowing_radius_m: float = 0.2
+    """Within this distance of its goal a robot slows down and ignores obstacles; study."""
+    recovery_speed_mps: float = 0.07
+    """Length of the straight-ahead force after avoiding; authors' program: 0.7 of the maximum speed."""
+    recovery_s: float = 2.0
+    """How long a robot drives straight on after avoiding; authors' program: 10 ticks."""
+    standing_speed_mps: float = 0.001
+    """A robot that avoids at most this fast also wanders, to break free; authors' program: 0.1 cm/s."""
+    soft_turn_deg: float = 15.0
+    """Force angles up to this are driven as arcs, larger ones as turns on the spot; study."""
+    exploration_lock_s: float = 10.0
+    """An exploring robot ignores objects under it for this long; authors' program: 50 ticks."""
+    drop_depth_min_m: float = 0.01
+    """Lower end of the uniform drop distance from the nest centre; authors' program."""
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            value = getattr(self, field.name)
+            is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            if not is_number or not math.isfinite(value) or value < 0:
+                raise ParameterError(f"Expected {field.name} to be a finite number >= 0, got {value!r}.")
+        for name in ("wander_max_change_deg", "soft_turn_deg", "slowing_radius_m"):
+            if getattr(self, name) == 0:
+                raise ParameterError(f"Expected {name} > 0, got 0.")
+        if self.wander_circle_radius <= self.wander_circle_distance:
+            raise ParameterError(
+                f"Expected wander_circle_radius > wander_circle_distance = {self.wander_circle_distance}, "
+                f"got {self.wander_circle_radius}; otherwise the robot would wander backwards."
+            )
+
+
+P = TypeVar("P", bound=ControllerParameters)
+
+
+def with_overrides(parameters: P, overrides: Mapping[str, float]) -> P:
+    """Return `parameters` with single numbers replaced by name.
+
+    Raises:
+        ParameterError: unknown name (with the nearest known one) or a value that makes no sense.
+    """
+    known = [field.name for field in dataclasses.fields(parameters)]
+    for name in overrides:
+        if name not in known:
+            close = difflib.get_close_matches(name, known, n=1)
+            hint = f" Did you mean {close[0]!r}?" if close else ""
+            raise ParameterError(f"Unknown controller parameter {name!r}.{hint} Known: {', '.join(known)}.")
+    return dataclasses.replace(parameters, **overrides)
+
+
+def kernel_constants(parameters: ControllerParameters, task: SwarmTask, **derived: float) -> np.ndarray:
+    """Pack everything that stays constant during a run into one record, readable by name inside kernels.
+
+    Args:
+        parameters: All fields are passed on under their own names, as float64.
+        task: Observation columns, scales, drive limits and nest of this run.
+        derived: Further numbers that a controller computes once.
+
+    Returns:
+        (1,) record array; `constants[0].name` works compiled and uncompiled.
+    """
+    layout = task.layout
+    scales = layout.part("position").scale
+    whole: dict[str, Any] = {name: layout.part(name).start for name in COLUMNS}
+    whole["n_objects"] = task.n_objects
+    whole["exploration_lock_ticks"] = round(parameters.exploration_lock_s / task.dt_s)
+    whole["recovery_ticks"] = round(parameters.recovery_s / task.dt_s)
+    whole["explore_double_start"] = int(task.quirks.explore_double_start)
+    whole["start_is_arrival"] = int(not task.quirks.finisher_tolerance_mismatch)
+    real: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}
+    real.update(
+        half_width_m=scales[0],
+        half_height_m=scales[1],
+        cell_m=task.cell_m,
+        wheel_scale_mps=task.wheel_scale_mps,
+        max_speed_mps=task.max_speed_mps,
+        nest_x_m=task.nest_centre_m[0],
+        nest_y_m=task.nest_centre_m[1],
+        soft_turn_rad=math.radians(parameters.soft_turn_deg),
+        **derived,
+    )
+    fields = np.dtype([(name, np.int64) for name in whole] + [(name, np.float64) for name in real], align=True)
+    # np.record makes fields readable as attributes when kernels run uncompiled; compiled they always are.
+    constants = np.zeros(1, np.dtype((np.record, fields)))
+    for name, value in (whole | real).items():
+        constants[name] = value
+    return constants
