@@ -1,0 +1,47 @@
+"""What the documents show works: examples run, commands are one line, links lead somewhere."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("**/*.md"))]
+EXAMPLES = [
+    pytest.param(block, id=f"{page.name}-{number}")
+    for page in PAGES
+    for number, block in enumerate(re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE), 1)
+]
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("block", EXAMPLES)
+def test_python_examples_run(block):
+    exec(compile(block, "example", "exec"), {})  # noqa: S102 - our own documentation
+
+
+@pytest.mark.parametrize("name", ["run", "tests"])
+def test_marked_commands_of_the_readme_are_one_line_each(name):
+    text = (ROOT / "README.md").read_text()
+    blocks = re.findall(rf"^<!-- ci:{name} -->\n```bash\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    assert len(blocks) == 1
+    assert len(blocks[0].splitlines()) == 1
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_relative_links_lead_to_files(page):
+    targets = re.findall(r"\]\((?!https?://|#)([^)#]+)", page.read_text())
+    assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+def test_readme_table_names_every_scenario():
+    from swarm_forage_env import SCENARIO_NAMES, scenario
+
+    rows = re.findall(
+        r"^\| `(\w+)` \| (\d+) x (\d+) m \| (\d+) \| (\d+) \|", (ROOT / "README.md").read_text(), re.MULTILINE
+    )
+    configs = [scenario(name) for name in SCENARIO_NAMES]
+    assert rows == [
+        (c.name, f"{c.arena.width_m:.0f}", f"{c.arena.height_m:.0f}", str(c.robots.n_robots), str(c.objects.n_objects))
+        for c in configs
+    ]
