@@ -79,13 +79,12 @@ def run_one(spec: RunSpec) -> RunRecord:
     return run_policy(load_policy(spec.policy, spec.parameters), spec)
 
 
-def warm_up(specs: Iterable[RunSpec]) -> None:
-    """Step each run a few ticks, so that its kernels are compiled and cached before many processes need them."""
-    for spec in specs:
-        policy = load_policy(spec.policy, spec.parameters)
-        recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
-        _drive(recorder, policy, spec.seed, max_ticks=WARM_UP_TICKS)
-        recorder.close()
+def warm_up(spec: RunSpec) -> None:
+    """Step a run a few ticks, so that its kernels are compiled and cached before many processes need them."""
+    policy = load_policy(spec.policy, spec.parameters)
+    recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
+    _drive(recorder, policy, spec.seed, max_ticks=WARM_UP_TICKS)
+    recorder.close()
 
 
 def _drive(recorder: RunRecorder, policy: Policy, seed: int, *, max_ticks: int | None = None) -> None:

@@ -1,0 +1,73 @@
+"""How many runs are done and how long the rest will take, on stderr."""
+
+import time
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+PLAIN_LINE_EVERY_S = 10.0
+"""Shortest time between two lines where stderr is no terminal."""
+
+
+class RunProgress:
+    """Context manager: a bar on a terminal, an occasional plain line elsewhere."""
+
+    def __init__(self, *, total: int, done: int = 0) -> None:
+        """Count `total` runs, of which `done` need not be run again."""
+        self._total = total
+        self._stored = done
+        self._done = done
+        self._failed = 0
+        self._console = Console(stderr=True, highlight=False, soft_wrap=True)
+        self._bar: Progress | None = None
+
+    def __enter__(self) -> "RunProgress":
+        """Start the clock."""
+        self._started = time.monotonic()
+        self._last_line = self._started
+        if self._stored:
+            self._console.print(f"{self._stored} of {self._total} runs are stored already.")
+        if self._console.is_terminal:
+            columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+            self._bar = Progress(*columns, TextColumn("{task.description}"), console=self._console)
+            self._bar.add_task(self._remaining(), total=self._total, completed=self._done)
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Take the bar down."""
+        if self._bar is not None:
+            self._bar.stop()
+
+    def advance(self, *, failed: bool) -> None:
+        """Count one more run."""
+        self._done += 1
+        self._failed += failed
+        now = time.monotonic()
+        if self._bar is not None:
+            self._bar.update(self._bar.task_ids[0], completed=self._done, description=self._remaining())
+        elif now - self._last_line >= PLAIN_LINE_EVERY_S or self._done == self._total:
+            self._last_line = now
+            self._console.print(f"{self._done}/{self._total} runs, {self._remaining()}")
+
+    def _remaining(self) -> str:
+        failures = f", {self._failed} failed" if self._failed else ""
+        ran, left = self._done - self._stored, self._total - self._done
+        if not left:
+            return "all done" + failures
+        if not ran:
+            return "no estimate yet" + failures
+        seconds = (time.monotonic() - self._started) / ran * left
+        return f"about {duration(seconds)} left{failures}"
+
+
+def duration(seconds: float) -> str:
+    """Return a length of time for people: "45 s", "12 min", "3.5 h"."""
+    if seconds < 90:
+        return f"{max(1, round(seconds))} s"
+    if seconds < 90 * 60:
+        return f"{round(seconds / 60)} min"
+    return f"{seconds / 3600:.1f} h"

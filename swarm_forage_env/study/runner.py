@@ -1,0 +1,272 @@
+"""Many runs: any concurrent.futures executor, records stored as they finish, restartable.
+
+The default is a pool of local processes. Past one machine, hand in another executor, for example Dask's
+`Client.get_executor()`; the code path is the same, and workers need no shared disk because records travel back.
+"""
+
+import os
+import signal
+import threading
+import traceback
+from collections import deque
+from collections.abc import Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import closing, contextmanager, nullcontext
+from dataclasses import dataclass
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from typing import Any, TypeAlias
+
+from swarm_forage_env.recording import RunRecord
+from swarm_forage_env.study.progress import RunProgress
+from swarm_forage_env.study.run import run_one, warm_up
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.study.store import RunFailure, RunStore
+
+Outcome: TypeAlias = RunRecord | RunFailure
+
+THREAD_SETTINGS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "POLARS_MAX_THREADS",
+)
+"""Environment variables set to 1 for workers: parallelism lives at the level of runs."""
+QUEUED_PER_WORKER = 2
+"""Runs handed to the pool per worker, so that none waits for the driver and little is lost when one crashes."""
+
+
+class WorkerError(RuntimeError):
+    """Worker processes could not be started at all."""
+
+
+class StudyInterrupted(KeyboardInterrupt):
+    """Ctrl-C during `run_all`; `result` holds what had finished by then."""
+
+    def __init__(self, result: "StudyResult", n_planned: int) -> None:
+        """Remember what was kept of `n_planned` runs."""
+        super().__init__(f"Interrupted: {len(result.records)} of {n_planned} runs are finished and kept.")
+        self.result = result
+
+
+@dataclass(frozen=True, slots=True)
+class StudyResult:
+    """Outcomes in the order of the specifications they belong to."""
+
+    records: tuple[RunRecord, ...]
+    failures: tuple[RunFailure, ...]
+    n_stored: int
+    """How many of the records had been stored before and were not run again."""
+
+
+def run_all(
+    specs: Iterable[RunSpec],
+    *,
+    store: RunStore | None = None,
+    executor: Executor | None = None,
+    jobs: int | None = None,
+    progress: bool = False,
+) -> StudyResult:
+    """Run every specification once and return all outcomes.
+
+    Args:
+        specs: What to run; equal ones count once.
+        store: Where records and failures go as they happen. Runs it already holds are read, not repeated;
+            failed ones are tried again.
+        executor: Runs the work; default a pool of local processes. It is not shut down.
+        jobs: Processes of the default pool, default one per available core; 1 = in this process.
+        progress: Show progress and an estimate on stderr.
+
+    Raises:
+        RecordError: a stored record is damaged or foreign; nothing has been run then.
+        StudyInterrupted: Ctrl-C; finished runs are kept, the others cancelled.
+        WorkerError: no worker process could be started.
+    """
+    planned = {spec.run_id: spec for spec in specs}
+    outcomes: dict[str, Outcome] = {}
+    if store is not None:
+        outcomes |= {run_id: store.read(run_id) for run_id in planned if run_id in store}
+    n_stored = len(outcomes)
+    todo = [spec for run_id, spec in planned.items() if run_id not in outcomes]
+    display = RunProgress(total=len(planned), done=n_stored) if progress and todo else nullcontext()
+    try:
+        # Closing ends the workers at once, wherever the interrupt struck.
+        with display as shown, closing(run_each(todo, store=store, executor=executor, jobs=jobs)) as fresh:
+            for outcome in fresh:
+                outcomes[outcome.run_id] = outcome
+                if shown is not None:
+                    shown.advance(failed=isinstance(outcome, RunFailure))
+    except KeyboardInterrupt:
+        raise StudyInterrupted(_result(planned, outcomes, n_stored), len(planned)) from None
+    return _result(planned, outcomes, n_stored)
+
+
+def run_each(
+    specs: Iterable[RunSpec],
+    *,
+    store: RunStore | None = None,
+    executor: Executor | None = None,
+    jobs: int | None = None,
+) -> Generator[Outcome]:
+    """Run specifications and yield each outcome as it finishes, already stored.
+
+    For studies whose records should not all be in memory. Unlike `run_all` it runs whatever it is given. Closing
+    the iterator, Ctrl-C included, cancels what has not finished.
+
+    Args:
+        specs: What to run.
+        store: Where records and failures go.
+        executor: Runs the work; default a pool of local processes.
+        jobs: Processes of the default pool, default one per available core; 1 = in this process.
+
+    Raises:
+        WorkerError: no worker process could be started.
+    """
+    todo = deque(specs)
+    if jobs is not None and jobs < 1:
+        raise ValueError(f"Expected jobs >= 1, got {jobs}.")
+    if executor is not None:
+        outcomes = _run_elsewhere(executor, todo)
+    elif jobs == 1 or len(todo) == 1:
+        outcomes = _run_on(_InProcess(), todo, limit=1)
+    else:
+        outcomes = _run_in_pool(todo, min(jobs or available_cores(), max(1, len(todo))))
+    with closing(outcomes):
+        for outcome in outcomes:
+            if store is not None:
+                if isinstance(outcome, RunRecord):
+                    store.write(outcome)
+                else:
+                    store.write_failure(outcome)
+            yield outcome
+
+
+def available_cores() -> int:
+    """Return the number of cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _result(planned: dict[str, RunSpec], outcomes: dict[str, Outcome], n_stored: int) -> StudyResult:
+    ordered = [outcomes[run_id] for run_id in planned if run_id in outcomes]
+    return StudyResult(
+        records=tuple(outcome for outcome in ordered if isinstance(outcome, RunRecord)),
+        failures=tuple(outcome for outcome in ordered if isinstance(outcome, RunFailure)),
+        n_stored=n_stored,
+    )
+
+
+def _run_on(executor: Executor, todo: deque[RunSpec], *, limit: int) -> Generator[Outcome]:
+    """Work `todo` off with at most `limit` runs submitted; stops early, leaving the rest, when the executor breaks."""
+    running: dict[Future[RunRecord], RunSpec] = {}
+    broken = False
+    try:
+        while running or (todo and not broken):
+            while todo and not broken and len(running) < limit:
+                spec = todo.popleft()
+                running[executor.submit(run_one, spec)] = spec
+            finished, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in finished:
+                spec, error = running.pop(future), future.exception()
+                broken = broken or isinstance(error, BrokenExecutor)
+                yield future.result() if error is None else _failure(spec, error)
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _run_elsewhere(executor: Executor, todo: deque[RunSpec]) -> Generator[Outcome]:
+    """Work `todo` off on an executor that is not ours to replace."""
+    yield from _run_on(executor, todo, limit=len(todo))
+    if todo:
+        raise WorkerError(f"The executor broke; {len(todo)} runs were not started. Run them again on a new one.")
+
+
+def _failure(spec: RunSpec, error: BaseException) -> RunFailure:
+    reason = str(error).splitlines()
+    return RunFailure(
+        spec=spec,
+        error=f"{type(error).__name__}: {reason[0] if reason else 'no message'}",
+        traceback="".join(traceback.format_exception(error)),
+    )
+
+
+class _InProcess(Executor):
+    """Runs what is submitted at once, here. Ctrl-C passes through, every error of the run belongs to its future."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Call and return a future that is done."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:  # noqa: BLE001 - an executor hands on whatever the call raises
+            future.set_exception(error)
+        return future
+
+
+def _run_in_pool(todo: deque[RunSpec], n_workers: int) -> Generator[Outcome]:
+    """Work `todo` off in local processes; a pool that breaks (a worker was killed) is replaced for the rest."""
+    cold = {_kernel_kind(spec): spec for spec in todo}
+    while todo:
+        with _process_pool(n_workers) as pool:
+            # One worker after the other compiles and caches the kernels of a kind before many need them. What a run
+            # raises here it raises again, and is recorded, in its own turn.
+            while cold:
+                _, spec = cold.popitem()
+                if isinstance(pool.submit(warm_up, spec).exception(), BrokenExecutor):
+                    raise WorkerError(
+                        "Worker processes could not be started. A script that starts runs must do so under "
+                        "`if __name__ == '__main__':`; jobs=1 runs everything in this process."
+                    )
+            yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers)
+
+
+def _kernel_kind(spec: RunSpec) -> tuple[Any, ...]:
+    """Runs of one kind use the same kernels."""
+    return spec.policy, spec.scenario.caches, tuple(config.name for config in spec.wrappers)
+
+
+@contextmanager
+def _process_pool(n_workers: int) -> Iterator[ProcessPoolExecutor]:
+    """A pool of spawned, single-threaded processes that leave at once when the driver gives up or dies."""
+    context = get_context("spawn")
+    lifeline, held_by_driver = context.Pipe(duplex=False)
+    with _single_threaded_children():
+        pool = ProcessPoolExecutor(n_workers, mp_context=context, initializer=_start_worker, initargs=(lifeline,))
+        try:
+            yield pool
+        except BaseException:
+            held_by_driver.close()  # workers see the end of the lifeline and leave in the middle of their runs
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+        pool.shutdown()
+        held_by_driver.close()
+        lifeline.close()
+
+
+def _start_worker(lifeline: Connection) -> None:
+    """Prepare a worker process: Ctrl-C is the driver's affair, and without a driver there is nothing to work for."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_leave_at_end_of, args=(lifeline,), daemon=True).start()
+
+
+def _leave_at_end_of(lifeline: Connection) -> None:
+    try:
+        lifeline.recv()
+    except (EOFError, OSError):
+        os._exit(1)
+
+
+@contextmanager
+def _single_threaded_children() -> Iterator[None]:
+    """Processes started meanwhile use one thread each; libraries read these settings when they are imported."""
+    before = {name: os.environ.get(name) for name in THREAD_SETTINGS}
+    os.environ.update(dict.fromkeys(THREAD_SETTINGS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
