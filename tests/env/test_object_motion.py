@@ -1,0 +1,206 @@
+"""Random walk of free objects."""
+
+import copy
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, chisquare
+
+from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, ObjectStatus
+from swarm_forage_env.kernels.walk import OPEN_BORDERS, can_step, crosses_open_border
+from swarm_forage_env.object_motion import walk_objects
+from swarm_forage_env.regions import Box, distributable_box
+from swarm_forage_env.state import ObjectState
+from tests.reference.object_walk import GAPS_AFTER, walk_slowly
+
+SIGNIFICANCE = 0.001
+"""Seeds are fixed, so a test that passes once passes always; this is what it passed."""
+
+
+def world(cells: list[tuple[int, int]], nx: int, ny: int) -> ObjectState:
+    """Return objects lying on the given cells of an otherwise empty floor."""
+    n_objects = len(cells)
+    floor = np.full((ny, nx), CELL_EMPTY, np.int32)
+    for row, (x, y) in enumerate(cells):
+        floor[y, x] = row
+    return ObjectState(
+        floor=floor,
+        status=np.full(n_objects, ObjectStatus.FREE, np.int8),
+        cell=np.array(cells, np.int32).reshape(n_objects, 2),
+        cache_slot=np.full(n_objects, -1, np.int32),
+        carriers=np.zeros(n_objects, np.int32),
+    )
+
+
+def crowded_world(rng: np.random.Generator) -> tuple[ObjectState, Box]:
+    """Return 200 objects, a quarter of them not free, between nest and cache cells."""
+    nx, ny = 60, 40
+    cells = [(int(k) % nx, int(k) // nx) for k in rng.permutation(nx * ny)[:200]]
+    objects = world(cells, nx, ny)
+    for row in range(0, 200, 4):
+        x, y = objects.cell[row]
+        objects.floor[y, x] = CELL_EMPTY
+        objects.status[row] = (ObjectStatus.CARRIED, ObjectStatus.CACHED, ObjectStatus.WAITING)[row % 3]
+        objects.cell[row] = (30, 20) if objects.status[row] == ObjectStatus.CACHED else (-1, -1)
+    litter = (objects.floor == CELL_EMPTY) & (rng.random(objects.floor.shape) < 0.3)
+    objects.floor[litter] = rng.choice([CELL_NEST, CELL_CACHE, CELL_CACHE - 1], np.count_nonzero(litter))
+    return objects, distributable_box(nx, ny)
+
+
+def step(objects: ObjectState, area: Box, p: float, rng: np.random.Generator, *, self_conflict: bool = False) -> int:
+    return walk_objects(objects, area, p, rng, self_conflict, np.zeros(len(objects.status)))
+
+
+@pytest.mark.parametrize("self_conflict", [False, True])
+@pytest.mark.parametrize("probability", [0.1, 1.0])
+def test_walk_agrees_with_its_slow_twin(probability, self_conflict):
+    rng = np.random.default_rng(8)
+    objects, area = crowded_world(rng)
+    twin = copy.deepcopy(objects)
+    for tick in range(40):
+        chance = np.random.default_rng(tick).random(200)
+        moved = step(objects, area, probability, np.random.default_rng(tick), self_conflict=self_conflict)
+        assert moved == walk_slowly(twin, area, probability, chance, self_conflict)
+        np.testing.assert_array_equal(objects.floor, twin.floor)
+        np.testing.assert_array_equal(objects.cell, twin.cell)
+
+
+@pytest.mark.parametrize("self_conflict", [False, True])
+def test_objects_are_conserved_and_stay_on_their_floor(self_conflict):
+    rng = np.random.default_rng(9)
+    objects, area = crowded_world(rng)
+    before = copy.deepcopy(objects)
+    moved = sum(step(objects, area, 0.3, rng, self_conflict=self_conflict) for _ in range(200))
+    assert moved > 100
+    free = np.flatnonzero(objects.status == ObjectStatus.FREE)
+    x, y = objects.cell[free].T
+    np.testing.assert_array_equal(objects.floor[y, x], free)
+    np.testing.assert_array_equal(np.sort(objects.floor[objects.floor >= 0]), free)
+    np.testing.assert_array_equal(objects.status, before.status)
+    np.testing.assert_array_equal(objects.floor <= CELL_NEST, before.floor <= CELL_NEST)
+    others = np.flatnonzero(objects.status != ObjectStatus.FREE)
+    np.testing.assert_array_equal(objects.cell[others], before.cell[others])
+    changed = np.any(objects.cell[free] != before.cell[free], axis=1)
+    in_x = (x[changed] >= area[0]) & (x[changed] < area[2])
+    in_y = (y[changed] >= area[1]) & (y[changed] < area[3])
+    assert np.all(in_x & in_y)
+
+
+def test_no_motion_draws_nothing():
+    objects, area = crowded_world(np.random.default_rng(0))
+    rng = np.random.default_rng(1)
+    assert step(objects, area, 0.0, rng) == 0
+    assert rng.bit_generator.state == np.random.default_rng(1).bit_generator.state
+
+
+def test_one_number_per_object_whatever_its_status():
+    objects, area = crowded_world(np.random.default_rng(0))
+    rng, other = np.random.default_rng(1), np.random.default_rng(1)
+    step(objects, area, 0.2, rng)
+    other.random(200)
+    assert rng.bit_generator.state == other.bit_generator.state
+
+
+def test_moves_happen_with_the_given_probability():
+    objects = world([(5 * x + 2, 5 * y + 2) for x in range(20) for y in range(20)], 100, 100)
+    rng = np.random.default_rng(3)
+    moved = sum(step(objects, (0, 0, 100, 100), 0.026, rng) for _ in range(100))
+    assert binomtest(moved, 40_000, 0.026).pvalue > SIGNIFICANCE
+
+
+@pytest.mark.parametrize(
+    ("start", "n_choices"), [((2, 2), 8), ((0, 2), 5), ((4, 4), 3)], ids=["open", "edge", "corner"]
+)
+def test_every_free_neighbour_is_equally_likely(start, n_choices):
+    rng = np.random.default_rng(5)
+    counts = np.zeros((5, 5), int)
+    for _ in range(400 * n_choices):
+        objects = world([start], 5, 5)
+        assert step(objects, (0, 0, 5, 5), 1.0, rng) == 1
+        counts += objects.floor == 0
+    assert counts[start[1], start[0]] == 0
+    reached = counts[counts > 0]
+    assert len(reached) == n_choices
+    assert chisquare(reached).pvalue > SIGNIFICANCE
+
+
+def test_the_number_that_triggers_a_move_does_not_bias_its_direction():
+    rng = np.random.default_rng(6)
+    counts = np.zeros((3, 3), int)
+    for _ in range(40_000):
+        objects = world([(1, 1)], 3, 3)
+        if step(objects, (0, 0, 3, 3), 0.05, rng):
+            counts += objects.floor == 0
+    counts = np.delete(counts.ravel(), 4)
+    assert binomtest(int(counts.sum()), 40_000, 0.05).pvalue > SIGNIFICANCE
+    assert chisquare(counts).pvalue > SIGNIFICANCE
+
+
+def test_a_surrounded_object_stays():
+    objects = world([(1, 1)], 3, 3)
+    objects.floor[objects.floor == CELL_EMPTY] = [CELL_NEST, CELL_CACHE] * 4
+    assert step(objects, (0, 0, 3, 3), 1.0, np.random.default_rng(0)) == 0
+    assert objects.cell.tolist() == [[1, 1]]
+
+
+def test_objects_see_the_moves_of_lower_rows():
+    corridor = (0, 0, 3, 1)
+    objects = world([(1, 0), (0, 0)], 3, 1)
+    assert step(objects, corridor, 1.0, np.random.default_rng(0)) == 2
+    assert objects.cell.tolist() == [[2, 0], [1, 0]]
+    objects = world([(0, 0), (1, 0)], 3, 1)
+    assert step(objects, corridor, 1.0, np.random.default_rng(0)) == 1  # row 0 was still shut in at its turn
+    assert objects.cell.tolist() == [[0, 0], [2, 0]]
+
+
+def test_long_run_visits_are_proportional_to_the_number_of_neighbours():
+    # A walk to a uniform choice of neighbours is reversible: its stationary law is the number of neighbours.
+    rng = np.random.default_rng(7)
+    objects = world([(0, 0)], 4, 3)
+    visits = np.zeros((3, 4), int)
+    for tick in range(40_000):
+        step(objects, (0, 0, 4, 3), 1.0, rng)
+        if tick % 10 == 0:
+            visits += objects.floor == 0
+    neighbours = np.array([[3, 5, 5, 3], [5, 8, 8, 5], [3, 5, 5, 3]])
+    assert chisquare(visits.ravel(), (4_000 * neighbours / neighbours.sum()).ravel()).pvalue > SIGNIFICANCE
+
+
+def test_open_borders_are_the_published_ones():
+    assert tuple(np.flatnonzero(OPEN_BORDERS).tolist()) == GAPS_AFTER
+    assert len(GAPS_AFTER) == 33
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "dx", "dy", "crosses"),
+    [
+        (5, 10, 1, 0, True),  # the border after cell 5
+        (6, 10, -1, 0, True),  # the same from the other side
+        (5, 10, -1, 0, False),
+        (5, 10, 0, 1, False),  # beside the open border, not across it
+        (5, 10, 1, 1, True),  # one open border is enough for a diagonal step
+        (10, 40, 1, 1, True),
+        (10, 41, -1, -1, True),
+        (10, 11, 1, 1, False),
+        (155, 10, 1, 0, True),
+        (160, 10, 1, 0, False),
+        (640, 643, 1, 1, False),  # beyond the study's grids no border is open
+    ],
+)
+def test_self_conflict_lets_objects_across_open_borders_only(x, y, dx, dy, crosses):
+    assert crosses_open_border(x, y, dx, dy) == crosses
+
+
+@pytest.mark.parametrize(
+    ("side", "percent"), [(16, 67), (32, 75), (48, 61), (64, 44), (80, 31), (96, 21), (112, 15), (128, 10)]
+)
+def test_share_of_places_from_which_an_object_can_move_at_all(side, percent):
+    n_cells = 5 * side
+    area = distributable_box(n_cells, n_cells)
+    floor = np.full((n_cells, n_cells), CELL_EMPTY, np.int32)
+    # Columns and rows from which an axis-parallel step crosses an open border; a diagonal one needs either.
+    axis = range(area[0], area[2])
+    can_x = np.array([any(can_step(floor, area, k, area[1], dx, 0, True) for dx in (-1, 1)) for k in axis])
+    can_y = np.array([any(can_step(floor, area, area[0], k, 0, dy, True) for dy in (-1, 1)) for k in axis])
+    share = np.mean(can_x[np.newaxis, :] | can_y[:, np.newaxis])
+    assert 100 * share == pytest.approx(percent, abs=0.7)

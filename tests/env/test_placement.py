@@ -1,0 +1,329 @@
+"""Where objects appear: uniform over free cells, one per cell, and a waiting list for those without a place."""
+
+import numpy as np
+import pytest
+from scipy.stats import chisquare
+
+from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, ObjectStatus
+from swarm_forage_env.config import ArenaConfig, ConfigError, ObjectConfig, RobotConfig, ScenarioConfig
+from swarm_forage_env.kernels.scatter import DRAWS, UNLIMITED, count_objects, draw_source_cell, scatter
+from swarm_forage_env.placement import Source, draw_source, place_all, place_objects
+from swarm_forage_env.regions import PLACEMENTS, Box, source_boxes
+from swarm_forage_env.rng import Stream, stream_rng
+from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+from swarm_forage_env.state import ObjectState
+from swarm_forage_env.types import IntArray
+from tests.reference.object_placement import choose_cell, random_source, scatter_slowly, waiting_by_the_word
+
+SIGNIFICANCE = 0.001
+"""Seeds are fixed, so a test that passes once passes always; this is what it passed."""
+
+
+def bare_objects(n_objects: int, nx: int, ny: int) -> ObjectState:
+    return ObjectState(
+        floor=np.full((ny, nx), CELL_EMPTY, np.int32),
+        status=np.full(n_objects, ObjectStatus.WAITING, np.int8),
+        cell=np.full((n_objects, 2), -1, np.int32),
+        cache_slot=np.full(n_objects, -1, np.int32),
+        carriers=np.zeros(n_objects, np.int32),
+        waiting=list(range(n_objects)),
+    )
+
+
+def one_region(box: Box, capacity: int = UNLIMITED) -> Source:
+    return Source(np.array([box], np.int32), np.array([capacity], np.int32), np.array([0, 1], np.int32))
+
+
+def lift(objects: ObjectState, row: int) -> None:
+    x, y = objects.cell[row]
+    objects.floor[y, x] = CELL_EMPTY
+    objects.status[row] = ObjectStatus.CARRIED
+    objects.cell[row] = -1
+    objects.carriers[row] += 1
+
+
+def furnished(config: ScenarioConfig, seed: int = 0) -> tuple[ObjectState, Source, np.random.Generator]:
+    objects = ObjectState.empty(config)
+    rng = stream_rng(seed, Stream.PLACEMENT)
+    source = draw_source(config, objects.floor, rng)
+    place_all(objects, source, config.arena.distributable_cells, rng)
+    return objects, source, rng
+
+
+def assert_consistent(objects: ObjectState) -> None:
+    free = np.flatnonzero(objects.status == ObjectStatus.FREE)
+    x, y = objects.cell[free].T
+    np.testing.assert_array_equal(objects.floor[y, x], free)
+    assert np.count_nonzero(objects.floor >= 0) == len(free)
+    waiting = np.flatnonzero(objects.status == ObjectStatus.WAITING)
+    assert sorted(objects.waiting) == waiting.tolist()
+    assert np.all(objects.cell[waiting] == -1)
+
+
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_presets_place_every_object_on_its_own_free_cell(name, seed):
+    config = scenario(name)
+    before = ObjectState.empty(config).floor
+    objects, source, _ = furnished(config, seed)
+    assert np.all(objects.status == ObjectStatus.FREE)
+    assert objects.waiting == []
+    assert_consistent(objects)
+    x, y = objects.cell.T
+    assert len({*zip(x.tolist(), y.tolist(), strict=True)}) == config.objects.n_objects
+    assert np.all(before[y, x] == CELL_EMPTY)
+    x_low, y_low, x_high, y_high = config.arena.distributable_cells
+    assert np.all((x >= x_low) & (x < x_high) & (y >= y_low) & (y < y_high))
+    inside = [(x >= box[0]) & (x < box[2]) & (y >= box[1]) & (y < box[3]) for box in source.regions.tolist()]
+    assert np.all(np.any(inside, axis=0))
+    np.testing.assert_array_equal(objects.floor == CELL_NEST, before == CELL_NEST)
+
+
+@pytest.mark.parametrize("placement", [name for name in PLACEMENTS if name != "power_law"])
+def test_sources_are_the_regions_without_limit(placement):
+    config = scenario("warehouse_medium", placement=placement)
+    rng = stream_rng(0, Stream.PLACEMENT)
+    source = draw_source(config, ObjectState.empty(config).floor, rng)
+    assert tuple(map(tuple, source.regions.tolist())) == source_boxes(placement, 240, 240)
+    assert np.all(source.capacity == UNLIMITED)
+    assert source.group_start.tolist() == [0, len(source.regions)]
+    assert rng.bit_generator.state == stream_rng(0, Stream.PLACEMENT).bit_generator.state
+
+
+def test_a_full_source_strip_takes_exactly_its_cells():
+    objects, _, _ = furnished(scenario("warehouse_small", n_objects=896))
+    assert np.all(objects.floor[12:68, 120:136] >= 0)
+
+
+def test_same_seed_same_places():
+    config = scenario("search_and_rescue")
+    first, other = furnished(config, 5)[0], furnished(config, 6)[0]
+    np.testing.assert_array_equal(first.floor, furnished(config, 5)[0].floor)
+    assert np.any(first.floor != other.floor)
+
+
+def test_place_all_says_how_many_fit():
+    objects = bare_objects(30, 20, 20)
+    with pytest.raises(ConfigError, match=r"Expected at most 24 objects .* got 30; ask for fewer"):
+        place_all(objects, one_region((3, 3, 9, 7)), (0, 0, 20, 20), np.random.default_rng(0))
+    assert_consistent(objects)
+
+
+def test_place_all_leaves_objects_in_caches_alone():
+    objects = bare_objects(6, 20, 20)
+    objects.status[[1, 4]] = ObjectStatus.CACHED
+    objects.cache_slot[[1, 4]] = 0
+    objects.cell[[1, 4]] = (15, 15)
+    objects.floor[14:17, 14:17] = CELL_CACHE
+    objects.waiting = [0, 2, 3, 5]
+    place_all(objects, one_region((0, 0, 20, 20)), (0, 0, 20, 20), np.random.default_rng(0))
+    assert objects.status.tolist() == [0, 2, 0, 0, 2, 0]
+    assert objects.cache_slot.tolist() == [-1, 0, -1, -1, 0, -1]
+    assert np.all(objects.floor[14:17, 14:17] == CELL_CACHE)
+
+
+@pytest.mark.compiled
+def test_the_largest_arena_is_furnished():
+    arena = ArenaConfig(width_m=576.0, height_m=576.0, nest_centre_m=(288.0, 288.0), nest_size_m=(115.2, 115.2))
+    config = ScenarioConfig(
+        name="bench",
+        arena=arena,
+        robots=RobotConfig(n_robots=16_384),
+        objects=ObjectConfig(n_objects=116_121, placement="random"),
+    )
+    objects, _, _ = furnished(config)
+    assert objects.waiting == []
+    assert_consistent(objects)
+
+
+@pytest.mark.parametrize("share_free", [0.9, 0.02], ids=["by trying", "by listing"])
+def test_every_free_cell_is_equally_likely(share_free):
+    rng = np.random.default_rng(11)
+    objects = bare_objects(1, 40, 30)
+    objects.floor[rng.random(objects.floor.shape) >= share_free] = CELL_NEST
+    area, box = (2, 3, 38, 28), (0, 0, 40, 25)
+    free = np.zeros(objects.floor.shape, bool)
+    free[3:25, 2:38] = objects.floor[3:25, 2:38] == CELL_EMPTY
+    counts = np.zeros(objects.floor.shape, int)
+    source = one_region(box)
+    for _ in range(20 * np.count_nonzero(free)):
+        place_objects([0], objects, source, area, rng)
+        x, y = objects.cell[0]
+        counts[y, x] += 1
+        lift(objects, 0)
+    assert counts[~free].sum() == 0
+    assert chisquare(counts[free]).pvalue > SIGNIFICANCE
+
+
+def test_a_crowded_region_is_filled_uniformly():
+    # Three of four cells are taken each time, so both ways of drawing a cell take part.
+    counts = np.zeros((6, 8), int)
+    for seed in range(400):
+        objects = bare_objects(36, 8, 6)
+        place_all(objects, one_region((0, 0, 8, 6)), (0, 0, 8, 6), np.random.default_rng(seed))
+        counts += objects.floor >= 0
+    # A cell is taken 36 / 48 of the time with variance p (1 - p); sampling without replacement takes one degree.
+    statistic = np.sum((counts - 300) ** 2) / (400 * 0.75 * 0.25) * 47 / 48
+    assert 25 < statistic < 80  # 0.1 and 99.9 percent points of chi-square with 47 degrees lie at 23 and 83
+
+
+def test_groups_then_regions_are_equally_likely():
+    regions = np.array([(0, 0, 4, 4), (5, 0, 9, 4), (10, 0, 14, 4), (15, 0, 25, 10)], np.int32)
+    source = Source(regions, np.array([8, 8, 8, 16], np.int32), np.array([0, 3, 4], np.int32))
+    objects = bare_objects(1, 30, 12)
+    rng = np.random.default_rng(2)
+    counts = np.zeros(4, int)
+    for _ in range(6_000):
+        place_objects([0], objects, source, (0, 0, 30, 12), rng)
+        counts[np.searchsorted([5, 10, 15], objects.cell[0, 0], side="right")] += 1
+        lift(objects, 0)
+    assert chisquare(counts, [1_000, 1_000, 1_000, 3_000]).pvalue > SIGNIFICANCE
+
+
+def test_the_two_sources_are_equally_likely_and_stand_in_for_each_other():
+    source = Source(
+        np.array([(0, 0, 2, 2), (5, 0, 9, 4)], np.int32), np.full(2, UNLIMITED, np.int32), np.array([0, 2], np.int32)
+    )
+    rng = np.random.default_rng(4)
+    left = 0
+    for _ in range(2_000):
+        objects = bare_objects(1, 10, 5)
+        place_all(objects, source, (0, 0, 10, 5), rng)
+        left += objects.cell[0, 0] < 2
+    assert chisquare([left, 2_000 - left]).pvalue > SIGNIFICANCE
+    objects = bare_objects(20, 10, 5)
+    place_all(objects, source, (0, 0, 10, 5), rng)  # 4 + 16 cells: both end up full
+    assert_consistent(objects)
+
+
+def test_a_region_at_capacity_is_skipped_dropped_objects_included():
+    regions = np.array([(0, 0, 5, 5), (6, 0, 11, 5)], np.int32)
+    source = Source(regions, np.array([3, 3], np.int32), np.array([0, 2], np.int32))
+    objects = bare_objects(6, 12, 6)
+    objects.floor[2, 2], objects.floor[3, 3] = 4, 5  # laid there by robots
+    objects.cell[[4, 5]] = (2, 2), (3, 3)
+    objects.status[[4, 5]] = ObjectStatus.FREE
+    objects.waiting = []
+    place_objects([0, 1, 2, 3], objects, source, (0, 0, 12, 6), np.random.default_rng(0))
+    assert count_objects(objects.floor, 0, 0, 5, 5) == 3
+    assert count_objects(objects.floor, 6, 0, 11, 5) == 3
+    lift(objects, 4)  # frees a slot although cells were free all along
+    place_objects([4], objects, source, (0, 0, 12, 6), np.random.default_rng(0))
+    assert count_objects(objects.floor, 0, 0, 5, 5) == 3
+    assert objects.waiting == []
+
+
+def test_a_cluster_under_a_cache_is_passed_over():
+    regions = np.array([(0, 0, 4, 4), (6, 0, 10, 4)], np.int32)
+    source = Source(regions, np.array([8, 8], np.int32), np.array([0, 2], np.int32))
+    objects = bare_objects(8, 12, 6)
+    objects.floor[0:5, 0:5] = CELL_CACHE - 1
+    place_all(objects, source, (0, 0, 12, 6), np.random.default_rng(1))
+    assert np.all(objects.cell[:, 0] >= 6)
+
+
+def test_a_region_outside_the_distributable_box_is_passed_over():
+    regions = np.array([(0, 0, 3, 3), (2, 2, 8, 8)], np.int32)
+    source = Source(regions, np.full(2, UNLIMITED, np.int32), np.array([0, 2], np.int32))
+    objects = bare_objects(9, 10, 10)
+    place_all(objects, source, (4, 5, 7, 10), np.random.default_rng(0))
+    assert np.all(objects.floor[5:8, 4:7] >= 0)
+
+
+def test_placed_objects_start_anew():
+    config = scenario("warehouse_small")
+    objects, source, rng = furnished(config)
+    lift(objects, 17)
+    objects.status[17] = ObjectStatus.WAITING
+    assert objects.carriers[17] == 1
+    place_objects(np.array([17], np.int32), objects, source, config.arena.distributable_cells, rng)
+    assert objects.status[17] == ObjectStatus.FREE
+    assert objects.carriers[17] == 0
+    assert objects.cache_slot[17] == -1
+    assert 120 <= objects.cell[17, 0] < 136
+    assert_consistent(objects)
+
+
+def test_newest_first_then_the_longest_wait():
+    objects = bare_objects(6, 5, 3)
+    objects.waiting = []
+    area, source, rng = (0, 0, 5, 3), one_region((1, 1, 4, 2)), np.random.default_rng(0)
+    place_objects([0, 1, 2, 3], objects, source, area, rng)
+    assert objects.waiting == [3]
+    place_objects([4], objects, source, area, rng)
+    assert objects.waiting == [3, 4]
+    lift(objects, 0)
+    place_objects([5], objects, source, area, rng)
+    assert (objects.waiting, int(objects.status[5])) == ([3, 4], ObjectStatus.FREE)
+    lift(objects, 1)
+    lift(objects, 5)
+    place_objects([0], objects, source, area, rng)
+    assert (objects.waiting, int(objects.status[3])) == ([4], ObjectStatus.FREE)
+    lift(objects, 2)
+    lift(objects, 0)
+    place_objects([1, 2], objects, source, area, rng)  # 1, then 4, which leaves no cell for 2
+    assert objects.waiting == [2]
+    assert [int(row) for row in np.flatnonzero(objects.status == ObjectStatus.FREE)] == [1, 3, 4]
+    assert np.flatnonzero(objects.status == ObjectStatus.CARRIED).tolist() == [0, 5]
+    assert_consistent(objects)
+
+
+def test_nothing_to_place_draws_nothing_and_wakes_nobody():
+    objects = bare_objects(3, 5, 3)
+    rng = np.random.default_rng(0)
+    place_objects([], objects, one_region((0, 0, 5, 3)), (0, 0, 5, 3), rng)
+    assert objects.waiting == [0, 1, 2]
+    assert rng.bit_generator.state == np.random.default_rng(0).bit_generator.state
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_waiting_list_follows_the_rule_word_by_word(seed):
+    rng = np.random.default_rng(seed)
+    source, area, floor = random_source(rng)
+    objects = bare_objects(100, floor.shape[1], floor.shape[0])
+    objects.floor[:] = floor
+    objects.status[:] = ObjectStatus.CARRIED
+    objects.waiting = []
+    outside = list(range(100))
+    n_waiting = []
+    for _ in range(30):
+        rows = [outside.pop(0) for _ in range(min(len(outside), int(rng.integers(1, 16))))]
+        twin_floor, twin_waiting = objects.floor.copy(), list(objects.waiting)
+
+        def place(row: int, twin_floor: IntArray = twin_floor) -> bool:
+            cell = choose_cell(twin_floor, source, area, rng.random(DRAWS))
+            if cell is not None:
+                twin_floor[cell[1], cell[0]] = row
+            return cell is not None
+
+        place_objects(rows, objects, source, area, rng)
+        assert objects.waiting == waiting_by_the_word(rows, twin_waiting, place)
+        assert_consistent(objects)
+        n_waiting.append(len(objects.waiting))
+        for row in rng.permutation(np.flatnonzero(objects.status == ObjectStatus.FREE))[: rng.integers(15)].tolist():
+            lift(objects, row)
+            outside.append(row)
+    assert np.diff(n_waiting).min() < 0 < np.diff(n_waiting).max()  # the list grew and shrank
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_scatter_agrees_with_its_slow_twin(seed):
+    rng = np.random.default_rng(seed)
+    source, area, floor = random_source(rng)
+    rows = rng.permutation(45).astype(np.int32)
+    draws = rng.random((45, DRAWS))
+    slow_floor, cell = floor.copy(), np.full((45, 2), -1, np.int32)
+    n_placed = scatter(rows, floor, cell, source.regions, source.capacity, source.group_start, area, draws)
+    placed = scatter_slowly(rows, slow_floor, source, area, draws)
+    assert n_placed == len(placed) > 5
+    np.testing.assert_array_equal(floor, slow_floor)
+    assert {row: tuple(cell[row].tolist()) for row in placed} == placed
+
+
+def test_largest_uniforms_stay_inside():
+    source, floor = one_region((2, 3, 9, 7)), np.full((10, 10), CELL_EMPTY, np.int32)
+    last = np.full(DRAWS, np.nextafter(1.0, 0.0))
+    args = (source.regions, source.capacity, source.group_start, (0, 0, 10, 10), last)
+    assert draw_source_cell(floor, *args) == (8, 6)
+    floor[6, 8] = 0
+    assert draw_source_cell(floor, *args) == (7, 6)  # all tries hit the taken cell, the list ends before it

@@ -1,0 +1,162 @@
+"""Power-law clusters: how many, how large, where."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.stats import chisquare
+
+from swarm_forage_env.clusters import ClusterLaw, cluster_law, draw_clusters, draw_sizes, footprint
+from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST
+from swarm_forage_env.config import ConfigError, ScenarioConfig
+from swarm_forage_env.kernels.scatter import count_objects
+from swarm_forage_env.placement import draw_source, place_all, static_cache_centres
+from swarm_forage_env.rng import Stream, stream_rng
+from swarm_forage_env.scenarios import SEARCH_AND_RESCUE_OBJECTS, scenario
+from swarm_forage_env.state import ObjectState
+
+LAW_TABLE = {
+    16: (3, 4, {8}, 10),
+    32: (4, 5, {16}, 17),
+    48: (4, 5, {16}, 23),
+    64: (4, 5, {16}, 28),
+    80: (4, 6, {16, 32}, 34),
+    96: (5, 6, {32}, 39),
+    112: (5, 6, {32}, 44),
+    128: (5, 7, {32, 64}, 49),
+}
+"""Side in metres: k_min, k_max, possible sizes, number of clusters."""
+
+
+def painted(config: ScenarioConfig) -> ObjectState:
+    """Return the objects of a world whose static caches stand already."""
+    objects = ObjectState.empty(config)
+    half = config.cache_side_cells // 2
+    for slot, (x, y) in enumerate(static_cache_centres(config)):
+        objects.floor[y - half : y + half + 1, x - half : x + half + 1] = CELL_CACHE - slot
+    return objects
+
+
+@pytest.mark.parametrize("side", LAW_TABLE)
+def test_cluster_law_table(side):
+    k_min, k_max, sizes, n_clusters = LAW_TABLE[side]
+    law = cluster_law(side)
+    assert law == ClusterLaw(k_min, k_max, n_clusters)
+    drawn = np.concatenate([draw_sizes(law, np.random.default_rng(seed)) for seed in range(20)])
+    assert set(drawn.tolist()) == sizes
+
+
+def test_object_counts_are_what_the_smallest_clusters_hold():
+    counts = {side: n_clusters * 2**k_min for side, (k_min, _, _, n_clusters) in LAW_TABLE.items()}
+    assert counts == SEARCH_AND_RESCUE_OBJECTS
+
+
+@pytest.mark.parametrize(("k_min", "k_max"), [(4, 6), (5, 7), (3, 8)])
+def test_larger_sizes_are_more_likely(k_min, k_max):
+    n_clusters = 20_000
+    sizes = draw_sizes(ClusterLaw(k_min, k_max, n_clusters), np.random.default_rng(1))
+    exponents = np.arange(k_min, k_max)
+    observed = [np.count_nonzero(sizes == 2**k) for k in exponents]
+    expected = n_clusters * ((exponents + 1) ** 3 - exponents**3) / (k_max**3 - k_min**3)
+    assert np.all(np.diff(expected) > 0)
+    assert sum(observed) == n_clusters
+    assert chisquare(observed, expected).pvalue > 0.001
+
+
+def test_a_single_possible_size():
+    # 20 m: both roots round up to the same k, whose cube root must not fall below it.
+    law = cluster_law(20.0)
+    assert law.k_min == law.k_max == 4
+    assert set(draw_sizes(law, np.random.default_rng(0)).tolist()) == {16}
+
+
+def test_sizes_come_largest_first():
+    sizes = draw_sizes(cluster_law(128), np.random.default_rng(3))
+    assert np.all(np.diff(sizes) <= 0)
+    assert len(set(sizes.tolist())) == 2
+
+
+@pytest.mark.parametrize(("size", "cells"), [(8, (7, 5)), (16, (8, 6)), (32, (10, 8)), (64, (12, 10))])
+def test_footprint_leaves_space_around_the_objects(size, cells):
+    assert footprint(size) == cells
+
+
+@pytest.mark.parametrize("side", LAW_TABLE)
+@pytest.mark.parametrize("caches", ["none", "static"])
+def test_clusters_keep_off_nest_caches_and_each_other(side, caches):
+    config = scenario("search_and_rescue", side_m=side, caches=caches)
+    floor = (painted(config) if caches == "static" else ObjectState.empty(config)).floor
+    x_low, y_low, x_high, y_high = config.arena.distributable_cells
+    for seed in range(5):
+        boxes, sizes = draw_clusters(config, floor, np.random.default_rng(seed))
+        assert len(boxes) == len(sizes) == LAW_TABLE[side][3]
+        for box, size in zip(boxes.tolist(), sizes.tolist(), strict=True):
+            assert (box[2] - box[0], box[3] - box[1]) == footprint(size)
+            assert x_low <= box[0] < box[2] <= x_high
+            assert y_low <= box[1] < box[3] <= y_high
+            assert np.all(floor[box[1] : box[3], box[0] : box[2]] == CELL_EMPTY)
+        for a, b in itertools.combinations(boxes.tolist(), 2):
+            assert a[2] < b[0] or b[2] < a[0] or a[3] < b[1] or b[3] < a[1]  # at least one cell between them
+
+
+@pytest.mark.parametrize("side", LAW_TABLE)
+def test_preset_counts_always_fit(side):
+    config = scenario("search_and_rescue", side_m=side)
+    floor = ObjectState.empty(config).floor
+    for seed in range(25):
+        source = draw_source(config, floor, stream_rng(seed, Stream.PLACEMENT))
+        assert source.capacity.sum() >= SEARCH_AND_RESCUE_OBJECTS[side]
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("side", LAW_TABLE)
+@pytest.mark.parametrize("seed", range(3))
+def test_every_object_lies_in_a_cluster_within_its_capacity(side, seed):
+    config = scenario("search_and_rescue", side_m=side, caches="static")
+    objects = painted(config)
+    rng = stream_rng(seed, Stream.PLACEMENT)
+    source = draw_source(config, objects.floor, rng)
+    place_all(objects, source, config.arena.distributable_cells, rng)
+    occupancy = np.array([count_objects(objects.floor, *box) for box in source.regions.tolist()])
+    assert occupancy.sum() == config.objects.n_objects
+    assert np.all(occupancy <= source.capacity)
+
+
+def test_source_groups_hold_equal_capacities():
+    config = scenario("search_and_rescue", side_m=128)
+    source = draw_source(config, ObjectState.empty(config).floor, stream_rng(0, Stream.PLACEMENT))
+    assert source.group_start[0] == 0
+    assert source.group_start[-1] == len(source.regions) == len(source.capacity)
+    groups = [set(part.tolist()) for part in np.split(source.capacity, source.group_start[1:-1])]
+    assert groups == [{32}, {64}]
+    for box, capacity in zip(source.regions.tolist(), source.capacity.tolist(), strict=True):
+        assert (box[2] - box[0], box[3] - box[1]) == footprint(capacity)
+
+
+def test_too_many_objects_for_the_clusters():
+    config = scenario("search_and_rescue", n_objects=369)
+    with pytest.raises(ConfigError, match=r"Expected at most 368 objects for the 23 power-law clusters .* got 369"):
+        draw_source(config, ObjectState.empty(config).floor, stream_rng(0, Stream.PLACEMENT))
+
+
+def test_no_room_for_the_clusters():
+    config = scenario("search_and_rescue")
+    floor = np.full((240, 240), CELL_NEST, np.int32)
+    with pytest.raises(ConfigError, match=r"room for 23 clusters of 16 to 16 objects .* found none in 100 random"):
+        draw_clusters(config, floor, np.random.default_rng(0))
+
+
+def test_an_arena_narrower_than_a_cluster():
+    corridor = scenario(
+        "search_and_rescue",
+        side_m=2_100.0,
+        width_m=2.0,
+        nest_centre_m=(1.0, 1_050.0),
+        nest_size_m=(0.4, 0.4),
+        start_margin_m=0.5,
+        n_objects=5,
+        n_robots=1,
+    )
+    # 8 distributable cells across; a cluster of 32 objects needs 10.
+    with pytest.raises(ConfigError, match="Expected room for 29 clusters of 16 to 32 objects"):
+        draw_clusters(corridor, ObjectState.empty(corridor).floor, np.random.default_rng(0))
