@@ -2,8 +2,9 @@
 
 Facts this file relies on, each held by a test:
 
-* Chipmunk moves bodies first and resolves contacts afterwards, so a contact is met one substep late. The number of
-  substeps bounds how deep robots push into each other; `tests/science/test_physics_convergence.py` shows the choice.
+* Chipmunk moves bodies first and resolves contacts afterwards, so a contact is met one substep late. How a tick is
+  divided bounds how deep robots push into each other; poses are only looked at when a tick ends, so a long first
+  substep and short last ones serve best. `tests/science/test_physics_convergence.py` shows the choice.
 * A batch lists dynamic bodies in the order they were added, then the space's static body. Bodies are never removed
   (removal would reorder them): a robot that leaves the world is parked, out of reach and colliding with nothing.
 * Chipmunk's search tree pads each box by what the body covers in 0.1 time units. Speeds are of the order of
@@ -26,8 +27,6 @@ MASS_KG = 1.6
 FRICTION = 0.7
 COLLISION_SLOP_M = 0.001
 """Overlap that Chipmunk leaves alone. Its default of 0.1 m would be more than a robot's radius."""
-OVERLAP_LEFT_PER_SUBSTEP = 0.2
-"""Share of an overlap that survives one substep."""
 WALL_RADIUS_M = 0.2
 """Half the thickness of a wall."""
 
@@ -48,11 +47,10 @@ class Physics:
         n_robots = len(heading)
         self.twist: FloatArray = np.zeros((n_robots + 1, 3))
         self._scaled = np.zeros((n_robots + 1, 3))
-        self._substeps = config.physics_substeps
-        self._substep = config.dt_s / TIME_UNIT_S / config.physics_substeps
+        self._substeps = [config.dt_s / TIME_UNIT_S * share for share in config.physics_substeps]
         self._space = pymunk.Space()
         self._space.collision_slop = COLLISION_SLOP_M
-        self._space.collision_bias = OVERLAP_LEFT_PER_SUBSTEP ** (1.0 / self._substep)
+        self._space.collision_bias = 0.0  # any overlap beyond the slop is undone in the next substep
         self._add_walls(config)
         self._shapes: list[pymunk.Circle] = []
         moment = pymunk.moment_for_circle(MASS_KG, 0.0, config.robots.radius_m)
@@ -82,8 +80,8 @@ class Physics:
         """Move all bodies by one tick along `twist` and write position, heading and facing of present robots."""
         np.multiply(self.twist, TIME_UNIT_S, out=self._scaled)
         pymunk.batch.set_space_bodies(self._space, _TWIST, self._write)
-        for _ in range(self._substeps):
-            self._space.step(self._substep)
+        for substep in self._substeps:
+            self._space.step(substep)
         unpack_poses(self.poses(), swarm.present, swarm.position, swarm.heading, swarm.facing)
 
     def poses(self) -> FloatArray:
@@ -93,10 +91,13 @@ class Physics:
         return np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 3)
 
     def park(self, row: int) -> None:
-        """Take a robot's body out of the world: far outside, colliding with nothing."""
+        """Take a robot's body out of the world: far outside, colliding with nothing, a metre from other parked ones.
+
+        Bodies parked on one spot would be tested against each other in every substep, only to be told apart by filter.
+        """
         disc = self._shapes[row]
         disc.filter = pymunk.ShapeFilter(categories=0, mask=0)
-        disc.body.position = (-10.0, -10.0)
+        disc.body.position = (-10.0 - row, -10.0)
         self._space.reindex_shapes_for_body(disc.body)
 
     def place(self, row: int, x: float, y: float, angle: float) -> None:

@@ -1,0 +1,273 @@
+"""Measure the project's speed targets: medians over repeats on one core, through the public runner.
+
+    scripts/bench             all cases
+    scripts/bench --quick     fewer repeats, shorter runs
+    scripts/bench --only crw  cases whose name contains "crw"
+
+A robot-tick is one robot for one control step of 0.2 s. Machines differ and are shared: compare ratios within one
+table, not single numbers between tables.
+"""
+
+import argparse
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+import swarm_forage_env.arena as arena_module
+from swarm_forage_env.config import ScenarioConfig, with_overrides
+from swarm_forage_env.env import parallel_env
+from swarm_forage_env.physics import Physics
+from swarm_forage_env.policy import load_policy, policy_names
+from swarm_forage_env.rng import Stream, stream_rng
+from swarm_forage_env.scenarios import warehouse_medium, warehouse_small
+from swarm_forage_env.study.run import build_stack, run_one
+from swarm_forage_env.study.spec import RunSpec, plan_run
+
+OBJECTS_PER_M2 = 0.35
+PHASES = ("physics", "sensing", "policy", "recording", "rest")
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table."""
+
+    case: str
+    value: float
+    unit: str
+    target: str
+    met: bool | None
+    note: str = ""
+
+
+def large_world(side_m: float, n_robots: int) -> ScenarioConfig:
+    """Random placement in a square of constant density: 5 % robots, 0.35 objects per square metre."""
+    return warehouse_medium(
+        width_m=side_m,
+        height_m=side_m,
+        nest_centre_m=(side_m / 2, side_m / 2),
+        nest_size_m=(0.2 * side_m, 0.2 * side_m),
+        n_robots=n_robots,
+        n_objects=int(OBJECTS_PER_M2 * side_m * side_m),
+    )
+
+
+def run_spec(scenario: ScenarioConfig, policy: str, ticks: int) -> RunSpec:
+    """A run of `ticks` control steps in one recording interval."""
+    seconds = ticks * scenario.dt_s
+    return plan_run(with_overrides(scenario, horizon_s=seconds, interval_s=seconds), policy)
+
+
+def robot_ticks_per_second(scenario: ScenarioConfig, policy: str, ticks: int, repeats: int) -> float:
+    """Median robot-ticks per second of `run_one`, compilation excluded, building the world included."""
+    run_one(run_spec(scenario, policy, 5))
+    spec = run_spec(scenario, policy, ticks)
+    rates = []
+    for _ in range(repeats):
+        started = time.perf_counter()
+        run_one(spec)
+        rates.append(ticks * scenario.robots.n_robots / (time.perf_counter() - started))
+    return statistics.median(rates)
+
+
+@contextmanager
+def stopwatch(owner: Any, name: str, total: list[float]) -> Iterator[None]:
+    """Add the time spent in `owner.name` to total[0] while the context lasts."""
+    original: Callable[..., Any] = getattr(owner, name)
+
+    def timed(*args: Any, **options: Any) -> Any:
+        started = time.perf_counter()
+        result = original(*args, **options)
+        total[0] += time.perf_counter() - started
+        return result
+
+    setattr(owner, name, timed)
+    try:
+        yield
+    finally:
+        setattr(owner, name, original)
+
+
+def tick_shares(scenario: ScenarioConfig, policy_name: str, ticks: int) -> dict[str, float]:
+    """Microseconds per tick spent in each phase; the stopwatches themselves cost a few of them."""
+    spec = run_spec(scenario, policy_name, ticks)
+    policy = load_policy(policy_name)
+    recorder = build_stack(spec.scenario, reads=getattr(policy, "reads", None))
+    world = recorder.world
+    policy.reset(world.task, stream_rng(0, Stream.POLICY))
+    obs = recorder.reset_batch(0)
+    spent: dict[str, list[float]] = {phase: [0.0] for phase in PHASES}
+    with (
+        stopwatch(Physics, "advance", spent["physics"]),
+        stopwatch(arena_module, "sense_proximity", spent["sensing"]),
+        stopwatch(arena_module, "mark_interference", spent["sensing"]),
+        stopwatch(arena_module, "sense", spent["sensing"]),
+        stopwatch(policy, "act", spent["policy"]),
+        stopwatch(recorder, "after_step", spent["recording"]),
+    ):
+        started = time.perf_counter()
+        for _ in range(ticks):
+            actions = policy.act(obs, world.active)
+            obs, _, _, _ = recorder.step_batch(actions, tasks=getattr(policy, "task", None))
+        total = time.perf_counter() - started
+    spent["rest"][0] = total - sum(seconds[0] for seconds in spent.values())
+    return {phase: seconds[0] / ticks * 1e6 for phase, seconds in spent.items()}
+
+
+def agent_steps_per_second(ticks: int, repeats: int) -> float:
+    """Median agent-steps per second through the dict API, with actions drawn beforehand, 200 robots."""
+    env = parallel_env("warehouse_medium")
+    env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    drawn = [{agent: rng.uniform(-1, 1, 3).astype(np.float32) for agent in env.agents} for _ in range(min(ticks, 50))]
+    env.step(drawn[0])
+    rates = []
+    for _ in range(repeats):
+        started = time.perf_counter()
+        for tick in range(ticks):
+            env.step(drawn[tick % len(drawn)])
+        rates.append(ticks * env.num_agents / (time.perf_counter() - started))
+    return statistics.median(rates)
+
+
+FIRST_TICK = """
+import time
+started = time.perf_counter()
+from swarm_forage_env.study.run import run_one
+from swarm_forage_env.study.spec import plan_run
+from swarm_forage_env.scenarios import warehouse_small
+run_one(plan_run(warehouse_small(horizon_s=1.0, interval_s=1.0), "crw"))
+print(time.perf_counter() - started)
+"""
+IMPORT = """
+import time
+started = time.perf_counter()
+import swarm_forage_env
+print(time.perf_counter() - started)
+"""
+PEAK_MEMORY = """
+import resource, sys
+sys.path.insert(0, {scripts!r})
+from bench import large_world, run_spec
+from swarm_forage_env.study.run import run_one
+run_one(run_spec(large_world(576.0, 16384), "crw", 20))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
+"""
+
+
+def in_fresh_process(program: str, **environment: str) -> float:
+    """Run a small program that prints one number, in a new interpreter."""
+    output = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, env={**os.environ, **environment}
+    )
+    return float(output.stdout.split()[-1])
+
+
+def rate_row(case: str, scenario: ScenarioConfig, policy: str, target: float | None, ticks: int, repeats: int) -> Row:
+    """Throughput of one case with the shares of a tick."""
+    rate = robot_ticks_per_second(scenario, policy, ticks, repeats) / 1e6
+    shares = tick_shares(scenario, policy, ticks)
+    total = sum(shares.values())
+    note = ", ".join(f"{phase} {share / total:.0%}" for phase, share in shares.items())
+    goal = "-" if target is None else f">= {target:g}"
+    return Row(case, rate, "M robot-ticks/s", goal, None if target is None else rate >= target, note)
+
+
+def scaling_rows(ticks: int, repeats: int) -> Iterator[Row]:
+    """Cost per robot-tick of large swarms beside that of 200 robots, measured in turn."""
+    small, medium, large = warehouse_medium(), large_world(288.0, 4096), large_world(576.0, 16_384)
+    costs: dict[int, list[float]] = {200: [], 4096: [], 16_384: []}
+    for _ in range(repeats):
+        for scenario in (small, medium, large):
+            n_robots = scenario.robots.n_robots
+            costs[n_robots].append(_cost_per_robot_tick(scenario, max(20, ticks * 200 // n_robots)))
+    base = costs[200]
+    yield Row("CRW, N = 200, as reference", statistics.median(base), "us per robot-tick", "-", None)
+    for n_robots in (4096, 16_384):
+        ratio = statistics.median(cost / reference for cost, reference in zip(costs[n_robots], base, strict=True))
+        note = f"{statistics.median(costs[n_robots]):.2f} us per robot-tick"
+        yield Row(f"CRW, N = {n_robots:,}, cost over N = 200", ratio, "x", "<= 1.5", ratio <= 1.5, note)
+    scripts = str(Path(__file__).resolve().parent)
+    memory = in_fresh_process(PEAK_MEMORY.format(scripts=scripts))
+    yield Row("CRW, N = 16,384, peak memory", memory, "GiB", "< 2", memory < 2)
+
+
+def _cost_per_robot_tick(scenario: ScenarioConfig, ticks: int) -> float:
+    """Microseconds per robot-tick of the loop alone, after a short run-in."""
+    policy = load_policy("crw")
+    spec = run_spec(scenario, "crw", ticks + 20)
+    recorder = build_stack(spec.scenario, reads=getattr(policy, "reads", None))
+    world = recorder.world
+    policy.reset(world.task, stream_rng(0, Stream.POLICY))
+    obs = recorder.reset_batch(0)
+    started = 0.0
+    for tick in range(ticks + 20):
+        if tick == 20:
+            started = time.perf_counter()
+        obs, _, _, _ = recorder.step_batch(policy.act(obs, world.active))
+    return (time.perf_counter() - started) / ticks / scenario.robots.n_robots * 1e6
+
+
+def start_rows(repeats: int) -> Iterator[Row]:
+    """Import and first tick, each in fresh interpreters."""
+    seconds = statistics.median(in_fresh_process(IMPORT) for _ in range(repeats))
+    yield Row("import swarm_forage_env", seconds, "s", "< 0.3", seconds < 0.3)
+    with tempfile.TemporaryDirectory() as folder:
+        seconds = in_fresh_process(FIRST_TICK, NUMBA_CACHE_DIR=folder)
+        yield Row("import to first ticks, nothing compiled yet", seconds, "s", "< 30", seconds < 30)
+        seconds = statistics.median(in_fresh_process(FIRST_TICK, NUMBA_CACHE_DIR=folder) for _ in range(repeats))
+        yield Row("import to first ticks, later", seconds, "s", "< 2", seconds < 2)
+
+
+def rows(ticks: int, repeats: int, only: str) -> Iterator[Row]:
+    """All cases whose name contains `only`."""
+    rates: list[tuple[str, ScenarioConfig, str, float]] = [
+        ("CRW, N = 50, warehouse_small", warehouse_small(), "crw", 0.5),
+        ("CRW, N = 200, warehouse_medium", warehouse_medium(), "crw", 1.5),
+        ("DPO, N = 200, warehouse_medium", warehouse_medium(), "dpo", 0.0),
+        ("STOCHX, N = 200, warehouse_medium", warehouse_medium(caches="dynamic"), "stochx", 0.8),
+    ]
+    for case, scenario, policy, target in rates:
+        if only in case.lower() and policy in policy_names():
+            yield rate_row(case, scenario, policy, target or None, ticks, repeats)
+    if only in "scaling crw, n = 4,096 16,384":
+        yield from scaling_rows(ticks, repeats)
+    if only in "dict api":
+        rate = agent_steps_per_second(ticks // 4, repeats)
+        yield Row("PettingZoo dict API, N = 200", rate / 1e3, "k agent-steps/s", ">= 150", rate >= 150_000)
+    if only in "start import":
+        yield from start_rows(repeats)
+
+
+def main() -> None:
+    """Run the cases and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="fewer repeats, shorter runs")
+    parser.add_argument("--only", default="", help="cases whose name contains this text")
+    arguments = parser.parse_args()
+    ticks, repeats = (2_000, 3) if arguments.quick else (10_000, 7)
+    console = Console(width=150)
+    table = Table(title=f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, one core")
+    for heading in ("case", "measured", "unit", "target", "met", "where the time goes"):
+        table.add_column(heading, justify="right" if heading in ("measured", "target") else "left")
+    for row in rows(ticks, repeats, arguments.only.lower()):
+        met = "" if row.met is None else ("yes" if row.met else "NO")
+        console.print(f"{row.case}: {row.value:.3g} {row.unit}", style="dim")
+        table.add_row(row.case, f"{row.value:.3g}", row.unit, row.target, met, row.note)
+    console.print(table)
+
+
+if __name__ == "__main__":
+    main()
