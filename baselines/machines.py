@@ -18,9 +18,8 @@ import numpy as np
 from swarm_forage_env.detection import is_obstacle_vector, ring_sum, sees_nest, sees_object
 from swarm_forage_env.layout import EVENT_SCALE
 from swarm_forage_env.policy import Event, Grip
-from swarm_forage_env.types import ActionArray, ObsArray
 
-from .compiling import inline_kernel, kernel
+from .compiling import Row, inline_kernel, kernel
 from .motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander
 
 
@@ -135,7 +134,7 @@ class Senses(NamedTuple):
 
 
 @kernel
-def sense(row: ObsArray, c: np.record) -> Senses:
+def sense(row: Row, c: np.record) -> Senses:
     """Read one observation row."""
     obstacle_x, obstacle_y = ring_sum(row[c.proximity : c.proximity + 24])
     return Senses(
@@ -205,7 +204,7 @@ def random_walk(robot: np.record, senses: Senses, c: np.record, u: float) -> tup
 
 @kernel
 def explore_for_object(
-    robot: np.record, senses: Senses, row: ObsArray, c: np.record, draws: np.ndarray
+    robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row
 ) -> tuple[bool, float, float]:
     """Walk at random until the ground sensors see an object, which is ignored for the first 50 ticks.
 
@@ -241,9 +240,7 @@ def stop_vector(robot: np.record) -> None:
 
 
 @kernel
-def go_to_goal(
-    robot: np.record, senses: Senses, row: ObsArray, c: np.record, draws: np.ndarray
-) -> tuple[bool, float, float]:
+def go_to_goal(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
     """One tick on the way to the goal: arrival force, avoidance, then 2 s straight on before turning back.
 
     A change of state acts in the same tick. Obstacles are ignored within the slowing radius, as far as the last
@@ -296,9 +293,9 @@ def go_to_goal(
 def acquire(
     robot: np.record,
     senses: Senses,
-    row: ObsArray,
+    row: Row,
     c: np.record,
-    draws: np.ndarray,
+    draws: Row,
     memory: Any,
     select: Callable[..., bool],
     is_known: Callable[..., bool],
@@ -350,7 +347,7 @@ def acquire(
 
 
 @kernel
-def home(robot: np.record, senses: Senses, row: ObsArray, c: np.record, draws: np.ndarray) -> tuple[bool, float, float]:
+def home(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
     """One tick of carrying an object into the nest: towards the light, then deeper by a random amount.
 
     The drop distance from the nest centre is drawn uniformly between 0.01 m and the distance at entry, which spreads
@@ -376,9 +373,7 @@ def home(robot: np.record, senses: Senses, row: ObsArray, c: np.record, draws: n
 
 
 @kernel
-def deliver_and_leave(
-    robot: np.record, senses: Senses, row: ObsArray, c: np.record, draws: np.ndarray
-) -> tuple[float, float]:
+def deliver_and_leave(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[float, float]:
     """Act in every activity that moves and is not acquiring: homing, and leaving the nest. Returns the force."""
     x = 0.0
     y = 0.0
@@ -392,7 +387,7 @@ def deliver_and_leave(
 
 
 @kernel
-def command(robot: np.record, x: float, y: float, c: np.record, action: ActionArray) -> None:
+def command(robot: np.record, x: float, y: float, c: np.record, action: Row) -> None:
     """Write the action: wheels for the summed force (x, y), gripper for the activity."""
     activity = robot.activity
     if activity in (WAIT_PICKUP, WAIT_DROP):

@@ -20,7 +20,7 @@ import numpy as np
 from swarm_forage_env.layout import WINDOW_CELLS
 from swarm_forage_env.types import FloatArray, IntArray, ObsArray
 
-from .compiling import kernel
+from .compiling import Row, kernel
 
 _WINDOW = WINDOW_CELLS * WINDOW_CELLS
 _REACH = WINDOW_CELLS // 2
@@ -46,12 +46,12 @@ class ObjectMemory(NamedTuple):
 class OneMemory(NamedTuple):
     """`ObjectMemory` of one robot: the same arrays without their first axis."""
 
-    row: IntArray
-    cell_x: IntArray
-    cell_y: IntArray
-    seen: IntArray
-    entry: IntArray
-    window: ObsArray
+    row: Row
+    cell_x: Row
+    cell_y: Row
+    seen: Row
+    entry: Row
+    window: Row
 
 
 def new_memory(n_robots: int, n_objects: int) -> ObjectMemory:
@@ -120,7 +120,7 @@ def forget(robot: np.record, memory: OneMemory, object_row: int) -> None:
 
 
 @kernel
-def look_around(robot: np.record, row: ObsArray, c: np.record, memory: OneMemory) -> None:
+def look_around(robot: np.record, row: Row, c: np.record, memory: OneMemory) -> None:
     """One tick of the memory rule above, from the window in observation `row`. Advances the robot's clock."""
     robot.clock += 1
     left = int((row[c.los_cell] + 1.0) * c.half_width_m / c.cell_m) - _REACH
@@ -164,4 +164,4 @@ def density(robot: np.record, memory: OneMemory, entry: int, log_keep: float) ->
 
 def densities(ages_ticks: IntArray, evaporation_per_tick: float) -> FloatArray:
     """Pheromone densities after `ages_ticks` ticks without sight, for inspection."""
-    return (1.0 - evaporation_per_tick) ** (np.asarray(ages_ticks) + 1.0)
+    return np.exp(math.log1p(-evaporation_per_tick) * (ages_ticks + 1.0))

@@ -10,9 +10,8 @@ import math
 import numpy as np
 
 from swarm_forage_env.detection import ring_sum
-from swarm_forage_env.types import ActionArray, ObsArray
 
-from .compiling import kernel
+from .compiling import Row, kernel
 
 
 @kernel
@@ -45,7 +44,7 @@ def avoidance(x: float, y: float, c: np.record) -> tuple[float, float]:
 
 
 @kernel
-def phototaxis(light: ObsArray, c: np.record) -> tuple[float, float]:
+def phototaxis(light: Row, c: np.record) -> tuple[float, float]:
     """Force towards the vector sum of the 24 light readings; straight ahead in the dark."""
     x, y = ring_sum(light)
     length = math.sqrt(x * x + y * y)
@@ -90,13 +89,13 @@ def recovery(c: np.record) -> tuple[float, float]:
 
 
 @kernel
-def is_standing(wheel_speed: ObsArray, c: np.record) -> bool:
+def is_standing(wheel_speed: Row, c: np.record) -> bool:
     """Return whether the mean of two wheel readings means standing, spinning on the spot or driving backwards."""
     return 0.5 * (wheel_speed[0] + wheel_speed[1]) * c.wheel_scale_mps <= c.standing_speed_mps
 
 
 @kernel
-def drive(x: float, y: float, c: np.record, wheels: ActionArray) -> None:
+def drive(x: float, y: float, c: np.record, wheels: Row) -> None:
     """Turn the summed force into wheel commands, as shares of the wheel scale.
 
         base = min(|F|, max_speed),  a = angle of F

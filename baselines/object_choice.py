@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarm_forage_env.detection import sees_object
-from swarm_forage_env.types import ObsArray
 
-from .compiling import kernel
+from .compiling import Row, kernel
 from .machines import Senses
 from .memory import OneMemory, density
 from .parameters import ControllerParameters, ParameterError
@@ -99,6 +98,6 @@ def object_is_known(robot: np.record, memory: OneMemory) -> bool:
 
 
 @kernel
-def object_is_reached(row: ObsArray, c: np.record) -> bool:
+def object_is_reached(row: Row, c: np.record) -> bool:
     """Whether the ground sensors see an object."""
     return sees_object(row[c.ground : c.ground + 4])
