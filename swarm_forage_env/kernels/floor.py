@@ -48,13 +48,21 @@ def ground(
             continue
         cos = facing[i, 0]
         sin = facing[i, 1]
+        grey = _GREY_EMPTY
+        last_x = -2
+        last_y = -2
         for k in range(4):
             x = position[i, 0] + cos * _GROUND_X[k] - sin * _GROUND_Y[k]
             y = position[i, 1] + sin * _GROUND_X[k] + cos * _GROUND_Y[k]
             cell_x = int(math.floor(x * CELLS_PER_M))
             cell_y = int(math.floor(y * CELLS_PER_M))
-            inside = 0 <= cell_x < nx and 0 <= cell_y < ny
-            obs[i, start + k] = grey_of(floor[cell_y, cell_x]) if inside else _GREY_EMPTY
+            # Mostly all four sensors are over one cell; a large floor does not fit the processor's cache.
+            if cell_x != last_x or cell_y != last_y:
+                inside = 0 <= cell_x < nx and 0 <= cell_y < ny
+                grey = grey_of(floor[cell_y, cell_x]) if inside else _GREY_EMPTY
+                last_x = cell_x
+                last_y = cell_y
+            obs[i, start + k] = grey
 
 
 @njit(cache=True)
