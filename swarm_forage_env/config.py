@@ -69,6 +69,16 @@ def _require_text(section: str, **values: Any) -> None:
         )
 
 
+def _require_shares(section: str, **values: Any) -> None:
+    for name, value in values.items():
+        shares = cast("tuple[Any, ...]", value) if isinstance(value, tuple) else ()
+        are_positive = all(isinstance(share, (int, float)) and share > 0 for share in shares)
+        _require(
+            are_positive and abs(sum(shares) - 1.0) < 1e-9,
+            f"Expected {section}.{name} to be positive shares of a tick that sum to 1, got {value!r}.",
+        )
+
+
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Return " Did you mean ...?" with the nearest known name, or an empty string."""
     close = difflib.get_close_matches(name, list(known), n=1)
@@ -302,7 +312,7 @@ class ScenarioConfig:
                 f"Expected {name} to be one of {', '.join(known)}, got {value!r}." + suggestion(str(value), known),
             )
         _require_positive("scenario", dt_s=self.dt_s, horizon_s=self.horizon_s, interval_s=self.interval_s)
-        self._check_substeps()
+        _require_shares("scenario", physics_substeps=self.physics_substeps)
         for name in ("horizon_s", "interval_s"):
             ticks = getattr(self, name) / self.dt_s
             _require(
@@ -316,14 +326,6 @@ class ScenarioConfig:
         )
         self._check_room_for_robots()
         self._check_room_for_objects()
-
-    def _check_substeps(self) -> None:
-        shares = self.physics_substeps
-        valid = isinstance(shares, tuple) and all(isinstance(share, (int, float)) and share > 0 for share in shares)
-        _require(
-            valid and abs(sum(shares) - 1.0) < 1e-9,
-            f"Expected scenario.physics_substeps to be positive shares of a tick that sum to 1, got {shares!r}.",
-        )
 
     def _check_room_for_robots(self) -> None:
         margin, radius, n_robots = self.robots.start_margin_m, self.robots.radius_m, self.robots.n_robots

@@ -187,6 +187,8 @@ def test_mapping_refuses_a_value_where_a_section_belongs():
         ({"horizon_s": 100.1}, ("horizon_s to be a whole number of ticks of 0.2 s", "got 100.1")),
         ({"interval_s": 0.3}, ("interval_s to be a whole number of ticks of 0.2 s", "got 0.3")),
         ({"physics_substeps": (0.5, 0.4)}, ("scenario.physics_substeps", "sum to 1", "got (0.5, 0.4)")),
+        ({"physics_substeps": 5}, ("scenario.physics_substeps", "sum to 1", "got 5")),
+        ({"physics_substeps": (1.5, -0.5)}, ("scenario.physics_substeps to be positive shares", "got (1.5, -0.5)")),
         ({"quirks": True}, ("quirks to be a Quirks", "got True")),
         ({"n_robot": 4}, ("Unknown scenario field 'n_robot'", "Did you mean 'n_robots'?")),
     ],
