@@ -194,5 +194,7 @@ class ForagingArena:
             swarm.wheel_speed[robot] = 0.0
         for robot in np.flatnonzero(~swarm.present & present).tolist():
             x, y = swarm.position[robot].tolist()
-            self._physics.place(robot, x, y, float(swarm.heading[robot]))
+            angle = float(swarm.heading[robot])
+            swarm.facing[robot] = np.cos(angle), np.sin(angle)
+            self._physics.place(robot, x, y, angle)
         swarm.active[:], swarm.present[:] = active, present

@@ -150,22 +150,24 @@ def protected_boxes(config: ScenarioConfig, source: Source) -> list[Box]:
     """
     if config.objects.placement == "random" and not config.quirks.dynamic_cache_merges_all:
         return []
-    return [(box[0], box[1], box[2], box[3]) for box in source.boxes.tolist()]
+    return [(box[0], box[1], box[2], box[3]) for box in source.regions.tolist()]
 
 
 def founding_members(founder: int, config: ScenarioConfig, objects: ObjectState, protected: list[Box]) -> IntArray:
     """Free, unprotected objects within `min_dist_m` of the object `founder`, itself included; empty if it is protected.
 
-    Under the quirk `dynamic_cache_merges_all` the distance does not matter.
+    Under the quirk `dynamic_cache_merges_all` neither the distance nor the founder itself matters: all unprotected
+    objects join.
     """
     usable = objects.status == ObjectStatus.FREE
     for box in protected:
         usable &= ~_inside(objects.cell, box)
-    if not usable[founder]:
-        return np.empty(0, np.int32)
     if not config.quirks.dynamic_cache_merges_all:
-        offset = (objects.cell - objects.cell[founder]) * CELL_M
-        usable &= (offset * offset).sum(axis=1) <= config.min_dist_m**2
+        if not usable[founder]:
+            return np.empty(0, np.int32)
+        # In cells, where squared distances are whole: in metres an object just at the limit would fall to rounding.
+        offset = objects.cell - objects.cell[founder]
+        usable &= (offset * offset).sum(axis=1) <= (config.min_dist_m / CELL_M) ** 2 + 1e-6
     return np.flatnonzero(usable).astype(np.int32)
 
 

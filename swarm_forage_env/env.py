@@ -185,7 +185,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """
         if seed is None:
             seed = int(self._seeds.integers(2**31))
-        elif isinstance(seed, bool) or int(seed) != seed or seed < 0:
+        elif isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
             raise ValueError(f"Expected seed to be a non-negative integer or None, got {seed!r}.")
         else:
             self._seeds = np.random.default_rng(seed)
@@ -274,7 +274,9 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     def _pack(self, actions: dict[str, np.ndarray]) -> ActionArray:
         agents = self.agents
         if not agents:
-            raise RuntimeError("All agents are done; call reset to start another run.")
+            raise RuntimeError(
+                "Call reset before step." if self.seed_value is None else "All agents are done; call reset first."
+            )
         if actions.keys() != self._row_of.keys() and set(actions) != set(agents):
             missing = [agent for agent in agents if agent not in actions]
             foreign = [agent for agent in actions if agent not in agents]
@@ -283,16 +285,18 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
                 f"missing {missing[:3] or 'none'}, not in env.agents {foreign[:3] or 'none'}."
             )
         packed = self._actions
+        complete = len(agents) == len(self.possible_agents)
+        rows = packed if complete else np.empty((len(agents), 3), np.float32)
         try:
-            if len(agents) == len(self.possible_agents):
-                np.stack([actions[agent] for agent in agents], out=packed, casting="same_kind")
-            else:
-                packed[:] = 0.0
-                for agent in agents:
-                    packed[self._row_of[agent]] = actions[agent]
-        except ValueError as error:
-            shapes = {np.shape(action) for action in actions.values()}
-            raise ActionError(f"Expected each action with shape (3,), got shapes {sorted(shapes)}.") from error
+            np.stack([actions[agent] for agent in agents], out=rows, casting="same_kind")
+        except (TypeError, ValueError) as error:
+            shapes = {np.shape(actions[agent]) for agent in agents}
+            raise ActionError(
+                f"Expected each action as three numbers, shape (3,), got shapes {sorted(shapes)}: {error}."
+            ) from error
+        if not complete:
+            packed[:] = 0.0
+            packed[[self._row_of[agent] for agent in agents]] = rows
         return packed
 
     def _infos(self, agents: list[str]) -> dict[str, dict[str, Any]]:

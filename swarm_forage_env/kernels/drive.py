@@ -23,24 +23,22 @@ def drive(
 
     `limits` holds wheel scale, centre-speed limit, wheel-difference limit (m/s) and wheel base (m). The velocity is
     the chord of the exact arc over one tick, so that free motion is exact however the tick is divided.
-    Returns the first active row with a command that is not finite, or -1.
+    Returns -1, or the first active row with a command that is not finite; then nothing is written.
     """
+    for i in range(facing.shape[0]):
+        if active[i] and not math.isfinite(float(actions[i, 0]) + float(actions[i, 1]) + float(actions[i, 2])):
+            return i
     scale, max_speed, max_difference, wheel_base = limits[0], limits[1], limits[2], limits[3]
     for i in range(facing.shape[0]):
         left = 0.0
         right = 0.0
-        if active[i]:
-            command_left = float(actions[i, 0])
-            command_right = float(actions[i, 1])
-            if not math.isfinite(command_left + command_right + actions[i, 2]):
-                return i
-            if pending_kind[i] == 0:
-                command_left = min(1.0, max(-1.0, command_left)) * scale
-                command_right = min(1.0, max(-1.0, command_right)) * scale
-                speed = min(max_speed, max(-max_speed, 0.5 * (command_left + command_right)))
-                difference = min(max_difference, max(-max_difference, command_right - command_left))
-                left = (speed - 0.5 * difference) * wheel_gain[i, 0]
-                right = (speed + 0.5 * difference) * wheel_gain[i, 1]
+        if active[i] and pending_kind[i] == 0:
+            command_left = min(1.0, max(-1.0, float(actions[i, 0]))) * scale
+            command_right = min(1.0, max(-1.0, float(actions[i, 1]))) * scale
+            speed = min(max_speed, max(-max_speed, 0.5 * (command_left + command_right)))
+            difference = min(max_difference, max(-max_difference, command_right - command_left))
+            left = (speed - 0.5 * difference) * wheel_gain[i, 0]
+            right = (speed + 0.5 * difference) * wheel_gain[i, 1]
         wheel_speed[i, 0] = left
         wheel_speed[i, 1] = right
         turn = (right - left) / wheel_base

@@ -458,9 +458,9 @@ def interact(world: World, rules: Rules, gripper: ActionArray, tick: int, chance
     n_queued = 0
     for k in range(n_robots):
         i = (tick + k) % n_robots
-        if world.pending_kind[i] == NO_REQUEST:
-            if not world.active[i] or (world.carried_object[i] >= 0) == (gripper[i, 2] > 0.0):
-                continue  # away, holding, or empty and not grasping: most robots in most ticks
+        idle = not world.active[i] or (world.carried_object[i] >= 0) == (gripper[i, 2] > 0.0)
+        if world.pending_kind[i] == NO_REQUEST and idle:
+            continue  # not here, holding, or empty and not grasping: most robots in most ticks
         band = _band_now(world, gripper, i)
         kind, _ = request_of(world, rules, band, i)
         if kind != NO_REQUEST or world.pending_kind[i] != NO_REQUEST:

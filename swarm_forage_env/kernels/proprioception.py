@@ -18,14 +18,15 @@ def own_motion(
 ) -> None:
     """Write wheel_speed, position and heading, six columns from `start`.
 
-    `scales` = wheel scale in m/s, arena width and height in m.
+    `scales` = wheel scale in m/s, arena width and height in m. Actuator noise can take a wheel above the scale; the
+    reading then stays at the end of its range.
     """
     for i in range(facing.shape[0]):
         if not present[i]:
             obs[i, start : start + 6] = 0.0
             continue
-        obs[i, start] = wheel_speed[i, 0] / scales[0]
-        obs[i, start + 1] = wheel_speed[i, 1] / scales[0]
+        obs[i, start] = min(1.0, max(-1.0, wheel_speed[i, 0] / scales[0]))
+        obs[i, start + 1] = min(1.0, max(-1.0, wheel_speed[i, 1] / scales[0]))
         obs[i, start + 2] = 2.0 * position[i, 0] / scales[1] - 1.0
         obs[i, start + 3] = 2.0 * position[i, 1] / scales[2] - 1.0
         obs[i, start + 4] = facing[i, 0]

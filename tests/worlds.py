@@ -1,0 +1,170 @@
+"""Small worlds arranged by hand: every object in the depot, every robot in the yard, until a test moves them.
+
+The stage is the small warehouse, 160 x 80 cells of 0.2 m: nest in the cells x 8 .. 23, y 8 .. 71, objects allowed in
+the cells x 24 .. 136, y 12 .. 68, source strip x 120 .. 135, y 12 .. 67.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from swarm_forage_env.caches import create_cache
+from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, Event
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policy import Grip
+from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.state import ObjectStatus
+
+NEST_CELL = (16, 40)
+OPEN_CELL = (60, 40)
+WALL_CELL = (60, 5)
+"""A cell outside of the distributable box, where nothing may lie."""
+
+
+def tidy_world(*, n_robots: int = 4, n_objects: int = 8, caches: str = "none", **overrides: Any) -> ForageEnv:
+    """A small warehouse after reset, with objects in the depot, robots in the yard and no cache standing."""
+    options: dict[str, Any] = {"respawn_scale": 0.0, "physics_substeps": (1.0,), **overrides}
+    env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, n_objects=n_objects, caches=caches, **options))
+    env.reset_batch(0)
+    objects, standing = env.objects, env.caches
+    objects.floor[objects.floor != CELL_NEST] = CELL_EMPTY
+    standing.alive[:], standing.count[:], standing.serial[:], standing.last_serial = False, 0, 0, 0
+    objects.status[:], objects.cache_slot[:], objects.carriers[:] = ObjectStatus.WAITING, -1, 0
+    objects.waiting.clear()
+    env.events.counters[:] = 0
+    for row in range(n_objects):
+        lay(env, row, depot(row))
+    for robot in range(n_robots):
+        put(env, robot, *cell_centre((30 + 3 * robot, 74)))
+    return env
+
+
+def depot(row: int) -> tuple[int, int]:
+    """Cell of an object that plays no part: far from all others, on the source strip."""
+    return (121 + 4 * (row % 4), 14 + 4 * (row // 4))
+
+
+def cell_centre(cell: tuple[int, int]) -> tuple[float, float]:
+    """Centre of a cell in metres."""
+    return (2 * cell[0] + 1) / 10, (2 * cell[1] + 1) / 10
+
+
+def put(env: ForageEnv, robot: int, x: float, y: float, heading: float = 0.0) -> None:
+    """Put a robot and its body at a pose."""
+    swarm = env.swarm
+    swarm.position[robot], swarm.heading[robot] = (x, y), heading
+    swarm.facing[robot] = np.cos(heading), np.sin(heading)
+    env.arena._physics.place(robot, x, y, heading)
+
+
+def stand(env: ForageEnv, robot: int, cell: tuple[int, int]) -> None:
+    """Put a robot on the centre of a cell."""
+    put(env, robot, *cell_centre(cell))
+
+
+def lift(env: ForageEnv, row: int) -> None:
+    """Take a free or waiting object off the floor or out of the waiting list."""
+    objects = env.objects
+    if objects.status[row] == ObjectStatus.FREE and objects.cell[row, 0] >= 0:
+        objects.floor[objects.cell[row, 1], objects.cell[row, 0]] = CELL_EMPTY
+    if row in objects.waiting:
+        objects.waiting.remove(row)
+    objects.cell[row] = -1
+
+
+def lay(env: ForageEnv, row: int, cell: tuple[int, int]) -> None:
+    """Put an object on a cell."""
+    lift(env, row)
+    objects = env.objects
+    objects.floor[cell[1], cell[0]] = row
+    objects.cell[row], objects.status[row] = cell, ObjectStatus.FREE
+
+
+def load(env: ForageEnv, robot: int, row: int) -> None:
+    """Give an object to a robot, as if picked up from the floor."""
+    lift(env, row)
+    env.objects.status[row] = ObjectStatus.CARRIED
+    env.objects.carriers[row] += 1
+    env.swarm.carried_object[robot] = row
+
+
+def build_cache(env: ForageEnv, rows: Sequence[int], centre: tuple[int, int]) -> int:
+    """Create a cache of free objects; returns its slot."""
+    return create_cache(
+        np.array(rows, np.int32), centre, env.scenario.cache_side_cells, env.objects, env.caches, env.events
+    )
+
+
+def act(env: ForageEnv, grips: Mapping[int, float]) -> list[Event]:
+    """Step once with standing wheels and these gripper commands (others hold or, empty, release); return the events."""
+    actions = np.zeros((len(env.active), 3), np.float32)
+    actions[:, 2] = np.where(env.swarm.carried_object >= 0, Grip.GRASP, Grip.RELEASE)
+    for robot, grip in grips.items():
+        actions[robot, 2] = grip
+    env.step_batch(actions)
+    return [Event(code) for code in env.events.code.tolist()]
+
+
+def snapshot(env: ForageEnv) -> dict[str, np.ndarray]:
+    """Copies of every array of the world, for bitwise comparison."""
+    world: dict[str, np.ndarray] = {"tick": np.array(env.tick)}
+    for name in ("swarm", "objects", "caches", "events"):
+        state = getattr(env, name)
+        for field in type(state).__slots__:
+            world[f"{name}.{field}"] = np.array(getattr(state, field))
+    return world
+
+
+def assert_same_world(before: Mapping[str, np.ndarray], after: Mapping[str, np.ndarray]) -> None:
+    """Compare two snapshots bit for bit."""
+    assert before.keys() == after.keys()
+    for name, value in before.items():
+        np.testing.assert_array_equal(after[name], value, err_msg=name)
+
+
+def assert_conserved(env: ForageEnv) -> None:
+    """Every object is in exactly one place, and floor, caches and robots agree about it."""
+    objects, caches, swarm = env.objects, env.caches, env.swarm
+    status = objects.status
+    counts = [int(np.count_nonzero(status == kind)) for kind in ObjectStatus]
+    assert sum(counts) == len(status)
+    floor = objects.floor
+    # Floor: exactly the free objects, each on its own cell.
+    lying = np.argwhere(floor >= 0)
+    rows = floor[lying[:, 0], lying[:, 1]]
+    assert sorted(rows.tolist()) == np.flatnonzero(status == ObjectStatus.FREE).tolist()
+    np.testing.assert_array_equal(objects.cell[rows], lying[:, ::-1])
+    x_low, y_low, x_high, y_high = env.scenario.arena.distributable_cells
+    low, high = np.array([x_low, y_low]), np.array([x_high, y_high])
+    assert np.all((objects.cell[rows] >= low) & (objects.cell[rows] < high))
+    # Nest and caches: every special code where it belongs, and nowhere else.
+    painted = np.where(floor >= 0, CELL_EMPTY, floor)
+    expected = np.full_like(floor, CELL_EMPTY)
+    nest = env.scenario.arena.nest_cells
+    expected[nest[1] : nest[3], nest[0] : nest[2]] = CELL_NEST
+    half = env.scenario.cache_side_cells // 2
+    for slot in np.flatnonzero(caches.alive).tolist():
+        x, y = caches.cell[slot].tolist()
+        square = expected[y - half : y + half + 1, x - half : x + half + 1]
+        assert np.all(square == CELL_EMPTY), "cache square overlaps nest or another cache"
+        square[:] = CELL_CACHE - slot
+    np.testing.assert_array_equal(painted, expected)
+    # Caches: contents and counts.
+    cached = status == ObjectStatus.CACHED
+    np.testing.assert_array_equal(cached, objects.cache_slot >= 0)
+    contents = np.bincount(objects.cache_slot[cached], minlength=len(caches.alive))
+    np.testing.assert_array_equal(contents[: len(caches.alive)], caches.count)
+    assert np.all(caches.count[caches.alive] >= 2)
+    assert np.all(caches.count[~caches.alive] == 0)
+    np.testing.assert_array_equal(objects.cell[cached], caches.cell[objects.cache_slot[cached]])
+    serials = caches.serial[caches.alive]
+    assert len(np.unique(serials)) == len(serials)
+    assert caches.serial.max(initial=0) <= caches.last_serial
+    # Robots: one object each, carried by nobody else; only robots in the world carry.
+    carried = swarm.carried_object[swarm.carried_object >= 0]
+    assert sorted(carried.tolist()) == np.flatnonzero(status == ObjectStatus.CARRIED).tolist()
+    assert np.all(swarm.carried_object[~swarm.present] < 0)
+    assert np.all(objects.carriers[carried] >= 1)
+    # Waiting list.
+    assert sorted(objects.waiting) == np.flatnonzero(status == ObjectStatus.WAITING).tolist()
