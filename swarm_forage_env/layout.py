@@ -100,7 +100,7 @@ def observation_layout(width_m: float, height_m: float, n_objects: int) -> Obser
     table: list[tuple[str, tuple[float, ...], str, str]] = [
         ("proximity", (1.0,) * PROXIMITY_BEAMS, "proximity", "beam k at 7.5 + 15 k deg: 0 nothing, 1 contact"),
         ("light", (1.0,) * LIGHT_SENSORS, "light", "nest light, sensor k at 7.5 + 15 k deg"),
-        ("ground", (1.0,) * GROUND_SENSORS, "ground", "grey of the floor below: object 0, cache 0.4, nest 0.7, empty 1"),
+        ("ground", (1.0,) * GROUND_SENSORS, "ground", "floor grey: object 0, cache 0.4, nest 0.7, empty 1"),
         ("wheel_speed", (WHEEL_SCALE_MPS,) * 2, "wheel_speed", "applied left, right wheel speed / 0.20 m/s"),
         ("position", (half_x, half_y), "position", "2 x / X - 1, 2 y / Y - 1"),
         ("heading", (1.0, 1.0), "heading", "cos, sin of the heading"),
