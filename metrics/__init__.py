@@ -1,1 +1,128 @@
-"""Measures of swarm behaviour: arrays in, numbers out."""
+"""Measures of swarm behaviour after Harwell and Gini: arrays in, numbers out.
+
+Every measure is a function of curves, arrays of shape (..., T) over recording intervals; it knows nothing of robots,
+files or policies. `docs/metrics.md` explains inputs and variants, `docs/errata.md` what the paper's print gets wrong.
+Names load on first use (PEP 562), so importing the package compiles nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+# Not lazy: the function and its module share a name, and loading the module later would put it in the function's place.
+from .scalability import efficiency, raw_performance, scalability, skipped_intervals
+
+if TYPE_CHECKING:
+    from .catalog import METRICS, Measure
+    from .curves import CurveError
+    from .distance import aligned_l1, dtw, noise_floor
+    from .earlier import fractional_maintenance, projective_performance, weighted_combination
+    from .emergence import spatial_emergence, task_emergence
+    from .environment import environment_distance, environment_scaling, waveform
+    from .flexibility import adaptability, reactivity
+    from .interference import fractional_loss, performance_lost, t_lost_fraction
+    from .population import availability, population_robustness, population_weight, ratio_for_availability
+    from .queues import PopulationError, PopulationRates, QueueStats, mean_away, queue_statistics
+    from .robustness import mean_signed_difference, noise_robustness
+    from .statistics import Summary, aggregate, bootstrap_measure, normalize
+
+__all__ = [
+    # interference
+    "t_lost_fraction",
+    "performance_lost",
+    "fractional_loss",
+    # emergence
+    "spatial_emergence",
+    "task_emergence",
+    # scalability
+    "scalability",
+    "skipped_intervals",
+    "efficiency",
+    "raw_performance",
+    # distance
+    "dtw",
+    "aligned_l1",
+    "noise_floor",
+    # environment
+    "waveform",
+    "environment_scaling",
+    "environment_distance",
+    # flexibility
+    "reactivity",
+    "adaptability",
+    # robustness
+    "noise_robustness",
+    "mean_signed_difference",
+    # queues and population
+    "PopulationRates",
+    "PopulationError",
+    "QueueStats",
+    "queue_statistics",
+    "mean_away",
+    "population_robustness",
+    "population_weight",
+    "availability",
+    "ratio_for_availability",
+    # statistics
+    "normalize",
+    "Summary",
+    "aggregate",
+    "bootstrap_measure",
+    # measures of earlier papers
+    "fractional_maintenance",
+    "projective_performance",
+    "weighted_combination",
+    # overview and errors
+    "METRICS",
+    "Measure",
+    "CurveError",
+]
+
+_HOMES = {
+    "METRICS": "catalog",
+    "Measure": "catalog",
+    "CurveError": "curves",
+    "aligned_l1": "distance",
+    "dtw": "distance",
+    "noise_floor": "distance",
+    "fractional_maintenance": "earlier",
+    "projective_performance": "earlier",
+    "weighted_combination": "earlier",
+    "spatial_emergence": "emergence",
+    "task_emergence": "emergence",
+    "environment_distance": "environment",
+    "environment_scaling": "environment",
+    "waveform": "environment",
+    "adaptability": "flexibility",
+    "reactivity": "flexibility",
+    "fractional_loss": "interference",
+    "performance_lost": "interference",
+    "t_lost_fraction": "interference",
+    "availability": "population",
+    "population_robustness": "population",
+    "population_weight": "population",
+    "ratio_for_availability": "population",
+    "PopulationError": "queues",
+    "PopulationRates": "queues",
+    "QueueStats": "queues",
+    "mean_away": "queues",
+    "queue_statistics": "queues",
+    "mean_signed_difference": "robustness",
+    "noise_robustness": "robustness",
+    "Summary": "statistics",
+    "aggregate": "statistics",
+    "bootstrap_measure": "statistics",
+    "normalize": "statistics",
+}
+"""Public name -> submodule that defines it, loaded when the name is first used."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

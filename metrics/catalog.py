@@ -1,0 +1,177 @@
+"""The measures in one table: what each is called, how to read it, and what it needs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+from .emergence import spatial_emergence, task_emergence
+from .flexibility import adaptability, reactivity
+from .interference import performance_lost, t_lost_fraction
+from .population import availability, population_robustness
+from .robustness import noise_robustness
+from .scalability import efficiency, raw_performance, scalability
+
+Input: TypeAlias = Literal["performance", "interference", "one robot", "two sizes", "ideal run", "waveforms", "rates"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measure:
+    """One measure of the paper."""
+
+    function: Callable[..., Any]
+    """Computes it in the corrected form by default."""
+    symbol: str
+    """Symbol in the paper."""
+    equation: str
+    """Displayed equation of the paper, or where else it comes from."""
+    higher_is_better: bool
+    """Direction of the corrected form."""
+    neutral: float | None
+    """Value that separates better from worse: robots that do not affect each other, or an undisturbed swarm."""
+    lowest: float
+    """Lower end of the range."""
+    highest: float
+    """Upper end of the range."""
+    is_distance: bool
+    """Whether `normalize` needs distance=True."""
+    needs: tuple[Input, ...]
+    """What has to be run to compute it."""
+
+
+_INF = float("inf")
+
+METRICS: dict[str, Measure] = {
+    "t_lost_fraction": Measure(
+        function=t_lost_fraction,
+        symbol="t_lost(N, t)",
+        equation="notation table",
+        higher_is_better=False,
+        neutral=0.0,
+        lowest=0.0,
+        highest=1.0,
+        is_distance=False,
+        needs=("interference",),
+    ),
+    "performance_lost": Measure(
+        function=performance_lost,
+        symbol="P_lost(N, t)",
+        equation="Eq. (1)",
+        higher_is_better=False,
+        neutral=0.0,
+        lowest=-_INF,
+        highest=_INF,
+        is_distance=False,
+        needs=("performance", "interference", "one robot"),
+    ),
+    "spatial_emergence": Measure(
+        function=spatial_emergence,
+        symbol="E_S(N1, N2)",
+        equation="Eq. (2)",
+        higher_is_better=True,
+        neutral=0.0,
+        lowest=-_INF,
+        highest=_INF,
+        is_distance=False,
+        needs=("performance", "interference", "one robot", "two sizes"),
+    ),
+    "task_emergence": Measure(
+        function=task_emergence,
+        symbol="E_T(N1, N2)",
+        equation="Eq. (3)",
+        higher_is_better=True,
+        neutral=0.0,
+        lowest=-_INF,
+        highest=_INF,
+        is_distance=False,
+        needs=("performance", "two sizes"),
+    ),
+    "scalability": Measure(
+        function=scalability,
+        symbol="C(N1, N2)",
+        equation="Eq. (4)",
+        higher_is_better=True,
+        neutral=1.0,
+        lowest=-_INF,
+        highest=_INF,
+        is_distance=False,
+        needs=("performance", "two sizes"),
+    ),
+    "reactivity": Measure(
+        function=reactivity,
+        symbol="R(N)",
+        equation="Eqs. (5) to (7)",
+        higher_is_better=False,
+        neutral=0.0,
+        lowest=0.0,
+        highest=_INF,
+        is_distance=True,
+        needs=("performance", "ideal run", "waveforms"),
+    ),
+    "adaptability": Measure(
+        function=adaptability,
+        symbol="A(N)",
+        equation="Eqs. (5) to (7)",
+        higher_is_better=False,
+        neutral=0.0,
+        lowest=0.0,
+        highest=_INF,
+        is_distance=True,
+        needs=("performance", "ideal run"),
+    ),
+    "noise_robustness": Measure(
+        function=noise_robustness,
+        symbol="B_sa",
+        equation="Eq. (8)",
+        higher_is_better=False,
+        neutral=0.0,
+        lowest=0.0,
+        highest=_INF,
+        is_distance=True,
+        needs=("performance", "ideal run"),
+    ),
+    "population_robustness": Measure(
+        function=population_robustness,
+        symbol="B_pd",
+        equation="Eq. (12)",
+        higher_is_better=True,
+        neutral=0.0,
+        lowest=-_INF,
+        highest=_INF,
+        is_distance=False,
+        needs=("performance", "ideal run", "rates"),
+    ),
+    "availability": Measure(
+        function=availability,
+        symbol="p_v",
+        equation="Eq. (13)",
+        higher_is_better=True,
+        neutral=1.0,
+        lowest=0.0,
+        highest=1.0,
+        is_distance=False,
+        needs=("rates",),
+    ),
+    "efficiency": Measure(
+        function=efficiency,
+        symbol="P(N) / N",
+        equation="Hecker and Moses 2015",
+        higher_is_better=True,
+        neutral=None,
+        lowest=0.0,
+        highest=_INF,
+        is_distance=False,
+        needs=("performance",),
+    ),
+    "raw_performance": Measure(
+        function=raw_performance,
+        symbol="P(N)",
+        equation="raw performance figures",
+        higher_is_better=True,
+        neutral=None,
+        lowest=0.0,
+        highest=_INF,
+        is_distance=False,
+        needs=("performance",),
+    ),
+}
+"""Public function name -> what the measure is."""

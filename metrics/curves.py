@@ -1,0 +1,182 @@
+"""The input contract of every measure, and the one place that raises about curves.
+
+A *curve* is an array of shape (..., T): the last axis is the recording interval, the axes before it (normally one axis
+of runs) broadcast against each other. A single number is a curve of one interval. NaN marks a run that cannot be
+scored: it makes the result of that run NaN and leaves the other runs alone. Infinities are refused, because no count
+per interval is infinite and no distance could carry one.
+"""
+
+from collections.abc import Iterable
+from operator import index
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int64]
+
+Variant: TypeAlias = Literal["paper", "corrected", "sierra"]
+"""`paper`: as printed; `corrected`: with the print's slips put right; `sierra`: what the authors' program computed."""
+Reduction: TypeAlias = Literal["sum", "mean", "last", "total"]
+"""How intervals become one number: sum, mean or last value of the measure, or the measure of the summed curves."""
+
+_FRACTION_TOLERANCE = 1e-9
+"""Averaging fractions over ticks may exceed 1 by rounding."""
+
+
+class CurveError(ValueError):
+    """A curve or a swarm size that a measure cannot work with."""
+
+
+def as_curve(name: str, values: ArrayLike | None, *, signed: bool = False) -> FloatArray:
+    """Return `values` as a float64 curve of shape (..., T), T >= 1; a number becomes shape (1,).
+
+    Args:
+        name: Word for the curve in error messages.
+        values: Array-like of numbers; NaN is allowed.
+        signed: Whether negative values make sense (waveforms, general curves) or not (performance, counts).
+
+    Raises:
+        CurveError: `values` is None, not numeric, empty, infinite, or negative where it may not be.
+    """
+    if values is None:
+        raise CurveError(f"Expected {name}, got None; record the missing reference runs and pass their curve.")
+    try:
+        curve = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    except (TypeError, ValueError) as error:
+        raise CurveError(f"Expected {name} as numbers of shape (..., T), got {values!r:.80}; {error}.") from error
+    if curve.size == 0:
+        raise CurveError(f"Expected {name} with at least one run and one interval, got shape {curve.shape}.")
+    if np.isinf(curve).any():
+        raise CurveError(f"Expected finite {name}, got infinity; where it is an inverse 1/x, let 1/0 be 0.")
+    if not signed and (curve < 0.0).any():
+        raise CurveError(f"Expected {name} >= 0, got {np.nanmin(curve)}; pass counts or rates, larger being better.")
+    return curve
+
+
+def as_curves(*, signed: bool = False, **curves: ArrayLike | None) -> tuple[FloatArray, ...]:
+    """Return the named curves as float64 arrays that share T and broadcast on their leading axes.
+
+    Raises:
+        CurveError: One of them is no curve (see `as_curve`), or they differ in T or do not broadcast.
+    """
+    arrays = {name: as_curve(name, values, signed=signed) for name, values in curves.items()}
+    shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+    if len({array.shape[-1] for array in arrays.values()}) > 1:
+        raise CurveError(f"Expected curves with equally many intervals T on the last axis, got {shapes}.")
+    check_broadcast(arrays.values(), shapes)
+    return tuple(arrays.values())
+
+
+def as_interference(**fractions: ArrayLike | None) -> tuple[FloatArray, ...]:
+    """Return the named curves of interference fractions, checked to lie in [0, 1].
+
+    Raises:
+        CurveError: As `as_curves`, or a value beyond 1.
+    """
+    arrays = as_curves(signed=False, **fractions)
+    for name, array in zip(fractions, arrays, strict=True):
+        if (array > 1.0 + _FRACTION_TOLERANCE).any():
+            raise CurveError(
+                f"Expected {name} as a fraction of the robots in [0, 1], got {np.nanmax(array)}; "
+                "divide numbers of robots by the swarm size with t_lost_fraction."
+            )
+    return arrays
+
+
+def as_waveforms(n_intervals: int, **waveforms: ArrayLike | None) -> tuple[FloatArray, ...]:
+    """Return the named environment signals with n_intervals samples each; a number stands for a constant signal.
+
+    Raises:
+        CurveError: A signal is missing, infinite or of another length.
+    """
+    arrays: list[FloatArray] = []
+    for name, values in waveforms.items():
+        wave = as_curve(name, values, signed=True)
+        if np.ndim(values) == 0:  # pyright: ignore[reportArgumentType]  (None was refused above)
+            wave = np.full(n_intervals, wave[0])
+        if wave.shape[-1] != n_intervals:
+            raise CurveError(f"Expected {name} with one sample per interval, T = {n_intervals}, got {wave.shape}.")
+        arrays.append(wave)
+    return tuple(arrays)
+
+
+def check_broadcast(arrays: Iterable[FloatArray], shapes: str) -> None:
+    """Check that the axes before the last broadcast; `shapes` describes the arrays.
+
+    Raises:
+        CurveError: They do not.
+    """
+    try:
+        np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
+    except ValueError as error:
+        raise CurveError(f"Expected run axes that broadcast, got {shapes}; pair runs one to one or average.") from error
+
+
+def check_size(name: str, n_robots: int) -> int:
+    """Return a swarm size as int.
+
+    Raises:
+        CurveError: Not a positive integer.
+    """
+    try:
+        size = index(n_robots)
+    except TypeError as error:
+        raise CurveError(f"Expected {name} as a whole number of robots, got {n_robots!r}.") from error
+    if size < 1:
+        raise CurveError(f"Expected {name} >= 1 robot, got {size}.")
+    return size
+
+
+def check_size_order(n1: int, n2: int) -> None:
+    """Check n1 < n2.
+
+    Raises:
+        CurveError: The sizes are equal or in the wrong order.
+    """
+    if n1 >= n2:
+        raise CurveError(f"Expected sizes n1 < n2, got n1 = {n1} and n2 = {n2}; pass the smaller swarm first.")
+
+
+def check_option(name: str, value: object, options: object) -> None:
+    """Check a named option against the values of its `Literal` type.
+
+    Raises:
+        ValueError: Unknown value.
+    """
+    allowed = get_args(options)
+    if value not in allowed:
+        raise ValueError(f"Expected {name} to be one of {', '.join(map(repr, allowed))}, got {value!r}.")
+
+
+def reduce_intervals(theta: FloatArray, reduce: Reduction, *inputs: FloatArray) -> FloatArray:
+    """Reduce a measure theta(t), shape (..., T), over its intervals to shape (...,).
+
+    `total` is the same number as `sum` here: it differs only for measures that are not linear in their curves, and
+    those sum their curves before they arrive at theta. A run with a NaN anywhere in `inputs` gives NaN, also under
+    `last`.
+    """
+    check_option("reduce", reduce, Reduction)
+    if reduce == "last":
+        value = theta[..., -1]
+    elif reduce == "mean":
+        value = theta.mean(axis=-1)
+    else:
+        value = theta.sum(axis=-1)
+    for curve in inputs:
+        value = np.where(np.isnan(curve).any(axis=-1), np.nan, value)
+    return value[()]
+
+
+def last_interval_only(reduce: Reduction) -> None:
+    """Check the reduction given to a measure whose `sierra` form knows only the last interval.
+
+    `sum`, the default of these measures, stands for "not chosen".
+
+    Raises:
+        ValueError: Another reduction was asked for.
+    """
+    check_option("reduce", reduce, Reduction)
+    if reduce not in ("sum", "last"):
+        raise ValueError(f"Expected reduce='last' in the sierra form, which reads the last interval, got {reduce!r}.")

@@ -1,0 +1,76 @@
+"""Flexibility: does performance follow the environment, or withstand it? Eqs. (5) to (7)."""
+
+from numpy.typing import ArrayLike
+
+from .curves import FloatArray, Variant, as_curves, as_waveforms
+from .distance import curve_distance
+from .environment import ScalingModel, environment_scaling
+
+
+def reactivity(
+    perf_ideal: ArrayLike,
+    perf: ArrayLike,
+    v: ArrayLike,
+    i_ec: ArrayLike,
+    *,
+    model: ScalingModel = "linear",
+    variant: Variant = "corrected",
+    clock: ArrayLike | None = None,
+) -> FloatArray:
+    """Reactivity R(N): distance from a swarm whose performance changes exactly as the environment does.
+
+        P_R*(t) = c_t P_ideal(t)        R = DTW( P_R*, P )
+
+    Lower is better. It pulls against adaptability: a perfectly reactive swarm is not adaptable. Without deviation,
+    V = I_ec, the two are equal. Report `noise_floor` beside it.
+
+    Args:
+        perf_ideal: Performance under ideal conditions, same swarm size and controller, shape (..., T), objects per
+            interval.
+        perf: Performance P(N, t) under the applied conditions, same intervals.
+        v: Applied conditions V(t) at the same instants, shape (..., T) or one number.
+        i_ec: Ideal conditions I_ec(t), likewise.
+        model: How c_t is computed, see `environment_scaling`; the equation as printed needs model="paper".
+        variant: Distance: exact DTW on values for `paper` and `corrected`; for `sierra` the cost includes the clock, as
+            in the authors' program, so that short delays are not forgiven.
+        clock: For `sierra`, sample times as in `dtw` (the authors: ticks, steps of 1000). Default: interval numbers.
+
+    Returns:
+        R >= 0, shape (...,), in the unit of `perf`.
+
+    Raises:
+        CurveError: Curves or signals are missing, negative (performance only), infinite or of different length, or the
+            model divides by zero.
+        ValueError: Unknown option.
+    """
+    perf_ideal, perf = as_curves(perf_ideal=perf_ideal, perf=perf)
+    v, i_ec = as_waveforms(perf.shape[-1], v=v, i_ec=i_ec)
+    perfectly_reactive = environment_scaling(v, i_ec, model=model) * perf_ideal
+    return curve_distance(perfectly_reactive, perf, variant, clock)
+
+
+def adaptability(
+    perf_ideal: ArrayLike, perf: ArrayLike, *, variant: Variant = "corrected", clock: ArrayLike | None = None
+) -> FloatArray:
+    """Adaptability A(N): distance from a swarm whose performance does not change at all.
+
+        P_A*(t) = P_ideal(t)        A = DTW( P_A*, P )
+
+    Lower is better. Report `noise_floor` beside it.
+
+    Args:
+        perf_ideal: Performance under ideal conditions, same swarm size and controller, shape (..., T), objects per
+            interval.
+        perf: Performance P(N, t) under the applied conditions, same intervals.
+        variant: As in `reactivity`.
+        clock: As in `reactivity`.
+
+    Returns:
+        A >= 0, shape (...,), in the unit of `perf`.
+
+    Raises:
+        CurveError: Curves are missing, negative, infinite or of different length.
+        ValueError: Unknown variant.
+    """
+    perf_ideal, perf = as_curves(perf_ideal=perf_ideal, perf=perf)
+    return curve_distance(perf_ideal, perf, variant, clock)

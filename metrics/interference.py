@@ -1,0 +1,141 @@
+"""Interference: how much of the swarm's time, and of its performance, goes into avoiding each other. Eq. (1)."""
+
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .curves import CurveError, FloatArray, Variant, as_curves, as_interference, check_option, check_size
+
+InterferenceReading: TypeAlias = Literal["fraction", "count"]
+"""Whether t_lost in Eq. (1) is the fraction of robots that interfere (notation table) or their number (text)."""
+
+_SIERRA_DECIMALS = 8
+"""The authors' program rounds fractional losses to this many decimals."""
+
+
+def t_lost_fraction(n_interfering: ArrayLike, n: int) -> FloatArray:
+    """Fraction of the swarm that loses time to collision avoidance, t_lost(N, t) = n_int(N, t) / N.
+
+    Avoiding a wall counts too, so a single robot has a fraction above zero.
+
+    Args:
+        n_interfering: Robots in collision avoidance, averaged over the ticks of each interval, shape (..., T).
+        n: Swarm size N.
+
+    Returns:
+        Fractions in [0, 1], shape (..., T). Lower is better.
+
+    Raises:
+        CurveError: Negative or infinite counts, more robots than the swarm has, or n < 1.
+
+    Source: notation table of the paper. Its text calls t_lost the number of robots instead; see `performance_lost`.
+    """
+    n = check_size("n", n)
+    (counts,) = as_curves(n_interfering=n_interfering)
+    if (counts > n).any():
+        raise CurveError(f"Expected n_interfering <= n = {n} robots, got {np.nanmax(counts)}.")
+    return counts / n
+
+
+def performance_lost(
+    perf: ArrayLike,
+    t_lost: ArrayLike,
+    n: int,
+    perf_one: ArrayLike,
+    t_lost_one: ArrayLike,
+    *,
+    variant: Variant = "corrected",
+    t_lost_as: InterferenceReading = "fraction",
+    n_reference: int = 1,
+) -> FloatArray:
+    """Performance lost to interference between robots, P_lost(N, t), Eq. (1).
+
+        P_lost(1, t) = P(1, t) t_lost(1, t)
+        P_lost(N, t) = P(N, t) t_lost(N, t) - N P_lost(1, t)        for N > 1
+
+    Lower is better; negative means less loss than N lone robots would have.
+
+    Args:
+        perf: P(N, t), shape (..., T), objects per interval.
+        t_lost: Interference *fraction* of that swarm, in every variant, shape (..., T).
+        n: Swarm size N.
+        perf_one: P(1, t) of one robot alone.
+        t_lost_one: Interference fraction of one robot alone.
+        variant: `paper` and `corrected` are the same here. `sierra` is what the authors' program computed: zero for the
+            first experiment, P(N) t_lost(N) - P(1) n_int(1) for the others (the loss of one lone robot is taken off
+            instead of N), and +inf where P(N) = 0.
+        t_lost_as: `count` multiplies the fractions by the swarm size first, as the paper's text reads. Then independent
+            robots look worse the more they are. Not for `sierra`, which has its own reading.
+        n_reference: Robots in the reference run; the authors' program took its first experiment, whatever its size (12
+            robots in search and rescue). Only `sierra` accepts another number than 1.
+
+    Returns:
+        P_lost, shape (..., T), in the unit of `perf`.
+
+    Raises:
+        CurveError: A curve is missing, negative, infinite or of another length; a fraction above 1; a size below 1.
+        ValueError: Unknown variant or reading, or a combination of them that has no meaning.
+
+    The print contradicts itself: the text makes t_lost a number of robots, the notation table a fraction of time. Only
+    the fraction lets P_lost vanish for N robots that do not affect each other. The table also calls P_lost a fraction,
+    but the equation is an absolute loss; `fractional_loss` is the fraction.
+    """
+    n = check_size("n", n)
+    n_reference = check_size("n_reference", n_reference)
+    _check_reading(variant, t_lost_as, n_reference)
+    perf, perf_one, t_lost, t_lost_one = as_curves(perf=perf, perf_one=perf_one, t_lost=t_lost, t_lost_one=t_lost_one)
+    as_interference(t_lost=t_lost, t_lost_one=t_lost_one)
+    if variant == "sierra":
+        return _sierra_performance_lost(perf, t_lost, n, perf_one, n_reference * t_lost_one, n_reference)
+    if t_lost_as == "count":
+        t_lost = n * t_lost
+    if n == 1:
+        return perf * t_lost
+    return perf * t_lost - n * (perf_one * t_lost_one)
+
+
+def fractional_loss(
+    perf: ArrayLike,
+    t_lost: ArrayLike,
+    n: int,
+    perf_one: ArrayLike,
+    t_lost_one: ArrayLike,
+    *,
+    variant: Variant = "corrected",
+    n_reference: int = 1,
+) -> FloatArray:
+    """Share of its performance that the swarm loses to interference, FL(N, t) = P_lost(N, t) / P(N, t).
+
+    Arguments, shapes and errors as in `performance_lost`. In the `sierra` form FL is 0 for the first experiment and 1
+    where P(N) = 0, rounded to 8 decimals; the others follow IEEE arithmetic (-inf or NaN where P(N) = 0).
+    """
+    lost = performance_lost(perf, t_lost, n, perf_one, t_lost_one, variant=variant, n_reference=n_reference)
+    (perf,) = as_curves(perf=perf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if variant != "sierra":
+            return lost / perf
+        if n == n_reference:
+            return lost
+        return np.where(perf == 0.0, 1.0, np.round(lost / perf, _SIERRA_DECIMALS))
+
+
+def _sierra_performance_lost(
+    perf: FloatArray, t_lost: FloatArray, n: int, perf_first: FloatArray, n_int_first: FloatArray, n_first: int
+) -> FloatArray:
+    if n == n_first:
+        return 0.0 * perf * t_lost  # keeps NaN and the shape
+    lost = perf * t_lost - perf_first * n_int_first
+    return np.where(perf == 0.0, np.inf, lost)
+
+
+def _check_reading(variant: Variant, t_lost_as: InterferenceReading, n_reference: int) -> None:
+    check_option("variant", variant, Variant)
+    check_option("t_lost_as", t_lost_as, InterferenceReading)
+    if variant == "sierra" and t_lost_as == "count":
+        raise ValueError("Expected t_lost_as='fraction' with variant='sierra', which converts to counts by itself.")
+    if variant != "sierra" and n_reference != 1:
+        raise CurveError(
+            f"Expected the run of one robot as reference, got n_reference = {n_reference}; "
+            "only variant='sierra' takes another first experiment in its place."
+        )

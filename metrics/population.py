@@ -1,0 +1,234 @@
+"""Robustness to a changing population, Eq. (12), and availability of enough robots, Eq. (13)."""
+
+import math
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .curves import (
+    FloatArray,
+    Reduction,
+    as_curves,
+    check_option,
+    check_size,
+    last_interval_only,
+    reduce_intervals,
+)
+from .queues import (
+    PopulationError,
+    PopulationRates,
+    check_horizon,
+    mean_away,
+    queue_statistics,
+    stationary_distribution,
+)
+
+PopulationWeight: TypeAlias = Literal["paper", "sojourn", "transient", "stationary", "sierra"]
+
+_SMALLEST_LOG, _LARGEST_LOG = math.log(5e-324), math.log(1.7976931348623157e308)
+"""Logarithms of the smallest and largest double: the range of ratios that can be returned."""
+
+
+def population_robustness(
+    perf: ArrayLike,
+    perf_ideal: ArrayLike,
+    rates: PopulationRates,
+    *,
+    horizon: float,
+    n: int | None = None,
+    ideal_rates: PopulationRates | None = None,
+    weight: PopulationWeight = "transient",
+    reduce: Reduction = "sum",
+) -> FloatArray:
+    """Population dynamics robustness B_pd, Eq. (12): performance beyond what the robots at work explain.
+
+        B_pd = sum_t [ P(N(t), t) - w P_ideal(t) ]
+
+    with w from `population_weight`. Higher is better; 0 if performance fell in proportion to the time at work.
+
+    Args:
+        perf: Performance with population dynamics, shape (..., T), objects per interval.
+        perf_ideal: Performance of the ideal swarm, same intervals. For `sierra`, of the lowest rate in the sweep.
+        rates: Population rates per tick.
+        horizon: Run length in ticks, in the same unit as the rates.
+        n: Swarm size N; `transient` and `stationary` need it.
+        ideal_rates: Rates of the ideal swarm; None: nobody leaves. `sierra` needs them.
+        weight: See `population_weight`.
+        reduce: `sum` as in the paper, `mean` or `last`. `sierra` always reads the last interval.
+
+    Returns:
+        B_pd, shape (...,), in the unit of `perf`.
+
+    Raises:
+        CurveError: Curves are missing, negative, infinite or of different length, or n < 1.
+        PopulationError: The weight does not exist for these rates.
+        ValueError: Unknown option, a missing n or ideal_rates, or `sierra` with another reduction.
+    """
+    perf, perf_ideal = as_curves(perf=perf, perf_ideal=perf_ideal)
+    share = population_weight(rates, horizon=horizon, n=n, ideal_rates=ideal_rates, weight=weight)
+    if weight == "sierra":
+        last_interval_only(reduce)
+        reduce = "last"
+    return reduce_intervals(perf - share * perf_ideal, reduce, perf, perf_ideal)
+
+
+def population_weight(
+    rates: PopulationRates,
+    *,
+    horizon: float,
+    n: int | None = None,
+    ideal_rates: PopulationRates | None = None,
+    weight: PopulationWeight = "transient",
+) -> float:
+    """Time at work relative to the ideal swarm, the factor T_S / T_S,ideal of Eq. (12).
+
+    | weight     | time at work                                                                                 |
+    |------------|----------------------------------------------------------------------------------------------|
+    | paper      | T - [1 / (mu - lambda) + 1 / mu], Eq. (11) with the printed time, which counts service twice |
+    | sojourn    | T - 1 / (mu - lambda), the same without the double count                                     |
+    | transient  | T (1 - m_T / N), the mean over the run, see `mean_away` (ours)                               |
+    | stationary | T (1 - L_N / N), in equilibrium, see `queue_statistics` (ours); nobody if the dead stay dead |
+    | sierra     | ideal time *away* over time away, which turns the idea round                                 |
+
+    The printed time away is the length of *one* absence, so `paper` and `sojourn` hold only if every robot is away
+    exactly once, and turn negative when 1 / (mu - lambda) exceeds T, as it does for the study's 200 robots. The
+    authors' program weighs by k when all rates are k times those of its lowest-rate experiment, which it takes as
+    ideal: B_pd then falls with k whatever the swarm does.
+
+    Returns:
+        The weight; 1 if nobody leaves either swarm. In [0, 1] for `transient` and `stationary` with ideal_rates None.
+
+    Raises:
+        CurveError: n < 1.
+        PopulationError: The weight does not exist: rho >= 1 for `paper` and `sojourn`, a division by zero.
+        ValueError: Unknown weight, or a missing n or ideal_rates.
+    """
+    check_option("weight", weight, PopulationWeight)
+    check_horizon(horizon)
+    if weight == "sierra":
+        if ideal_rates is None:
+            raise ValueError("Expected ideal_rates with weight='sierra': the rates of its first experiment.")
+        away, ideal_away = _sierra_time_away(rates, horizon), _sierra_time_away(ideal_rates, horizon)
+        if away == 0.0:
+            raise PopulationError(
+                f"Expected returns with weight='sierra', got mu = 0 without deaths in {rates}; use weight='transient'."
+            )
+        return ideal_away / away
+    at_work = _share_at_work(rates, horizon, n, weight)
+    ideal_at_work = _share_at_work(ideal_rates or PopulationRates(), horizon, n, weight)
+    if ideal_at_work == 0.0:
+        raise PopulationError(
+            f"Expected an ideal swarm with time at work, got none for weight={weight!r}, {ideal_rates}."
+        )
+    return at_work / ideal_at_work
+
+
+def availability(n: int, n_min: int, ratio_out: float) -> float:
+    """Availability p_v: probability that at least n_min of n robots are at work, in equilibrium, Eq. (13).
+
+        p_v = sum_{j=0}^{N - N_min} q^j pi_N = (1 - q^(N - N_min + 1)) / (1 - q^(N + 1)),    q = lambda / mu
+
+    The printed 1 / rho must be lambda / mu, so its rho is mu / lambda, entering over leaving: the reciprocal of the rho
+    of the queue equations, where the symbol lost its subscript. The other rho gives the probability that at least n_min
+    robots are *away*. The print leaves pi_N, the probability that all are at work, undefined; it is
+    (1 - q) / (1 - q^(N + 1)).
+
+    Args:
+        n: Swarm size N.
+        n_min: Robots needed; any integer: 1.0 for n_min <= 0, 0.0 for n_min > n.
+        ratio_out: q = lambda / mu, leaving over entering, from 0 (nobody leaves) to inf (nobody returns).
+
+    Returns:
+        p_v in [0, 1]. Higher is better.
+
+    Raises:
+        CurveError: n < 1.
+        PopulationError: A ratio that is negative or NaN.
+    """
+    n = check_size("n", n)
+    if not ratio_out >= 0.0:
+        raise PopulationError(f"Expected ratio_out = lambda / mu >= 0, got {ratio_out}.")
+    if n_min <= 0:
+        return 1.0
+    if n_min > n:
+        return 0.0
+    if ratio_out == 0.0 or math.isinf(ratio_out):
+        return 1.0 if ratio_out == 0.0 else 0.0
+    return _availability(n, n_min, math.log(ratio_out))
+
+
+def ratio_for_availability(n: int, n_min: int, p_v: float) -> float:
+    """Ratio q = lambda / mu of leaving over entering at which `availability` is p_v, by bisection in log q.
+
+    Args:
+        n: Swarm size N.
+        n_min: Robots needed, 1 <= n_min <= n.
+        p_v: Wanted availability in [0, 1], strictly falling with q: 1 gives 0, 0 gives inf.
+
+    Raises:
+        CurveError: n < 1.
+        PopulationError: n_min or p_v outside its range.
+    """
+    n = check_size("n", n)
+    if not 1 <= n_min <= n:
+        raise PopulationError(
+            f"Expected 1 <= n_min <= n = {n}, got {n_min}; elsewhere availability does not depend on q."
+        )
+    if not 0.0 <= p_v <= 1.0:
+        raise PopulationError(f"Expected an availability p_v in [0, 1], got {p_v}.")
+    if p_v in (0.0, 1.0):
+        return math.inf if p_v == 0.0 else 0.0
+    low, high = _SMALLEST_LOG, _LARGEST_LOG
+    middle = 0.5 * (low + high)
+    while low < middle < high:
+        if _availability(n, n_min, middle) > p_v:
+            low = middle
+        else:
+            high = middle
+        middle = 0.5 * (low + high)
+    return math.exp(middle)
+
+
+def _availability(n: int, n_min: int, log_q: float) -> float:
+    """p_v for 1 <= n_min <= n; powers of q <= 1 only, so that nothing overflows, and exact near q = 1."""
+    if log_q == 0.0:
+        return (n - n_min + 1) / (n + 1)
+    decay = -abs(log_q)
+    p_v = math.expm1((n - n_min + 1) * decay) / math.expm1((n + 1) * decay)
+    return p_v if log_q < 0.0 else p_v * math.exp(n_min * decay)
+
+
+def _share_at_work(rates: PopulationRates, horizon: float, n: int | None, weight: PopulationWeight) -> float:
+    if rates.lam == 0.0:
+        return 1.0
+    if weight in ("transient", "stationary"):
+        if n is None:
+            raise ValueError(f"Expected the swarm size n with weight={weight!r}, got None.")
+        n = check_size("n", n)
+        if weight == "transient":
+            return 1.0 - mean_away(rates, n, horizon) / n
+        if rates.lambda_d > 0.0 and rates.mu_b == 0.0:  # repairs bring nobody back from the dead
+            return 0.0
+        return float(stationary_distribution(rates, n) @ np.arange(n, -1.0, -1.0)) / n
+    queue = queue_statistics(rates)
+    if not queue.stable:
+        raise PopulationError(
+            f"Expected more returns than departures with weight={weight!r}, got rho = {queue.rho}: the time away is "
+            "infinite; use weight='transient'."
+        )
+    return 1.0 - (queue.time_printed if weight == "paper" else queue.time) / horizon
+
+
+def _sierra_time_away(rates: PopulationRates, horizon: float) -> float:
+    """Time away as the authors' program computes it, its special cases in its order."""
+    if rates.lambda_d > 0.0 and rates.mu_b == 0.0:
+        return horizon
+    if rates.mu == 0.0:
+        return 0.0
+    if rates.lam == 0.0 or rates.lam == rates.mu:
+        raise PopulationError(
+            f"Expected lambda > 0 and lambda != mu with weight='sierra', which divides by both, got {rates}; "
+            "use weight='transient'."
+        )
+    return 1.0 / (rates.mu - rates.lam)  # negative for lambda > mu, and used as it is

@@ -1,0 +1,222 @@
+"""Queue model of a changing population: who is away from the swarm, for how long, in equilibrium and in a finite run.
+
+S is the sub-swarm at work. Deaths and temporary departures take robots out of S, births and returns bring them in. The
+paper models the robots *not* in S as one M/M/1 queue with arrival rate lambda and service rate mu, Eqs. (9) to (11).
+"""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.special import pdtrc  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
+
+from .curves import FloatArray, check_size
+
+
+class PopulationError(ValueError):
+    """Population rates, a run length or a demand on the population for which a quantity does not exist."""
+
+
+@dataclass(frozen=True)
+class PopulationRates:
+    """Rates of change of the population, per tick and for the whole swarm, not per robot.
+
+    Raises:
+        PopulationError: A rate is negative, infinite or not a number.
+
+    Source: section on population dynamics of the paper.
+    """
+
+    lambda_d: float = 0.0
+    """Deaths per tick; the dead never return by themselves."""
+    lambda_bd: float = 0.0
+    """Temporary departures (malfunctions) per tick."""
+    mu_b: float = 0.0
+    """Births per tick."""
+    mu_bd: float = 0.0
+    """Returns (repairs) per tick."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            rate = getattr(self, field.name)
+            if not (math.isfinite(rate) and rate >= 0.0):
+                raise PopulationError(f"Expected {field.name} as a finite rate >= 0 per tick, got {rate}.")
+
+    @property
+    def lam(self) -> float:
+        """Rate of leaving the swarm at work, lambda = lambda_d + lambda_bd, per tick."""
+        return self.lambda_d + self.lambda_bd
+
+    @property
+    def mu(self) -> float:
+        """Rate of entering it, mu = mu_b + mu_bd, per tick."""
+        return self.mu_b + self.mu_bd
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class QueueStats:
+    """Equilibrium of the queue of robots away from work; numbers of robots, times in ticks.
+
+    The unlimited quantities are infinite when the queue is not stable and NaN for rates per robot, which have no
+    unlimited counterpart. The paper prints the number *waiting* as the number away, and a time that counts the service
+    twice: 1 / (mu - lambda) contains it already.
+    """
+
+    lam: float
+    """Rate of leaving, lambda."""
+    mu: float
+    """Rate of entering, mu."""
+    rho: float
+    """lambda / mu; 0 if nobody leaves, inf if nobody returns."""
+    stable: bool
+    """Whether rho < 1. A finite swarm is always stable."""
+    length_printed: float
+    """Number away as printed, rho^2 / (1 - rho), which is `waiting`."""
+    length: float
+    """Number away in an unlimited M/M/1 queue, rho / (1 - rho)."""
+    waiting: float
+    """Number waiting, without the one in service, rho^2 / (1 - rho)."""
+    time_printed: float
+    """Time away per visit as printed, 1 / (mu - lambda) + 1 / mu."""
+    time: float
+    """Time away per visit, W = 1 / (mu - lambda)."""
+    waiting_time: float
+    """Of that, time before the service begins, 1 / (mu - lambda) - 1 / mu."""
+    truncated_length: float | None
+    """Mean number away of a swarm of n robots, L_N; None if n was not given."""
+    truncated_distribution: FloatArray | None
+    """Probability that 0, 1, ..., n robots are away, shape (n + 1,); None if n was not given."""
+
+
+def queue_statistics(rates: PopulationRates, n: int | None = None, *, per_robot: bool = False) -> QueueStats:
+    """Equilibrium quantities of the queue of robots away from work, Eqs. (9) and (10) and what they should be.
+
+    A swarm of n robots cannot have more than n away. With constant rates cut off at 0 and n (which is how the study's
+    population process works), n robots are away with probability rho^n / sum_k rho^k, for every rho. The paper writes
+    this M/M/1/N(t)/N, with the current size in the capacity slot; capacity and population are both N.
+
+    Args:
+        rates: Rates per tick.
+        n: Swarm size N, for the truncated quantities.
+        per_robot: Read the leaving rates as rates of each robot at work (finite-source queue; not in the paper).
+
+    Raises:
+        CurveError: n < 1.
+        ValueError: per_robot without n.
+    """
+    if per_robot and n is None:
+        raise ValueError("Expected the swarm size n with per_robot=True: the rate of leaving depends on it.")
+    distribution = None if n is None else stationary_distribution(rates, check_size("n", n), per_robot=per_robot)
+    lam, mu = rates.lam, rates.mu
+    rho = 0.0 if lam == 0.0 else math.inf if mu == 0.0 else lam / mu
+    stable = rho < 1.0
+    length = rho / (1.0 - rho) if stable else math.inf
+    waiting = rho * length
+    time = 1.0 / (mu - lam) if mu > lam else math.inf
+    service = 1.0 / mu if mu > 0.0 else math.inf
+    waiting_time = time - service if mu > lam else math.inf
+    if per_robot:
+        stable = True
+        length = waiting = time = service = waiting_time = math.nan
+    return QueueStats(
+        lam=lam,
+        mu=mu,
+        rho=rho,
+        stable=stable,
+        length_printed=waiting,
+        length=length,
+        waiting=waiting,
+        time_printed=time + service,
+        time=time,
+        waiting_time=waiting_time,
+        truncated_length=None if distribution is None else float(distribution @ np.arange(distribution.size)),
+        truncated_distribution=distribution,
+    )
+
+
+def mean_away(rates: PopulationRates, n: int, horizon: float, *, per_robot: bool = False) -> float:
+    """Mean number of robots away during a run that starts with nobody away, m_T.
+
+    The queue of `queue_statistics` solved in time, because runs are far shorter than its relaxation time (253,000 ticks
+    for the study's 50 robots, 4,000,000 for 200, against 50,000): most of the swarm is at work throughout. With the
+    generator Q of the chain and pi(0) = (1, 0, ..., 0):
+
+        d pi / dt = pi Q,    m_T = (1 / T) int_0^T sum_n n pi_n(s) ds
+
+    by uniformisation: with jumps at rate Lambda, some of them to the same state,
+    m_T = 1 / (Lambda T) sum_k E[n after k jumps] P(Poisson(Lambda T) > k).
+
+    Args:
+        rates: Rates per tick. No stability is needed; mu = 0 is pure death.
+        n: Swarm size N.
+        horizon: Run length T in ticks.
+        per_robot: As in `queue_statistics`.
+
+    Returns:
+        m_T in [0, n].
+
+    Raises:
+        CurveError: n < 1.
+        PopulationError: The horizon is not positive and finite.
+
+    Source: our choice; the paper uses equilibrium formulas.
+    """
+    n = check_size("n", n)
+    check_horizon(horizon)
+    if rates.lam == 0.0:
+        return 0.0
+    leave, back = _chain(rates, n, per_robot)
+    jump_rate = leave[0] + rates.mu  # no state has a larger total rate
+    expected_jumps = jump_rate * horizon
+    n_jumps = int(expected_jumps + 12.0 * math.sqrt(expected_jumps)) + 40  # the tail beyond is below 1e-16
+    more_jumps = pdtrc(np.arange(n_jumps), expected_jumps)
+    up, down = leave / jump_rate, back / jump_rate
+    stay = 1.0 - up - down
+    n_away = np.arange(n + 1.0)
+    probability = np.zeros(n + 1)
+    probability[0] = 1.0
+    total = 0.0
+    for more in more_jumps:
+        total += more * (probability @ n_away)
+        after = stay * probability
+        after[1:] += up[:-1] * probability[:-1]
+        after[:-1] += down[1:] * probability[1:]
+        probability = after
+    return float(total / expected_jumps)
+
+
+def check_horizon(horizon: float) -> None:
+    """Check a run length in ticks.
+
+    Raises:
+        PopulationError: Not positive and finite.
+    """
+    if not (math.isfinite(horizon) and horizon > 0.0):
+        raise PopulationError(f"Expected a horizon of more than 0 ticks, got {horizon}; pass the run length in ticks.")
+
+
+def _chain(rates: PopulationRates, n: int, per_robot: bool) -> tuple[FloatArray, FloatArray]:
+    """Rates of one robot more, and of one robot fewer, being away, from each state 0 ... n; shapes (n + 1,)."""
+    n_at_work = np.arange(n, -1.0, -1.0)
+    leave = rates.lam * (n_at_work if per_robot else np.minimum(n_at_work, 1.0))
+    back = np.full(n + 1, rates.mu)
+    back[0] = 0.0
+    return leave, back
+
+
+def stationary_distribution(rates: PopulationRates, n: int, *, per_robot: bool = False) -> FloatArray:
+    """Probabilities that 0, 1, ..., n of n robots are away in equilibrium, shape (n + 1,).
+
+    Balance across every cut between k and k + 1 robots away: leave[k] pi[k] = back[k + 1] pi[k + 1].
+    """
+    distribution = np.zeros(n + 1)
+    if rates.lam == 0.0:
+        distribution[0] = 1.0
+        return distribution
+    if rates.mu == 0.0:
+        distribution[n] = 1.0
+        return distribution
+    leave, back = _chain(rates, n, per_robot)
+    log_weight = np.concatenate([[0.0], np.cumsum(np.log(leave[:-1]) - np.log(back[1:]))])
+    weight = np.exp(log_weight - log_weight.max())  # logarithms, because rho^n overflows for large swarms
+    return weight / weight.sum()

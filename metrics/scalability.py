@@ -1,0 +1,160 @@
+"""Scalability: how much of an added robot's work arrives in the result? Eq. (4)."""
+
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .curves import (
+    FloatArray,
+    IntArray,
+    Reduction,
+    Variant,
+    as_curves,
+    check_option,
+    check_size,
+    check_size_order,
+    reduce_intervals,
+)
+
+ZeroPolicy: TypeAlias = Literal["nan", "skip"]
+"""What an interval without performance does to a sum: its IEEE value counts, NaN included, or it is left out."""
+
+_DEFAULT_REDUCTION: dict[Variant, Reduction] = {"paper": "sum", "corrected": "total", "sierra": "last"}
+
+
+def scalability(
+    perf1: ArrayLike,
+    n1: int,
+    perf2: ArrayLike,
+    n2: int,
+    *,
+    variant: Variant = "corrected",
+    reduce: Reduction | None = None,
+    zero_policy: ZeroPolicy = "nan",
+) -> FloatArray:
+    """Scalability C(N1, N2), Eq. (4): one minus Karp and Flatt's serial fraction e of the swarm.
+
+    With size ratio r = N2 / N1 and speedup S(t) = P(N2, t) / P(N1, t):
+
+        corrected    C = 1 - (1/S - 1/r) / (1 - 1/r)         S of the performance summed over time
+        paper        C = sum_t [ 1 - (S - 1/r) / (1 - 1/r) ]
+        sierra       as paper, last interval; 0 if N1 = N2 or N2 = 1 or P(N1) = 0 < P(N2)
+
+    The paper names e but prints the speedup where Karp and Flatt have its reciprocal. The printed value is -S times the
+    corrected one, so it ranks swarms upside down: at r = 2 linear gain (S = 2) gives 1 corrected and -2 printed, halved
+    performance gives -2 and 1. The text around the equation (higher means more cooperative) fits the corrected form.
+
+    Args:
+        perf1: P(N1, t), shape (..., T), objects per interval.
+        n1: Smaller size N1, best the size next to N2 in the sweep.
+        perf2: P(N2, t), same intervals.
+        n2: Larger size N2.
+        variant: Which of the three above.
+        reduce: Overrides the reduction of the variant: `total` takes S of the summed curves, `sum`, `mean` and `last`
+            take S in each interval.
+        zero_policy: `skip` leaves intervals out of `sum` or `mean` in which either swarm did nothing; report
+            `skipped_intervals` beside it. A run in which every interval is skipped gives NaN.
+
+    Returns:
+        C, shape (...,). Corrected: 1 linear gain, 0 no gain, above 1 superlinear (at most r / (r - 1), also where only
+        P(N1) is 0), negative when the larger swarm does worse (-inf where only P(N2) is 0), NaN where both are 0.
+
+    Raises:
+        CurveError: Curves are missing, negative, infinite or of different length; n1 >= n2 when corrected.
+        ValueError: Unknown option, or zero_policy="skip" without a sum or mean over intervals.
+    """
+    n1, n2 = check_size("n1", n1), check_size("n2", n2)
+    perf1, perf2 = as_curves(perf1=perf1, perf2=perf2)
+    check_option("variant", variant, Variant)
+    check_option("zero_policy", zero_policy, ZeroPolicy)
+    if variant == "corrected":
+        check_size_order(n1, n2)
+    if reduce is None:
+        reduce = _DEFAULT_REDUCTION[variant]
+    check_option("reduce", reduce, Reduction)
+    if zero_policy == "skip" and reduce not in ("sum", "mean"):
+        raise ValueError(f"Expected reduce='sum' or 'mean' with zero_policy='skip', got {reduce!r}.")
+
+    theta = _THETA[variant]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if reduce == "total":
+            total1, total2 = perf1.sum(axis=-1, keepdims=True), perf2.sum(axis=-1, keepdims=True)
+            return reduce_intervals(theta(total1, n1, total2, n2), "last", total1, total2)
+        if zero_policy == "skip":
+            return _reduce_without_zeros(theta(perf1, n1, perf2, n2), perf1, perf2, reduce)
+        return reduce_intervals(theta(perf1, n1, perf2, n2), reduce, perf1, perf2)
+
+
+def _karp_flatt(perf1: FloatArray, n1: int, perf2: FloatArray, n2: int) -> FloatArray:
+    speedup, r = perf2 / perf1, n2 / n1
+    return 1.0 - (1.0 / speedup - 1.0 / r) / (1.0 - 1.0 / r)
+
+
+def _as_printed(perf1: FloatArray, n1: int, perf2: FloatArray, n2: int) -> FloatArray:
+    speedup, r = perf2 / perf1, n2 / n1
+    return 1.0 - (speedup - 1.0 / r) / (1.0 - 1.0 / r)
+
+
+def _as_programmed(perf1: FloatArray, n1: int, perf2: FloatArray, n2: int) -> FloatArray:
+    if n1 == n2 or n2 == 1:
+        return np.zeros(np.broadcast_shapes(perf1.shape, perf2.shape))
+    infinite_speedup = (perf1 == 0.0) & (perf2 > 0.0)
+    return np.where(infinite_speedup, 0.0, _as_printed(perf1, n1, perf2, n2))
+
+
+_THETA = {"corrected": _karp_flatt, "paper": _as_printed, "sierra": _as_programmed}
+
+
+def _reduce_without_zeros(theta: FloatArray, perf1: FloatArray, perf2: FloatArray, reduce: Reduction) -> FloatArray:
+    kept = (perf1 != 0.0) & (perf2 != 0.0)
+    n_kept = kept.sum(axis=-1)
+    total = np.where(kept, theta, 0.0).sum(axis=-1)
+    value = np.where(n_kept == 0, np.nan, total / n_kept if reduce == "mean" else total)
+    return value[()]
+
+
+def skipped_intervals(perf1: ArrayLike, perf2: ArrayLike) -> IntArray:
+    """Number of intervals that `scalability` leaves out under zero_policy="skip", shape (...,): either curve is 0.
+
+    Raises:
+        CurveError: As `scalability`.
+    """
+    perf1, perf2 = as_curves(perf1=perf1, perf2=perf2)
+    return ((perf1 == 0.0) | (perf2 == 0.0)).sum(axis=-1)
+
+
+def efficiency(perf: ArrayLike, n: int, *, reduce: Reduction = "last") -> FloatArray:
+    """Performance per robot, P(N, t) / N (Hecker and Moses 2015); the authors' program reads the last interval.
+
+    Args:
+        perf: P(N, t), shape (..., T), objects per interval.
+        n: Swarm size N.
+        reduce: `last`, `mean`, or `sum` over the run.
+
+    Returns:
+        Objects per robot, shape (...,). Higher is better.
+
+    Raises:
+        CurveError: The curve is missing, negative or infinite, or n < 1.
+        ValueError: Unknown reduction.
+    """
+    return raw_performance(perf, reduce=reduce) / check_size("n", n)
+
+
+def raw_performance(perf: ArrayLike, *, reduce: Reduction = "last") -> FloatArray:
+    """Performance P(N, t) itself as one number per run; the paper's raw figures show the last interval.
+
+    Args:
+        perf: P(N, t), shape (..., T), objects per interval.
+        reduce: `last`, `mean`, or `sum` over the run.
+
+    Returns:
+        Objects, shape (...,). Higher is better.
+
+    Raises:
+        CurveError: The curve is missing, negative or infinite.
+        ValueError: Unknown reduction.
+    """
+    (perf,) = as_curves(perf=perf)
+    return reduce_intervals(perf, reduce, perf)
