@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_forage_env.rendering_view import PALETTE, RenderError
+from swarm_forage_env.rendering_view import CACHE_OPACITY, NEST_OPACITY, PALETTE, SOURCE_OPACITY, RenderError
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -105,7 +105,7 @@ def _gif_palette() -> "Image.Image":
     colour = PALETTE
     nest, cache, source = (
         _mix(colour.floor, tint, share)
-        for tint, share in ((colour.nest, 0.30), (colour.cache, 0.22), (colour.source, 0.07))
+        for tint, share in ((colour.nest, NEST_OPACITY), (colour.cache, CACHE_OPACITY), (colour.source, SOURCE_OPACITY))
     )
     grounds = (colour.floor, nest, cache, source, colour.page, colour.wall)
     things = (
@@ -136,7 +136,8 @@ def _mix(ground: tuple[int, int, int], thing: tuple[int, int, int], share: float
 
 
 def _write_mp4(frames: Iterable[Frame], path: Path, fps: float) -> None:
-    # macro_block_size=2: the common pixel format halves colour resolution and needs even sides, nothing more.
+    # The usual pixel format halves the resolution of colour, so sides must be even; imageio's default macro block
+    # would instead rescale the picture to multiples of 16.
     with _import_imageio().get_writer(
         path, format="FFMPEG", fps=fps, codec="libx264", quality=8, macro_block_size=1
     ) as writer:

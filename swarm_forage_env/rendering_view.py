@@ -123,7 +123,7 @@ def arena_view(scenario: ScenarioConfig, size_px: int = 900) -> View:
         scale=scale,
         left=(width - width_m * scale) / 2 + WALL_M * scale,
         bottom=header + floor_px - WALL_M * scale,
-        robot_px=max(scenario.robots.radius_m * scale, min(4.6 * grow, max(1.2, 0.17 * robot_gap))),
+        robot_px=max(scenario.robots.radius_m * scale, min(4.6 * grow, max(1.2, 0.065 * robot_gap))),
         object_px=max(0.9 * CELL_M * scale, min(2.6 * grow, max(0.8, 0.35 * object_gap))),
     )
 

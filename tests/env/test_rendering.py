@@ -1,0 +1,429 @@
+"""Pictures of hand-built worlds: what is where, in which colour, and that nothing is written."""
+
+import copy
+import sys
+from itertools import combinations, product
+
+import numpy as np
+import pytest
+
+from swarm_forage_env import rendering_paint, rendering_view
+from swarm_forage_env.config import CELL_M, ScenarioConfig
+from swarm_forage_env.rendering import Trails, render_frame
+from swarm_forage_env.rendering_paint import paint_box, paint_discs, paint_needles, paint_rings, paint_squares
+from swarm_forage_env.rendering_view import (
+    CACHE_OPACITY,
+    NEST_OPACITY,
+    PALETTE,
+    SOURCE_OPACITY,
+    RenderError,
+    arena_view,
+    legend_rows,
+)
+from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.state import CacheState, Counter, ObjectState, ObjectStatus, StepEvents, SwarmState
+
+pytest.importorskip("PIL")
+
+
+class World:
+    """A small warehouse with four robots in the middle of the floor and nothing lying about."""
+
+    def __init__(self, config: ScenarioConfig | None = None) -> None:
+        self.config = config or scenario("warehouse_small", n_robots=4, n_objects=10, caches="static")
+        n_robots = self.config.robots.n_robots
+        self.swarm = SwarmState.empty(n_robots)
+        self.swarm.position[:] = [(10.0 + 2.0 * (row % 4), 4.0) for row in range(n_robots)]
+        self.objects = ObjectState.empty(self.config)
+        self.caches = CacheState.empty(2)
+        self.events = StepEvents.empty(n_robots)
+        self.view = arena_view(self.config, 900)
+
+    def draw(self, tick: int = 100, **options) -> np.ndarray:
+        return render_frame(self.config, self.swarm, self.objects, self.caches, self.events, tick=tick, **options)
+
+    def lay(self, row: int, cell: tuple[int, int]) -> None:
+        self.objects.status[row] = ObjectStatus.FREE
+        self.objects.cell[row] = cell
+
+    def pixel(self, picture: np.ndarray, x: float, y: float, right_px: float = 0.0, down_px: float = 0.0):
+        """Colour at arena position (x, y) m, moved by some pixels."""
+        column, row = self.view.pixels((x, y))
+        return tuple(int(value) for value in picture[int(row + down_px), int(column + right_px)])
+
+    def states(self):
+        return (self.swarm, self.objects, self.caches, self.events)
+
+
+@pytest.fixture
+def world() -> World:
+    return World()
+
+
+def mix(ground, tint, share):
+    return tuple(a + (b - a) * share for a, b in zip(ground, tint, strict=True))
+
+
+def arrays_of(state) -> dict[str, np.ndarray]:
+    values = {name: getattr(state, name) for name in type(state).__slots__}
+    return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+
+
+def test_a_picture_is_uint8_and_keeps_the_shape_of_the_arena(world):
+    picture = world.draw()
+    assert picture.dtype == np.uint8
+    assert picture.shape == (world.view.height, world.view.width, 3)
+    left, top, right, bottom = world.view.box((0.0, 0.0, 32.0, 16.0))
+    assert (right - left) / (bottom - top) == pytest.approx(2.0)
+    assert world.view.width == 900
+
+
+def test_drawing_writes_nothing(world):
+    world.lay(0, (120, 40))
+    world.caches.alive[0], world.caches.count[0], world.caches.cell[0] = True, 3, (80, 40)
+    world.swarm.carried_object[1] = 1
+    world.events.interfering[2] = True
+    trails = Trails(4, 3)
+    trails.add(world.swarm)
+    trails.add(world.swarm)
+    before = copy.deepcopy(world.states())
+    for state in world.states():
+        for array in arrays_of(state).values():
+            array.flags.writeable = False
+    world.draw(trails=trails)
+    for state, old in zip(world.states(), before, strict=True):
+        for name, array in arrays_of(state).items():
+            assert array.tobytes() == arrays_of(old)[name].tobytes(), name
+    assert world.objects.waiting == before[1].waiting
+
+
+def test_equal_states_give_equal_pictures(world):
+    world.lay(0, (120, 40))
+    first = world.draw()
+    world.draw(tick=7, size_px=300)  # other pictures in between leave no trace
+    np.testing.assert_array_equal(first, world.draw())
+
+
+def test_grounds_have_their_colours(world):
+    picture = world.draw()
+    assert world.pixel(picture, 16.0, 8.0) == PALETTE.floor
+    assert world.pixel(picture, 2.0, 2.2) == pytest.approx(mix(PALETTE.floor, PALETTE.nest, NEST_OPACITY), abs=1)
+    assert world.pixel(picture, 25.0, 8.0) == pytest.approx(mix(PALETTE.floor, PALETTE.source, SOURCE_OPACITY), abs=1)
+    assert tuple(picture[0, 0]) == PALETTE.page
+    for x, y in ((0.0, 8.0), (31.8, 8.0), (16.0, 0.0), (16.0, 16.0)):
+        assert world.pixel(picture, x, y) == PALETTE.wall
+
+
+def test_lights_shine_over_the_nest(world):
+    picture = world.draw()
+    for x, y, _ in world.config.arena.lights_m:
+        assert world.pixel(picture, x, y) == pytest.approx(PALETTE.light, abs=2)
+    assert len(world.config.arena.lights_m) == 3
+
+
+def test_only_free_objects_lie_on_the_floor(world):
+    cell = (127, 44)
+    x, y = (cell[0] + 0.5) * CELL_M, (cell[1] + 0.5) * CELL_M
+    bare = world.draw()
+    world.lay(3, cell)
+    assert world.pixel(world.draw(), x, y) == PALETTE.object
+    for status in (ObjectStatus.CARRIED, ObjectStatus.CACHED, ObjectStatus.WAITING):
+        world.objects.status[3] = status
+        np.testing.assert_array_equal(world.draw(), bare)
+
+
+def test_a_cache_is_a_square_with_the_number_of_its_objects(world):
+    bare = world.draw()
+    world.caches.alive[1], world.caches.count[1], world.caches.cell[1] = True, 7, (80, 40)
+    picture = world.draw()
+    half = world.config.cache_side_cells * CELL_M / 2
+    x, y = 80.5 * CELL_M, 40.5 * CELL_M
+    tint = mix(PALETTE.floor, PALETTE.cache, CACHE_OPACITY)
+    for dx, dy in product((-0.9, 0.9), (-0.9, 0.9)):
+        assert world.pixel(picture, x + dx * half, y + dy * half) == pytest.approx(tint, abs=1)
+    assert world.pixel(picture, x + 1.1 * half, y) == PALETTE.floor
+    changed = np.argwhere((picture != bare).any(axis=2))
+    left, top, right, bottom = world.view.box((x - half, y - half, x + half, y + half))
+    assert changed.min(axis=0) == pytest.approx((top, left), abs=1.5)
+    assert changed.max(axis=0) == pytest.approx((bottom, right), abs=1.5)
+    world.caches.count[1] = 8
+    differs = np.argwhere((world.draw() != picture).any(axis=2)).mean(axis=0)
+    assert differs == pytest.approx(world.view.pixels((x, y))[::-1], abs=12), "the number stands in the middle"
+
+
+@pytest.mark.parametrize(
+    ("heading", "right", "up"), [(0.0, 1, 0), (np.pi / 2, 0, 1), (np.pi, -1, 0), (-np.pi / 2, 0, -1)]
+)
+def test_the_needle_points_where_the_robot_is_heading(world, heading, right, up):
+    world.swarm.heading[0] = heading
+    picture, reach = world.draw(), 1.7 * world.view.robot_px
+    x, y = world.swarm.position[0]
+    ahead = world.pixel(picture, x, y, right * reach, -up * reach)
+    behind = world.pixel(picture, x, y, -right * reach, up * reach)
+    assert np.linalg.norm(np.subtract(ahead, PALETTE.empty)) < np.linalg.norm(np.subtract(ahead, PALETTE.floor))
+    assert behind == PALETTE.floor
+
+
+def test_y_points_up(world):
+    world.swarm.position[:] = (16.0, 15.0)
+    blue = np.argwhere((world.draw() == PALETTE.empty).all(axis=2))
+    arena_rows = blue[(blue[:, 0] < world.view.bottom)]
+    assert (arena_rows[:, 0] < world.view.bottom - 14.0 * world.view.scale).all()
+
+
+def test_colours_tell_what_robots_do(world):
+    swarm, (x, y) = world.swarm, world.swarm.position[0]
+    assert world.pixel(world.draw(), x, y) == PALETTE.empty
+    swarm.carried_object[0] = 5
+    picture = world.draw()
+    assert world.pixel(picture, x, y) == PALETTE.object
+    assert world.pixel(picture, x, y, down_px=0.75 * world.view.robot_px) == pytest.approx(PALETTE.carrying, abs=12)
+    swarm.carried_object[0] = -1
+    swarm.active[0] = False
+    picture = world.draw()
+    assert np.linalg.norm(np.subtract(world.pixel(picture, x, y), PALETTE.floor)) < 20, "hollow"
+    assert world.pixel(picture, x, y, right_px=0.8 * world.view.robot_px) == pytest.approx(PALETTE.repair, abs=12)
+
+
+def test_interference_is_a_ring_around_robots_at_work(world):
+    x, y = world.swarm.position[0]
+    ring_px = 1.55 * world.view.robot_px + 0.5
+    world.events.interfering[0] = True
+    ring = world.pixel(world.draw(), x, y, down_px=ring_px)
+    assert ring == pytest.approx(PALETTE.interference, abs=40)
+    assert world.pixel(world.draw(), x, y) == PALETTE.empty
+    world.swarm.active[0] = False
+    assert world.pixel(world.draw(), x, y, down_px=ring_px) == PALETTE.floor
+
+
+def test_robots_without_a_body_are_not_drawn(world):
+    world.swarm.present[0] = world.swarm.active[0] = False
+    assert world.pixel(world.draw(), *world.swarm.position[0]) == PALETTE.floor
+    assert world.pixel(world.draw(), *world.swarm.position[1]) == PALETTE.empty
+
+
+def test_clock_and_figures_stand_in_the_header(world):
+    header = slice(0, int(world.view.bottom - 16.2 * world.view.scale))
+    before = world.draw(tick=100)
+    later = world.draw(tick=105)
+    world.events.counters[Counter.COLLECTED] = 12
+    delivered = world.draw(tick=105)
+    titled = world.draw(tick=105, title="another headline")
+    for one, two in ((before, later), (later, delivered), (delivered, titled)):
+        rows = np.argwhere((one != two).any(axis=2))[:, 0]
+        assert rows.size
+        assert rows.max() < header.stop
+
+
+@pytest.mark.parametrize("size_px", [0, -5, 239, 4001, 900.5, True, "900", None])
+def test_impossible_sizes_are_refused(world, size_px):
+    with pytest.raises(RenderError, match="size_px"):
+        world.draw(size_px=size_px)
+
+
+@pytest.mark.parametrize("size_px", [240, 600, 1500])
+def test_size_is_the_longer_side_of_the_arena(size_px):
+    tall = scenario(
+        "warehouse_small", width_m=16.0, height_m=32.0, nest_centre_m=(8.0, 4.0), nest_size_m=(6.4, 3.2), n_objects=10
+    )
+    world = World(tall)
+    picture = world.draw(size_px=size_px)
+    view = arena_view(tall, size_px)
+    assert picture.shape == (view.height, view.width, 3)
+    assert view.scale * 32.4 == pytest.approx(size_px)
+    left, top, right, bottom = view.box((0.0, 0.0, 16.0, 32.0))
+    assert 0 < left < right < view.width
+    assert 0 < top < bottom < view.height
+
+
+@pytest.mark.parametrize("width", [240, 500, 900, 2000])
+def test_the_legend_stays_inside_the_picture(width):
+    config = scenario("warehouse_small", caches="dynamic")
+    rows = legend_rows(config, width, width / 32.4)
+    names = [name for row in rows for name, _, _ in row]
+    assert names == ["empty", "carrying", "in interference", "in repair", "object", "source", "nest", "cache"]
+    font = rendering_view.text_font(rendering_view.text_height(width / 900))
+    for row in rows:
+        name, x, _ = row[-1]
+        assert x + font.getlength(name) < width
+
+
+def test_the_legend_names_only_what_the_world_has():
+    rows = legend_rows(scenario("search_and_rescue"), 900, 20.0)
+    names = {name for row in rows for name, _, _ in row}
+    assert "cache" not in names
+    assert "source" not in names
+
+
+def test_trails_fade_towards_the_past(world):
+    trails = Trails(4, 30)
+    for step in range(30):
+        world.swarm.position[0] = (10.0 + 0.1 * step, 10.0)
+        trails.add(world.swarm)
+    picture = world.draw(trails=trails)
+    blue = [world.pixel(picture, x, 10.0)[2] for x in (10.5, 11.2, 12.0, 12.6)]
+    assert blue == sorted(blue)
+    assert blue[0] < blue[-1]
+    assert world.pixel(world.draw(), 12.0, 10.0) == PALETTE.floor
+
+
+def test_trails_have_the_colour_of_what_the_robot_did_there(world):
+    trails = Trails(4, 20)
+    for step in range(20):
+        world.swarm.position[0] = (10.0 + 0.1 * step, 10.0)
+        world.swarm.carried_object[0] = 2 if step >= 10 else -1
+        trails.add(world.swarm)
+    world.swarm.position[0] = (20.0, 13.0)
+    picture = world.draw(trails=trails)
+    red, _, blue = world.pixel(picture, 10.8, 10.0)
+    assert blue > red
+    red, _, blue = world.pixel(picture, 11.6, 10.0)
+    assert red > blue
+
+
+def test_trails_have_gaps_where_a_robot_was_away(world):
+    trails = Trails(4, 3)
+    for x, present in ((10.0, True), (15.0, False), (20.0, True)):
+        world.swarm.position[0] = (x, 12.0)
+        world.swarm.present[0] = present
+        trails.add(world.swarm)
+    picture = world.draw(trails=trails)
+    for x in (12.0, 15.0, 18.0):
+        assert world.pixel(picture, x, 12.0) == PALETTE.floor
+
+
+def test_trails_of_another_world_are_refused(world):
+    with pytest.raises(RenderError, match="4 robots, got 5"):
+        world.draw(trails=Trails(5, 3))
+    with pytest.raises(RenderError, match="n_samples"):
+        Trails(4, 1)
+
+
+def test_sixteen_thousand_robots_leave_the_floor_visible():
+    config = scenario(
+        "warehouse_medium", width_m=576.0, height_m=576.0, nest_centre_m=(288.0, 288.0), nest_size_m=(115.2, 115.2),
+        n_robots=16_384, n_objects=20_000,
+    )  # fmt: skip
+    world = World(config)
+    world.swarm.position[:] = np.random.default_rng(1).uniform(1.0, 575.0, (16_384, 2))
+    picture = world.draw()
+    left, top, right, bottom = (int(edge) for edge in world.view.box((10.0, 10.0, 70.0, 566.0)))
+    strip = picture[top:bottom, left:right]
+    floor_share = (strip == PALETTE.floor).all(axis=2).mean()
+    assert 0.5 < floor_share < 0.95
+    assert world.view.robot_px >= 1.0
+
+
+def test_without_pillow_the_message_tells_what_to_install(world, monkeypatch):
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    rendering_view.text_font.cache_clear()
+    arena_view.cache_clear()
+    with pytest.raises(ImportError, match=r"pip install 'swarm-forage-env\[render\]'"):
+        world.draw()
+
+
+# Colour vision: severe forms, matrices of Machado, Oliveira and Fernandes 2009, on linear RGB.
+VISION = {
+    "normal": np.eye(3),
+    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+}
+
+
+def seen_lab(colour, vision) -> np.ndarray:
+    """CIE L*a*b* of an sRGB colour as seen with `vision`."""
+    share = np.asarray(colour) / 255.0
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(np.asarray(vision) @ linear, 0.0, 1.0)
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    scaled = to_xyz @ seen / np.array([0.9505, 1.0, 1.089])
+    f = np.where(scaled > 0.008856, np.cbrt(scaled), 7.787 * scaled + 16 / 116)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize("vision", VISION.values(), ids=VISION.keys())
+def test_colours_stay_apart_for_colour_blind_readers(vision):
+    things = [PALETTE.empty, PALETTE.carrying, PALETTE.interference, PALETTE.repair, PALETTE.object]
+    grounds = [
+        PALETTE.floor,
+        mix(PALETTE.floor, PALETTE.nest, NEST_OPACITY),
+        mix(PALETTE.floor, PALETTE.cache, CACHE_OPACITY),
+        mix(PALETTE.floor, PALETTE.source, SOURCE_OPACITY),
+    ]
+    pairs = [*combinations(things, 2), *product(things, grounds)]
+    for one, two in pairs:
+        assert np.linalg.norm(seen_lab(one, vision) - seen_lab(two, vision)) > 20.0
+
+
+# The painter
+
+
+def blank(size: int = 40) -> np.ndarray:
+    return np.zeros((size, size, 3), np.float32)
+
+
+@pytest.mark.parametrize("centre", [(20.0, 20.0), (20.5, 20.5), (20.3, 19.8)])
+@pytest.mark.parametrize(
+    ("paint", "area"),
+    [
+        (lambda canvas, centre: paint_discs(canvas, centre, 5.0, (255, 0, 0)), np.pi * 25.0),
+        (lambda canvas, centre: paint_rings(canvas, centre, 8.0, 2.0, (255, 0, 0)), 2.0 * np.pi * 8.0 * 2.0),
+        (lambda canvas, centre: paint_squares(canvas, centre, 3.4, (255, 0, 0)), 3.4**2),
+        (
+            lambda canvas, centre: paint_needles(canvas, centre, np.array([[0.6, -0.8]]), 9.0, 2.0, (255, 0, 0)),
+            9.0 * 2.0 + np.pi,
+        ),
+    ],
+    ids=["disc", "ring", "square", "needle"],
+)
+def test_shapes_cover_their_area_wherever_they_are(paint, area, centre):
+    canvas = blank()
+    paint(canvas, [centre])
+    assert canvas[..., 0].sum() / 255.0 == pytest.approx(area, rel=0.03)
+    assert not canvas[..., 1:].any()
+
+
+def test_a_disc_is_centred_where_it_was_asked_for():
+    canvas = blank()
+    paint_discs(canvas, [(12.3, 25.8)], 4.0, (255, 255, 255))
+    rows, columns = np.mgrid[0:40, 0:40] + 0.5
+    weight = canvas[..., 0]
+    assert (columns * weight).sum() / weight.sum() == pytest.approx(12.3, abs=0.02)
+    assert (rows * weight).sum() / weight.sum() == pytest.approx(25.8, abs=0.02)
+
+
+def test_a_box_shares_its_edge_pixels():
+    canvas = blank(8)
+    paint_box(canvas, (1.25, 2.0, 4.5, 3.5), (100, 0, 0), opacity=0.5)
+    expected = np.zeros((8, 8))
+    expected[2, 1:5] = 50.0 * np.array([0.75, 1.0, 1.0, 0.5])
+    expected[3, 1:5] = 0.5 * expected[2, 1:5]
+    np.testing.assert_allclose(canvas[..., 0], expected)
+
+
+def test_shapes_may_stick_out_of_the_canvas_or_be_absent():
+    canvas = blank(10)
+    paint_discs(canvas, [(0.0, 5.0), (-30.0, 4.0), (5.0, 100.0)], 3.0, (255, 0, 0))
+    assert canvas[5, 0, 0] == pytest.approx(255.0)
+    assert not canvas[:, 4:].any()
+    before = canvas.copy()
+    paint_discs(canvas, np.empty((0, 2)), 3.0, (0, 255, 0))
+    paint_box(canvas, (20.0, 0.0, 30.0, 5.0), (0, 255, 0))
+    np.testing.assert_array_equal(canvas, before)
+
+
+def test_shapes_of_one_call_do_not_add_up():
+    canvas = blank()
+    paint_discs(canvas, [(20.0, 20.0)] * 3, 5.0, (200, 0, 0), opacity=0.5)
+    assert canvas.max() == pytest.approx(100.0)
+
+
+def test_painting_in_portions_gives_the_same_picture(monkeypatch):
+    centre = np.random.default_rng(2).uniform(-2.0, 42.0, (300, 2))
+    opacity = np.linspace(0.1, 1.0, 300)
+    whole, portions = blank(), blank()
+    paint_discs(whole, centre, 2.2, (255, 10, 0), opacity)
+    monkeypatch.setattr(rendering_paint, "_STAMP_BUDGET", 500)
+    paint_discs(portions, centre, 2.2, (255, 10, 0), opacity)
+    np.testing.assert_array_equal(whole, portions)
