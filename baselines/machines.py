@@ -144,8 +144,8 @@ def sense(row: Row, c: np.record) -> Senses:
         sees_nest(row[c.ground : c.ground + 4]),
         row[c.carrying] > 0.5,
         int(row[c.event] * EVENT_SCALE + 0.5),
-        (row[c.position] + 1.0) * c.half_width_m,
-        (row[c.position + 1] + 1.0) * c.half_height_m,
+        (float(row[c.position]) + 1.0) * c.half_width_m,
+        (float(row[c.position + 1]) + 1.0) * c.half_height_m,
     )
 
 
@@ -265,7 +265,7 @@ def go_to_goal(robot: np.record, senses: Senses, row: Row, c: np.record, draws: 
         if senses.obstacle and not robot.is_slowing:
             robot.vector_state = VECTOR_AVOIDANCE
         else:
-            seek_x, seek_y = arrival(robot, senses.x, senses.y, row[c.heading], row[c.heading + 1], c)
+            seek_x, seek_y = arrival(robot, senses.x, senses.y, float(row[c.heading]), float(row[c.heading + 1]), c)
             x += seek_x
             y += seek_y
             dx = robot.goal_x_m - senses.x

@@ -123,8 +123,8 @@ def forget(robot: np.record, memory: OneMemory, object_row: int) -> None:
 def look_around(robot: np.record, row: Row, c: np.record, memory: OneMemory) -> None:
     """One tick of the memory rule above, from the window in observation `row`. Advances the robot's clock."""
     robot.clock += 1
-    left = int((row[c.los_cell] + 1.0) * c.half_width_m / c.cell_m) - _REACH
-    low = int((row[c.los_cell + 1] + 1.0) * c.half_height_m / c.cell_m) - _REACH
+    left = int((float(row[c.los_cell]) + 1.0) * c.half_width_m / c.cell_m) - _REACH
+    low = int((float(row[c.los_cell + 1]) + 1.0) * c.half_height_m / c.cell_m) - _REACH
     changed = left != robot.window_x or low != robot.window_y
     for k in range(_WINDOW):
         if row[c.los_object + k] != memory.window[k]:

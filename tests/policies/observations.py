@@ -1,0 +1,116 @@
+"""Synthetic observations, built through the layout, for tests of policies without a world."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from swarm_forage_env.layout import EVENT_SCALE, observation_layout
+from swarm_forage_env.policy import Event, SwarmTask
+from swarm_forage_env.quirks import Quirks
+
+GREYS = {"floor": 1.0, "nest": 0.7, "cache": 0.4, "object": 0.0}
+CELL_M = 0.2
+
+
+def make_task(n_robots: int = 1, **changes: Any) -> SwarmTask:
+    """The task of a 32 x 16 m warehouse with 200 objects, or a variation of it."""
+    width_m, height_m = changes.get("arena_size_m", (32.0, 16.0))
+    n_objects = changes.get("n_objects", 200)
+    task = SwarmTask(
+        n_robots=n_robots,
+        n_objects=n_objects,
+        dt_s=0.2,
+        horizon_s=10_000.0,
+        layout=observation_layout(width_m, height_m, n_objects),
+        max_speed_mps=0.1,
+        max_wheel_difference_mps=0.2,
+        wheel_scale_mps=0.2,
+        wheel_base_m=0.14,
+        arena_size_m=(width_m, height_m),
+        cell_m=CELL_M,
+        nest_centre_m=(3.2, 8.0),
+        nest_size_m=(3.2, 12.8),
+        distributable_box_m=(4.8, 2.4, 27.4, 13.8),
+        placement="single_source",
+        caches="none",
+        cache_side_m=6.2,
+        cache_side_nominal_m=6.4,
+        min_dist_m=3.2,
+        cache_proximity_m=12.8,
+        quirks=Quirks(),
+    )
+    return dataclasses.replace(task, **changes)
+
+
+class Observations:
+    """An (N, D) observation array with setters in the units of the world; each acts on all robots unless told."""
+
+    def __init__(self, task: SwarmTask) -> None:
+        """Robots stand on empty floor at (10, 10) m, facing +x, carrying nothing, moving straight."""
+        self.task = task
+        self.array = np.zeros((task.n_robots, task.layout.size), np.float32)
+        self.set("active", 1.0)
+        self.set("wheel_speed", 0.45)
+        self.ground("floor")
+        self.pose(10.0, 10.0)
+
+    def set(self, name: str, value: Any, robots: Any = slice(None)) -> None:
+        """Write a slice in observation units."""
+        self.array[robots, self.task.layout[name]] = value
+
+    def get(self, name: str, robot: int = 0) -> np.ndarray:
+        """Read a slice of one robot."""
+        return self.array[robot, self.task.layout[name]]
+
+    def pose(self, x: float, y: float, heading: float = 0.0, robots: Any = slice(None)) -> None:
+        """Set position and heading, and the cell that goes with them."""
+        self.believed_position(x, y, robots)
+        self.set("heading", (math.cos(heading), math.sin(heading)), robots)
+        cell = (int(x / CELL_M), int(y / CELL_M))
+        self.set("los_cell", self._share((cell[0] + 0.5) * CELL_M, (cell[1] + 0.5) * CELL_M), robots)
+
+    def believed_position(self, x: float, y: float, robots: Any = slice(None)) -> None:
+        """Set the position reading only."""
+        self.set("position", self._share(x, y), robots)
+
+    def _share(self, x: float, y: float) -> tuple[float, float]:
+        width_m, height_m = self.task.arena_size_m
+        return 2 * x / width_m - 1, 2 * y / height_m - 1
+
+    def ground(self, kind: str, robots: Any = slice(None)) -> None:
+        """Let all four ground sensors see one kind of floor."""
+        self.set("ground", GREYS[kind], robots)
+
+    def obstacle(self, angle: float | None, robots: Any = slice(None)) -> None:
+        """Let the two beams around a body-frame angle see an obstacle, or none."""
+        self.set("proximity", self._ring(angle, 0.5), robots)
+
+    def light(self, angle: float, robots: Any = slice(None)) -> None:
+        """Let the light shine from a body-frame angle."""
+        self.set("light", self._ring(angle, 0.9), robots)
+
+    @staticmethod
+    def _ring(angle: float | None, reading: float) -> np.ndarray:
+        readings = np.zeros(24)
+        if angle is not None:
+            first = math.floor(math.degrees(angle) / 15.0 - 0.5)
+            readings[[first % 24, (first + 1) % 24]] = reading
+        return readings
+
+    def carry(self, object_row: int | None, robots: Any = slice(None)) -> None:
+        """Set cargo; None = carrying nothing."""
+        self.set("carrying", 0.0 if object_row is None else 1.0, robots)
+        self.set("cargo", 0.0 if object_row is None else (object_row + 1) / self.task.n_objects, robots)
+
+    def event(self, event: Event, robots: Any = slice(None)) -> None:
+        """Set what happened in the last step."""
+        self.set("event", int(event) / EVENT_SCALE, robots)
+
+    def window(self, objects: dict[tuple[int, int], int], robots: Any = slice(None)) -> None:
+        """Show objects: offset in cells from the robot's own cell, -2 .. 2 each -> object row."""
+        view = np.zeros((5, 5))
+        for (dx, dy), object_row in objects.items():
+            view[dy + 2, dx + 2] = (object_row + 1) / self.task.n_objects
+        self.set("los_object", view.ravel(), robots)

@@ -1,0 +1,62 @@
+"""Controller parameters refuse nonsense and reach the policies by name."""
+
+import dataclasses
+
+import pytest
+
+from baselines.crw import CRWPolicy
+from baselines.dpo import DPOPolicy
+from baselines.object_choice import MemoryParameters
+from baselines.parameters import ControllerParameters, ParameterError, kernel_constants
+from swarm_forage_env.policy import Policy, load_policy
+from swarm_forage_env.quirks import Quirks
+from tests.policies.observations import make_task
+
+
+@pytest.mark.parametrize("name", ["crw", "dpo"])
+def test_controllers_are_found_by_name(name):
+    policy = load_policy(name, {"wander_speed_mps": 0.07})
+    assert isinstance(policy, Policy)
+    assert isinstance(policy, CRWPolicy | DPOPolicy)
+    assert policy.parameters.wander_speed_mps == 0.07
+
+
+def test_overrides_build_on_given_parameters():
+    policy = DPOPolicy(MemoryParameters(object_priority=2.0), evaporation_per_tick=0.1)
+    assert policy.parameters == MemoryParameters(object_priority=2.0, evaporation_per_tick=0.1)
+
+
+def test_unknown_parameter_names_the_nearest_one():
+    with pytest.raises(ParameterError, match="Did you mean 'wander_speed_mps'"):
+        CRWPolicy(wander_speed=0.1)
+
+
+@pytest.mark.parametrize("field", [field.name for field in dataclasses.fields(MemoryParameters)])
+@pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf"), True, "1"])
+def test_every_parameter_must_be_a_finite_number_from_zero(field, value):
+    with pytest.raises(ParameterError, match=field):
+        MemoryParameters(**{field: value})
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"wander_max_change_deg": 0.0},
+        {"soft_turn_deg": 0.0},
+        {"slowing_radius_m": 0.0},
+        {"wander_circle_radius": 4.0},
+        {"evaporation_per_tick": 1.0},
+    ],
+)
+def test_values_that_make_no_sense_are_refused(values):
+    with pytest.raises(ParameterError, match=next(iter(values))):
+        MemoryParameters(**values)
+
+
+def test_durations_become_ticks_and_quirks_reach_the_kernels():
+    constants = kernel_constants(ControllerParameters(), make_task(dt_s=0.1))[0]
+    assert (constants.exploration_lock_ticks, constants.recovery_ticks) == (100, 20)
+    assert (constants.explore_double_start, constants.start_is_arrival) == (0, 1)
+    quirks = Quirks(explore_double_start=True, finisher_tolerance_mismatch=True)
+    constants = kernel_constants(ControllerParameters(), make_task(quirks=quirks))[0]
+    assert (constants.explore_double_start, constants.start_is_arrival) == (1, 0)

@@ -1,0 +1,263 @@
+"""CRW and DPO for one robot, slow and obvious: complex numbers, dictionaries, strings. Twin of the compiled kernels.
+
+A force is a complex number, forward + 1j * left, in cm/s; distances are in metres.
+"""
+
+import cmath
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from swarm_forage_env.policy import Event, Grip, SwarmTask
+
+RHO = 0.00001
+LOCK_TICKS = 50
+RECOVERY_TICKS = 10
+SENSOR_ANGLES = np.deg2rad(7.5 + 15.0 * np.arange(24))
+
+
+def sensed(task: SwarmTask, row: np.ndarray) -> dict[str, np.ndarray]:
+    """One observation row as a dictionary of its slices, in double precision."""
+    return {part.name: row[part.start : part.stop].astype(float) for part in task.layout}
+
+
+def vector_sum(readings: np.ndarray) -> complex:
+    """Ring readings summed as polar vectors."""
+    return complex(np.sum(readings * np.exp(1j * SENSOR_ANGLES)))
+
+
+def with_length(direction: complex, length: float) -> complex:
+    """A force of a given length; a zero direction means straight ahead."""
+    return cmath.rect(length, cmath.phase(direction))
+
+
+class ObjectDictionary:
+    """Object memory as a dictionary: row -> [cell, density]; every density decays in every tick."""
+
+    def __init__(self) -> None:
+        self.known: dict[int, tuple[tuple[int, int], float]] = {}
+
+    def update(self, own_cell: tuple[int, int], visible: dict[tuple[int, int], int]) -> None:
+        """One tick: forget what should be visible but is not, remember what is visible, decay."""
+        for row, (cell, _) in list(self.known.items()):
+            in_window = max(abs(cell[0] - own_cell[0]), abs(cell[1] - own_cell[1])) <= 2
+            if in_window and row not in visible.values():
+                del self.known[row]
+        for cell, row in visible.items():
+            for other, (other_cell, _) in list(self.known.items()):
+                if other_cell == cell and other != row:
+                    del self.known[other]
+            self.known[row] = (cell, 1.0)
+        for row, (cell, density) in self.known.items():
+            self.known[row] = (cell, max(0.0, (1.0 - RHO) * density))
+
+
+def visible_objects(task: SwarmTask, senses: dict[str, np.ndarray]) -> tuple[tuple[int, int], dict]:
+    """The robot's own cell, and the objects in its window: cell -> row."""
+    size = np.array(task.arena_size_m)
+    own = np.rint((senses["los_cell"] + 1.0) / 2.0 * size / task.cell_m - 0.5).astype(int)
+    visible = {}
+    for k, value in enumerate(senses["los_object"]):
+        if value > 0:
+            cell = (int(own[0]) + k % 5 - 2, int(own[1]) + k // 5 - 2)
+            visible[cell] = round(value * task.n_objects) - 1
+    return (int(own[0]), int(own[1])), visible
+
+
+@dataclass
+class ReferenceRobot:
+    """One robot under CRW, or under DPO if it has a memory."""
+
+    task: SwarmTask
+    memory: ObjectDictionary | None = None
+    state: str = "acquire"
+    wander_deg: float = 0.0
+    timer: int | None = None
+    """Ticks of exploration; None = not exploring."""
+    vector: str = "idle"
+    recovery: int = 0
+    slowing: bool = False
+    depth: float = 0.0
+    target: int = -1
+    goal: tuple[float, float] = (0.0, 0.0)
+    draws: np.ndarray = field(default_factory=lambda: np.zeros(4))
+
+    def act(self, row: np.ndarray, draws: np.ndarray) -> tuple[float, float, float]:
+        """One tick; draws are for drop depth, wander, restart wander and free-breaking wander."""
+        self.draws = draws
+        self.senses = sensed(self.task, row)
+        self.away = vector_sum(self.senses["proximity"])
+        size = np.array(self.task.arena_size_m)
+        self.position = (self.senses["position"] + 1.0) / 2.0 * size
+        if self.memory is not None:
+            self.memory.update(*visible_objects(self.task, self.senses))
+        self.change_state()
+        force = 0j
+        if self.state == "acquire":
+            found, force = self.acquire() if self.memory is not None else self.explore()
+            if found:
+                self.state = "wait for pick-up"
+        elif self.state in ("homing", "homing in nest"):
+            force = self.home()
+        elif self.state == "leave nest":
+            force = self.wander(1) + self.avoid()
+        if self.state.startswith("wait"):
+            grip = Grip.GRASP if self.state == "wait for pick-up" else Grip.DELIVER
+            return 0.0, 0.0, grip
+        return (*drive(force), Grip.GRASP if self.state.startswith("homing") else Grip.RELEASE)
+
+    def change_state(self) -> None:
+        """What the world did to the robot."""
+        carrying = self.senses["carrying"][0] == 1.0
+        event = round(self.senses["event"][0] * 16)
+        failed = event in (Event.NOTHING_HERE, Event.VANISHED)
+        if carrying and self.state in ("acquire", "wait for pick-up", "leave nest"):
+            self.state = "homing"
+            if self.memory is not None:
+                self.memory.known.pop(round(self.senses["cargo"][0] * self.task.n_objects) - 1, None)
+        elif carrying and self.state == "wait for drop" and failed:
+            self.state = "homing"
+        elif not carrying and (self.state.startswith("homing") or (self.state == "wait for pick-up" and failed)):
+            self.restart()
+        elif not carrying and self.state == "wait for drop":
+            self.state = "leave nest"
+        if self.state == "leave nest" and not self.sees(0.6, 0.8, 3):
+            self.restart()
+
+    def restart(self) -> None:
+        """Acquire from the beginning."""
+        self.state, self.timer, self.vector, self.recovery = "acquire", None, "idle", 0
+
+    def sees(self, low: float, high: float, at_least: int) -> bool:
+        """Whether enough ground sensors read a grey in the band."""
+        readings = self.senses["ground"]
+        return int(np.sum((readings >= low - 1e-6) & (readings <= high + 1e-6))) >= at_least
+
+    def sees_object(self) -> bool:
+        return self.sees(-0.05, 0.05, 4)
+
+    def obstacle(self) -> bool:
+        if abs(self.away) < 1e-12:
+            return False
+        return abs(self.away) > 0.1 or abs(cmath.phase(self.away)) > 2.61
+
+    def avoid(self) -> complex:
+        return with_length(-self.away, 8.0) if self.obstacle() else 0j
+
+    def wander(self, draw: int) -> complex:
+        w = math.radians(self.wander_deg)
+        force = with_length(100.0 * cmath.exp(1j * w) - 4.0, 9.0)
+        self.wander_deg = math.fmod(self.wander_deg + (-5.0 + 10.0 * self.draws[draw]), 5.0)
+        return force
+
+    def explore(self) -> tuple[bool, complex]:
+        force = 0j
+        if self.timer is None:
+            self.timer = 0
+            if self.task.quirks.explore_double_start:
+                force += self.wander(2) + self.avoid()
+        if self.timer >= LOCK_TICKS and self.sees_object():
+            self.timer = None
+            return True, 0j
+        self.timer += 1
+        return False, force + self.wander(1) + self.avoid()
+
+    def acquire(self) -> tuple[bool, complex]:
+        if self.vector == "idle":
+            if not self.choose():
+                return self.explore()
+            self.timer, self.vector, self.recovery = None, "vector", 0
+            arrived, force = self.go()
+        else:
+            arrived, force = self.go()
+            if self.target not in self.memory.known:
+                return self.give_up(force)
+        if not arrived:
+            return False, force
+        if self.sees_object():
+            self.vector = "idle"
+            return True, 0j
+        return self.give_up(force)
+
+    def give_up(self, force: complex) -> tuple[bool, complex]:
+        self.vector, self.recovery = "idle", 0
+        found, more = self.explore()
+        return found, force + more
+
+    def choose(self) -> bool:
+        """Best remembered object further than 0.2 m."""
+        nest, cell_m = self.task.nest_centre_m, self.task.cell_m
+        utilities = {}
+        for row, (cell, density) in self.memory.known.items():
+            anchor = (cell[0] * cell_m, cell[1] * cell_m)
+            centre = (anchor[0] + cell_m / 2, anchor[1] + cell_m / 2)
+            if math.dist(centre, self.position) > 0.2:
+                utilities[row] = math.dist(anchor, nest) / math.dist(anchor, self.position) * math.exp(density)
+        if not utilities:
+            return False
+        self.target = max(utilities, key=lambda row: utilities[row])
+        cell = self.memory.known[self.target][0]
+        self.goal = ((cell[0] + 0.5) * cell_m, (cell[1] + 0.5) * cell_m)
+        return True
+
+    def go(self) -> tuple[bool, complex]:
+        """One tick of vectoring: whether arrived, and the force. States may follow one another within the tick."""
+        force = 0j
+        for _ in range(2):
+            if self.vector == "recovery":
+                force += 7.0
+                self.recovery += 1
+                if self.obstacle():
+                    self.recovery, self.vector = 0, "avoidance"
+                elif self.recovery == RECOVERY_TICKS:
+                    self.recovery, self.vector = 0, "vector"
+                else:
+                    return False, force
+            elif self.vector == "vector":
+                if self.obstacle() and not self.slowing:
+                    self.vector = "avoidance"
+                    continue
+                distance = math.dist(self.goal, self.position)
+                return distance <= 0.02, force + self.arrive(distance)
+            else:
+                if self.obstacle():
+                    force += self.avoid()
+                    left, right = self.senses["wheel_speed"] * 20.0
+                    if (left + right) / 2 <= 0.1:
+                        force += self.wander(3)
+                    return False, force
+                self.vector = "recovery"
+        raise AssertionError("vectoring changes state at most once in a tick")
+
+    def arrive(self, distance: float) -> complex:
+        cos, sin = self.senses["heading"]
+        offset = complex(self.goal[0] - self.position[0], self.goal[1] - self.position[1]) * complex(cos, -sin)
+        self.slowing = distance <= 0.2
+        return with_length(offset, max(1.0, 8.0 * distance / 0.2) if self.slowing else 8.0)
+
+    def home(self) -> complex:
+        distance = math.dist(self.position, self.task.nest_centre_m)
+        in_nest = self.sees(0.6, 0.8, 3)
+        if self.state == "homing" and in_nest:
+            self.depth = 0.01 + (distance - 0.01) * self.draws[0]
+            self.state = "homing in nest"
+        if self.state == "homing in nest" and in_nest and distance <= self.depth:
+            self.state = "wait for drop"
+            return 0j
+        force = with_length(vector_sum(self.senses["light"]), 8.0) + self.avoid()
+        if self.state == "homing in nest":
+            force += self.wander(1)
+        return force
+
+
+def drive(force: complex) -> tuple[float, float]:
+    """Wheel commands in [-1, 1] (1 = 20 cm/s) for a summed force in cm/s."""
+    angle = math.degrees(cmath.phase(force))
+    if abs(angle) <= 15.0:
+        base = min(abs(force), 10.0)
+        share = (15.0 - abs(angle)) / 15.0
+        slow, fast = base * share, base * (2.0 - share)
+    else:
+        slow, fast = -10.0, 10.0
+    return (slow / 20.0, fast / 20.0) if angle > 0 else (fast / 20.0, slow / 20.0)
