@@ -5,6 +5,7 @@ Drawing reads the world and never writes it: a run that is filmed and one that i
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,13 +33,14 @@ def record_run(
     fps: float = 20.0,
     size_px: int = 900,
     trail_s: float = 20.0,
+    caches: str | None = None,
     wrappers: "Iterable[WrapperConfig]" = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Run a policy and film it.
 
     Args:
-        scenario: The world. Its `caches` are taken as they are, whatever world the policy is made for.
+        scenario: The world, but for its caches.
         policy: Name of an installed policy, or a fresh policy object.
         path: File to write, .gif or .mp4.
         seconds: Simulated time to film.
@@ -47,6 +49,8 @@ def record_run(
         fps: Pictures per second of film.
         size_px: Longer side of the drawn arena.
         trail_s: Simulated time over which the robots' trails fade; 0 for none.
+        caches: Which caches the world has; default what the policy states in `caches`, or what the scenario has
+            where it states nothing.
         wrappers: Configurations of noise, throttling and population dynamics, in any order.
         progress: Called with (pictures done, pictures in all) after each picture.
 
@@ -64,9 +68,10 @@ def record_run(
     path = check_film(path, fps, len(ticks))
     arena_view(scenario, size_px)  # refuses a bad size before the run starts
     name = policy if isinstance(policy, str) else getattr(policy, "name", type(policy).__name__)
-    title = f"{scenario.name.replace('_', ' ')}, {name}, {scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
     if isinstance(policy, str):
         policy = load_policy(policy)
+    scenario = replace(scenario, caches=caches or getattr(policy, "caches", scenario.caches))
+    title = f"{scenario.name.replace('_', ' ')}, {name}, {scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
     stack = build_stack(scenario, wrappers, reads=getattr(policy, "reads", None))
     n_samples = round(trail_s * fps / speedup) + 1
     trails = Trails(scenario.robots.n_robots, n_samples) if n_samples > 1 else None

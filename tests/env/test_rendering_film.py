@@ -135,6 +135,10 @@ class Witness(RandomPolicy):
 
     calls = 0
 
+    def reset(self, task, rng):
+        self.caches_seen = task.caches
+        super().reset(task, rng)
+
     def act(self, obs, active):
         self.calls += 1
         return super().act(obs, active)
@@ -154,6 +158,17 @@ def test_pictures_are_spaced_evenly_in_ticks(small, tmp_path):
         progress=lambda *_: seen.append(policy.calls),
     )
     assert seen == list(range(0, 21, 2))
+
+
+@pytest.mark.parametrize(
+    ("stated", "asked", "expected"), [(None, None, "static"), ("none", None, "none"), ("none", "static", "static")]
+)
+def test_the_world_has_the_caches_that_the_policy_is_made_for(tmp_path, stated, asked, expected):
+    world, policy = scenario("warehouse_small", n_robots=4, n_objects=10, caches="static"), Witness()
+    if stated is not None:
+        policy.caches = stated
+    record_run(world, policy, tmp_path / "run.gif", seconds=2.0, size_px=300, caches=asked)
+    assert policy.caches_seen == expected
 
 
 def test_one_seed_gives_one_film(small, tmp_path):
