@@ -35,6 +35,8 @@ THREAD_SETTINGS = (
 """Environment variables set to 1 for workers: parallelism lives at the level of runs."""
 QUEUED_PER_WORKER = 2
 """Runs handed to the pool per worker, so that none waits for the driver and little is lost when one crashes."""
+WAKE_UP_EVERY_S = 0.5
+"""The driver never sleeps longer: a library's signal handler (that of polars) can make a sleep outlast Ctrl-C."""
 
 
 class WorkerError(RuntimeError):
@@ -156,8 +158,13 @@ def _result(planned: dict[str, RunSpec], outcomes: dict[str, Outcome], n_stored:
     )
 
 
-def _run_on(executor: Executor, todo: deque[RunSpec], *, limit: int) -> Generator[Outcome]:
-    """Work `todo` off with at most `limit` runs submitted; stops early, leaving the rest, when the executor breaks."""
+def _run_on(
+    executor: Executor, todo: deque[RunSpec], *, limit: int, lost: deque[RunSpec] | None = None
+) -> Generator[Outcome]:
+    """Work `todo` off with at most `limit` runs submitted; stops early, leaving the rest, when the executor breaks.
+
+    Runs that were submitted when it broke are failures, or go to `lost` where one is given.
+    """
     running: dict[Future[RunRecord], RunSpec] = {}
     broken = False
     try:
@@ -165,10 +172,14 @@ def _run_on(executor: Executor, todo: deque[RunSpec], *, limit: int) -> Generato
             while todo and not broken and len(running) < limit:
                 spec = todo.popleft()
                 running[executor.submit(run_one, spec)] = spec
-            finished, _ = wait(running, return_when=FIRST_COMPLETED)
+            finished, _ = wait(running, timeout=WAKE_UP_EVERY_S, return_when=FIRST_COMPLETED)
             for future in finished:
                 spec, error = running.pop(future), future.exception()
-                broken = broken or isinstance(error, BrokenExecutor)
+                if isinstance(error, BrokenExecutor):
+                    broken = True
+                    if lost is not None:
+                        lost.append(spec)
+                        continue
                 yield future.result() if error is None else _failure(spec, error)
     finally:
         for future in running:
@@ -205,25 +216,56 @@ class _InProcess(Executor):
 
 
 def _run_in_pool(todo: deque[RunSpec], n_workers: int) -> Generator[Outcome]:
-    """Work `todo` off in local processes; a pool that breaks (a worker was killed) is replaced for the rest."""
-    cold = {_kernel_kind(spec): spec for spec in todo}
+    """Work `todo` off in local processes.
+
+    A pool breaks as a whole when one worker is killed (too little memory, say). It is replaced for the rest, and the
+    runs it took down are tried once more, one at a time: so only those that kill their worker fail.
+    """
+    lost: deque[RunSpec] = deque()
+    with _process_pool(n_workers) as pool:
+        _warm_up_workers(pool, todo)
+        yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers, lost=lost)
     while todo:
         with _process_pool(n_workers) as pool:
-            # One worker after the other compiles and caches the kernels of a kind before many need them. What a run
-            # raises here it raises again, and is recorded, in its own turn.
-            while cold:
-                _, spec = cold.popitem()
-                if isinstance(pool.submit(warm_up, spec).exception(), BrokenExecutor):
-                    raise WorkerError(
-                        "Worker processes could not be started. A script that starts runs must do so under "
-                        "`if __name__ == '__main__':`; jobs=1 runs everything in this process."
-                    )
-            yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers)
+            yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers, lost=lost)
+    while lost:
+        with _process_pool(1) as pool:
+            yield from _run_on(pool, lost, limit=1)
+
+
+def _warm_up_workers(pool: Executor, specs: Iterable[RunSpec]) -> None:
+    """Have one run of each kind compile and cache its kernels before many processes need them.
+
+    What a run raises here it raises again, and is recorded, in its own turn.
+    """
+    for spec in {_kernel_kind(spec): spec for spec in specs}.values():
+        future = pool.submit(warm_up, spec)
+        while not future.done():
+            wait((future,), timeout=WAKE_UP_EVERY_S)
+        if isinstance(future.exception(), BrokenExecutor):
+            raise WorkerError(
+                "Worker processes could not be started. A script that starts runs must do so under "
+                "`if __name__ == '__main__':`; jobs=1 runs everything in this process."
+            )
 
 
 def _kernel_kind(spec: RunSpec) -> tuple[Any, ...]:
     """Runs of one kind use the same kernels."""
     return spec.policy, spec.scenario.caches, tuple(config.name for config in spec.wrappers)
+
+
+class _Pool(ProcessPoolExecutor):
+    """A process pool whose workers never see Ctrl-C, not even while they start: it is the driver's affair."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Submit with SIGINT held back, because a worker started here inherits what is held back."""
+        if not hasattr(signal, "pthread_sigmask"):  # Windows: workers ignore Ctrl-C from `_start_worker` on
+            return super().submit(fn, *args, **kwargs)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager
@@ -232,7 +274,7 @@ def _process_pool(n_workers: int) -> Iterator[ProcessPoolExecutor]:
     context = get_context("spawn")
     lifeline, held_by_driver = context.Pipe(duplex=False)
     with _single_threaded_children():
-        pool = ProcessPoolExecutor(n_workers, mp_context=context, initializer=_start_worker, initargs=(lifeline,))
+        pool = _Pool(n_workers, mp_context=context, initializer=_start_worker, initargs=(lifeline,))
         try:
             yield pool
         except BaseException:
@@ -245,7 +287,7 @@ def _process_pool(n_workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _start_worker(lifeline: Connection) -> None:
-    """Prepare a worker process: Ctrl-C is the driver's affair, and without a driver there is nothing to work for."""
+    """Prepare a worker process: deaf to Ctrl-C, and gone when the driver is."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_leave_at_end_of, args=(lifeline,), daemon=True).start()
 

@@ -1,0 +1,136 @@
+"""From command-line words to run specifications. Everything a person can get wrong raises a ConfigError here."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, get_args, get_origin, get_type_hints
+
+from swarm_forage_env.config import SECTIONS, ConfigError, ScenarioConfig, field_sections, suggestion
+from swarm_forage_env.policy import policy_class
+from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.study.spec import RunSpec, plan_run
+
+ASSUMED_ROBOT_TICKS_PER_S = 0.5e6
+"""Speed that estimates assume per core, in robots times ticks per second; our choice: the low end of what scripted
+controllers reach."""
+
+_TRUTH = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True, slots=True)
+class WorldOptions:
+    """The options that describe a world; None = the scenario's own value."""
+
+    scenario: str
+    robots: int | None = None
+    objects: int | None = None
+    side: float | None = None
+    caches: str | None = None
+    horizon: float | None = None
+    settings: tuple[str, ...] = ()
+    """Words of the form key=value."""
+
+
+def split_names(text: str) -> tuple[str, ...]:
+    """Split a comma-separated list of names, dropping repetitions.
+
+    Raises:
+        ConfigError: nothing in it.
+    """
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    if not names:
+        raise ConfigError(f"Expected one or more names separated by commas, got {text!r}.")
+    return names
+
+
+def build_scenario(options: WorldOptions) -> tuple[ScenarioConfig, str | None]:
+    """Return the scenario, and which caches were asked for (None = those the policy is made for).
+
+    Raises:
+        ConfigError: unknown names, values of a wrong type, or a world that cannot be.
+    """
+    overrides = dict(parse_setting(word) for word in options.settings)
+    named = {"n_robots": options.robots, "n_objects": options.objects, "horizon_s": options.horizon}
+    named |= {"side_m": options.side, "caches": options.caches}
+    for name, value in named.items():
+        if value is not None and name in overrides:
+            raise ConfigError(f"Expected {name} once, got it from an option and from --set.")
+        if value is not None:
+            overrides[name] = value
+    if options.side is not None and options.scenario != "search_and_rescue":
+        raise ConfigError(
+            f"Expected --side with search_and_rescue only, got it with {options.scenario}; "
+            "other arenas change by --set width_m=... and --set height_m=..."
+        )
+    config = scenario(options.scenario, **overrides)
+    return config, overrides.get("caches")
+
+
+def parse_setting(word: str) -> tuple[str, Any]:
+    """Turn "key=value" into a scenario field and its value, by the field's type.
+
+    Raises:
+        ConfigError: no "=", an unknown field (with the nearest known one), or a value of another type.
+    """
+    name, equals, text = word.partition("=")
+    if not equals:
+        raise ConfigError(f"Expected --set key=value, got {word!r}.")
+    types = field_types()
+    if name not in types:
+        raise ConfigError(f"Unknown scenario field {name!r}.{suggestion(name, types)} See: swarm-forage info SCENARIO.")
+    return name, _parse_value(name, text, types[name])
+
+
+def field_types() -> dict[str, Any]:
+    """Return the type of every scenario field that can be set by name."""
+    hints = {section: get_type_hints(section_class) for section, section_class in SECTIONS.items()}
+    hints[""] = get_type_hints(ScenarioConfig)
+    return {name: hints[section][name] for name, section in field_sections().items()}
+
+
+def _parse_value(name: str, text: str, kind: Any) -> Any:
+    try:
+        if get_origin(kind) is tuple:
+            parts, kinds = text.split(","), get_args(kind)
+            if kinds[-1] is Ellipsis:
+                kinds = kinds[:1] * len(parts)
+            return tuple(part_kind(part) for part_kind, part in zip(kinds, parts, strict=True))
+        if kind is bool:
+            return _TRUTH[text.lower()]
+        return kind(text)
+    except (KeyError, ValueError) as error:
+        words = {bool: "true or false", int: "a whole number", float: "a number"}
+        wanted = words.get(kind, "numbers separated by commas, like its default")
+        raise ConfigError(f"Expected {name} to be {wanted}, got {text!r}.") from error
+
+
+def plan_runs(
+    options: WorldOptions, controllers: Sequence[str], *, n_seeds: int, first_seed: int
+) -> tuple[RunSpec, ...]:
+    """Return one specification per controller and seed.
+
+    Raises:
+        ConfigError: see `build_scenario`; or an unknown controller.
+    """
+    config, caches = build_scenario(options)
+    for name in controllers:
+        try:
+            policy_class(name)
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
+    return tuple(
+        plan_run(config, name, caches=caches, seed=seed)
+        for name in controllers
+        for seed in range(first_seed, first_seed + n_seeds)
+    )
+
+
+def default_folder(scenario_name: str) -> Path:
+    """Return where results go unless told otherwise: one folder per scenario, so that repeated runs are found."""
+    return Path("results") / scenario_name
+
+
+def estimated_seconds(specs: Sequence[RunSpec], jobs: int) -> float:
+    """Return a rough wall-clock time for `specs` on `jobs` processes, in seconds."""
+    robot_ticks = sum(spec.scenario.robots.n_robots * spec.scenario.horizon_ticks for spec in specs)
+    return robot_ticks / (ASSUMED_ROBOT_TICKS_PER_S * min(jobs, max(1, len(specs))))

@@ -1,0 +1,187 @@
+"""What a command has to say: tables for people, JSON for programs, a picture."""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from metrics.statistics import aggregate
+from swarm_forage_env.plots import Curve, draw_curves
+from swarm_forage_env.recording import RunRecord
+from swarm_forage_env.study.progress import duration
+from swarm_forage_env.study.runner import StudyResult
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.study.store import RunStore
+
+LEVEL = 0.95
+"""Confidence level of all intervals."""
+PERFORMANCE_WORDS = {"collected": "deliveries", "first_picked": "first pick-ups"}
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A mean over seeds with its t interval; NaN ends where a single seed allows none."""
+
+    mean: float
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        if math.isnan(self.low):
+            return f"{self.mean:.2f} (n/a)"
+        return f"{self.mean:.2f} ({self.low:.2f} to {self.high:.2f})"
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerSummary:
+    """One row of the table."""
+
+    controller: str
+    caches: str
+    n_runs: int
+    deliveries_per_1000_s: Estimate
+    first_pickups_per_1000_s: Estimate
+    interference_fraction: float
+    simulated_s_per_wall_s: float
+    """Per process, policy and recording included."""
+
+
+def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[ControllerSummary, ...]:
+    """Return one summary per controller that has a record, in the order of `specs`."""
+    caches = {spec.policy: spec.scenario.caches for spec in specs}
+    summaries = []
+    for controller, world in caches.items():
+        own = [record for record in records if record.controller == controller]
+        if own:
+            wall_s = sum(record.wall_time_s for record in own)
+            summaries.append(
+                ControllerSummary(
+                    controller=controller,
+                    caches=world,
+                    n_runs=len(own),
+                    deliveries_per_1000_s=_estimate(own, "collected"),
+                    first_pickups_per_1000_s=_estimate(own, "first_picked"),
+                    interference_fraction=float(np.mean([record.interference_fraction.mean() for record in own])),
+                    simulated_s_per_wall_s=sum(record.horizon_s for record in own) / wall_s if wall_s else math.nan,
+                )
+            )
+    return tuple(summaries)
+
+
+def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummary]) -> Table:
+    """Return the table of results, one row per controller."""
+    first = specs[0].scenario
+    table = Table(
+        title=f"{first.name}: {first.robots.n_robots} robots, {first.objects.n_objects} objects, {first.horizon_s:g} s",
+        caption=f"mean over seeds ({LEVEL:.0%} t interval); interference = share of active robot time",
+    )
+    picks = first.performance == "first_picked"
+    for name in ("controller", "caches"):
+        table.add_column(name)
+    numbers = ["runs", *(["first pick-ups / 1,000 s"] if picks else []), "deliveries / 1,000 s"]
+    for name in (*numbers, "interference", "simulated s / wall s"):
+        table.add_column(name, justify="right")
+    for row in summaries:
+        rates = [*([str(row.first_pickups_per_1000_s)] if picks else []), str(row.deliveries_per_1000_s)]
+        tail = [f"{row.interference_fraction:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
+        table.add_row(row.controller, row.caches, str(row.n_runs), *rates, *tail)
+    return table
+
+
+def plan_table(specs: Sequence[RunSpec], store: RunStore) -> Table:
+    """Return the table of planned runs."""
+    table = Table(title=f"{len(specs)} planned runs, records go to {store.folder}")
+    for name in ("run", "controller", "caches", "robots", "seed", "seconds", "state"):
+        table.add_column(name)
+    for spec in specs:
+        world = spec.scenario
+        state = "stored" if spec.run_id in store else "to do"
+        numbers = (str(world.robots.n_robots), str(spec.seed), f"{world.horizon_s:g}")
+        table.add_row(spec.run_id, spec.policy, world.caches, *numbers, state)
+    return table
+
+
+def plan_json(specs: Sequence[RunSpec], store: RunStore, seconds: float) -> str:
+    """Return the planned runs as a JSON document."""
+    runs = [{"run_id": spec.run_id, "stored": spec.run_id in store, "spec": spec.to_mapping()} for spec in specs]
+    return json.dumps({"out": str(store.folder), "estimated_wall_s": seconds, "runs": runs}, indent=1)
+
+
+def results_json(specs: Sequence[RunSpec], result: StudyResult, store: RunStore, plot: Path | None) -> str:
+    """Return the results as a JSON document; numbers that do not exist are null."""
+    runs = [
+        {
+            **record.keys(),
+            "deliveries_per_1000_s": record.rate_per_1000_s("collected"),
+            "first_pickups_per_1000_s": record.rate_per_1000_s("first_picked"),
+            "interference_fraction": float(record.interference_fraction.mean()),
+            "wall_time_s": record.wall_time_s,
+            "file": str(store.path(record.run_id)),
+        }
+        for record in result.records
+    ]
+    failures = [
+        {"run_id": failure.run_id, "error": failure.error, "file": str(store.failure_path(failure.run_id))}
+        for failure in result.failures
+    ]
+    document = {
+        "scenario": specs[0].scenario.name,
+        "out": str(store.folder),
+        "plot": None if plot is None else str(plot),
+        "controllers": [asdict(summary) for summary in summarize(specs, result.records)],
+        "runs": runs,
+        "failures": failures,
+    }
+    return json.dumps(_without_nan(document), indent=1)
+
+
+def draw_performance(specs: Sequence[RunSpec], records: Sequence[RunRecord], path: Path) -> None:
+    """Draw performance over time, one curve per controller with the t interval over seeds.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    scenario = specs[0].scenario
+    curves = []
+    for controller in dict.fromkeys(record.controller for record in records):
+        runs = np.array([record.performance for record in records if record.controller == controller])
+        per_interval = [aggregate(column, level=LEVEL) for column in runs.T]
+        mean, low, high = np.array([(point.mean, point.lower, point.upper) for point in per_interval]).T
+        curves.append(Curve(controller, mean, low, high))
+    words = PERFORMANCE_WORDS[scenario.performance]
+    draw_curves(
+        path,
+        records[0].t_end_s,
+        curves,
+        title=f"{scenario.name}, {scenario.robots.n_robots} robots",
+        ylabel=f"{words} per {scenario.interval_s:g} s",
+        band=f"{LEVEL:.0%} t interval over seeds",
+    )
+
+
+def plan_note(specs: Sequence[RunSpec], seconds: float, jobs: int) -> str:
+    """Return the estimate in words."""
+    simulated = sum(spec.scenario.horizon_s for spec in specs)
+    return (
+        f"{len(specs)} runs to do, {simulated:,.0f} simulated seconds: roughly {duration(seconds)} on {jobs} "
+        f"process{'es' if jobs > 1 else ''}, if each does half a million robot-ticks per second."
+    )
+
+
+def _estimate(records: Sequence[RunRecord], column: str) -> Estimate:
+    summary = aggregate([record.rate_per_1000_s(column) for record in records], level=LEVEL)
+    return Estimate(summary.mean, summary.lower, summary.upper)
+
+
+def _without_nan(value: Any) -> Any:
+    """Replace NaN, which JSON does not have, by None."""
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    return None if isinstance(value, float) and math.isnan(value) else value

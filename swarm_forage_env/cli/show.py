@@ -1,0 +1,85 @@
+"""`swarm-forage list` and `info`: what there is and what it is made of."""
+
+import dataclasses
+import inspect
+from collections.abc import Iterator
+from typing import Any
+
+from rich.table import Table
+
+from swarm_forage_env import scenarios
+from swarm_forage_env.config import ConfigError, ScenarioConfig, suggestion
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policy import policy_class, policy_names
+
+
+def overview() -> tuple[Table, Table]:
+    """Return the tables of scenarios and of controllers."""
+    worlds = Table("scenario", "robots", "objects", "arena", "what it is", title="scenarios")
+    for name in scenarios.SCENARIO_NAMES:
+        config = scenarios.scenario(name)
+        size = f"{config.arena.width_m:g} x {config.arena.height_m:g} m"
+        counts = (str(config.robots.n_robots), str(config.objects.n_objects))
+        worlds.add_row(name, *counts, size, _first_line(getattr(scenarios, name)))
+    controllers = Table("controller", "caches", "what it is", title="controllers")
+    for name in policy_names():
+        policy = policy_class(name)
+        controllers.add_row(name, getattr(policy, "caches", "none"), _first_line(policy))
+    return worlds, controllers
+
+
+def information(name: str) -> str:
+    """Return everything about a scenario or a controller as text.
+
+    Raises:
+        ConfigError: neither a scenario nor a controller has that name.
+    """
+    if name in scenarios.SCENARIO_NAMES:
+        return "\n".join(_scenario_lines(scenarios.scenario(name), _first_line(getattr(scenarios, name))))
+    if name in policy_names():
+        return "\n".join(_policy_lines(name))
+    known = (*scenarios.SCENARIO_NAMES, *policy_names())
+    raise ConfigError(f"Unknown scenario or controller {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
+
+
+def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
+    env = ForageEnv(config)
+    agent = env.possible_agents[0]
+    yield f"{config.name}: {headline}"
+    yield ""
+    yield "Fields (change them with --set name=value):"
+    for item in dataclasses.fields(config):
+        value = getattr(config, item.name)
+        if dataclasses.is_dataclass(value):
+            yield f"  [{item.name}]"
+            for inner in dataclasses.fields(value):
+                yield f"    {inner.name:<34}{_plain(getattr(value, inner.name))}"
+        else:
+            yield f"  {item.name:<36}{_plain(value)}"
+    yield ""
+    yield "Spaces, per robot:"
+    yield f"  action       {env.action_space(agent)}: left wheel, right wheel, gripper"
+    yield f"  observation  {env.observation_space(agent)}"
+    yield f"  state()      {env.state_space}"
+    yield ""
+    yield "Observation:"
+    yield env.layout.describe()
+
+
+def _policy_lines(name: str) -> Iterator[str]:
+    policy = policy_class(name)
+    reads = getattr(policy, "reads", None)
+    yield f"{name}: {inspect.getdoc(policy) or 'no description'}"
+    yield ""
+    yield f"  defined in  {policy.__module__}"
+    yield f"  parameters  {inspect.signature(policy)}"
+    yield f"  caches      {getattr(policy, 'caches', 'none')} (the world it is made for)"
+    yield f"  reads       {'all slices' if reads is None else ', '.join(reads) or 'nothing'}"
+
+
+def _first_line(documented: Any) -> str:
+    return (inspect.getdoc(documented) or "no description").splitlines()[0]
+
+
+def _plain(value: Any) -> str:
+    return " x ".join(f"{part:g}" for part in value) if isinstance(value, tuple) else str(value)
