@@ -56,7 +56,6 @@ def test_values_that_make_no_sense_are_refused(values):
 def test_durations_become_ticks_and_quirks_reach_the_kernels():
     constants = kernel_constants(ControllerParameters(), make_task(dt_s=0.1))[0]
     assert (constants.exploration_lock_ticks, constants.recovery_ticks) == (100, 20)
-    assert (constants.explore_double_start, constants.start_is_arrival) == (0, 1)
-    quirks = Quirks(explore_double_start=True, finisher_tolerance_mismatch=True)
-    constants = kernel_constants(ControllerParameters(), make_task(quirks=quirks))[0]
-    assert (constants.explore_double_start, constants.start_is_arrival) == (1, 0)
+    assert constants.explore_double_start == 0
+    task = make_task(quirks=Quirks(explore_double_start=True))
+    assert kernel_constants(ControllerParameters(), task)[0].explore_double_start == 1
