@@ -22,7 +22,10 @@ from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray
 from .compiling import kernel
 from .machines import (
     ACQUIRE,
+    DELIVER,
     DRAWS,
+    HOMING,
+    LEAVE_NEST,
     WAIT_PICKUP,
     command,
     deliver_and_leave,
@@ -56,14 +59,14 @@ def step_crw(
         robot = robots[i]
         row = obs[i]
         senses = sense(row, c)
-        follow_cargo(robot, senses)
+        follow_cargo(robot, senses, HOMING, LEAVE_NEST)
         if robot.activity == ACQUIRE:
             found, x, y = explore_for_object(robot, senses, row, c, draws[i])
             if found:
                 robot.activity = WAIT_PICKUP
         else:
             x, y = deliver_and_leave(robot, senses, row, c, draws[i])
-        command(robot, x, y, c, action)
+        command(robot, x, y, c, DELIVER, action)
 
 
 class CRWPolicy:

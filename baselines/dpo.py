@@ -14,7 +14,10 @@ from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray
 from .compiling import kernel
 from .machines import (
     ACQUIRE,
+    DELIVER,
     DRAWS,
+    HOMING,
+    LEAVE_NEST,
     WAIT_PICKUP,
     acquire,
     command,
@@ -54,7 +57,7 @@ def step_dpo(
         known = memory_of(memory, i)
         senses = sense(row, c)
         look_around(robot, row, c, known)
-        if follow_cargo(robot, senses):
+        if follow_cargo(robot, senses, HOMING, LEAVE_NEST):
             forget(robot, known, object_row_of(row[c.cargo], c))
         if robot.activity == ACQUIRE:
             found, x, y = acquire(
@@ -73,7 +76,7 @@ def step_dpo(
                 robot.activity = WAIT_PICKUP
         else:
             x, y = deliver_and_leave(robot, senses, row, c, draws[i])
-        command(robot, x, y, c, action)
+        command(robot, x, y, c, DELIVER, action)
 
 
 class DPOPolicy:

@@ -4,12 +4,12 @@ Written once for all controllers. Every function is compiled, handles one robot 
 (forward, left) that it adds this tick; a kernel of a controller loops over the robots. What differs between goals
 (which candidate, is it still valid, was it reached) is passed in as compiled functions.
 
-Conventions: `robot` is one record of `ROBOT`, edited in place; `row` its observation; `c` the record of
+Conventions: `robot` is one record of `ROBOT_FIELDS`, edited in place; `row` its observation; `c` the record of
 `parameters.kernel_constants`; `draws` its uniform draws of this tick, one column per use, so that no decision
 shifts the randomness of another.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import IntEnum
 from typing import Any, NamedTuple
 
@@ -35,9 +35,15 @@ class Activity(IntEnum):
     HOMING_IN_NEST = 3
     """Carrying, inside the nest, looking for a place to drop."""
     WAIT_DROP = 4
-    """Standing in the nest, asking to deliver."""
+    """Standing at the destination, asking to drop."""
     LEAVE_NEST = 5
     """Empty, wandering until the nest is left."""
+    TRANSPORT = 6
+    """Carrying, looking for a destination other than the nest, or on the way to it."""
+    FINISHED = 7
+    """Just dropped: the task is done."""
+    LET_GO = 8
+    """Giving up while carrying: standing, releasing the object here."""
 
 
 class VectorState(IntEnum):
@@ -55,6 +61,9 @@ HOMING = int(Activity.HOMING)
 HOMING_IN_NEST = int(Activity.HOMING_IN_NEST)
 WAIT_DROP = int(Activity.WAIT_DROP)
 LEAVE_NEST = int(Activity.LEAVE_NEST)
+TRANSPORT = int(Activity.TRANSPORT)
+FINISHED = int(Activity.FINISHED)
+LET_GO = int(Activity.LET_GO)
 VECTOR_IDLE = int(VectorState.IDLE)
 VECTOR = int(VectorState.VECTOR)
 VECTOR_AVOIDANCE = int(VectorState.AVOIDANCE)
@@ -77,39 +86,34 @@ DRAW_VECTOR = 3
 """Draw column: wandering to break free on the way to a point."""
 DRAWS = 4
 
-ROBOT = np.dtype(
-    (
-        np.record,
-        np.dtype(
-            [
-                ("wander_deg", np.float64),  # wander angle
-                ("drop_depth_m", np.float64),  # deliver at most this far from the nest centre
-                ("goal_x_m", np.float64),
-                ("goal_y_m", np.float64),
-                ("goal_tolerance_m", np.float64),
-                ("target", np.int32),  # identity of the goal: object row
-                ("explore_ticks", np.int32),  # since exploration started, or NOT_EXPLORING
-                ("recovery_ticks", np.int32),  # driven straight on after avoiding
-                ("clock", np.int32),  # ticks lived through while active
-                ("n_known", np.int32),  # remembered objects
-                ("window_x", np.int32),  # lower left cell of the window seen last
-                ("window_y", np.int32),
-                ("activity", np.int8),
-                ("vector_state", np.int8),
-                ("is_slowing", np.bool_),  # within the slowing radius at the last arrival force
-            ],
-            align=True,
-        ),
-    )
-)
-"""Inner state of one robot."""
+ROBOT_FIELDS: list[tuple[str, type]] = [
+    ("wander_deg", np.float64),  # wander angle
+    ("drop_depth_m", np.float64),  # deliver at most this far from the nest centre
+    ("goal_x_m", np.float64),
+    ("goal_y_m", np.float64),
+    ("goal_tolerance_m", np.float64),
+    ("target", np.int32),  # identity of the goal: object row
+    ("explore_ticks", np.int32),  # since exploration started, or NOT_EXPLORING
+    ("recovery_ticks", np.int32),  # driven straight on after avoiding
+    ("clock", np.int32),  # ticks lived through while active
+    ("n_known", np.int32),  # remembered objects
+    ("window_x", np.int32),  # lower left cell of the window seen last
+    ("window_y", np.int32),
+    ("activity", np.int8),
+    ("vector_state", np.int8),
+    ("is_slowing", np.bool_),  # within the slowing radius at the last arrival force
+    ("is_searching", np.bool_),  # the point it goes to is where a search begins, not a goal
+]
+"""Inner state of one robot; a controller may add fields of its own."""
 
 NO_WINDOW = -(2**30)
 
 
-def new_robots(n_robots: int) -> np.ndarray:
-    """Return (n_robots,) records of `ROBOT` that start to acquire and have seen nothing."""
-    robots = np.zeros(n_robots, ROBOT)
+def new_robots(n_robots: int, more_fields: Sequence[tuple[str, type]] = ()) -> np.ndarray:
+    """Return (n_robots,) records of `ROBOT_FIELDS` and `more_fields` that start to acquire and have seen nothing."""
+    fields = np.dtype([*ROBOT_FIELDS, *more_fields], align=True)
+    # np.record makes fields readable as attributes when kernels run uncompiled; compiled they always are.
+    robots = np.zeros(n_robots, np.dtype((np.record, fields)))
     robots["explore_ticks"] = NOT_EXPLORING
     robots["target"] = -1
     robots["window_x"] = NO_WINDOW
@@ -158,12 +162,26 @@ def restart_acquiring(robot: np.record) -> None:
 
 
 @kernel
-def follow_cargo(robot: np.record, senses: Senses) -> bool:
+def start_carrying(robot: np.record, activity: int) -> None:
+    """Begin to bring the cargo away: HOMING, or TRANSPORT with no goal and exploration not started."""
+    robot.activity = activity
+    robot.explore_ticks = NOT_EXPLORING
+    stop_vector(robot)
+
+
+@kernel
+def follow_cargo(robot: np.record, senses: Senses, loaded: int, emptied: int) -> bool:
     """Change the activity after what happened to the robot since its last tick, before it acts.
 
     Cargo is the truth that activities follow, so a robot that missed an event in repair, or whose cargo something
     else took or gave, still makes sense. Refusals and lost conditions arrive as events: a waiting robot then
-    looks for another object, or resumes homing (with a new drop depth once it sees the nest again).
+    looks for another object, or resumes homing (with a new drop depth once it sees the nest again) or transport.
+
+    Args:
+        robot: Record of the robot.
+        senses: What it senses.
+        loaded: Activity after a pick-up: HOMING or TRANSPORT.
+        emptied: Activity after a drop: LEAVE_NEST or FINISHED.
 
     Returns:
         Whether the robot has just got its cargo.
@@ -172,15 +190,15 @@ def follow_cargo(robot: np.record, senses: Senses) -> bool:
     failed = senses.event == NOTHING_HERE or senses.event == VANISHED
     if senses.carrying:
         if activity in (ACQUIRE, WAIT_PICKUP, LEAVE_NEST):
-            robot.activity = HOMING
+            start_carrying(robot, loaded)
             return True
         if activity == WAIT_DROP and failed:
-            robot.activity = HOMING
+            start_carrying(robot, loaded)
         return False
-    if activity in (HOMING, HOMING_IN_NEST) or (activity == WAIT_PICKUP and failed):
+    if activity in (HOMING, HOMING_IN_NEST, TRANSPORT, LET_GO) or (activity == WAIT_PICKUP and failed):
         restart_acquiring(robot)
     elif activity == WAIT_DROP:
-        robot.activity = LEAVE_NEST
+        robot.activity = emptied
     if robot.activity == LEAVE_NEST and not senses.in_nest:
         restart_acquiring(robot)
     return False
@@ -203,6 +221,25 @@ def random_walk(robot: np.record, senses: Senses, c: np.record, u: float) -> tup
 
 
 @kernel
+def start_exploring(robot: np.record, senses: Senses, c: np.record, draws: Row) -> tuple[float, float]:
+    """Start a random walk unless one is under way; returns the force that starting adds."""
+    if robot.explore_ticks == NOT_EXPLORING:
+        robot.explore_ticks = 0
+        if c.explore_double_start:  # quirk: starting runs the strategy once more
+            return random_walk(robot, senses, c, draws[DRAW_RESTART])
+    return 0.0, 0.0
+
+
+@kernel
+def explore(robot: np.record, senses: Senses, c: np.record, draws: Row) -> tuple[float, float]:
+    """One tick of a random walk for something that is only found by seeing it from afar; returns the force."""
+    x, y = start_exploring(robot, senses, c, draws)
+    walk_x, walk_y = random_walk(robot, senses, c, draws[DRAW_WANDER])
+    robot.explore_ticks += 1
+    return x + walk_x, y + walk_y
+
+
+@kernel
 def explore_for_object(
     robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row
 ) -> tuple[bool, float, float]:
@@ -211,17 +248,11 @@ def explore_for_object(
     Returns:
         Whether an object was found (then the robot stands still), and the force.
     """
-    x = 0.0
-    y = 0.0
-    if robot.explore_ticks == NOT_EXPLORING:
-        robot.explore_ticks = 0
-        if c.explore_double_start:  # quirk: starting runs the strategy once more
-            x, y = random_walk(robot, senses, c, draws[DRAW_RESTART])
+    x, y = start_exploring(robot, senses, c, draws)
     if robot.explore_ticks >= c.exploration_lock_ticks and sees_object(row[c.ground : c.ground + 4]):
         robot.explore_ticks = NOT_EXPLORING
         return True, 0.0, 0.0
-    walk_x, walk_y = random_walk(robot, senses, c, draws[DRAW_WANDER])
-    robot.explore_ticks += 1
+    walk_x, walk_y = explore(robot, senses, c, draws)
     return False, x + walk_x, y + walk_y
 
 
@@ -230,6 +261,7 @@ def start_vector(robot: np.record) -> None:
     """Start going to the robot's goal; follow with `go_to_goal` in the same tick."""
     robot.vector_state = VECTOR
     robot.recovery_ticks = 0
+    robot.is_searching = False
 
 
 @kernel
@@ -237,6 +269,7 @@ def stop_vector(robot: np.record) -> None:
     """Give up the goal."""
     robot.vector_state = VECTOR_IDLE
     robot.recovery_ticks = 0
+    robot.is_searching = False
 
 
 @kernel
@@ -310,19 +343,20 @@ def acquire(
         row: Its observation.
         c: Constants of the run.
         draws: Its draws of this tick.
-        memory: What the robot remembers, handed to `select` and `is_known`.
-        select: (robot, senses, c, memory) -> found; sets goal, tolerance and target of the robot.
-        is_known: (robot, memory) -> whether the target is still valid.
-        is_reached: (row, c) -> whether the goal is really there.
-        search: (robot, senses, row, c, draws) -> (found, force), while there is nothing to go to.
+        memory: What the robot remembers, handed to the first three functions.
+        select: (robot, senses, c, draws, memory) -> found; sets goal, tolerance and target of the robot, or nothing.
+        is_known: (robot, c, memory) -> whether the goal is still valid.
+        is_reached: (robot, senses, row, c, memory) -> whether the goal is really there.
+        search: (robot, senses, row, c, draws) -> (found, force), while there is nothing to go to. It may itself go
+            to a point, marked by the robot's `is_searching`.
 
     Returns:
         Whether a goal was acquired, by going there or by the search, and the force.
     """
     x = 0.0
     y = 0.0
-    if robot.vector_state == VECTOR_IDLE:
-        if select(robot, senses, c, memory):
+    if robot.vector_state == VECTOR_IDLE or robot.is_searching:
+        if select(robot, senses, c, draws, memory):
             robot.explore_ticks = NOT_EXPLORING
             start_vector(robot)
             arrived, x, y = go_to_goal(robot, senses, row, c, draws)
@@ -330,17 +364,17 @@ def acquire(
                 return False, x, y
             stop_vector(robot)
             # Quirk finisher_tolerance_mismatch: starting within tolerance never counts as arriving.
-            if c.start_is_arrival and is_reached(row, c):
+            if not c.finisher_tolerance_mismatch and is_reached(robot, senses, row, c, memory):
                 return True, 0.0, 0.0
     else:
         arrived, x, y = go_to_goal(robot, senses, row, c, draws)
-        if not is_known(robot, memory):
+        if not is_known(robot, c, memory):
             stop_vector(robot)
         elif not arrived:
             return False, x, y
         else:
             stop_vector(robot)
-            if is_reached(row, c):
+            if is_reached(robot, senses, row, c, memory):
                 return True, 0.0, 0.0
     found, search_x, search_y = search(robot, senses, row, c, draws)
     return found, x + search_x, y + search_y
@@ -387,17 +421,17 @@ def deliver_and_leave(robot: np.record, senses: Senses, row: Row, c: np.record, 
 
 
 @kernel
-def command(robot: np.record, x: float, y: float, c: np.record, action: Row) -> None:
-    """Write the action: wheels for the summed force (x, y), gripper for the activity."""
+def command(robot: np.record, x: float, y: float, c: np.record, drop_grip: float, action: Row) -> None:
+    """Write the action: wheels for the summed force (x, y), gripper for the activity (`drop_grip` asks to drop)."""
     activity = robot.activity
-    if activity in (WAIT_PICKUP, WAIT_DROP):
+    if activity in (WAIT_PICKUP, WAIT_DROP, LET_GO):
         action[0] = 0.0
         action[1] = 0.0
     else:
         drive(x, y, c, action)
     if activity == WAIT_DROP:
-        action[2] = DELIVER
-    elif activity in (WAIT_PICKUP, HOMING, HOMING_IN_NEST):
+        action[2] = drop_grip
+    elif activity in (WAIT_PICKUP, HOMING, HOMING_IN_NEST, TRANSPORT):
         action[2] = GRASP  # empty: asks for the object below; carrying: holds
     else:
         action[2] = RELEASE

@@ -1,13 +1,15 @@
 """Which remembered object to go to, and whether it is still worth going: the object goal of `machines.acquire`."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from swarm_forage_env.detection import sees_object
 
-from .compiling import Row, kernel
+from .compiling import Row, inline_kernel, kernel
 from .machines import Senses
 from .memory import OneMemory, density
 from .parameters import ControllerParameters, ParameterError
@@ -57,11 +59,19 @@ def object_utility(anchor_x: float, anchor_y: float, x: float, y: float, pheromo
     return math.sqrt(ratio) * math.exp(pheromone * c.object_priority)
 
 
-@kernel
-def select_object(robot: np.record, senses: Senses, c: np.record, memory: OneMemory) -> bool:
+@inline_kernel
+def select_best_object(
+    robot: np.record,
+    senses: Senses,
+    c: np.record,
+    memory: OneMemory,
+    whole_memory: Any,
+    is_left_out: Callable[..., bool],
+) -> bool:
     """Choose the remembered object of highest utility as goal; the first one found wins a tie.
 
-    Objects whose centre is within `object_exclusion_m` of the robot are left out.
+    Objects whose centre is within `object_exclusion_m` of the robot are left out, and those for which the compiled
+    function `is_left_out(robot, whole_memory, object_row)` holds.
 
     Returns:
         Whether there is one; then goal (its centre), tolerance and target of the robot are set.
@@ -75,7 +85,7 @@ def select_object(robot: np.record, senses: Senses, c: np.record, memory: OneMem
         anchor_y = memory.cell_y[entry] * c.cell_m
         dx = anchor_x + half - senses.x
         dy = anchor_y + half - senses.y
-        if dx * dx + dy * dy <= nearest:
+        if dx * dx + dy * dy <= nearest or is_left_out(robot, whole_memory, memory.row[entry]):
             continue
         pheromone = density(robot, memory, entry, c.log_keep)
         utility = object_utility(anchor_x, anchor_y, senses.x, senses.y, pheromone, c)
@@ -92,12 +102,23 @@ def select_object(robot: np.record, senses: Senses, c: np.record, memory: OneMem
 
 
 @kernel
-def object_is_known(robot: np.record, memory: OneMemory) -> bool:
+def _never(_robot: np.record, _memory: OneMemory, _object_row: int) -> bool:
+    return False
+
+
+@kernel
+def select_object(robot: np.record, senses: Senses, c: np.record, _draws: Row, memory: OneMemory) -> bool:
+    """Choose the best remembered object, as `select_best_object`, leaving out none by name."""
+    return select_best_object(robot, senses, c, memory, memory, _never)
+
+
+@kernel
+def object_is_known(robot: np.record, _c: np.record, memory: OneMemory) -> bool:
     """Whether the target object is still remembered."""
     return memory.entry[robot.target] > 0
 
 
 @kernel
-def object_is_reached(row: Row, c: np.record) -> bool:
+def object_is_reached(_robot: np.record, _senses: Senses, row: Row, c: np.record, _memory: OneMemory) -> bool:
     """Whether the ground sensors see an object."""
     return sees_object(row[c.ground : c.ground + 4])

@@ -24,9 +24,12 @@ COLUMNS = (
     "heading",
     "carrying",
     "cargo",
+    "event_object",
     "event",
+    "event_cache",
     "los_cell",
     "los_object",
+    "los_cache",
 )
 """Observation slices whose first columns the kernels know by name."""
 
@@ -109,8 +112,8 @@ def kernel_constants(parameters: ControllerParameters, task: SwarmTask, **derive
 
     Args:
         parameters: All fields are passed on under their own names, as float64.
-        task: Observation columns, scales, drive limits and nest of this run.
-        derived: Further numbers that a controller computes once.
+        task: Observation columns, scales, drive limits, nest and quirks (0 or 1) of this run.
+        derived: Further numbers that a controller computes once; whole ones stay whole.
 
     Returns:
         (1,) record array; `constants[0].name` works compiled and uncompiled.
@@ -121,8 +124,7 @@ def kernel_constants(parameters: ControllerParameters, task: SwarmTask, **derive
     whole["n_objects"] = task.n_objects
     whole["exploration_lock_ticks"] = round(parameters.exploration_lock_s / task.dt_s)
     whole["recovery_ticks"] = round(parameters.recovery_s / task.dt_s)
-    whole["explore_double_start"] = int(task.quirks.explore_double_start)
-    whole["start_is_arrival"] = int(not task.quirks.finisher_tolerance_mismatch)
+    whole.update({name: int(is_on) for name, is_on in dataclasses.asdict(task.quirks).items()})
     real: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}
     real.update(
         half_width_m=scales[0],
@@ -133,8 +135,9 @@ def kernel_constants(parameters: ControllerParameters, task: SwarmTask, **derive
         nest_x_m=task.nest_centre_m[0],
         nest_y_m=task.nest_centre_m[1],
         soft_turn_rad=math.radians(parameters.soft_turn_deg),
-        **derived,
     )
+    for name, value in derived.items():
+        (whole if isinstance(value, int) else real)[name] = value
     fields = np.dtype([(name, np.int64) for name in whole] + [(name, np.float64) for name in real], align=True)
     # np.record makes fields readable as attributes when kernels run uncompiled; compiled they always are.
     constants = np.zeros(1, np.dtype((np.record, fields)))
