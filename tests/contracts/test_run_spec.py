@@ -1,0 +1,161 @@
+"""RunSpec: identity, and the way to JSON and back."""
+
+import json
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import pytest
+
+from swarm_forage_env.config import ConfigError
+from swarm_forage_env.policy import policy_class, policy_names
+from swarm_forage_env.quirks import AUTHORS_PROGRAM
+from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.wrappers import registry
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+
+BASE = RunSpec(scenario=scenario("warehouse_small"), policy="crw")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class OuterConfig(WrapperConfig):
+    name: ClassVar[str] = "test_outer"
+    stack_position: ClassVar[int] = 1
+    groups: tuple[str, ...] = ("proximity",)
+
+    def wrap(self, env):
+        return type("Outer", (SwarmWrapper,), {"stack_position": 1})(env)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class InnerConfig(WrapperConfig):
+    name: ClassVar[str] = "test_inner"
+    stack_position: ClassVar[int] = 4
+    sigma: float = 0.1
+
+    def wrap(self, env):
+        return type("Inner", (SwarmWrapper,), {"stack_position": 4})(env)
+
+
+@pytest.fixture
+def registered(monkeypatch):
+    monkeypatch.setitem(registry.WRAPPERS, "test_outer", f"{__name__}:OuterConfig")
+    monkeypatch.setitem(registry.WRAPPERS, "test_inner", f"{__name__}:InnerConfig")
+
+
+@pytest.mark.parametrize("policy", policy_names())
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_every_scenario_and_policy_survives_json(name, policy):
+    spec = plan_run(scenario(name), policy, seed=3, criterion="noise", criterion_value=0.0043)
+    again = RunSpec.from_json(spec.to_json())
+    assert again == spec
+    assert again.run_id == spec.run_id
+    assert hash(again) == hash(spec)
+
+
+def test_quirks_parameters_and_wrappers_survive_json(registered):
+    spec = replace(
+        BASE,
+        scenario=scenario("search_and_rescue", quirks=AUTHORS_PROGRAM, nest_centre_m=(20.0, 24.0)),
+        parameters={"gain": 0.1, "levels": (1, 2), "nested": {"on": True, "none": None}},
+        wrappers=(InnerConfig(sigma=1 / 3), OuterConfig(groups=("light", "ground"))),
+    )
+    again = RunSpec.from_mapping(json.loads(json.dumps(spec.to_mapping())))
+    assert again == spec
+    assert again.wrappers == (OuterConfig(groups=("light", "ground")), InnerConfig(sigma=1 / 3))
+
+
+def test_wrappers_are_kept_in_stack_order_and_at_most_once():
+    shuffled = replace(BASE, wrappers=(InnerConfig(), OuterConfig()))
+    assert shuffled == replace(BASE, wrappers=(OuterConfig(), InnerConfig()))
+    with pytest.raises(ConfigError, match="each wrapper at most once, got test_inner, test_inner"):
+        replace(BASE, wrappers=(InnerConfig(), InnerConfig(sigma=0.2)))
+
+
+def test_the_id_is_short_and_tells_every_difference_apart():
+    variants = [
+        BASE,
+        replace(BASE, seed=1),
+        replace(BASE, policy="dpo"),
+        replace(BASE, criterion="noise"),
+        replace(BASE, criterion_value=0.1),
+        replace(BASE, parameters={"a": 1}),
+        replace(BASE, parameters={"a": True}),
+        replace(BASE, wrappers=(InnerConfig(),)),
+        replace(BASE, wrappers=(InnerConfig(sigma=0.2),)),
+        replace(BASE, scenario=scenario("warehouse_small", quirks=AUTHORS_PROGRAM)),
+        replace(BASE, scenario=scenario("warehouse_small", n_robots=49)),
+    ]
+    ids = {spec.run_id for spec in variants}
+    assert len(ids) == len(variants)
+    assert {len(run_id) for run_id in ids} == {16}
+    assert all(int(run_id, 16) >= 0 for run_id in ids)
+
+
+def test_equal_numbers_give_equal_ids_however_they_are_spelt():
+    whole, real = (replace(BASE, scenario=scenario("warehouse_small", horizon_s=value)) for value in (2000, 2000.0))
+    assert whole == real
+    assert whole.run_id == real.run_id
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63, 1.0, True, "1"])
+def test_bad_seeds_are_refused(seed):
+    with pytest.raises(ConfigError, match="Expected seed to be a whole number"):
+        replace(BASE, seed=seed)
+
+
+@pytest.mark.parametrize("value", [float("nan"), object(), {1, 2}])
+def test_parameters_must_be_plain(value):
+    with pytest.raises(ConfigError, match="plain JSON values"):
+        replace(BASE, parameters={"a": value})
+
+
+def test_a_horizon_of_broken_intervals_is_refused():
+    with pytest.raises(ConfigError, match="whole number of intervals of 200 s, got 300 s"):
+        replace(BASE, scenario=scenario("warehouse_small", horizon_s=300.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "run specification as JSON"),
+        ("[]", "JSON object, got list"),
+        ('{"policy": "crw"}', "Missing key 'scenario'"),
+        ('{"polcy": "crw"}', "Unknown key 'polcy'.* Did you mean 'policy'"),
+    ],
+)
+def test_texts_that_are_no_specification(text, message):
+    with pytest.raises(ConfigError, match=message):
+        RunSpec.from_json(text)
+
+
+def test_mappings_with_unknown_parts_are_refused():
+    mapping = BASE.to_mapping()
+    mapping["scenario"]["arena"]["widht_m"] = 1.0
+    with pytest.raises(ConfigError, match=r"Unknown key 'scenario\.arena\.widht_m'.* Did you mean 'width_m'"):
+        RunSpec.from_mapping(mapping)
+    for wrapper, message in (({"wrapper": "fog"}, "Unknown wrapper 'fog'"), ({"sigma": 1}, "Missing key 'wrapper'")):
+        with pytest.raises(ConfigError, match=message):
+            RunSpec.from_mapping({**BASE.to_mapping(), "wrappers": [wrapper]})
+
+
+@pytest.mark.parametrize("policy", policy_names())
+def test_a_planned_run_has_the_world_its_policy_is_made_for(policy):
+    made_for = getattr(policy_class(policy), "caches", "none")
+    assert plan_run(scenario("warehouse_small"), policy).scenario.caches == made_for
+    for caches in ("none", "static", "dynamic"):
+        assert plan_run(scenario("warehouse_small"), policy, caches=caches).scenario.caches == caches
+
+
+def test_a_policy_that_states_no_caches_leaves_the_scenario_alone():
+    assert plan_run(scenario("warehouse_small", caches="static"), "random").scenario.caches == "static"
+
+
+def test_planning_an_unknown_policy_suggests_the_nearest():
+    with pytest.raises(ValueError, match=r"Unknown policy 'crv'\. Did you mean 'crw'"):
+        plan_run(scenario("warehouse_small"), "crv")
+
+
+def test_describe_is_one_line():
+    text = replace(BASE, seed=7, criterion="noise", criterion_value=0.03).describe()
+    assert text == f"{text[:16]}: crw in warehouse_small, 50 robots, seed 7, noise = 0.03"
