@@ -1,0 +1,48 @@
+"""The population chain the slow, obvious way: generator matrix, null vector, matrix exponential, single events."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm, null_space
+
+Matrix = NDArray[np.float64]
+
+
+def generator(lam: float, mu: float, n: int, *, per_robot: bool = False) -> Matrix:
+    """Generator Q over the number of robots away, 0 ... n."""
+    q = np.zeros((n + 1, n + 1))
+    for away in range(n + 1):
+        if away < n:
+            q[away, away + 1] = lam * (n - away) if per_robot else lam
+        if away > 0:
+            q[away, away - 1] = mu
+        q[away, away] = -q[away].sum()
+    return q
+
+
+def stationary_by_null_vector(q: Matrix) -> Matrix:
+    """The distribution with pi Q = 0."""
+    vector = null_space(q.T)[:, 0]
+    return vector / vector.sum()
+
+
+def mean_away_by_exponential(q: Matrix, horizon: float) -> float:
+    """(1 / T) times the integral of the mean number away, starting with nobody away."""
+    size = q.shape[0]
+    block = np.zeros((2 * size, 2 * size))
+    block[:size, :size] = q
+    block[:size, size:] = np.eye(size)
+    integral = expm(block * horizon)[:size, size:]
+    return float(integral[0] @ np.arange(size)) / horizon
+
+
+def share_of_time_by_events(lam: float, mu: float, n: int, n_events: int, seed: int) -> Matrix:
+    """Share of time with 0 ... n robots away, simulated event by event; void events count as time passing."""
+    rng = np.random.default_rng(seed)
+    waits = rng.exponential(1.0 / (lam + mu), size=n_events)
+    leaves = rng.random(n_events) < lam / (lam + mu)
+    time = np.zeros(n + 1)
+    away = 0
+    for wait, leave in zip(waits, leaves, strict=True):
+        time[away] += wait
+        away = min(away + 1, n) if leave else max(away - 1, 0)
+    return time / time.sum()

@@ -1,0 +1,84 @@
+"""The names and arguments that others call, and a package that stands alone."""
+
+import ast
+import inspect
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import metrics
+
+FOLDER = Path(metrics.__file__).parent
+SIGNATURES = {
+    "t_lost_fraction": "n_interfering, n",
+    "performance_lost": "perf, t_lost, n, perf_one, t_lost_one, *, variant='corrected'",
+    "spatial_emergence": "perf1, t_lost1, n1, perf2, t_lost2, n2, perf_one, t_lost_one, *, variant='corrected', "
+    "reduce='sum'",
+    "task_emergence": "perf1, n1, perf2, n2, *, reduce='sum'",
+    "scalability": "perf1, n1, perf2, n2, *, variant='corrected', reduce=None, zero_policy='nan'",
+    "efficiency": "perf, n, *, reduce='last'",
+    "dtw": "x, y, *, ground='value', clock=None, window=None, per_interval=False",
+    "aligned_l1": "x, y",
+    "waveform": "kind, ticks, *, frequency=0.0, amplitude=0.0, offset=0.0, phase=0.0",
+    "environment_scaling": "v, i_ec, *, model='linear', clip=False",
+    "environment_distance": "v, i_ec, *, ground='value', clock=None",
+    "reactivity": "perf_ideal, perf, v, i_ec, *, model='linear', variant='corrected', clock=None",
+    "adaptability": "perf_ideal, perf, *, variant='corrected', clock=None",
+    "noise_robustness": "perf_ideal, perf, *, variant='corrected', clock=None",
+    "PopulationRates": "lambda_d=0.0, lambda_bd=0.0, mu_b=0.0, mu_bd=0.0",
+    "queue_statistics": "rates, n=None, *, per_robot=False",
+    "mean_away": "rates, n, horizon, *, per_robot=False",
+    "population_robustness": "perf, perf_ideal, rates, *, horizon, n=None, ideal_rates=None, weight='transient', "
+    "reduce='sum'",
+    "availability": "n, n_min, ratio_out",
+    "ratio_for_availability": "n, n_min, p_v",
+    "normalize": "theta, *, distance=False",
+    "aggregate": "values, *, method='t', level=0.95, seed=None",
+}
+
+
+@pytest.mark.parametrize(("name", "expected"), SIGNATURES.items(), ids=SIGNATURES)
+def test_arguments_and_defaults_stay(name, expected):
+    parameters = inspect.signature(getattr(metrics, name)).parameters.values()
+    bare = inspect.Signature([p.replace(annotation=inspect.Parameter.empty) for p in parameters])
+    assert str(bare).removesuffix(")").startswith(f"({expected}")
+
+
+@pytest.mark.parametrize("name", metrics.__all__)
+def test_every_public_name_loads(name):
+    assert getattr(metrics, name) is not None
+    assert name in dir(metrics)
+
+
+def test_type_checkers_and_the_interpreter_see_the_same_names():
+    tree = ast.parse(Path(metrics.__file__).read_text())
+    block = next(node for node in tree.body if isinstance(node, ast.If))
+    homes = {alias.name: node.module for node in block.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+    eager = {
+        alias.name for node in tree.body if isinstance(node, ast.ImportFrom) and node.level == 1 for alias in node.names
+    }
+    assert homes == metrics._HOMES
+    assert {*homes, *eager} == set(metrics.__all__)
+
+
+def test_unknown_names_are_refused():
+    with pytest.raises(AttributeError, match="no attribute 'scalabilty'"):
+        _ = metrics.scalabilty
+
+
+@pytest.mark.parametrize("first", ["metrics.scalability", "metrics.catalog", "metrics.population", "metrics"])
+def test_the_function_wins_over_its_module_in_any_order_of_imports(first):
+    code = (
+        f"import {first}; import metrics.catalog; from metrics import scalability; print(scalability([1], 1, [2], 2))"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (result.stdout.strip(), result.stderr) == ("1.0", "")
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    heavy = ("numba", "scipy", "polars", "pymunk", "swarm_forage_env", "baselines")
+    code = f"import sys, metrics; print(*[name for name in {heavy} if name in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.split() == []

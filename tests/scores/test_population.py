@@ -1,0 +1,243 @@
+"""Robustness to a changing population and availability: by hand, and against generator matrices."""
+
+import math
+
+import numpy as np
+import pytest
+
+from metrics import (
+    PopulationError,
+    PopulationRates,
+    availability,
+    population_robustness,
+    population_weight,
+    ratio_for_availability,
+)
+from tests.reference.population_chain import generator, stationary_by_null_vector
+
+HALF = PopulationRates(lambda_bd=0.001, mu_bd=0.002)
+DEATHS = PopulationRates(lambda_d=0.001)
+DEATHS_AND_REPAIRS = PopulationRates(lambda_d=0.0001, lambda_bd=0.001, mu_bd=0.002)
+
+
+def robustness(weight, **options):
+    return population_robustness([0.9, 0.9], [1.0, 1.0], HALF, horizon=50_000, n=10, weight=weight, **options)
+
+
+@pytest.mark.parametrize(
+    ("weight", "expected"),
+    [("paper", -0.14), ("sojourn", -0.16), ("stationary", -0.001074744), ("transient", -0.008752086)],
+)
+def test_by_hand(weight, expected):
+    assert robustness(weight) == pytest.approx(expected, abs=1e-9)
+
+
+def test_weights_by_hand():
+    assert population_weight(HALF, horizon=50_000, weight="paper") == pytest.approx(0.97, abs=1e-12)
+    assert population_weight(HALF, horizon=50_000, weight="sojourn") == pytest.approx(0.98, abs=1e-12)
+    assert population_weight(HALF, horizon=50_000, n=10, weight="stationary") == pytest.approx(0.900537372, abs=1e-9)
+    assert population_weight(HALF, horizon=50_000, n=10) == pytest.approx(1 - 0.0956239568, abs=1e-9)
+
+
+@pytest.mark.parametrize("options", [{}, {"reduce": "last"}])
+def test_program_weighs_by_the_ratio_of_times_away(options):
+    twice = PopulationRates(lambda_bd=0.002, mu_bd=0.004)
+    value = population_robustness(
+        [5.0, 0.9], [7.0, 1.0], twice, horizon=50_000, ideal_rates=HALF, weight="sierra", **options
+    )
+    assert value == pytest.approx(0.9 - 2.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("k", range(1, 9))
+def test_programs_weight_is_the_rate_factor_whatever_the_swarm_does(k):
+    first = PopulationRates(lambda_bd=0.001, mu_bd=0.001022222)
+    rates = PopulationRates(lambda_bd=0.001 * k, mu_bd=0.001022222 * k)
+    assert population_weight(rates, horizon=50_000, ideal_rates=first, weight="sierra") == pytest.approx(k, rel=1e-9)
+
+
+def test_reductions():
+    options = {"horizon": 50_000, "weight": "paper"}
+    assert population_robustness([0.9, 1.0], [1.0, 1.0], HALF, reduce="mean", **options) == pytest.approx(-0.02)
+    assert population_robustness([0.9, 1.0], [1.0, 1.0], HALF, reduce="last", **options) == pytest.approx(0.03)
+
+
+def test_printed_time_at_work_is_negative_for_the_studys_large_swarm():
+    rates = PopulationRates(lambda_bd=0.001, mu_bd=0.001005556)
+    assert population_weight(rates, horizon=50_000, weight="sojourn") == pytest.approx(1 - 179986 / 50000, abs=1e-4)
+
+
+@pytest.mark.parametrize("weight", ["paper", "sojourn", "transient", "stationary"])
+@pytest.mark.parametrize("rates", [PopulationRates(), PopulationRates(mu_bd=0.001)])
+def test_nobody_leaves(weight, rates):
+    assert population_weight(rates, horizon=1000, n=5, weight=weight) == 1.0
+
+
+@pytest.mark.parametrize("weight", ["paper", "sojourn", "transient", "stationary"])
+def test_weight_relative_to_a_disturbed_ideal(weight):
+    options = {"horizon": 50_000, "n": 10, "weight": weight}
+    rare = PopulationRates(lambda_bd=0.0001, mu_bd=0.002)
+    expected = population_weight(HALF, **options) / population_weight(rare, **options)
+    assert population_weight(HALF, ideal_rates=rare, **options) == pytest.approx(expected, rel=1e-12)
+    assert population_weight(HALF, ideal_rates=HALF, **options) == 1.0
+
+
+@pytest.mark.parametrize("weight", ["paper", "sojourn"])
+@pytest.mark.parametrize(
+    "rates",
+    [
+        DEATHS,
+        PopulationRates(lambda_bd=0.001),
+        PopulationRates(lambda_bd=0.001, mu_bd=0.001),
+        PopulationRates(lambda_bd=0.002, mu_bd=0.001),
+    ],
+)
+def test_an_infinite_time_away_has_no_printed_weight(weight, rates):
+    with pytest.raises(PopulationError, match="transient"):
+        population_weight(rates, horizon=1000, n=5, weight=weight)
+
+
+@pytest.mark.parametrize(("lam", "mu"), [(0.001, 0.001), (0.002, 0.001)])
+def test_finite_swarms_need_no_stability(lam, mu):
+    rates = PopulationRates(lambda_bd=lam, mu_bd=mu)
+    stationary = population_weight(rates, horizon=1e6, n=5, weight="stationary")
+    assert 0.0 < stationary <= 0.5
+    assert population_weight(rates, horizon=1e6, n=5) == pytest.approx(stationary, abs=0.01)
+
+
+@pytest.mark.parametrize("rates", [DEATHS, DEATHS_AND_REPAIRS])
+def test_in_equilibrium_the_dead_do_not_return(rates):
+    assert population_weight(rates, horizon=1000, n=5, weight="stationary") == 0.0
+    with pytest.raises(PopulationError, match="ideal swarm with time at work"):
+        population_weight(HALF, horizon=1000, n=5, ideal_rates=rates, weight="stationary")
+
+
+def test_pure_death_during_a_run():
+    rates = PopulationRates(lambda_d=0.0001)
+    assert population_weight(rates, horizon=50_000, n=115) == pytest.approx(1 - 0.0001 * 50_000 / 230, abs=1e-9)
+
+
+@pytest.mark.parametrize("rates", [DEATHS, DEATHS_AND_REPAIRS])
+def test_program_takes_deaths_as_away_for_the_whole_run(rates):
+    assert population_weight(rates, horizon=1000, ideal_rates=DEATHS, weight="sierra") == 1.0
+    assert population_weight(rates, horizon=4000, ideal_rates=HALF, weight="sierra") == pytest.approx(0.25, rel=1e-12)
+
+
+def test_program_uses_negative_times_without_complaint():
+    growing = PopulationRates(lambda_bd=0.002, mu_bd=0.001)
+    assert population_weight(growing, horizon=1000, ideal_rates=HALF, weight="sierra") == pytest.approx(-1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "rates",
+    [
+        PopulationRates(),
+        PopulationRates(lambda_bd=0.001),
+        PopulationRates(mu_bd=0.001),
+        PopulationRates(lambda_bd=0.001, mu_bd=0.001),
+    ],
+)
+def test_divisions_by_zero_of_the_program_are_refused_with_advice(rates):
+    with pytest.raises(PopulationError, match="transient"):
+        population_weight(rates, horizon=1000, ideal_rates=HALF, weight="sierra")
+
+
+def test_what_a_weight_needs():
+    with pytest.raises(ValueError, match="ideal_rates"):
+        population_weight(HALF, horizon=1000, weight="sierra")
+    for weight in ("transient", "stationary"):
+        with pytest.raises(ValueError, match="swarm size n"):
+            population_weight(HALF, horizon=1000, weight=weight)
+    with pytest.raises(PopulationError, match="horizon"):
+        population_weight(HALF, horizon=0, weight="paper")
+    with pytest.raises(ValueError, match="last interval"):
+        robustness("sierra", ideal_rates=HALF, reduce="mean")
+
+
+@pytest.mark.parametrize(
+    ("n", "n_min", "q", "expected"),
+    [(2, 1, 0.5, 6 / 7), (2, 2, 0.5, 4 / 7), (2, 1, 2.0, 3 / 7), (10, 4, 1.0, 7 / 11), (50, 5, 1.2, 0.401822797)],
+)
+def test_availability_by_hand(n, n_min, q, expected):
+    assert availability(n, n_min, q) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("n", "n_min", "q", "expected"),
+    [
+        (5, 0, 2.0, 1.0),
+        (5, -1, math.inf, 1.0),
+        (5, 6, 0.0, 0.0),
+        (5, 3, 0.0, 1.0),
+        (5, 3, math.inf, 0.0),
+        (5, 5, 0.5, 0.5 / (1 - 0.5**6)),
+    ],
+)
+def test_availability_at_its_ends(n, n_min, q, expected):
+    assert availability(n, n_min, q) == pytest.approx(expected, abs=1e-15)
+
+
+PAPER_TABLE = {
+    (50, 5): [0.833, 0.402, 0.161, 0.026, 0.001],
+    (50, 10): [0.908, 0.618, 0.381, 0.142, 0.014],
+    (50, 20): [0.948, 0.764, 0.579, 0.320, 0.064],
+    (200, 5): [0.833, 0.402, 0.162, 0.026, 0.001],
+    (200, 10): [0.909, 0.621, 0.386, 0.149, 0.022],
+    (200, 20): [0.952, 0.784, 0.614, 0.377, 0.142],
+}
+"""(robots, desired mean at work L) -> availability of 1, 5, 10, 20, 40 robots with rho_S = L / (1 + L)."""
+
+
+@pytest.mark.parametrize(("swarm", "expected"), PAPER_TABLE.items())
+def test_availability_of_the_papers_teams(swarm, expected):
+    n, length = swarm
+    values = [availability(n, n_min, (1 + length) / length) for n_min in (1, 5, 10, 20, 40)]
+    assert values == pytest.approx(expected, abs=0.0005)
+
+
+def test_the_paper_took_the_queue_length_for_the_number_at_work():
+    # Reading 0.40 off the figure decides between rho / (1 - rho) = 5 and the printed rho^2 / (1 - rho) = 5.
+    printed_rho = (-5 + math.sqrt(5**2 + 4 * 5)) / 2
+    assert availability(50, 5, 1.2) == pytest.approx(0.4018, abs=1e-4)
+    assert availability(50, 5, 1 / printed_rho) == pytest.approx(0.454, abs=1e-3)
+
+
+@pytest.mark.parametrize("q", [0.3, 0.999999, 1.0, 1.000001, 4.0])
+def test_availability_is_a_sum_over_the_null_vector_of_the_generator(q):
+    distribution = stationary_by_null_vector(generator(q, 1.0, 9))  # over robots away
+    for n_min in range(1, 10):
+        assert availability(9, n_min, q) == pytest.approx(distribution[: 9 - n_min + 1].sum(), abs=1e-12)
+
+
+def test_availability_of_large_swarms():
+    assert availability(16_384, 100, 1.5) == pytest.approx(1.5**-100, rel=1e-9)
+    assert availability(16_384, 8_193, 1 + 1e-13) == pytest.approx(8192 / 16385, rel=1e-6)
+    assert availability(16_384, 8_192, 0.5) == 1.0
+
+
+@pytest.mark.parametrize("q", [-0.1, math.nan])
+def test_ratios_are_not_negative(q):
+    with pytest.raises(PopulationError, match="lambda / mu"):
+        availability(5, 3, q)
+
+
+@pytest.mark.parametrize(("n", "n_min"), [(1, 1), (50, 5), (200, 200), (16_384, 10_000)])
+@pytest.mark.parametrize("p_v", [0.999, 0.5, 0.40, 1e-6])
+def test_ratio_for_availability_inverts(n, n_min, p_v):
+    q = ratio_for_availability(n, n_min, p_v)
+    assert availability(n, n_min, q) == pytest.approx(p_v, rel=1e-9)
+
+
+def test_ratio_for_certain_and_impossible_availability():
+    assert ratio_for_availability(50, 5, 1.0) == 0.0
+    assert ratio_for_availability(50, 5, 0.0) == math.inf
+
+
+@pytest.mark.parametrize(("n_min", "p_v"), [(0, 0.5), (51, 0.5), (5, -0.1), (5, 1.1), (5, math.nan)])
+def test_availabilities_that_no_ratio_gives_are_refused(n_min, p_v):
+    with pytest.raises(PopulationError, match="Expected"):
+        ratio_for_availability(50, n_min, p_v)
+
+
+def test_one_weight_serves_all_runs():
+    runs = np.full((3, 2), 0.9)
+    assert population_robustness(runs, [1.0, 1.0], HALF, horizon=50_000, n=10).shape == (3,)

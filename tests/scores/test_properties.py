@@ -1,0 +1,270 @@
+"""Laws that each measure obeys for any curves; every measure of the catalogue is listed or left out for a reason."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+import metrics
+from metrics import METRICS, PopulationRates
+from tests.reference.naive_dtw import dtw_by_matrix
+
+RATES = PopulationRates(lambda_bd=0.001, mu_bd=0.002)
+N_INTERVALS = 6
+
+performance = arrays(np.float64, N_INTERVALS, elements=st.floats(0.0, 100.0))
+working = arrays(np.float64, N_INTERVALS, elements=st.floats(0.01, 100.0))
+fraction = arrays(np.float64, N_INTERVALS, elements=st.floats(0.0, 1.0))
+sizes = st.tuples(st.integers(1, 64), st.integers(1, 64)).map(lambda pair: (pair[0], pair[0] + pair[1]))
+rate = st.floats(1e-5, 1e-1)
+scale = st.floats(0.01, 100.0)
+close = {"rel": 1e-9, "abs": 1e-7}
+law = settings(max_examples=40)
+"""The measures are smooth functions of few arguments: more examples find nothing that these do not."""
+
+
+def from_ideal_and_observed(name):
+    """A measure as a function of an ideal and an observed curve alone."""
+    if name == "reactivity":
+        return lambda ideal, observed, **options: metrics.reactivity(ideal, observed, 0.3, 0.3, **options)
+    if name == "population_robustness":
+        return lambda ideal, observed: metrics.population_robustness(observed, ideal, PopulationRates(), horizon=100)
+    return getattr(metrics, name)
+
+
+COMPARISONS = ["reactivity", "adaptability", "noise_robustness", "population_robustness"]
+SIZE_MEASURES = ["spatial_emergence", "task_emergence", "scalability"]
+NOT_LISTED = {
+    "t_lost_fraction": "an input of the others, not a comparison",
+    "performance_lost": "an input of spatial_emergence; its laws are there",
+    "availability": "no curves; its laws are below",
+    "efficiency": "one curve, no comparison",
+    "raw_performance": "one curve, no comparison",
+}
+
+
+def test_every_measure_is_in_a_list_or_left_out_for_a_reason():
+    assert sorted([*COMPARISONS, *SIZE_MEASURES, *NOT_LISTED]) == sorted(METRICS)
+
+
+@pytest.mark.parametrize("name", COMPARISONS)
+@law
+@given(curve=performance)
+def test_identical_curves_score_zero(name, curve):
+    assert from_ideal_and_observed(name)(curve, curve) == 0.0
+
+
+@pytest.mark.parametrize("name", COMPARISONS)
+@law
+@given(ideal=performance, observed=performance, factor=scale)
+def test_comparisons_scale_with_the_unit_of_performance(name, ideal, observed, factor):
+    measure = from_ideal_and_observed(name)
+    assert measure(factor * ideal, factor * observed) == pytest.approx(factor * measure(ideal, observed), **close)
+
+
+@pytest.mark.parametrize("name", [name for name in COMPARISONS if METRICS[name].is_distance])
+@pytest.mark.parametrize("variant", ["corrected", "sierra"])
+@law
+@given(ideal=performance, observed=performance)
+def test_distances_are_symmetric_and_not_negative(name, variant, ideal, observed):
+    measure = from_ideal_and_observed(name)
+    value = measure(ideal, observed, variant=variant)
+    assert value >= 0.0
+    assert measure(observed, ideal, variant=variant) == pytest.approx(value, **close)
+
+
+@law
+@given(ideal=performance, observed=performance)
+def test_population_robustness_is_antisymmetric_without_dynamics(ideal, observed):
+    measure = from_ideal_and_observed("population_robustness")
+    assert measure(ideal, observed) == pytest.approx(-measure(observed, ideal), **close)
+
+
+@law
+@given(perf1=performance, perf2=performance, n=sizes, factor=scale)
+def test_task_emergence_is_linear_in_the_curves(perf1, perf2, n, factor):
+    value = metrics.task_emergence(perf1, n[0], perf2, n[1])
+    scaled = metrics.task_emergence(factor * perf1, n[0], factor * perf2, n[1])
+    assert scaled == pytest.approx(factor * value, rel=1e-9, abs=1e-5)
+    total = metrics.task_emergence([perf1.sum()], n[0], [perf2.sum()], n[1])
+    assert total == pytest.approx(value, rel=1e-9, abs=1e-5)
+
+
+@law
+@given(perf1=working, perf2=working, n=sizes, factor=scale)
+@pytest.mark.parametrize("variant", ["paper", "corrected", "sierra"])
+def test_scalability_does_not_depend_on_the_unit(variant, perf1, perf2, n, factor):
+    value = metrics.scalability(perf1, n[0], perf2, n[1], variant=variant)
+    scaled = metrics.scalability(factor * perf1, n[0], factor * perf2, n[1], variant=variant)
+    assert scaled == pytest.approx(value, rel=1e-6, abs=1e-6)
+
+
+@law
+@given(lone=working, lost=fraction, n=sizes)
+@pytest.mark.parametrize("name", SIZE_MEASURES)
+def test_independent_robots_are_neutral_at_any_pair_of_sizes(name, lone, lost, n):
+    small, large = n[0] * lone, n[1] * lone
+    value = {
+        "spatial_emergence": lambda: metrics.spatial_emergence(small, lost, n[0], large, lost, n[1], lone, lost),
+        "task_emergence": lambda: metrics.task_emergence(small, n[0], large, n[1]),
+        "scalability": lambda: metrics.scalability(small, n[0], large, n[1]),
+    }[name]()
+    assert value == pytest.approx(METRICS[name].neutral, rel=1e-9, abs=1e-6)
+
+
+@law
+@given(perf1=working, perf2=working, n=sizes)
+def test_printed_scalability_is_minus_speedup_times_the_corrected(perf1, perf2, n):
+    printed = metrics.scalability(perf1, n[0], perf2, n[1], variant="paper", reduce="total")
+    corrected = metrics.scalability(perf1, n[0], perf2, n[1])
+    speedup = perf2.sum() / perf1.sum()
+    assert printed == pytest.approx(-speedup * corrected, rel=1e-6, abs=1e-6 * (1 + speedup))
+
+
+@law
+@given(perf1=working, perf2=working, n=sizes, more=st.floats(1.001, 10.0))
+def test_more_performance_of_the_larger_swarm_never_lowers_a_size_measure(perf1, perf2, n, more):
+    assert metrics.scalability(perf1, n[0], more * perf2, n[1]) > metrics.scalability(perf1, n[0], perf2, n[1])
+    assert metrics.task_emergence(perf1, n[0], more * perf2, n[1]) > metrics.task_emergence(perf1, n[0], perf2, n[1])
+
+
+@law
+@given(perf1=working, perf2=working, n=sizes)
+def test_scalability_stays_below_its_limit(perf1, perf2, n):
+    r = n[1] / n[0]
+    assert metrics.scalability(perf1, n[0], perf2, n[1]) <= r / (r - 1) * (1 + 1e-9)
+
+
+@law
+@given(perf=performance, lost=fraction, n=st.integers(2, 64), lone=performance, lone_lost=fraction)
+def test_more_interference_means_less_spatial_emergence(perf, lost, n, lone, lone_lost):
+    calm = metrics.spatial_emergence(lone, lone_lost, 1, perf, 0.5 * lost, n, lone, lone_lost)
+    busy = metrics.spatial_emergence(lone, lone_lost, 1, perf, lost, n, lone, lone_lost)
+    assert busy <= calm
+
+
+curve_pair = st.tuples(st.integers(1, 8), st.integers(1, 8)).flatmap(
+    lambda lengths: st.tuples(*(arrays(np.float64, length, elements=st.floats(-10, 10)) for length in lengths))
+)
+
+
+@law
+@given(pair=curve_pair, ground=st.sampled_from(["value", "time_value"]))
+def test_dtw_is_the_recursion_and_symmetric(pair, ground):
+    x, y = pair
+    step = 1.0 if ground == "time_value" else 0.0
+    expected = dtw_by_matrix(len(x), len(y), lambda i, j: abs(x[i] - y[j]) + abs(step * i - step * j))
+    assert metrics.dtw(x, y, ground=ground) == expected
+    assert metrics.dtw(y, x, ground=ground) == pytest.approx(expected, **close)
+
+
+@law
+@given(pair=curve_pair, shift=st.floats(-10, 10), factor=scale)
+def test_dtw_ignores_a_common_shift_repeated_samples_and_scales(pair, shift, factor):
+    x, y = pair
+    value = metrics.dtw(x, y)
+    assert metrics.dtw(x + shift, y + shift) == pytest.approx(value, **close)
+    assert metrics.dtw(factor * x, factor * y) == pytest.approx(factor * value, **close)
+    assert metrics.dtw(x, np.repeat(x, 3)) == 0.0
+    assert metrics.dtw(x[::-1], y[::-1]) == pytest.approx(value, **close)
+
+
+@law
+@given(x=performance, y=performance, window=st.integers(0, N_INTERVALS))
+def test_dtw_lies_between_its_ends_and_the_aligned_distance(x, y, window):
+    free, limited, aligned = metrics.dtw(x, y), metrics.dtw(x, y, window=window), metrics.aligned_l1(x, y)
+    assert max(abs(x[0] - y[0]), abs(x[-1] - y[-1])) <= free * (1 + 1e-12)
+    assert free <= limited * (1 + 1e-12)
+    assert limited <= aligned * (1 + 1e-12)
+    assert free <= metrics.dtw(x, y, ground="time_value") * (1 + 1e-12)
+
+
+@law
+@given(x=performance, y=performance)
+def test_dtw_with_a_coarse_clock_does_not_warp(x, y):
+    assert metrics.dtw(x, y, ground="time_value", clock=1e4) == pytest.approx(metrics.aligned_l1(x, y), **close)
+
+
+@law
+@given(v=arrays(np.float64, 4, elements=st.floats(0.01, 2)), ideal=arrays(np.float64, 4, elements=st.floats(0.01, 2)))
+def test_scalings_are_one_without_deviation_and_reciprocal_to_each_other(v, ideal):
+    printed = metrics.environment_scaling(v, ideal, model="paper")
+    assert metrics.environment_scaling(v, ideal, model="reciprocal") * printed == pytest.approx(np.ones(4), rel=1e-12)
+    for model in ("paper", "linear", "reciprocal"):
+        assert metrics.environment_scaling(v, v, model=model).tolist() == [1.0] * 4
+    linear = metrics.environment_scaling(v, ideal)
+    assert ((linear < 1) == (v > ideal)).all()  # adversity lowers what a reactive swarm should do
+
+
+@law
+@given(lam=rate, mu=rate, n=st.integers(1, 30), horizon=st.floats(1.0, 1e4))
+def test_mean_away_grows_with_time_towards_equilibrium(lam, mu, n, horizon):
+    rates = PopulationRates(lambda_bd=lam, mu_bd=mu)
+    away = metrics.mean_away(rates, n, horizon)
+    limit = metrics.queue_statistics(rates, n).truncated_length
+    assert limit is not None
+    assert 0.0 < away <= metrics.mean_away(rates, n, 2 * horizon) * (1 + 1e-9)
+    assert away <= limit * (1 + 1e-9)
+    assert away <= 0.5 * lam * horizon * (1 + 1e-9)  # nobody returns
+
+
+@law
+@given(lam=rate, mu=rate, n=st.integers(1, 30))
+def test_littles_law_ties_lengths_and_times(lam, mu, n):
+    assume(lam < 0.999 * mu)
+    queue = metrics.queue_statistics(PopulationRates(lambda_d=lam, mu_b=mu), n)
+    assert queue.length == pytest.approx(lam * queue.time, rel=1e-6)
+    assert queue.waiting == pytest.approx(lam * queue.waiting_time, rel=1e-6, abs=1e-12)
+    assert queue.time_printed == pytest.approx(queue.time + 1 / mu, rel=1e-12)
+    assert queue.truncated_length <= min(n, queue.length) * (1 + 1e-9)
+
+
+@law
+@given(n=st.integers(1, 300), q=st.floats(1e-3, 1e3), data=st.data())
+def test_availability_falls_with_robots_needed_and_with_the_rate_of_leaving(n, q, data):
+    n_min = data.draw(st.integers(1, n))
+    p_v = metrics.availability(n, n_min, q)
+    assert 0.0 <= p_v <= 1.0
+    assert metrics.availability(n, n_min + 1, q) <= p_v
+    assert metrics.availability(n, n_min, 1.1 * q) <= p_v
+    away = metrics.queue_statistics(PopulationRates(lambda_bd=q, mu_bd=1.0), n).truncated_distribution
+    assert away is not None
+    assert p_v == pytest.approx(away[: n - n_min + 1].sum(), rel=1e-6, abs=1e-12)
+
+
+@law
+@given(n=st.integers(1, 300), p_v=st.floats(1e-9, 1 - 1e-9), data=st.data())
+def test_ratio_for_availability_is_the_inverse(n, p_v, data):
+    n_min = data.draw(st.integers(1, n))
+    assert metrics.availability(n, n_min, metrics.ratio_for_availability(n, n_min, p_v)) == pytest.approx(p_v, rel=1e-6)
+
+
+@law
+@given(perf=performance, ideal=performance, k=st.integers(1, 8))
+def test_the_programs_population_weight_knows_nothing_but_the_rate_factor(perf, ideal, k):
+    rates = PopulationRates(lambda_bd=k * RATES.lambda_bd, mu_bd=k * RATES.mu_bd)
+    value = metrics.population_robustness(perf, ideal, rates, horizon=100, ideal_rates=RATES, weight="sierra")
+    assert value == pytest.approx(perf[-1] - k * ideal[-1], **close)
+
+
+@law
+@given(theta=arrays(np.float64, 5, elements=st.floats(-20, 20)))
+def test_normalize_is_odd_bounded_and_keeps_order(theta):
+    value = metrics.normalize(theta)
+    assert (np.abs(value) < 1).all()
+    assert (metrics.normalize(-theta) == -value).all()
+    assert (metrics.normalize(theta, distance=True) == -value).all()
+    assert (np.diff(value[np.argsort(theta)]) >= 0).all()
+
+
+@law
+@given(values=arrays(np.float64, 7, elements=st.floats(-100, 100)), shift=st.floats(-100, 100))
+@pytest.mark.parametrize("method", ["t", "two_sd", "bootstrap"])
+def test_intervals_move_with_the_values_and_hold_the_mean(method, values, shift):
+    summary = metrics.aggregate(values, method=method, seed=1)
+    moved = metrics.aggregate(values + shift, method=method, seed=1)
+    for name in ("mean", "lower", "upper"):
+        assert getattr(moved, name) == pytest.approx(getattr(summary, name) + shift, abs=1e-9)
+    assert moved.std == pytest.approx(summary.std, abs=1e-9)
+    assert summary.lower - 1e-9 <= summary.mean <= summary.upper + 1e-9

@@ -1,0 +1,93 @@
+"""Scalability and its three forms, by hand."""
+
+import numpy as np
+import pytest
+
+from metrics import CurveError, efficiency, raw_performance, scalability, skipped_intervals
+
+INF, NAN = np.inf, np.nan
+
+
+@pytest.mark.parametrize(
+    ("speedup", "printed", "karp_flatt"),
+    [(0.0, 2.0, -INF), (0.5, 1.0, -2.0), (1.0, 0.0, 0.0), (1.5, -1.0, 2 / 3), (2.0, -2.0, 1.0), (3.0, -4.0, 4 / 3)],
+)
+def test_the_print_ranks_swarms_upside_down(speedup, printed, karp_flatt):
+    assert scalability([2.0], 3, [2.0 * speedup], 6, variant="paper") == pytest.approx(printed, abs=1e-12)
+    assert scalability([2.0], 3, [2.0 * speedup], 6) == pytest.approx(karp_flatt, abs=1e-12)
+
+
+def test_linear_swarm():
+    assert scalability([1, 1], 1, [2, 2], 2, variant="paper") == pytest.approx(-4.0, abs=1e-9)
+    assert scalability([1, 1], 1, [2, 2], 2, reduce="sum") == pytest.approx(2.0, abs=1e-9)
+    assert scalability([1, 1], 1, [2, 2], 2) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_uneven_intervals():
+    perf1, perf2 = [1, 3], [2, 3]
+    assert scalability(perf1, 4, perf2, 8, variant="paper") == pytest.approx(-2.0, abs=1e-9)
+    assert scalability(perf1, 4, perf2, 8, reduce="sum") == pytest.approx(1.0, abs=1e-9)
+    assert scalability(perf1, 4, perf2, 8, reduce="mean") == pytest.approx(0.5, abs=1e-9)
+    assert scalability(perf1, 4, perf2, 8, reduce="last") == pytest.approx(0.0, abs=1e-9)
+    assert scalability(perf1, 4, perf2, 8, variant="paper", reduce="total") == pytest.approx(-0.5, abs=1e-9)
+    assert scalability(perf1, 4, perf2, 8) == pytest.approx(0.4, abs=1e-9)
+    assert scalability(perf1, 4, perf2, 8, variant="sierra") == pytest.approx(0.0, abs=1e-9)
+    assert scalability(perf1, 4, perf2, 8, variant="sierra", reduce="sum") == pytest.approx(-2.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("perf1", "perf2", "paper", "sierra", "corrected"),
+    [(0.0, 1.0, -INF, 0.0, 4 / 3), (0.0, 0.0, NAN, NAN, NAN), (1.0, 0.0, 4 / 3, 4 / 3, -INF)],
+)
+def test_swarms_without_performance(perf1, perf2, paper, sierra, corrected):
+    for variant, expected in (("paper", paper), ("sierra", sierra), ("corrected", corrected)):
+        value = scalability([perf1], 1, [perf2], 4, variant=variant)
+        assert value == pytest.approx(expected, abs=1e-12, nan_ok=True), variant
+
+
+@pytest.mark.parametrize(("perf2", "expected"), [(0.5, INF), (1.0, NAN), (2.0, -INF)])
+def test_equal_sizes(perf2, expected):
+    assert scalability([1.0], 4, [perf2], 4, variant="paper") == pytest.approx(expected, nan_ok=True)
+    assert scalability([1.0], 4, [perf2], 4, variant="sierra") == 0.0
+    with pytest.raises(CurveError, match="n1 < n2"):
+        scalability([1.0], 4, [perf2], 4)
+
+
+def test_sizes_in_reverse():
+    printed = 1 - (0.5 - 2) / (1 - 2)  # S = 1/2, r = 1/2
+    assert scalability([2.0], 8, [1.0], 4, variant="paper") == pytest.approx(printed, abs=1e-12)
+    assert scalability([2.0], 8, [1.0], 4, variant="sierra") == pytest.approx(printed, abs=1e-12)
+    assert scalability([2.0], 8, [1.0], 1, variant="sierra") == 0.0
+    with pytest.raises(CurveError, match="n1 < n2"):
+        scalability([2.0], 8, [1.0], 4)
+
+
+def test_intervals_without_performance_can_be_skipped_and_are_counted():
+    perf1 = np.array([[0.0, 1.0, 1.0, 2.0], [0.0, 0.0, 0.0, 0.0], [1.0, 1.0, NAN, 1.0]])
+    perf2 = np.array([[1.0, 0.0, 2.0, 2.0], [1.0, 1.0, 1.0, 1.0], [2.0, 2.0, 2.0, 0.0]])
+    total = scalability(perf1, 1, perf2, 2, reduce="sum", zero_policy="skip")
+    mean = scalability(perf1, 1, perf2, 2, reduce="mean", zero_policy="skip")
+    assert total == pytest.approx([1.0, NAN, NAN], abs=1e-12, nan_ok=True)
+    assert mean == pytest.approx([0.5, NAN, NAN], abs=1e-12, nan_ok=True)
+    assert skipped_intervals(perf1, perf2).tolist() == [2, 4, 1]
+    paper = scalability(perf1[0], 1, perf2[0], 2, variant="paper", zero_policy="skip")
+    assert paper == pytest.approx(-2.0 + 0.0, abs=1e-12)
+
+
+def test_zeros_count_by_default():
+    assert scalability([0.0, 1.0], 1, [1.0, 2.0], 2, variant="paper") == -INF
+    assert np.isnan(scalability([0.0, 1.0], 1, [0.0, 2.0], 2, variant="paper"))
+    assert scalability([0.0, 1.0], 1, [1.0, 2.0], 2, reduce="sum") == pytest.approx(2.0 + 1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("reduce", ["last", "total"])
+def test_skipping_needs_a_sum_over_intervals(reduce):
+    with pytest.raises(ValueError, match="zero_policy"):
+        scalability([1.0], 1, [1.0], 2, reduce=reduce, zero_policy="skip")
+
+
+def test_performance_per_robot():
+    assert efficiency([4.0, 8.0], 4) == 2.0
+    assert efficiency([4.0, 8.0], 4, reduce="sum") == 3.0
+    assert raw_performance([4.0, 8.0]) == 8.0
+    assert raw_performance([4.0, 8.0], reduce="mean") == 6.0
