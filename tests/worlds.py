@@ -27,17 +27,22 @@ def tidy_world(*, n_robots: int = 4, n_objects: int = 8, caches: str = "none", *
     options: dict[str, Any] = {"respawn_scale": 0.0, "physics_substeps": (1.0,), **overrides}
     env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, n_objects=n_objects, caches=caches, **options))
     env.reset_batch(0)
-    objects, standing = env.objects, env.caches
-    objects.floor[objects.floor != CELL_NEST] = CELL_EMPTY
-    standing.alive[:], standing.count[:], standing.serial[:], standing.last_serial = False, 0, 0, 0
-    objects.status[:], objects.cache_slot[:], objects.carriers[:] = ObjectStatus.WAITING, -1, 0
-    objects.waiting.clear()
-    env.events.counters[:] = 0
+    clear(env)
     for row in range(n_objects):
         lay(env, row, depot(row))
     for robot in range(n_robots):
         put(env, robot, *cell_centre((30 + 3 * robot, 74)))
     return env
+
+
+def clear(env: ForageEnv) -> None:
+    """Take all objects and caches out of the world; the test has to lay down every object before it goes on."""
+    objects, caches = env.objects, env.caches
+    objects.floor[objects.floor != CELL_NEST] = CELL_EMPTY
+    caches.alive[:], caches.count[:], caches.serial[:], caches.last_serial = False, 0, 0, 0
+    objects.status[:], objects.cache_slot[:], objects.carriers[:], objects.cell[:] = ObjectStatus.WAITING, -1, 0, -1
+    objects.waiting.clear()
+    env.events.counters[:] = 0
 
 
 def depot(row: int) -> tuple[int, int]:

@@ -426,13 +426,13 @@ def _serve(world: World, rules: Rules, band: int, i: int, chance: float) -> None
 
 
 @njit(cache=True)
-def _phase_of(kind: int) -> int:
-    """Order within a tick: deliver 0, cache drop 1, floor drops 2, pick-ups 3."""
+def _phase_of(kind: int, band: int) -> int:
+    """Order within a tick: deliver 0, cache drop 1, floor drops 2, pick-ups 3, those that find nothing yet included."""
     if kind == DELIVER:
         return 0
     if kind == CACHE_DROP:
         return 1
-    if kind in (FLOOR_PICKUP, CACHE_PICKUP):
+    if band == GRASP:
         return 3
     return 2
 
@@ -465,7 +465,7 @@ def interact(world: World, rules: Rules, gripper: ActionArray, tick: int, chance
         kind, _ = request_of(world, rules, band, i)
         if kind != NO_REQUEST or world.pending_kind[i] != NO_REQUEST:
             world.queue[n_queued] = i
-            world.queue[n_robots + n_queued] = _phase_of(kind)
+            world.queue[n_robots + n_queued] = _phase_of(kind, band)
             n_queued += 1
     for phase in range(4):
         for place in range(n_queued):

@@ -1,0 +1,84 @@
+"""The observation layout: named slices that partition the columns, in the published order."""
+
+import numpy as np
+import pytest
+
+from swarm_forage_env.layout import SERIAL_SCALE, observation_layout
+
+SIZES = {
+    "proximity": 24,
+    "light": 24,
+    "ground": 4,
+    "wheel_speed": 2,
+    "position": 2,
+    "heading": 2,
+    "carrying": 1,
+    "interacting": 1,
+    "active": 1,
+    "cargo": 1,
+    "event_object": 1,
+    "event": 1,
+    "event_cache": 4,
+    "los_cell": 2,
+    "los_object": 25,
+    "los_cache": 16,
+}
+NOISY = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
+
+
+@pytest.fixture(scope="module")
+def layout():
+    return observation_layout(32.0, 16.0, 200)
+
+
+def test_slices_are_the_documented_ones_in_order(layout):
+    assert {part.name: part.size for part in layout} == SIZES
+    assert layout.names == tuple(SIZES)
+
+
+def test_slices_partition_the_columns(layout):
+    columns = np.concatenate([np.arange(part.start, part.stop) for part in layout])
+    np.testing.assert_array_equal(columns, np.arange(layout.size))
+    assert layout.size == sum(SIZES.values())
+
+
+def test_indexing_gives_the_columns_of_a_slice(layout):
+    row = np.arange(layout.size)
+    assert row[layout["ground"]].tolist() == [48, 49, 50, 51]
+    assert row[layout["los_cache"]].tolist() == list(range(layout.size - 16, layout.size))
+
+
+def test_noise_groups_name_the_sensors_that_noise_may_reach(layout):
+    assert {part.name: part.noise_group for part in layout if part.noise_group} == {name: name for name in NOISY}
+
+
+def test_scales_are_natural_units(layout):
+    for part in layout:
+        assert len(part.scale) == part.size
+    assert layout.part("position").scale == (16.0, 8.0)
+    assert layout.part("wheel_speed").scale == (0.20, 0.20)
+    assert layout.part("cargo").scale == (200.0,)
+    assert layout.part("event").scale == (16.0,)
+    assert layout.part("event_cache").scale == (SERIAL_SCALE, 16.0, 8.0, 200.0)
+
+
+def test_unknown_slice_lists_the_known_ones(layout):
+    with pytest.raises(KeyError, match=r"'lidar'.*proximity, light"):
+        layout["lidar"]
+
+
+def test_description_has_one_line_per_slice(layout):
+    lines = layout.describe().splitlines()[1:]
+    assert [line.split()[1] for line in lines] == list(SIZES)
+    assert lines[0].split()[0] == "0..23"
+    assert lines[6].split()[0] == "58"
+
+
+def test_layouts_of_equal_worlds_are_one_object():
+    assert observation_layout(48.0, 48.0, 10) is observation_layout(48.0, 48.0, 10)
+    assert observation_layout(48.0, 48.0, 10) != observation_layout(48.0, 48.0, 11)
+
+
+def test_serial_numbers_survive_float32():
+    serials = np.array([1, 2, 12_345_678, 2**24 - 1])
+    np.testing.assert_array_equal(np.float32(serials / SERIAL_SCALE).astype(np.float64) * SERIAL_SCALE, serials)
