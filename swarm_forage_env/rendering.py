@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from PIL import ImageDraw
 
 _SMALLEST_TEXT_PX = 6.0
+_SMALLEST_DETAILED_PX = 2.0
+"""Robots below this radius are plain discs."""
 
 
 class Trails:
@@ -194,30 +196,22 @@ def _draw_robots(canvas: Canvas, view: View, swarm: SwarmState, events: StepEven
     working = swarm.present & swarm.active
     carrying = swarm.carried_object >= 0
     interfering = working & events.interfering
-    _draw_bodies(canvas, centre[swarm.present & ~swarm.active], direction[:0], radius, PALETTE.repair, hollow=True)
+    paint_rings(canvas, centre[swarm.present & ~swarm.active], 0.8 * radius, 0.4 * radius, PALETTE.repair)
     for rows, colour in ((working & ~carrying, PALETTE.empty), (working & carrying, PALETTE.carrying)):
         _draw_bodies(canvas, centre[rows], direction[rows], radius, colour)
     paint_squares(canvas, centre[swarm.present & carrying], 0.85 * radius, PALETTE.object)
     paint_rings(canvas, centre[interfering], 1.55 * radius + 0.5, max(1.0, 0.36 * radius), PALETTE.interference)
 
 
-def _draw_bodies(
-    canvas: Canvas,
-    centre: FloatArray,
-    direction: FloatArray,
-    radius: float,
-    colour: Colour,
-    *,
-    hollow: bool = False,
-) -> None:
-    """Robots of one colour; a dark rim keeps neighbours apart. Needles are left out where they would be a blur."""
-    if hollow:
-        paint_rings(canvas, centre, 0.8 * radius, 0.4 * radius, colour)
-        return
-    if radius >= 2.0:
+def _draw_bodies(canvas: Canvas, centre: FloatArray, direction: FloatArray, radius: float, colour: Colour) -> None:
+    """Discs of one colour; unless they are tiny with dark rims, which part robots that touch, and needles."""
+    detailed = radius >= _SMALLEST_DETAILED_PX
+    if detailed:
         paint_discs(canvas, centre, radius + max(0.5, 0.22 * radius), PALETTE.floor)
-        paint_needles(canvas, centre, direction, 2.1 * radius, 0.4 * radius, colour)
     paint_discs(canvas, centre, radius, colour)
+    if detailed:
+        paint_rings(canvas, centre, radius + 0.2, max(0.5, 0.14 * radius), PALETTE.page)
+        paint_needles(canvas, centre, direction, 2.1 * radius, 0.4 * radius, colour)
 
 
 def _draw_legend(canvas: Canvas, view: View, scenario: ScenarioConfig) -> None:
@@ -257,7 +251,7 @@ def _draw_symbol(canvas: Canvas, name: str, x: float, y: float, radius: float) -
     elif name == "in interference":
         paint_rings(canvas, centre, radius, max(1.0, 0.3 * radius), PALETTE.interference)
     elif name == "in repair":
-        _draw_bodies(canvas, centre, ahead, radius, PALETTE.repair, hollow=True)
+        paint_rings(canvas, centre, 0.8 * radius, 0.4 * radius, PALETTE.repair)
     elif name == "object":
         paint_squares(canvas, centre, 1.2 * radius, PALETTE.object)
     elif name == "source":
