@@ -40,7 +40,7 @@ def record_run(
     """Run a policy and film it.
 
     Args:
-        scenario: The world, but for its caches.
+        scenario: The world; see `caches`.
         policy: Name of an installed policy, or a fresh policy object.
         path: File to write, .gif or .mp4.
         seconds: Simulated time to film.
@@ -49,8 +49,8 @@ def record_run(
         fps: Pictures per second of film.
         size_px: Longer side of the drawn arena.
         trail_s: Simulated time over which the robots' trails fade; 0 for none.
-        caches: Which caches the world has; default what the policy states in `caches`, or what the scenario has
-            where it states nothing.
+        caches: Which caches the world has; default what the scenario has or, where it has none, what the policy
+            states in `caches`. Say "none" to film a policy for caches in a world without.
         wrappers: Configurations of noise, throttling and population dynamics, in any order.
         progress: Called with (pictures done, pictures in all) after each picture.
 
@@ -70,7 +70,9 @@ def record_run(
     name = policy if isinstance(policy, str) else getattr(policy, "name", type(policy).__name__)
     if isinstance(policy, str):
         policy = load_policy(policy)
-    scenario = replace(scenario, caches=caches or getattr(policy, "caches", scenario.caches))
+    if caches is None:
+        caches = scenario.caches if scenario.caches != "none" else getattr(policy, "caches", "none")
+    scenario = replace(scenario, caches=caches)
     title = f"{scenario.name.replace('_', ' ')}, {name}, {scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
     stack = build_stack(scenario, wrappers, reads=getattr(policy, "reads", None))
     n_samples = round(trail_s * fps / speedup) + 1

@@ -161,10 +161,17 @@ def test_pictures_are_spaced_evenly_in_ticks(small, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("stated", "asked", "expected"), [(None, None, "static"), ("none", None, "none"), ("none", "static", "static")]
+    ("given", "stated", "asked", "expected"),
+    [
+        ("none", None, None, "none"),
+        ("none", "static", None, "static"),
+        ("none", "static", "none", "none"),
+        ("static", "none", None, "static"),
+        ("static", None, "dynamic", "dynamic"),
+    ],
 )
-def test_the_world_has_the_caches_that_the_policy_is_made_for(tmp_path, stated, asked, expected):
-    world, policy = scenario("warehouse_small", n_robots=4, n_objects=10, caches="static"), Witness()
+def test_caches_are_those_asked_for_or_of_the_scenario_or_of_the_policy(tmp_path, given, stated, asked, expected):
+    world, policy = scenario("warehouse_small", n_robots=4, n_objects=10, caches=given), Witness()
     if stated is not None:
         policy.caches = stated
     record_run(world, policy, tmp_path / "run.gif", seconds=2.0, size_px=300, caches=asked)
