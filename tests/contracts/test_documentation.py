@@ -7,17 +7,21 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("**/*.md"))]
-EXAMPLES = [
-    pytest.param(block, id=f"{page.name}-{number}")
-    for page in PAGES
-    for number, block in enumerate(re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE), 1)
-]
+BLOCK = re.compile(r"(<!-- not run: .+ -->\n)?^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
+"""A Python example; one that takes too long for a test says so in a comment before it."""
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("block", EXAMPLES)
-def test_python_examples_run(block):
-    exec(compile(block, "example", "exec"), {})  # noqa: S102 - our own documentation
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if "```python" in page.read_text()], ids=lambda page: page.name
+)
+def test_python_examples_run(page, tmp_path, monkeypatch):
+    """The examples of a page run one after the other, as somebody would type them."""
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    for number, (skipped, block) in enumerate(BLOCK.findall(page.read_text()), 1):
+        if not skipped:
+            exec(compile(block, f"{page.name}, example {number}", "exec"), names)  # noqa: S102 - our own documentation
 
 
 @pytest.mark.parametrize("name", ["run", "tests"])
