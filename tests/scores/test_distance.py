@@ -117,6 +117,7 @@ def test_one_clock_cannot_serve_two_lengths():
     assert dtw([0.0, 0.0, 0.0], [0.0, 0.0], ground="time_value") == 1.0
 
 
+@pytest.mark.compiled
 def test_noise_floor_of_aligned_curves():
     sigma, n_intervals = 0.01, 400  # 16,000 independent values: standard error of the mean difference 0.6 %
     runs = 0.5 + sigma * np.random.default_rng(5).standard_normal((40, n_intervals))
@@ -124,5 +125,9 @@ def test_noise_floor_of_aligned_curves():
     assert floor.shape == (40 * 39 // 2,)
     assert floor.mean() == pytest.approx(2 / np.sqrt(np.pi) * sigma * n_intervals, rel=0.02)  # 1.13 sigma T
     assert (noise_floor(runs) < floor).all()
+
+
+def test_noise_floor_pairs_different_runs():
+    assert noise_floor([[0.0, 0.0], [1.0, 1.0], [4.0, 4.0]]).tolist() == [2.0, 8.0, 6.0]
     with pytest.raises(CurveError, match="two runs"):
-        noise_floor(runs[0])
+        noise_floor([0.0, 1.0])

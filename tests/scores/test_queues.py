@@ -136,6 +136,13 @@ def test_most_of_the_studys_swarm_is_at_work_throughout(n, k, away):
     assert mean_away(warehouse(n, k), n, 50_000) == pytest.approx(away, abs=0.05)
 
 
+@pytest.mark.parametrize(("n", "ticks"), [(50, 253_000), (200, 4_000_000)])
+def test_the_studys_queues_relax_far_more_slowly_than_its_runs_last(n, ticks):
+    rates = warehouse(n, 1)
+    decay = np.sort(-np.linalg.eigvals(generator(rates.lam, rates.mu, n)).real)
+    assert 1 / decay[1] == pytest.approx(ticks, rel=0.02)  # decay[0] = 0 is equilibrium itself
+
+
 def test_long_runs_reach_equilibrium():
     assert mean_away(HALF, 10, 10_000_000) == pytest.approx(queue_statistics(HALF, 10).truncated_length, abs=1e-3)
 
