@@ -32,9 +32,10 @@ def ring_sum(readings: ObsArray) -> tuple[float, float]:
     """Sum 24 ring readings as polar vectors; returns the body-frame vector (forward, left)."""
     x = 0.0
     y = 0.0
-    for k in range(24):
-        x += readings[k] * _BEAM_COS[k]
-        y += readings[k] * _BEAM_SIN[k]
+    for k in range(12):  # beam k + 12 points the opposite way, so equal readings cancel exactly
+        difference = float(readings[k]) - float(readings[k + 12])
+        x += difference * _BEAM_COS[k]
+        y += difference * _BEAM_SIN[k]
     return x, y
 
 
