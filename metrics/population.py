@@ -94,7 +94,8 @@ def population_weight(
     The printed time away is the length of *one* absence, so `paper` and `sojourn` hold only if every robot is away
     exactly once, and turn negative when 1 / (mu - lambda) exceeds T, as it does for the study's 200 robots. The
     authors' program weighs by k when all rates are k times those of its lowest-rate experiment, which it takes as
-    ideal: B_pd then falls with k whatever the swarm does.
+    ideal: B_pd then falls with k whatever the swarm does. That same k, 1 to 8, is the "population variance" on the
+    x axis of its scenario 1 figure.
 
     Returns:
         The weight; 1 if nobody leaves either swarm. In [0, 1] for `transient` and `stationary` with ideal_rates None.
