@@ -33,7 +33,7 @@ def ring_sum(readings: ObsArray) -> tuple[float, float]:
     x = 0.0
     y = 0.0
     for k in range(12):  # beam k + 12 points the opposite way, so equal readings cancel exactly
-        difference = float(readings[k]) - float(readings[k + 12])
+        difference = np.float64(readings[k]) - np.float64(readings[k + 12])
         x += difference * _BEAM_COS[k]
         y += difference * _BEAM_SIN[k]
     return x, y
