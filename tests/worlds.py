@@ -24,7 +24,7 @@ WALL_CELL = (60, 5)
 
 def tidy_world(*, n_robots: int = 4, n_objects: int = 8, caches: str = "none", **overrides: Any) -> ForageEnv:
     """A small warehouse after reset, with objects in the depot, robots in the yard and no cache standing."""
-    options: dict[str, Any] = {"respawn_scale": 0.0, "physics_substeps": (1.0,), **overrides}
+    options: dict[str, Any] = {"respawn_scale": 0.0, **overrides}
     env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, n_objects=n_objects, caches=caches, **options))
     env.reset_batch(0)
     clear(env)
