@@ -32,6 +32,8 @@ class Fuzz:
             seen.set("ground", rng.random(4), i)
         if rng.random() < 0.3:
             seen.obstacle(rng.uniform(-math.pi, math.pi) if rng.random() < 0.25 else None, i)
+            # Two equal beams would point exactly at the edge between soft and hard turns, which rounding decides.
+            seen.set("proximity", seen.get("proximity", i) * rng.uniform(0.9, 1.0, 24), i)
         seen.set("light", rng.random(24), i)
         seen.set("wheel_speed", rng.choice([-0.5, 0.0, 0.0004, 0.45], 2), i)
         cell = rng.integers(40, 46, 2)
