@@ -13,17 +13,20 @@ class ActionError(ValueError):
     """Actions of the wrong shape, or not finite."""
 
 
+def drive_limits(config: ScenarioConfig) -> FloatArray:
+    """Return what the drive kernels call `limits`: wheel scale, centre-speed limit, difference limit, wheel base."""
+    robots = config.robots
+    return np.array([WHEEL_SCALE_MPS, robots.max_speed_mps, robots.max_wheel_difference_mps, robots.wheel_base_m])
+
+
 class Drive:
     """Differential drive of a swarm: wheel speed = limit(command) x gain, not limited again."""
 
     def __init__(self, config: ScenarioConfig) -> None:
         """Take the limits from `config`."""
-        robots = config.robots
         self._dt_s = config.dt_s
-        self._limits = np.array(
-            [WHEEL_SCALE_MPS, robots.max_speed_mps, robots.max_wheel_difference_mps, robots.wheel_base_m]
-        )
-        self._unit_gain = np.ones((robots.n_robots, 2))
+        self._limits = drive_limits(config)
+        self._unit_gain = np.ones((config.robots.n_robots, 2))
 
     def apply(self, actions: ActionArray, wheel_gain: FloatArray | None, swarm: SwarmState, twist: FloatArray) -> None:
         """Write `swarm.wheel_speed` and body twists.

@@ -27,6 +27,7 @@ class ForagingArena:
     Attributes:
         config: The scenario.
         layout: Layout of the observation rows.
+        reads: Observation slices that are looked at; sensors of others may stay zero.
         tick: Ticks done since reset.
         swarm, objects, caches, events: The state; read freely, write through the methods.
     """
@@ -41,8 +42,8 @@ class ForagingArena:
         self.config = config
         arena = config.arena
         self.layout = observation_layout(arena.width_m, arena.height_m, config.objects.n_objects)
-        self._reads = self.layout.names if reads is None else tuple(reads)
-        for name in self._reads:
+        self.reads = self.layout.names if reads is None else tuple(reads)
+        for name in self.reads:
             self.layout.part(name)
         self._drive = Drive(config)
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
@@ -64,12 +65,16 @@ class ForagingArena:
         self._interaction_rng = stream_rng(seed, Stream.INTERACTION)
         self._cache_rng = stream_rng(seed, Stream.CACHE)
         self._interactions = Interactions(config, self.swarm, self.objects, self.caches, self.events)
-        self._suite = SensorSuite.build(config, self.layout, self._reads)
+        self._suite = SensorSuite.build(config, self.layout, self.reads)
         self._furnish()
         position, heading = draw_start_poses(config, stream_rng(seed, Stream.START_POSE))
         self.swarm.position[:], self.swarm.heading[:] = position, heading
         self.swarm.facing[:] = np.column_stack((np.cos(heading), np.sin(heading)))
         self._physics = Physics(config, position, heading)
+        return self.observe()
+
+    def observe(self) -> ObsArray:
+        """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
         sense_proximity(self.swarm, self._suite)
         return sense(self.swarm, self.objects, self.caches, self.events, self._suite)
 

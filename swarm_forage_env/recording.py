@@ -254,6 +254,13 @@ KNOWN_CONTRIBUTIONS: dict[str, tuple[str, str]] = {
     "task_share_cache_collector": ("1", "the same for the task Cache Collector"),
     "throttle": ("1", "waveform V(t) of the throttle at the last tick of the interval"),
     "throttle_mean": ("1", "waveform V(t) of the throttle, mean over the ticks of the interval"),
+    "deaths": ("robots", "that died in the interval"),
+    "births": ("robots", "that were born"),
+    "malfunctions": ("robots", "that went into repair"),
+    "repairs": ("robots", "that came back from repair"),
+    "n_in_repair": ("robots", "length of the repair queue, mean over ticks"),
+    "time_at_work_s": ("s", "mean length of the stays in the tasked swarm that ended in the interval; 0 = none ended"),
+    "time_in_repair_s": ("s", "mean length of the absences that ended with a repair in the interval; 0 = none ended"),
 }
 """Columns of `RunRecord.contributed` that this package may write: unit and meaning. Present only where they apply."""
 

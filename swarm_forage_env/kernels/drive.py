@@ -8,6 +8,21 @@ from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray
 
 
 @njit(cache=True)
+def limit_command(
+    command_left: float, command_right: float, scale: float, max_speed: float, max_difference: float
+) -> tuple[float, float]:
+    """Left and right wheel speed (m/s) for commands in [-1, 1]: centre speed and difference each clipped.
+
+    `scale` is the wheel speed that a command of 1 stands for; all limits in m/s.
+    """
+    wanted_left = min(1.0, max(-1.0, command_left)) * scale
+    wanted_right = min(1.0, max(-1.0, command_right)) * scale
+    speed = min(max_speed, max(-max_speed, 0.5 * (wanted_left + wanted_right)))
+    difference = min(max_difference, max(-max_difference, wanted_right - wanted_left))
+    return speed - 0.5 * difference, speed + 0.5 * difference
+
+
+@njit(cache=True)
 def drive(
     actions: ActionArray,
     wheel_gain: FloatArray,
@@ -33,12 +48,9 @@ def drive(
         left = 0.0
         right = 0.0
         if active[i] and pending_kind[i] == 0:
-            command_left = min(1.0, max(-1.0, float(actions[i, 0]))) * scale
-            command_right = min(1.0, max(-1.0, float(actions[i, 1]))) * scale
-            speed = min(max_speed, max(-max_speed, 0.5 * (command_left + command_right)))
-            difference = min(max_difference, max(-max_difference, command_right - command_left))
-            left = (speed - 0.5 * difference) * wheel_gain[i, 0]
-            right = (speed + 0.5 * difference) * wheel_gain[i, 1]
+            left, right = limit_command(float(actions[i, 0]), float(actions[i, 1]), scale, max_speed, max_difference)
+            left *= wheel_gain[i, 0]
+            right *= wheel_gain[i, 1]
         wheel_speed[i, 0] = left
         wheel_speed[i, 1] = right
         turn = (right - left) / wheel_base

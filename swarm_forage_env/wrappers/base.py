@@ -66,10 +66,11 @@ class SwarmWrapper(BaseParallelWrapper):
     def before_step(self) -> None:
         """Act on the world before it steps."""
 
-    def gain(self, wheel_gain: FloatArray | None) -> FloatArray | None:
+    def gain(self, actions: ActionArray, wheel_gain: FloatArray | None) -> FloatArray | None:
         """Return the wheel gain handed to the next wrapper inwards.
 
         Args:
+            actions: (N, 3) float32, the commands of this step; read only.
             wheel_gain: (N, 2) factors on the left and right wheel speed from the wrappers outside, None = all 1.
                 Multiply into an array of your own; never change this one.
         """
@@ -121,7 +122,7 @@ class SwarmWrapper(BaseParallelWrapper):
         """
         self.before_step()
         obs, reward, terminated, truncated = self._inner.step_batch(
-            actions, wheel_gain=self.gain(wheel_gain), tasks=tasks
+            actions, wheel_gain=self.gain(actions, wheel_gain), tasks=tasks
         )
         obs = self.observe(obs)
         self.after_step(tasks, terminated, truncated)

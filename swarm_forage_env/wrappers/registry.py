@@ -1,15 +1,23 @@
-"""Wrapper configurations by the name that stored specifications use."""
+"""Wrapper configurations by the name that stored specifications, the command line and TOML files use."""
 
+from collections.abc import Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env.config import ConfigError, suggestion
 
 if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import WrapperConfig
 
-WRAPPERS: dict[str, str] = {}
+WRAPPERS: dict[str, str] = {
+    "sensor_noise": "swarm_forage_env.wrappers.noise:SensorNoiseConfig",
+    "population": "swarm_forage_env.wrappers.population:PopulationConfig",
+    "throttle": "swarm_forage_env.wrappers.throttle:ThrottleConfig",
+    "actuator_noise": "swarm_forage_env.wrappers.noise:ActuatorNoiseConfig",
+}
 """Name -> "module:class" of a `WrapperConfig`. Strings, so that reading a specification imports only what it names."""
+
+_WORDS = {"true": True, "false": False}
 
 
 def wrapper_config_class(name: str) -> "type[WrapperConfig]":
@@ -19,7 +27,72 @@ def wrapper_config_class(name: str) -> "type[WrapperConfig]":
         ConfigError: no wrapper has that name.
     """
     if name not in WRAPPERS:
-        known = ", ".join(sorted(WRAPPERS)) or "none"
+        known = ", ".join(sorted(WRAPPERS))
         raise ConfigError(f"Unknown wrapper {name!r}.{suggestion(name, WRAPPERS)} Known: {known}.")
     module, _, class_name = WRAPPERS[name].partition(":")
     return getattr(import_module(module), class_name)
+
+
+def parse_wrapper(text: str) -> "WrapperConfig":
+    """Build a wrapper configuration from one word of a command line.
+
+    Written `name:key=value,key=value`; a dot leads into a table, "+" joins the members of a list:
+
+        throttle:waveform=square,amplitude=0.2,period_s=5000,carriers=true
+        sensor_noise:sigma=0.03,groups=proximity+light,sigmas.position=0.1
+
+    Raises:
+        ConfigError: an unknown name or key, a word that is no key=value, or values that the wrapper refuses.
+    """
+    name, _, settings = text.strip().partition(":")
+    config_class = wrapper_config_class(name)
+    mapping: dict[str, Any] = {}
+    for setting in filter(None, settings.split(",")):
+        key, equals, value = (part.strip() for part in setting.partition("="))
+        if not (key and equals and value):
+            raise ConfigError(f"Expected the settings of wrapper {name} as key=value, got {setting!r} in {text!r}.")
+        *tables, last = key.split(".")
+        target = mapping
+        for table in tables:
+            target = target.setdefault(table, {})
+            if not isinstance(target, dict):
+                raise ConfigError(f"Expected {table} of wrapper {name} either as a value or as a table, in {text!r}.")
+        if last in target:
+            raise ConfigError(f"Expected {key} of wrapper {name} once, got it twice in {text!r}.")
+        target[last] = _plain_value(value)
+    return config_class.from_mapping(mapping)
+
+
+def wrappers_from_mapping(tables: Mapping[str, Any]) -> "tuple[WrapperConfig, ...]":
+    """Build wrapper configurations from tables by name, as a TOML file has them.
+
+    Args:
+        tables: Name -> fields, for example `{"throttle": {"waveform": "constant", "amplitude": 0.1}}`.
+
+    Returns:
+        The configurations in the order of the stack, outermost first.
+
+    Raises:
+        ConfigError: an unknown name or key, or values that a wrapper refuses.
+    """
+    configs = []
+    for name, table in tables.items():
+        config_class = wrapper_config_class(name)
+        if not isinstance(table, Mapping):
+            raise ConfigError(f"Expected the settings of wrapper {name} as a table, got {table!r}.")
+        configs.append(config_class.from_mapping(dict(table)))
+    return tuple(sorted(configs, key=lambda config: config.stack_position))
+
+
+def _plain_value(text: str) -> Any:
+    """Read a word as a truth value, a number or a text; words joined by "+" that are no number as a list."""
+    if text.lower() in _WORDS:
+        return _WORDS[text.lower()]
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    if "+" in text:
+        return [_plain_value(word) for word in text.split("+")]
+    return text

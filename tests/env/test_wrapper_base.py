@@ -32,7 +32,7 @@ class Logging(SwarmWrapper):
     def before_step(self):
         self.log.append((self.name, "before_step"))
 
-    def gain(self, wheel_gain):
+    def gain(self, actions, wheel_gain):
         self.log.append((self.name, "gain"))
         own = np.full((4, 2), self.factor)
         return own if wheel_gain is None else wheel_gain * own

@@ -1,0 +1,265 @@
+"""Noise on what robots sense and on what their wheels do."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import sqrt
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+
+from swarm_forage_env.config import ConfigError, from_mapping, suggestion
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.kernels.noise import noisy_gain, perturb_readings, turn_heading
+from swarm_forage_env.rng import Stream, stream_rng
+from swarm_forage_env.signals import Signal, Waveform, gather_waveform, require_number
+from swarm_forage_env.types import ActionArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+
+NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
+"""Groups of sensors that can be noisy, in the order of their columns."""
+STUDY_NOISE_GROUPS = NOISE_GROUPS[:4]
+"""Groups that are noisy in the authors' program; the paper speaks of all sensors."""
+DISTRIBUTIONS = ("gaussian", "uniform")
+
+Sigma: TypeAlias = float | Waveform
+"""Standard deviation: constant, or by a waveform of time (no noise where it is below 0)."""
+
+_READINGS = ("proximity", "light", "ground")
+"""Groups with values in [0, 1]; those of the others lie in [-1, 1]."""
+_NATURAL_UNITS = {"wheel_speed": 0.01}
+"""What sigma = 1 is in the natural unit of a group's columns: 1 cm/s in m/s; for the others 1 (reading, m, rad)."""
+_UNIFORM_WIDTH = 2.0 * sqrt(3.0)
+"""Width of a uniform distribution with standard deviation 1."""
+
+
+def _is_noisy(sigma: Sigma) -> bool:
+    return isinstance(sigma, Waveform) or sigma > 0.0
+
+
+class SensorNoise(SwarmWrapper):
+    """Perturbs what policies see. The world, its rules and the measure of interference use the truth.
+
+    Unit of sigma: 1 for readings (proximity, light, ground; clamped to [0, 1]), 1 cm/s for wheel speeds and 1 m per
+    axis for positions (both clamped to the ends of their range), 1 rad for the heading, whose angle is perturbed. All
+    other columns stay exact, rows of robots that are not present stay zero.
+
+    In every tick a number is drawn for each robot and noisy column, whether it is used or not. So neither a death, nor
+    the policy's choice of slices, nor the size of sigma shifts anybody's noise.
+    """
+
+    stack_position: ClassVar[int] = 1
+
+    def __init__(self, env: ForageEnv | SwarmWrapper, config: "SensorNoiseConfig") -> None:
+        """Wrap `env`."""
+        super().__init__(env)
+        self._is_uniform = config.distribution == "uniform"
+        self._place_groups({name: sigma for name, sigma in config.group_sigmas().items() if _is_noisy(sigma)})
+        self._draws: ObsArray = np.zeros((self.world.scenario.robots.n_robots, len(self._factors)), np.float32)
+
+    def _place_groups(self, sigmas: dict[str, Sigma]) -> None:
+        """Give each noisy group its columns of the draws, in a fixed order, and the factors from draws to noise."""
+        parts = {part.noise_group: part for part in self.world.layout if part.noise_group in sigmas}
+        units: list[float] = []
+        spans: list[tuple[int, int, int]] = []
+        lows: list[float] = []
+        constant: list[float] = []
+        self._varying: list[tuple[slice, Signal]] = []
+        self._heading: tuple[int, int] | None = None
+        for name in (name for name in NOISE_GROUPS if name in sigmas):
+            part, sigma, first = parts[name], sigmas[name], len(units)
+            # Nobody reads the other slices, and nobody rewrites them either: noise would pile up there.
+            is_read = part.name in self.world.arena.reads
+            if name == "heading":
+                units.append(1.0)
+                self._heading = (part.start, first) if is_read else None
+            else:
+                units += [_NATURAL_UNITS.get(name, 1.0) / scale for scale in part.scale]
+                if is_read:
+                    spans.append((part.start, first, part.size))
+                    lows.append(0.0 if name in _READINGS else -1.0)
+            if isinstance(sigma, Waveform):
+                self._varying.append((slice(first, len(units)), sigma.signal(self.world.scenario.dt_s)))
+            constant += [0.0 if isinstance(sigma, Waveform) else sigma] * (len(units) - first)
+        self._units: ObsArray = np.array(units, np.float32) * np.float32(_UNIFORM_WIDTH if self._is_uniform else 1.0)
+        self._factors: ObsArray = np.array(constant, np.float32) * self._units
+        self._spans: IntArray = np.array(spans, np.int32).reshape(-1, 3)
+        self._lows: ObsArray = np.array(lows, np.float32)
+
+    def on_reset(self, seed: int) -> None:
+        """Start the random stream."""
+        self._rng = stream_rng(seed, Stream.SENSOR_NOISE)
+
+    def observe(self, obs: ObsArray) -> ObsArray:
+        """Perturb `obs` in place."""
+        if not len(self._factors):
+            return obs
+        centre = _draw(self._rng, self._draws, is_uniform=self._is_uniform)
+        for columns, signal in self._varying:
+            self._factors[columns] = max(0.0, signal(self.world.tick)) * self._units[columns]
+        present = self.world.swarm.present
+        perturb_readings(obs, present, self._draws, centre, self._factors, self._spans, self._lows)
+        if self._heading is not None:
+            turn_heading(obs, present, self._draws, centre, self._factors, *self._heading)
+        return obs
+
+
+class ActuatorNoise(SwarmWrapper):
+    """Multiplies each wheel's speed by a factor of its own in every tick, with mean 1 and standard deviation sigma."""
+
+    stack_position: ClassVar[int] = 4
+
+    def __init__(self, env: ForageEnv | SwarmWrapper, config: "ActuatorNoiseConfig") -> None:
+        """Wrap `env`."""
+        super().__init__(env)
+        scenario, sigma = self.world.scenario, config.sigma
+        self._is_uniform = config.distribution == "uniform"
+        self._is_noisy = _is_noisy(sigma)
+        constant = Waveform(kind="constant", amplitude=sigma) if not isinstance(sigma, Waveform) else sigma
+        self._signal = constant.signal(scenario.dt_s)
+        self._unit_gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
+        self._gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
+
+    def on_reset(self, seed: int) -> None:
+        """Start the random stream."""
+        self._rng = stream_rng(seed, Stream.ACTUATOR_NOISE)
+
+    def gain(self, actions: ActionArray, wheel_gain: FloatArray | None) -> FloatArray | None:
+        """Multiply this tick's factors into the gains."""
+        if not self._is_noisy:
+            return wheel_gain
+        gain = self._gain
+        centre = _draw(self._rng, gain, is_uniform=self._is_uniform)
+        factor = max(0.0, self._signal(self.world.tick + 1)) * (_UNIFORM_WIDTH if self._is_uniform else 1.0)
+        noisy_gain(gain, centre, factor, self._unit_gain if wheel_gain is None else wheel_gain)
+        return gain
+
+
+def _draw(rng: np.random.Generator, out: np.ndarray, *, is_uniform: bool) -> float:
+    """Fill `out` with standard normal draws or with uniform ones in [0, 1); returns their mean."""
+    if is_uniform:
+        rng.random(out=out, dtype=out.dtype.type)
+        return 0.5
+    rng.standard_normal(out=out, dtype=out.dtype.type)
+    return 0.0
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SensorNoiseConfig(WrapperConfig):
+    """A `SensorNoise` as data.
+
+    Raises:
+        ConfigError: an unknown group or distribution, or a sigma that is negative or no number.
+    """
+
+    name: ClassVar[str] = "sensor_noise"
+    stack_position: ClassVar[int] = SensorNoise.stack_position
+
+    sigma: Sigma = 0.0
+    """Standard deviation for all of `groups`, in the unit of each."""
+    groups: tuple[str, ...] = NOISE_GROUPS
+    """Which of `NOISE_GROUPS` are noisy; kept in that order."""
+    sigmas: Mapping[str, Sigma] = field(default_factory=dict, hash=False)
+    """Group -> standard deviation of its own, instead of `sigma`; the group need not be among `groups`."""
+    distribution: str = "gaussian"
+    """One of `DISTRIBUTIONS`; a uniform one has the same standard deviation (our choice)."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.groups, tuple) or not self.groups:
+            raise ConfigError(f"Expected sensor_noise.groups to be one or more names of sensors, got {self.groups!r}.")
+        if not isinstance(self.sigmas, Mapping):
+            raise ConfigError(f"Expected sensor_noise.sigmas to be a table of sigma by group, got {self.sigmas!r}.")
+        for name in (*self.groups, *self.sigmas):
+            if name not in NOISE_GROUPS:
+                hint = suggestion(str(name), NOISE_GROUPS)
+                raise ConfigError(f"Unknown group of sensors {name!r}.{hint} Known: {', '.join(NOISE_GROUPS)}.")
+        _check_sigma("sensor_noise.sigma", self.sigma)
+        for name, sigma in self.sigmas.items():
+            _check_sigma(f"sensor_noise.sigmas.{name}", sigma)
+        _check_distribution("sensor_noise", self.distribution)
+        object.__setattr__(self, "groups", tuple(name for name in NOISE_GROUPS if name in self.groups))
+        object.__setattr__(self, "sigmas", dict(self.sigmas))
+
+    def group_sigmas(self) -> dict[str, Sigma]:
+        """Return the standard deviation of each group that is named."""
+        return {**dict.fromkeys(self.groups, self.sigma), **self.sigmas}
+
+    def wrap(self, env: ForageEnv | SwarmWrapper) -> SensorNoise:
+        """Build the wrapper around `env`."""
+        return SensorNoise(env, self)
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "SensorNoiseConfig":
+        """Build the configuration from plain values.
+
+        A waveform in place of a sigma is read as by `signals.gather_waveform`; groups may be one text, joined by "+".
+        """
+        values = gather_waveform(mapping, "sigma")
+        if isinstance(values.get("groups"), str):
+            values["groups"] = values["groups"].split("+")
+        sigmas = values.get("sigmas")
+        if isinstance(sigmas, Mapping):
+            values["sigmas"] = {
+                name: Waveform.from_mapping(sigma) if isinstance(sigma, Mapping) else sigma
+                for name, sigma in sigmas.items()
+            }
+        return from_mapping(cls, values)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ActuatorNoiseConfig(WrapperConfig):
+    """An `ActuatorNoise` as data.
+
+    Raises:
+        ConfigError: an unknown distribution, or a sigma that is negative or no number.
+    """
+
+    name: ClassVar[str] = "actuator_noise"
+    stack_position: ClassVar[int] = ActuatorNoise.stack_position
+
+    sigma: Sigma
+    """Standard deviation of the factor on a wheel's speed."""
+    distribution: str = "gaussian"
+    """One of `DISTRIBUTIONS`; a uniform one has the same standard deviation (our choice)."""
+
+    def __post_init__(self) -> None:
+        _check_sigma("actuator_noise.sigma", self.sigma)
+        _check_distribution("actuator_noise", self.distribution)
+
+    def wrap(self, env: ForageEnv | SwarmWrapper) -> ActuatorNoise:
+        """Build the wrapper around `env`."""
+        return ActuatorNoise(env, self)
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "ActuatorNoiseConfig":
+        """Build the configuration from plain values; a waveform as `signals.gather_waveform` reads it."""
+        return from_mapping(cls, gather_waveform(mapping, "sigma"))
+
+
+def noise_levels(
+    sigma_max: float = 0.03, *, n_levels: int = 8, groups: tuple[str, ...] = NOISE_GROUPS
+) -> tuple[tuple[SensorNoiseConfig, ActuatorNoiseConfig], ...]:
+    """Return the noise of the paper's robustness studies: Gaussian, one sigma for all sensors and the wheels.
+
+    Args:
+        sigma_max: Highest sigma: 0.03 in the warehouses and 0.10 in search and rescue (paper; the study configuration
+            of search and rescue has 0.05).
+        n_levels: Levels in equal steps from 0, which is the ideal (study configuration: 8).
+        groups: Noisy sensors. The authors' program adds none to positions and headings: `STUDY_NOISE_GROUPS`.
+    """
+    return tuple(
+        (SensorNoiseConfig(sigma=sigma, groups=groups), ActuatorNoiseConfig(sigma=sigma))
+        for sigma in np.linspace(0.0, sigma_max, n_levels).tolist()
+    )
+
+
+def _check_sigma(where: str, sigma: Any) -> None:
+    if not isinstance(sigma, Waveform):
+        require_number(where, sigma, at_least=0.0)
+
+
+def _check_distribution(where: str, distribution: Any) -> None:
+    if distribution not in DISTRIBUTIONS:
+        raise ConfigError(
+            f"Expected {where}.distribution to be one of {', '.join(DISTRIBUTIONS)}, got {distribution!r}."
+            + suggestion(str(distribution), DISTRIBUTIONS)
+        )

@@ -1,0 +1,198 @@
+"""PopulationDynamics: robots that die, are born, break down and are repaired during a run."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from swarm_forage_env.config import ConfigError, suggestion
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.queues import EventClocks, EventRates, EventTally, PopulationState, advance_population
+from swarm_forage_env.signals import require_number
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+
+BIRTH_MARGIN_M = 2.0
+"""Robots are born at least this far from the border of the arena (study configuration)."""
+BIRTH_TRIALS = 1000
+"""Positions that are tried in one tick (study configuration)."""
+DEATHS = ("terminate", "absorbing")
+
+_STUDY_REPAIR_PER_TICK = {50: 0.001022222, 200: 0.001005556}
+"""Swarm size -> lowest repair rate of the study."""
+
+
+class PopulationDynamics(SwarmWrapper):
+    """Lets the robots of a run die, be born, break down and be repaired, by the processes described in `queues`.
+
+    A robot in repair stays where it is with its wheels stopped, visible to others, keeping cargo and memory; it stays
+    an agent, with `active` at 0. A robot that dies loses its cargo where it stands and its body disappears: its agent
+    terminates, or stays as a row of zeros (`deaths="absorbing"`, for trainers that need a fixed number of agents). In
+    both cases the world and its record are the same, and the episode ends when the last robot is dead. A row that is
+    not yet born is an agent without a body, a row of zeros; it enters at a uniform position, heading along +x.
+
+    Records `deaths`, `births`, `malfunctions`, `repairs`, `n_in_repair`, `time_at_work_s`, `time_in_repair_s`.
+    """
+
+    stack_position: ClassVar[int] = 2
+
+    def __init__(self, env: ForageEnv | SwarmWrapper, config: "PopulationConfig") -> None:
+        """Wrap `env`.
+
+        Raises:
+            ConfigError: more robots at the start than the scenario has, or births with nobody left to be born.
+        """
+        super().__init__(env)
+        scenario = self.world.scenario
+        n_robots = scenario.robots.n_robots
+        initial = n_robots if config.initial_robots is None else config.initial_robots
+        if initial > n_robots:
+            raise ConfigError(
+                f"Expected population.initial_robots <= {n_robots}, the robots of the scenario, got {initial}."
+            )
+        if config.birth_per_tick > 0.0 and initial == n_robots:
+            raise ConfigError(
+                f"Expected population.initial_robots below {n_robots}, the robots of the scenario, so that somebody "
+                f"can be born, got {config.initial_robots}."
+            )
+        self._config = config
+        margin = min(BIRTH_MARGIN_M, scenario.robots.start_margin_m)
+        self._birth_low = np.array([margin, margin])
+        self._birth_high = np.array([scenario.arena.width_m, scenario.arena.height_m]) - margin
+        self._body_m = 2.0 * scenario.robots.radius_m
+
+    def on_reset(self, seed: int) -> None:
+        """Start the clocks; robots that are not yet born leave the world before anybody sees them."""
+        config = self._config
+        n_robots = self.world.scenario.robots.n_robots
+        self._state = PopulationState.start(
+            n_robots, initial_robots=config.initial_robots, max_robots=config.max_robots
+        )
+        self._clocks = EventClocks(config.rates, seed)
+        self._next_tick = self._clocks.next_tick
+        self._repair_ticks = 0
+        if not self._state.present.all():
+            self._apply()
+            self.world.arena.observe()
+
+    def before_step(self) -> None:
+        """Let happen what is due in the coming tick."""
+        tick = self.world.tick + 1
+        if tick >= self._next_tick:
+            if advance_population(self._state, self._clocks, tick, self._find_place):
+                self._apply()
+            self._next_tick = self._clocks.next_tick
+        self._repair_ticks += len(self._state.repair_queue)
+
+    def interval_columns(self) -> dict[str, float]:
+        """Return the events since the last call, the mean repair queue, and how long stays and absences were."""
+        scenario, tally = self.world.scenario, self._state.tally
+        columns = {
+            "deaths": float(tally.deaths),
+            "births": float(tally.births),
+            "malfunctions": float(tally.malfunctions),
+            "repairs": float(tally.repairs),
+            "n_in_repair": self._repair_ticks / scenario.interval_ticks,
+            "time_at_work_s": tally.stay_ticks * scenario.dt_s / max(1, tally.stays),
+            "time_in_repair_s": tally.absence_ticks * scenario.dt_s / max(1, tally.repairs),
+        }
+        self._state.tally = EventTally()
+        self._repair_ticks = 0
+        return columns
+
+    def _apply(self) -> None:
+        """Tell the world who is present and active, and learners who is gone."""
+        state = self._state
+        gone = state.dead
+        if self._config.deaths == "absorbing":
+            gone = np.full(len(state.dead), bool(state.dead.all()))
+        self.world.set_population(active=state.active, present=state.present, terminated=gone)
+
+    def _find_place(self, row: int, rng: np.random.Generator) -> bool:
+        """Put a row that is to be born at a uniform position without overlap, if one is found."""
+        swarm = self.world.swarm
+        others = swarm.position[swarm.present]
+        for x, y in rng.uniform(self._birth_low, self._birth_high, (BIRTH_TRIALS, 2)).tolist():
+            if np.all(np.hypot(others[:, 0] - x, others[:, 1] - y) > self._body_m):
+                swarm.position[row] = x, y
+                swarm.heading[row] = 0.0
+                return True
+        return False
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class PopulationConfig(WrapperConfig):
+    """A `PopulationDynamics` as data. Rates are events per tick of the whole swarm; 0 = never.
+
+    Raises:
+        ConfigError: a rate that is negative or no number, swarm sizes that make no sense, or an unknown `deaths`.
+    """
+
+    name: ClassVar[str] = "population"
+    stack_position: ClassVar[int] = PopulationDynamics.stack_position
+
+    death_per_tick: float = 0.0
+    birth_per_tick: float = 0.0
+    malfunction_per_tick: float = 0.0
+    repair_per_tick: float = 0.0
+    initial_robots: int | None = None
+    """Robots at the start of a run, the first rows; the others wait to be born. Default: all of the scenario."""
+    max_robots: int | None = None
+    """No births while this many robots are present. Default: all of the scenario."""
+    deaths: str = "terminate"
+    """Whether the agent of a dead robot terminates, or stays until the end ("absorbing")."""
+
+    def __post_init__(self) -> None:
+        for process in ("death", "birth", "malfunction", "repair"):
+            field = f"{process}_per_tick"
+            require_number(f"population.{field}", getattr(self, field), at_least=0.0)
+        for field in ("initial_robots", "max_robots"):
+            size = getattr(self, field)
+            if size is not None and (isinstance(size, bool) or not isinstance(size, int) or size < 1):
+                raise ConfigError(f"Expected population.{field} to be a whole number >= 1, got {size!r}.")
+        if self.deaths not in DEATHS:
+            raise ConfigError(
+                f"Expected population.deaths to be one of {', '.join(DEATHS)}, got {self.deaths!r}."
+                + suggestion(str(self.deaths), DEATHS)
+            )
+
+    @property
+    def rates(self) -> EventRates:
+        """The four rates."""
+        return EventRates(
+            death=self.death_per_tick,
+            birth=self.birth_per_tick,
+            malfunction=self.malfunction_per_tick,
+            repair=self.repair_per_tick,
+        )
+
+    def wrap(self, env: ForageEnv | SwarmWrapper) -> PopulationDynamics:
+        """Build the wrapper around `env`."""
+        return PopulationDynamics(env, self)
+
+
+def malfunction_levels(n_robots: int) -> tuple[PopulationConfig, ...]:
+    """Return the population dynamics of scenario 1: malfunctions and repairs at x + 1 times a base rate, x = 0 ... 7.
+
+    The ratio of the rates is such that a tenth of the swarm would be at work in equilibrium, which a run is too short
+    to reach (study configuration; it has no level without malfunctions, x = 0 is the reference).
+
+    Args:
+        n_robots: 50 (small warehouse) or 200 (medium).
+
+    Raises:
+        ConfigError: another swarm size; the study has rates for these two only.
+    """
+    if n_robots not in _STUDY_REPAIR_PER_TICK:
+        raise ConfigError(f"Expected 50 or 200 robots, for which the study has repair rates, got {n_robots!r}.")
+    repair = _STUDY_REPAIR_PER_TICK[n_robots]
+    return tuple(
+        PopulationConfig(malfunction_per_tick=factor / 1000, repair_per_tick=repair * factor) for factor in range(1, 9)
+    )
+
+
+def death_levels() -> tuple[PopulationConfig, ...]:
+    """Return the population dynamics of scenario 2: 0.0001, 0.0003, ..., 0.0015 deaths per tick.
+
+    5, 15, ..., 75 deaths are expected in a run (study configuration; the paper says up to 0.0007).
+    """
+    return tuple(PopulationConfig(death_per_tick=factor / 10_000) for factor in range(1, 16, 2))

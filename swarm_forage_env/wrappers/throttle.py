@@ -1,0 +1,126 @@
+"""Throttle: robots lose part of their speed, by a waveform of time."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from swarm_forage_env.actuators import drive_limits
+from swarm_forage_env.config import ConfigError, from_mapping
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.kernels.throttle import throttle
+from swarm_forage_env.signals import Waveform, gather_waveform
+from swarm_forage_env.types import ActionArray, FloatArray
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+
+IDEAL_THROTTLE = 0.10
+"""Constant throttle that the paper's flexibility studies take as ideal conditions."""
+
+
+class Throttle(SwarmWrapper):
+    """Slows robots down: both wheels of a limited command (l, r) get the factor 1 - a |l + r| / (|l| + |r|).
+
+    a = max(0, V(t)), with t the tick that is executed (the first is 1) and V the waveform. Driving straight loses the
+    share a of its speed, turning on the spot loses nothing, in between it is continuous: the study throttles the
+    steering force, which does not slow turns on the spot. Robots do not know about it.
+
+    Records `throttle`, V at the last tick of an interval, and `throttle_mean`.
+    """
+
+    stack_position: ClassVar[int] = 3
+
+    def __init__(self, env: ForageEnv | SwarmWrapper, config: "ThrottleConfig") -> None:
+        """Wrap `env`."""
+        super().__init__(env)
+        scenario = self.world.scenario
+        self._only_carriers = config.carriers
+        self._signal = config.waveform.signal(scenario.dt_s)
+        self._limits = drive_limits(scenario)
+        self._gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
+
+    def on_reset(self, seed: int) -> None:
+        """Start the waveform."""
+        self._value = self._sum = 0.0
+        self._ticks = 0
+
+    def gain(self, actions: ActionArray, wheel_gain: FloatArray | None) -> FloatArray | None:
+        """Multiply the throttle of the coming tick into the gains."""
+        self._value = value = self._signal(self.world.tick + 1)
+        self._sum += value
+        self._ticks += 1
+        if value <= 0.0:
+            return wheel_gain
+        np.copyto(self._gain, 1.0 if wheel_gain is None else wheel_gain)
+        carried_object = self.world.swarm.carried_object
+        throttle(actions, value, self._only_carriers, carried_object, self._limits, self._gain)
+        return self._gain
+
+    def interval_columns(self) -> dict[str, float]:
+        """Return V at the last tick, and its mean over the ticks since the last call."""
+        mean = self._sum / self._ticks
+        self._sum, self._ticks = 0.0, 0
+        return {"throttle": self._value, "throttle_mean": mean}
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ThrottleConfig(WrapperConfig):
+    """A `Throttle` as data.
+
+    Raises:
+        ConfigError: a waveform that exceeds 1, at which robots stand still.
+    """
+
+    name: ClassVar[str] = "throttle"
+    stack_position: ClassVar[int] = Throttle.stack_position
+
+    waveform: Waveform
+    """Share of speed lost; negative values throttle nothing."""
+    carriers: bool = False
+    """Whether only robots that carry an object at the start of the step are throttled."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.waveform, Waveform):
+            raise ConfigError(f"Expected throttle.waveform to be a Waveform, got {self.waveform!r}.")
+        if self.waveform.peak > 1.0:
+            raise ConfigError(
+                f"Expected a throttle of at most 1 (robots stand still), got a waveform that reaches "
+                f"{self.waveform.peak:g}; lower its amplitude or its offset."
+            )
+        if not isinstance(self.carriers, bool):
+            raise ConfigError(f"Expected throttle.carriers to be True or False, got {self.carriers!r}.")
+
+    def wrap(self, env: ForageEnv | SwarmWrapper) -> Throttle:
+        """Build the wrapper around `env`."""
+        return Throttle(env, self)
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "ThrottleConfig":
+        """Build the configuration from plain values; the waveform as `signals.gather_waveform` reads it."""
+        return from_mapping(cls, gather_waveform(mapping, "waveform"))
+
+
+def square_throttles() -> tuple[ThrottleConfig, ...]:
+    """Throttles of scenario 1: carriers lose speed by a square wave, two cycles in a run; the first is the ideal.
+
+    Amplitude = offset = 0.15, 0.20, ..., 0.40, so that speed is full in one half of a cycle and falls by twice the
+    amplitude in the other (study configuration BCSquare; the paper prints 0 to 0.40). Ideal: constant 0.10.
+    """
+    return _throttles("square", 7, 5_000.0, carriers=True)
+
+
+def sine_throttles() -> tuple[ThrottleConfig, ...]:
+    """Throttles of scenario 2: all robots lose speed by a sine, one cycle in a run; the first is the ideal.
+
+    Amplitude = offset = 0.15, 0.20, ..., 0.45 (study configuration MSine; the paper prints 0 to 0.40). Ideal: constant
+    0.10.
+    """
+    return _throttles("sine", 8, 10_000.0, carriers=False)
+
+
+def _throttles(kind: str, n_levels: int, period_s: float, *, carriers: bool) -> tuple[ThrottleConfig, ...]:
+    ideal = Waveform(kind="constant", amplitude=IDEAL_THROTTLE)
+    # Hundredths are exact as whole numbers: 0.10 + 0.05 + ... would not be.
+    levels = [(10 + 5 * level) / 100 for level in range(1, n_levels)]
+    waves = [Waveform(kind=kind, amplitude=level, offset=level, period_s=period_s) for level in levels]
+    return tuple(ThrottleConfig(waveform=waveform, carriers=carriers) for waveform in (ideal, *waves))
