@@ -1,0 +1,297 @@
+"""The environment keeps PettingZoo's contract, and says what is wrong when its user does not."""
+
+import numpy as np
+import pettingzoo
+import pytest
+from gymnasium import spaces
+from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, seed_test, state_test
+from pettingzoo.utils.env import AECEnv
+
+import swarm_forage_env.env as env_module
+from swarm_forage_env import SCENARIO_NAMES
+from swarm_forage_env.actuators import ActionError
+from swarm_forage_env.config import ConfigError
+from swarm_forage_env.env import ForageEnv, env, parallel_env
+
+SMALL = {"n_robots": 5, "n_objects": 80}
+WORLDS = [(name, caches) for name in SCENARIO_NAMES for caches in ("none", "static", "dynamic")]
+
+
+@pytest.mark.parametrize(("name", "caches"), WORLDS)
+def test_parallel_api(name, caches):
+    parallel_api_test(parallel_env(name, caches=caches, **SMALL), num_cycles=60)
+
+
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_parallel_api_beyond_the_horizon(name):
+    parallel_api_test(parallel_env(name, max_cycles=7, **SMALL), num_cycles=20)
+
+
+@pytest.mark.parametrize(("name", "caches"), WORLDS)
+def test_equal_seeds_give_equal_runs(name, caches):
+    parallel_seed_test(lambda: parallel_env(name, caches=caches, **SMALL), num_cycles=20)
+
+
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_agent_by_agent(name):
+    api_test(env(name, max_cycles=6, **SMALL), num_cycles=40)
+
+
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_agent_by_agent_seeds(name):
+    seed_test(lambda: env(name, **SMALL), num_cycles=40)
+
+
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_state(name):
+    state_test(env(name, **SMALL), parallel_env(name, **SMALL), num_cycles=5)
+
+
+def test_max_cycles():
+    max_cycles_test(env_module)
+
+
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_environments_are_made_by_id(name):
+    parallel = pettingzoo.make("parallel", f"swarm_forage/{name}-v0", caches="dynamic", **SMALL)
+    assert isinstance(parallel.unwrapped, ForageEnv)
+    assert parallel.unwrapped.scenario.name == name
+    assert parallel.unwrapped.scenario.caches == "dynamic"
+    turns = pettingzoo.make("aec", f"swarm_forage/{name}-v0", **SMALL)
+    assert isinstance(turns, AECEnv)
+    assert turns.unwrapped.scenario.name == name
+    assert len(turns.possible_agents) == 5
+
+
+def test_metadata_names_a_versioned_environment():
+    world = parallel_env(**SMALL)
+    assert world.metadata["name"] == "swarm_forage_v0"
+    assert world.metadata["is_parallelizable"]
+    assert str(env(**SMALL)) == "swarm_forage_v0"
+
+
+# Spaces and agents
+
+
+def test_spaces_are_boxes_of_the_documented_size():
+    world = parallel_env(**SMALL)
+    assert world.possible_agents == [f"robot_{row}" for row in range(5)]
+    for agent in world.possible_agents:
+        assert world.observation_space(agent) == spaces.Box(-1.0, 1.0, (world.layout.size,), np.float32)
+        assert world.action_space(agent) == spaces.Box(-1.0, 1.0, (3,), np.float32)
+        assert world.observation_space(agent) is world.observation_space(agent)
+        assert world.action_space(agent) is world.action_space(agent)
+
+
+def idle(world: ForageEnv) -> dict[str, np.ndarray]:
+    return {agent: np.zeros(3, np.float32) for agent in world.agents}
+
+
+def test_dicts_hold_the_rows_of_the_batch():
+    dicts, batch = parallel_env(**SMALL), parallel_env(**SMALL)
+    rng = np.random.default_rng(0)
+    obs, infos = dicts.reset(seed=2)
+    np.testing.assert_array_equal(np.stack(list(obs.values())), batch.reset_batch(2))
+    assert list(obs) == list(infos) == dicts.possible_agents
+    for _ in range(30):
+        actions = rng.uniform(-1, 1, (5, 3)).astype(np.float32)
+        obs, rewards, terminations, truncations, infos = dicts.step(dict(zip(dicts.agents, actions, strict=True)))
+        rows, reward, terminated, truncated = batch.step_batch(actions)
+        np.testing.assert_array_equal(np.stack(list(obs.values())), rows)
+        assert list(rewards.values()) == reward.tolist()
+        assert list(terminations.values()) == terminated.tolist()
+        assert set(truncations.values()) == {truncated}
+        assert [info["active"] for info in infos.values()] == batch.active.tolist()
+
+
+def test_earlier_observations_stay_valid():
+    world = parallel_env(**SMALL)
+    first, _ = world.reset(seed=0)
+    kept = {agent: row.copy() for agent, row in first.items()}
+    second = world.step({agent: np.ones(3, np.float32) for agent in world.agents})[0]
+    shown = {agent: row.copy() for agent, row in second.items()}
+    world.step(idle(world))
+    for agent in kept:
+        np.testing.assert_array_equal(first[agent], kept[agent])
+        np.testing.assert_array_equal(second[agent], shown[agent])
+
+
+def test_actions_may_come_in_any_order_and_beyond_the_range():
+    one, other = parallel_env(**SMALL), parallel_env(**SMALL)
+    one.reset(seed=0)
+    other.reset(seed=0)
+    actions = {agent: np.array([row / 5, 3.0, -1.0], np.float32) for row, agent in enumerate(one.agents)}
+    obs = one.step(actions)[0]
+    expected = other.step({agent: np.clip(actions[agent], -1, 1) for agent in reversed(other.agents)})[0]
+    for agent, row in obs.items():
+        np.testing.assert_array_equal(row, expected[agent])
+
+
+def test_everybody_leaves_at_the_horizon():
+    world = parallel_env(max_cycles=2, **SMALL)
+    world.reset(seed=0)
+    assert not any(world.step(idle(world))[3].values())
+    obs, _, terminations, truncations, _ = world.step(idle(world))
+    assert len(obs) == 5
+    assert all(truncations.values())
+    assert not any(terminations.values())
+    assert world.agents == []
+
+
+def kill(world: ForageEnv, *rows: int) -> None:
+    alive = world.swarm.present.copy()
+    alive[list(rows)] = False
+    world.set_population(active=alive, present=alive, terminated=~alive)
+
+
+def test_the_dead_leave_and_the_others_go_on():
+    world = parallel_env(**SMALL)
+    world.reset(seed=0)
+    kill(world, 1, 3)
+    obs, rewards, terminations, truncations, infos = world.step(idle(world))
+    assert terminations == {agent: agent in ("robot_1", "robot_3") for agent in world.possible_agents}
+    assert world.agents == ["robot_0", "robot_2", "robot_4"]
+    assert not infos["robot_1"]["active"]
+    assert not obs["robot_1"].any()
+    obs, rewards, terminations, truncations, infos = world.step(idle(world))
+    for table in (obs, rewards, terminations, truncations, infos):
+        assert list(table) == ["robot_0", "robot_2", "robot_4"]
+    assert not any(terminations.values())
+
+
+def test_actions_of_the_living_reach_the_right_rows_after_a_death():
+    world = parallel_env(**SMALL)
+    world.reset(seed=0)
+    kill(world, 0)
+    world.step(idle(world))
+    actions = idle(world)
+    actions["robot_2"][:2] = 0.5
+    world.step(actions)
+    assert np.flatnonzero(world.swarm.wheel_speed.any(axis=1)).tolist() == [2]
+    # Actions for all agents that ever were are fine too; those of the dead are ignored.
+    world.step({agent: np.full(3, 0.5, np.float32) for agent in world.possible_agents})
+    assert np.flatnonzero(world.swarm.wheel_speed.any(axis=1)).tolist() == [1, 2, 3, 4]
+
+
+def test_the_last_death_ends_the_episode():
+    world = parallel_env(**SMALL)
+    world.reset(seed=0)
+    kill(world, 0, 1, 2, 3, 4)
+    assert all(world.step(idle(world))[2].values())
+    assert world.agents == []
+    world.reset(seed=0)
+    assert len(world.agents) == 5
+
+
+def test_robots_in_repair_stay_agents():
+    world = parallel_env(**SMALL)
+    world.reset(seed=0)
+    world.set_population(active=np.array([True, False, True, True, True]), present=np.ones(5, np.bool_))
+    obs, _, terminations, _, infos = world.step(idle(world))
+    assert not any(terminations.values())
+    assert len(world.agents) == 5
+    assert [infos[agent]["active"] for agent in world.agents] == [True, False, True, True, True]
+    assert [obs[agent][world.layout["active"]].item() for agent in world.agents] == [1, 0, 1, 1, 1]
+
+
+# Errors that help
+
+
+def test_step_before_reset():
+    world = parallel_env(**SMALL)
+    with pytest.raises(RuntimeError, match="Call reset before step"):
+        world.step({})
+    with pytest.raises(RuntimeError, match="Call reset before step"):
+        world.step_batch(np.zeros((5, 3), np.float32))
+
+
+def test_step_after_the_end():
+    world = parallel_env(max_cycles=1, **SMALL)
+    world.reset(seed=0)
+    world.step(idle(world))
+    with pytest.raises(RuntimeError, match="All agents are done; call reset"):
+        world.step({})
+
+
+@pytest.mark.parametrize("shape", [(4, 3), (5, 2), (5,), (5, 3, 1)])
+def test_batches_of_the_wrong_shape(shape):
+    world = parallel_env(**SMALL)
+    world.reset(seed=0)
+    with pytest.raises(ActionError, match=r"\(n_robots, 3\) = \(5, 3\), got"):
+        world.step_batch(np.zeros(shape, np.float32))
+    assert world.tick == 0
+
+
+@pytest.mark.parametrize(
+    "action",
+    [np.zeros(2), np.zeros((1, 3)), 0.5, "abc", None, np.zeros(3, np.complex128)],
+    ids=["short", "nested", "number", "text", "none", "complex"],
+)
+@pytest.mark.parametrize("after_a_death", [False, True])
+def test_actions_that_are_not_three_numbers(action, after_a_death):
+    world = parallel_env(**SMALL)
+    world.reset(seed=0)
+    if after_a_death:
+        kill(world, 4)
+        world.step(idle(world))
+    tick = world.tick
+    with pytest.raises(ActionError, match=r"three numbers, shape \(3,\)"):
+        world.step(dict.fromkeys(world.agents, action))
+    with pytest.raises(ActionError, match=r"three numbers, shape \(3,\)"):
+        world.step({**idle(world), "robot_2": action})
+    assert world.tick == tick
+
+
+def test_missing_and_foreign_agents_are_named():
+    world = parallel_env(**SMALL)
+    world.reset(seed=0)
+    actions = idle(world)
+    del actions["robot_3"]
+    actions["robot_9"] = np.zeros(3)
+    with pytest.raises(ActionError, match=r"5 agents.*missing \['robot_3'\].*not in env.agents \['robot_9'\]"):
+        world.step(actions)
+    with pytest.raises(ActionError, match="missing"):
+        world.step({})
+
+
+def test_actions_that_are_not_finite_name_the_robot():
+    world = parallel_env(**SMALL)
+    world.reset(seed=0)
+    with pytest.raises(ActionError, match="robot_1"):
+        world.step({**idle(world), "robot_1": np.array([0.0, np.nan, 0.0])})
+    assert world.tick == 0
+
+
+@pytest.mark.parametrize("seed", [-1, 1.5, 3.0, "3", True, [1], np.float64(2.0)])
+def test_seeds_are_whole_numbers(seed):
+    world = parallel_env(**SMALL)
+    with pytest.raises(ValueError, match="non-negative integer or None"):
+        world.reset(seed=seed)
+
+
+def test_numpy_integers_are_seeds():
+    one, other = parallel_env(**SMALL), parallel_env(**SMALL)
+    np.testing.assert_array_equal(one.reset_batch(np.int64(7)), other.reset_batch(7))
+    assert one.seed_value == 7
+
+
+def test_resets_without_a_seed_continue_the_sequence_of_the_last_seed():
+    one, other = parallel_env(**SMALL), parallel_env(**SMALL)
+    first = [one.reset_batch(3).copy(), *(one.reset_batch().copy() for _ in range(3))]
+    again = [other.reset_batch(3).copy(), *(other.reset_batch().copy() for _ in range(3))]
+    np.testing.assert_array_equal(first, again)
+    assert len({row.tobytes() for row in first}) == 4
+    fresh = parallel_env(**SMALL)
+    fresh.reset_batch()
+    assert fresh.seed_value is not None
+
+
+def test_constructor_errors():
+    with pytest.raises(ValueError, match="max_cycles >= 1, got 0"):
+        parallel_env(max_cycles=0, **SMALL)
+    with pytest.raises(ValueError, match="render_mode None or 'rgb_array', got 'human'"):
+        parallel_env(render_mode="human", **SMALL)
+    with pytest.raises(ConfigError, match="warehouse_small"):
+        parallel_env("warehouse_smal")
+    with pytest.raises(ConfigError, match="n_robots"):
+        parallel_env(n_robot=3)
