@@ -10,7 +10,15 @@ import threading
 import traceback
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -170,11 +178,15 @@ def _run_on(
     try:
         while running or (todo and not broken):
             while todo and not broken and len(running) < limit:
-                spec = todo.popleft()
-                running[executor.submit(run_one, spec)] = spec
+                try:
+                    running[executor.submit(run_one, todo[0])] = todo[0]
+                    todo.popleft()
+                except BrokenExecutor:
+                    broken = True
             finished, _ = wait(running, timeout=WAKE_UP_EVERY_S, return_when=FIRST_COMPLETED)
             for future in finished:
-                spec, error = running.pop(future), future.exception()
+                spec = running.pop(future)
+                error = CancelledError("by its executor") if future.cancelled() else future.exception()
                 if isinstance(error, BrokenExecutor):
                     broken = True
                     if lost is not None:
@@ -198,7 +210,7 @@ def _failure(spec: RunSpec, error: BaseException) -> RunFailure:
     return RunFailure(
         spec=spec,
         error=f"{type(error).__name__}: {reason[0] if reason else 'no message'}",
-        traceback="".join(traceback.format_exception(error)),
+        traceback="".join(traceback.format_exception(error)).rstrip(),
     )
 
 
