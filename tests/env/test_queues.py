@@ -1,0 +1,300 @@
+"""Population dynamics without a world: the event clock, the four processes, and what the study expects of them."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from metrics.queues import PopulationRates, mean_away
+from swarm_forage_env.queues import (
+    EventClock,
+    EventClocks,
+    EventRates,
+    PopulationState,
+    advance_population,
+    simulate_population,
+)
+from swarm_forage_env.wrappers.population import death_levels, malfunction_levels
+from tests.reference.adversity import SlowPopulation
+
+RUN_TICKS = 50_000
+SURE = 0.001
+"""Tests of chance have fixed seeds; one in a thousand choices of seeds would fail."""
+
+
+def clock(rate: float, seed: int = 0) -> EventClock:
+    return EventClock(rate, np.random.default_rng([seed, 1]), np.random.default_rng([seed, 2]))
+
+
+def due(state_ticks: dict[str, float]) -> EventClocks:
+    """Clocks whose next events are set by hand; later ones are far away."""
+    clocks = EventClocks(EventRates(death=1e-9, birth=1e-9, malfunction=1e-9, repair=1e-9), seed=0)
+    for name in ("death", "birth", "malfunction", "repair"):
+        getattr(clocks, name).next_tick = state_ticks.get(name, np.inf)
+    return clocks
+
+
+# The clock
+
+
+@pytest.mark.parametrize("rate", [0.01, 0.3, 2.0])
+def test_waiting_times_are_floored_exponentials(rate):
+    events = clock(rate)
+    waits = []
+    for _ in range(20_000):
+        events.restart(100)
+        waits.append(int(events.next_tick) - 100)
+    longest = int(np.ceil(6.0 / rate))  # exp(-6) of 20,000 waits are longer: 50
+    edges = np.unique(np.linspace(0, longest, 25).astype(int))
+    counts, _ = np.histogram(waits, bins=[*edges, np.inf])
+    survival = np.exp(-rate * edges)
+    expected = np.append(survival[:-1] - survival[1:], survival[-1]) * len(waits)
+    assert stats.chisquare(counts, expected).pvalue > SURE
+
+
+def test_gaps_between_events_follow_the_clock():
+    """At most one event per tick: a wait of 0 ends in the next tick, like a wait of 1."""
+    rate, n_robots = 0.4, 20_000
+    history = simulate_population(EventRates(death=rate), n_robots, 30_000, seed=3)
+    deaths = np.flatnonzero(np.diff(history.n_present, prepend=n_robots)) + 1
+    gaps = np.diff(deaths, prepend=0)
+    counts = np.bincount(gaps, minlength=12)
+    assert counts[0] == 0
+    probability = np.exp(-rate * np.arange(12)) * (1 - np.exp(-rate))
+    expected = [probability[0] + probability[1], *probability[2:11], np.exp(-rate * 11)]
+    observed = [*counts[1:11], counts[11:].sum()]
+    assert stats.chisquare(observed, np.array(expected) * len(gaps)).pvalue > SURE
+
+
+def test_a_rate_of_zero_never_fires():
+    assert clock(0.0).next_tick == np.inf
+    assert simulate_population(EventRates(), 5, 100, seed=0).n_active.tolist() == [5] * 100
+
+
+def test_a_tiny_rate_may_wait_for_ever():
+    assert clock(1e-320).next_tick > 1e300
+
+
+def test_the_same_choices_are_made_at_any_rate():
+    """Runs of a sweep stay paired: events come at times that scale, to the same robots."""
+    slow, fast = (PopulationState.start(30) for _ in range(2))
+    victims = {}
+    for state, rate in ((slow, 0.01), (fast, 0.02)):
+        clocks = EventClocks(EventRates(death=rate), seed=5)
+        order, ticks = [], []
+        while len(order) < 20:
+            tick = int(max(clocks.next_tick, 1))
+            before = state.dead.copy()
+            advance_population(state, clocks, tick)
+            order += np.flatnonzero(state.dead & ~before).tolist()
+            ticks.append(tick)
+        victims[rate] = order
+        assert ticks == sorted(ticks)
+    assert victims[0.01] == victims[0.02]
+
+
+def test_another_process_does_not_shift_the_events_of_this_one():
+    alone = simulate_population(EventRates(death=0.002), 50, 10_000, seed=9)
+    among = simulate_population(EventRates(death=0.002, malfunction=0.01, repair=0.01), 50, 10_000, seed=9)
+    np.testing.assert_array_equal(alone.n_present, among.n_present)
+    assert among.tally.malfunctions > 0
+
+
+# Choices
+
+
+def test_victims_are_uniform_among_candidates():
+    candidates = np.array([True, False, True, True, False, True])
+    events = clock(1.0)
+    chosen = np.bincount([events.choose(candidates) for _ in range(4_000)], minlength=6)
+    assert np.all(chosen[~candidates] == 0)
+    assert stats.chisquare(chosen[candidates]).pvalue > SURE
+
+
+def test_who_else_is_a_candidate_does_not_shift_the_draw():
+    everybody = np.ones(8, np.bool_)
+    first = clock(1.0, 4).choose(everybody)
+    without_first = everybody.copy()
+    without_first[first] = False
+    one, other = clock(1.0, 4), clock(1.0, 4)
+    second = one.choose(without_first)
+    bystander = next(row for row in range(8) if row not in (first, second))
+    fewer = everybody.copy()
+    fewer[bystander] = False
+    assert other.choose(fewer) == first
+    assert one.choose(everybody) == other.choose(everybody), "the next draw is where it would be anyway"
+
+
+# The four processes
+
+
+def test_the_repair_queue_is_first_in_first_out():
+    state = PopulationState.start(6)
+    for tick in (1, 2, 3):
+        assert advance_population(state, due({"malfunction": tick}), tick)
+    waiting = list(state.repair_queue)
+    assert len(waiting) == 3
+    assert not state.active[waiting].any()
+    assert state.present.all()
+    for tick, row in enumerate(waiting, start=10):
+        assert advance_population(state, due({"repair": tick}), tick)
+        assert state.active[row]
+    assert state.repair_queue == []
+
+
+def test_a_repair_of_nobody_is_lost():
+    state, clocks = PopulationState.start(3), due({"repair": 5, "malfunction": 6})
+    assert not advance_population(state, clocks, 5)
+    assert clocks.repair.next_tick > 1000, "the clock was started again"
+    assert advance_population(state, clocks, 6)
+    assert len(state.repair_queue) == 1
+    assert state.tally.repairs == 0
+
+
+def test_a_malfunction_without_a_victim_waits_for_one():
+    state, clocks = PopulationState.start(1), due({"malfunction": 2})
+    assert advance_population(state, clocks, 2)
+    clocks.malfunction.next_tick, clocks.repair.next_tick = 3, 7
+    for tick in (3, 4, 5, 6):
+        assert not advance_population(state, clocks, tick)
+        assert clocks.malfunction.next_tick == 3
+    # Malfunctions come before repairs: the robot works for this one tick.
+    assert advance_population(state, clocks, 7)
+    assert state.active[0]
+    assert advance_population(state, clocks, 8)
+    assert not state.active[0]
+    assert clocks.malfunction.next_tick > 8
+
+
+def test_the_dead_leave_the_repair_queue_and_stay_dead():
+    state = PopulationState.start(2)
+    advance_population(state, due({"malfunction": 1}), 1)
+    broken = state.repair_queue[0]
+    survivor = 1 - broken
+    state.present[survivor] = state.active[survivor] = False  # so that the broken one must be the victim
+    assert advance_population(state, due({"death": 2}), 2)
+    assert state.repair_queue == []
+    assert state.dead[broken]
+    assert not state.present[broken]
+    assert not advance_population(state, due({"repair": 3}), 3)
+    assert not state.active[broken]
+
+
+def test_deaths_strike_robots_in_repair_too():
+    struck = 0
+    for seed in range(200):
+        state = PopulationState.start(4)
+        clocks = EventClocks(EventRates(death=0.01, malfunction=0.01), seed)
+        clocks.death.next_tick, clocks.malfunction.next_tick = 2, 1
+        advance_population(state, clocks, 1)
+        broken = state.repair_queue[0]
+        clocks.malfunction.next_tick = np.inf
+        advance_population(state, clocks, 2)
+        struck += bool(state.dead[broken])
+    assert stats.binomtest(struck, 200, 0.25).pvalue > SURE
+
+
+def test_births_bring_the_next_row_while_there_is_room():
+    state, clocks = PopulationState.start(4, initial_robots=2, max_robots=3), due({"birth": 3})
+    assert state.present.tolist() == [True, True, False, False]
+    assert advance_population(state, clocks, 3)
+    assert state.active.tolist() == [True, True, True, False]
+    clocks.birth.next_tick = 4
+    assert not advance_population(state, clocks, 4), "three are the most"
+    clocks.death.next_tick = 5
+    assert advance_population(state, clocks, 5), "a death makes room within the tick"
+    assert state.present[3]
+    assert np.count_nonzero(state.present) == 3
+    clocks.birth.next_tick, clocks.death.next_tick = 6, 6
+    assert advance_population(state, clocks, 6)
+    assert np.count_nonzero(state.present) == 2, "nobody is left to be born"
+    assert clocks.birth.next_tick == 6
+
+
+def test_a_birth_without_a_place_waits_for_one():
+    state, clocks, asked = PopulationState.start(2, initial_robots=1), due({"birth": 1}), []
+
+    def find_place(row, rng):
+        asked.append(row)
+        return len(asked) == 3
+
+    changes = [advance_population(state, clocks, tick, find_place) for tick in (1, 2, 3, 4)]
+    assert changes == [False, False, True, False]
+    assert asked == [1, 1, 1]
+
+
+def test_stays_and_absences_are_measured_in_ticks():
+    state, clocks = PopulationState.start(1), due({"malfunction": 11})
+    advance_population(state, clocks, 11)
+    assert (state.tally.stays, state.tally.stay_ticks) == (1, 10), "at work in the ticks 1 to 10"
+    clocks.malfunction.next_tick, clocks.repair.next_tick = np.inf, 15
+    advance_population(state, clocks, 15)
+    assert (state.tally.repairs, state.tally.absence_ticks) == (1, 4), "away in the ticks 11 to 14"
+    clocks.death.next_tick = 20
+    advance_population(state, clocks, 20)
+    assert (state.tally.stays, state.tally.stay_ticks, state.tally.deaths) == (2, 15, 1)
+
+
+@given(
+    seed=st.integers(0, 2**32),
+    death=st.sampled_from([0.0, 0.01, 0.2]),
+    birth=st.sampled_from([0.0, 0.05]),
+    malfunction=st.sampled_from([0.0, 0.1, 3.0]),
+    repair=st.sampled_from([0.0, 0.1, 3.0]),
+    initial=st.integers(1, 8),
+    most=st.integers(1, 8),
+)
+def test_equals_the_slow_twin_in_every_tick(seed, death, birth, malfunction, repair, initial, most):
+    rates = EventRates(death=death, birth=birth, malfunction=malfunction, repair=repair)
+    fast = PopulationState.start(8, initial_robots=initial, max_robots=most)
+    clocks = EventClocks(rates, seed)
+    slow = SlowPopulation(rates, 8, seed, initial=initial, most=most)
+    for tick in range(1, 121):
+        before = (fast.present.copy(), fast.active.copy())
+        changed = advance_population(fast, clocks, tick)
+        slow.tick(tick)
+        assert fast.repair_queue == list(slow.in_repair)
+        assert set(np.flatnonzero(fast.active)) == slow.at_work
+        assert set(np.flatnonzero(fast.dead)) == slow.dead
+        np.testing.assert_array_equal(fast.present, ~fast.dead & (np.arange(8) < fast.born))
+        assert changed or np.array_equal(before, (fast.present, fast.active))
+
+
+def test_idle_ticks_may_be_skipped():
+    rates = EventRates(death=0.01, birth=0.02, malfunction=0.05, repair=0.05)
+    history = simulate_population(rates, 20, 2_000, seed=1, initial_robots=10)
+    state, clocks = PopulationState.start(20, initial_robots=10), EventClocks(rates, 1)
+    n_active = []
+    for tick in range(1, 2_001):
+        advance_population(state, clocks, tick)
+        n_active.append(np.count_nonzero(state.active))
+    np.testing.assert_array_equal(history.n_active, n_active)
+    assert history.tally == state.tally
+    tally = history.tally
+    assert history.n_present[-1] == 10 + tally.births - tally.deaths
+    assert min(tally.deaths, tally.births, tally.malfunctions, tally.repairs) > 5
+
+
+# The study
+
+
+@pytest.mark.parametrize(("level", "expected", "deviation"), [(0, 45.4, 3.0), (7, 37.7, 7.0)])
+def test_mean_active_robots_of_the_small_warehouse(level, expected, deviation):
+    config, n_runs = malfunction_levels(50)[level], 400
+    means = [simulate_population(config.rates, 50, RUN_TICKS, seed).n_active.mean() for seed in range(n_runs)]
+    error = deviation / np.sqrt(n_runs)
+    assert np.mean(means) == pytest.approx(expected, abs=0.05 + 3 * error)
+    assert np.std(means) == pytest.approx(deviation, rel=0.2)
+    rates = PopulationRates(lambda_bd=config.malfunction_per_tick, mu_bd=config.repair_per_tick)
+    assert np.mean(means) == pytest.approx(50 - mean_away(rates, 50, RUN_TICKS), abs=3 * error)
+
+
+def test_deaths_per_run_of_search_and_rescue():
+    n_runs = 60
+    expected = [5, 15, 25, 35, 45, 55, 65, 75]
+    for config, mean in zip(death_levels(), expected, strict=True):
+        deaths = [simulate_population(config.rates, 115, RUN_TICKS, seed).tally.deaths for seed in range(n_runs)]
+        # Poisson but for the floor, which lengthens no wait by more than a tick in a thousand.
+        assert np.mean(deaths) == pytest.approx(mean, abs=3.5 * np.sqrt(mean / n_runs))
+        assert np.var(deaths, ddof=1) == pytest.approx(mean, rel=0.6)

@@ -1,0 +1,216 @@
+"""Waveforms: their formulas, their samples in the study, their ways in and out of plain values."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import metrics
+from swarm_forage_env.config import ConfigError, to_mapping
+from swarm_forage_env.signals import WAVEFORM_KINDS, Waveform, gather_waveform
+from swarm_forage_env.wrappers.throttle import IDEAL_THROTTLE, sine_throttles, square_throttles
+
+DT_S = 0.2
+SAMPLES = range(1_000, 50_001, 1_000)
+"""Ticks at the ends of the study's recording intervals."""
+
+
+def sampled(waveform: Waveform, ticks=SAMPLES) -> list[float]:
+    signal = waveform.signal(DT_S)
+    return [signal(tick) for tick in ticks]
+
+
+# The study
+
+
+@pytest.mark.parametrize(
+    ("throttles", "distances"),
+    [
+        (square_throttles(), [7.4, 9.8, 12.2, 14.6, 17.0, 19.4]),
+        (sine_throttles(), [5.04, 7.18, 9.44, 11.76, 14.13, 16.52, 18.92]),
+    ],
+    ids=["square", "sine"],
+)
+def test_distances_from_ideal_conditions_are_those_of_the_study(throttles, distances):
+    ideal, *levels = throttles
+    assert set(sampled(ideal.waveform)) == {IDEAL_THROTTLE}
+    measured = [sum(abs(value - IDEAL_THROTTLE) for value in sampled(level.waveform)) for level in levels]
+    assert measured == pytest.approx(distances, abs=0.0051)
+
+
+def test_square_wave_of_the_study_is_high_in_24_of_50_samples():
+    values = sampled(square_throttles()[2].waveform)
+    high, low = 0.4, 0.0
+    assert values == [high] * 12 + [low] * 13 + [high] * 12 + [low] * 13
+
+
+def test_square_wave_of_the_study_changes_at_the_half_cycles():
+    signal = square_throttles()[1].waveform.signal(DT_S)
+    changes = [tick for tick in range(1, 50_001) if signal(tick) != signal(tick - 1)]
+    # At whole cycles the sine of the rounded angle is just below 0, at half ones just above.
+    assert changes == [12_501, 25_001, 37_501]
+
+
+def test_sine_of_the_study_runs_once_from_zero_to_twice_the_amplitude():
+    waveform = sine_throttles()[-1].waveform
+    values = sampled(waveform, range(1, 50_001))
+    assert max(values) == pytest.approx(0.9)
+    assert values[12_499] == pytest.approx(0.9)
+    assert min(values) == values[37_499] == 0.0
+    assert values[24_999] == pytest.approx(0.45)
+
+
+# Formulas
+
+
+def test_values_at_chosen_ticks():
+    period_s = 100 * DT_S
+    sine = Waveform(kind="sine", amplitude=0.3, offset=0.5, period_s=period_s)
+    assert sampled(sine, [0, 25, 75]) == pytest.approx([0.5, 0.8, 0.2])
+    square = Waveform(kind="square", amplitude=0.3, offset=0.5, period_s=period_s)
+    assert sampled(square, [0, 1, 49, 51, 99, 101]) == [0.8, 0.8, 0.8, 0.2, 0.2, 0.8]
+    sawtooth = Waveform(kind="sawtooth", amplitude=0.3, offset=0.5, period_s=period_s)
+    assert sampled(sawtooth, [0, 25, 49, 50, 75, 100]) == pytest.approx([0.5, 0.65, 0.794, 0.2, 0.35, 0.5])
+    constant = Waveform(kind="constant", amplitude=0.3)
+    assert sampled(constant, [0, 1, 10**6]) == [0.3, 0.3, 0.3]
+    down = Waveform(kind="step", amplitude=-0.4, offset=0.4, start_s=10.0)
+    assert sampled(down, [1, 49, 50, 51]) == [0.4, 0.4, 0.0, 0.0]
+    table = Waveform(kind="table", times_s=(2.0, 4.0, 4.2), values=(0.0, 1.0, 0.5))
+    assert sampled(table, [0, 10, 15, 20, 21, 99]) == pytest.approx([0.0, 0.0, 0.5, 1.0, 0.5, 0.5])
+
+
+def test_the_sign_of_zero_is_positive():
+    assert sampled(Waveform(kind="square", amplitude=1.0, period_s=1.0), [0]) == [1.0]
+
+
+def test_phase_shifts_waves_and_raises_sawteeth():
+    late = Waveform(kind="sine", amplitude=0.5, period_s=20.0, phase=math.pi / 2)
+    assert sampled(late, [0, 50]) == pytest.approx([0.5, -0.5])
+    raised = Waveform(kind="sawtooth", amplitude=0.5, period_s=20.0, phase=0.25)
+    assert sampled(raised, [0]) == [0.25]
+
+
+@pytest.mark.parametrize("start_s", [0.0, 0.6, 1.4, 200.0])
+def test_a_step_happens_at_the_tick_of_its_time(start_s):
+    signal = Waveform(kind="step", amplitude=1.0, start_s=start_s).signal(DT_S)
+    tick = round(start_s / DT_S)
+    assert [signal(tick - 1), signal(tick)] == [0.0, 1.0]
+
+
+@given(
+    kind=st.sampled_from(["constant", "sine", "square", "sawtooth"]),
+    amplitude=st.floats(-1, 1),
+    offset=st.floats(-1, 1),
+    period=st.floats(2.0, 1e5),
+    phase=st.floats(-7, 7),
+    tick=st.integers(0, 50_000),
+)
+def test_the_measures_know_the_same_waveforms(kind, amplitude, offset, period, phase, tick):
+    shape = {} if kind == "constant" else {"offset": offset, "period_s": period * DT_S, "phase": phase}
+    mine = Waveform(kind=kind, amplitude=amplitude, **shape).signal(DT_S)(tick)
+    theirs = metrics.waveform(
+        kind, tick, frequency=1.0 / period, amplitude=amplitude, offset=offset, phase=shape.get("phase", 0.0)
+    )
+    cycles = tick / period + (phase / math.tau if kind != "sawtooth" else 0.5)
+    jumps_here = kind in ("square", "sawtooth") and abs(cycles * 2 - round(cycles * 2)) < 1e-6
+    if not jumps_here:
+        assert mine == pytest.approx(float(theirs), abs=1e-8)
+
+
+@pytest.mark.parametrize("throttles", [square_throttles(), sine_throttles()], ids=["square", "sine"])
+def test_the_measures_sample_the_study_alike(throttles):
+    for config in throttles[1:]:
+        wave = config.waveform
+        assert wave.period_s is not None
+        theirs = metrics.waveform(
+            wave.kind,  # type: ignore[arg-type]
+            np.array(SAMPLES),
+            frequency=DT_S / wave.period_s,
+            amplitude=wave.amplitude,
+            offset=wave.offset,
+        )
+        np.testing.assert_allclose(sampled(wave), theirs, rtol=0, atol=1e-12)
+
+
+EXAMPLES = {
+    "constant": Waveform(kind="constant", amplitude=-0.2),
+    "sine": Waveform(kind="sine", amplitude=-0.2, offset=0.1, period_s=7.0, phase=0.3),
+    "square": Waveform(kind="square", amplitude=0.2, offset=0.1, period_s=7.0),
+    "sawtooth": Waveform(kind="sawtooth", amplitude=-0.2, offset=0.1, period_s=7.0, phase=0.2),
+    "step": Waveform(kind="step", amplitude=0.3, offset=0.1, start_s=3.0),
+    "table": Waveform(kind="table", times_s=(0.0, 1.0, 9.0), values=(0.1, 0.7, -0.3)),
+}
+
+
+def test_there_is_an_example_of_each_kind():
+    assert tuple(EXAMPLES) == WAVEFORM_KINDS
+
+
+@pytest.mark.parametrize("kind", EXAMPLES)
+def test_the_peak_is_the_least_upper_bound(kind):
+    waveform = EXAMPLES[kind]
+    highest = max(sampled(waveform, range(1, 7 * 35 + 1)))
+    assert waveform.peak - 0.02 < highest <= waveform.peak + 1e-12
+
+
+def test_any_function_of_time_can_be_tabulated():
+    waveform = Waveform.sampled(lambda time_s: time_s**2 / 100, until_s=1.0, every_s=0.2)
+    assert waveform.times_s == pytest.approx((0.0, 0.2, 0.4, 0.6, 0.8, 1.0))
+    assert sampled(waveform, range(7)) == pytest.approx([0.0, 0.0004, 0.0016, 0.0036, 0.0064, 0.01, 0.01])
+
+
+# Plain values
+
+
+@pytest.mark.parametrize("kind", EXAMPLES)
+def test_waveforms_survive_json(kind):
+    stored = json.loads(json.dumps(to_mapping(EXAMPLES[kind])))
+    assert Waveform.from_mapping(stored) == EXAMPLES[kind]
+
+
+def test_a_waveform_may_be_named_with_its_fields_beside_it():
+    flat = {"waveform": "square", "amplitude": 0.2, "period_s": 5_000, "carriers": True}
+    expected = Waveform(kind="square", amplitude=0.2, period_s=5_000)
+    assert gather_waveform(flat, "waveform") == {"waveform": expected, "carriers": True}
+    nested = {"waveform": {"kind": "square", "amplitude": 0.2, "period_s": 5_000}, "carriers": True}
+    assert gather_waveform(nested, "waveform") == {"waveform": expected, "carriers": True}
+    assert gather_waveform({"sigma": 0.1}, "sigma") == {"sigma": 0.1}
+    assert flat["waveform"] == "square", "the given mapping is left alone"
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"kind": "squre"}, "one of constant, sine.*Did you mean 'square'"),
+        ({"kind": None}, "one of constant"),
+        ({"kind": "square", "amplitude": 0.2}, "period_s of a square waveform to be a finite number, got None"),
+        ({"kind": "sine", "period_s": 0.0}, "period_s of a sine waveform > 0"),
+        ({"kind": "sine", "period_s": -5.0}, "period_s of a sine waveform > 0, got -5.0"),
+        ({"kind": "sine", "period_s": 1.0, "amplitude": math.nan}, "amplitude of a waveform to be a finite number"),
+        ({"kind": "sine", "period_s": 1.0, "offset": math.inf}, "offset of a waveform to be a finite number"),
+        ({"kind": "sine", "period_s": 1.0, "phase": "pi"}, "phase of a waveform to be a finite number, got 'pi'"),
+        ({"kind": "sine", "period_s": True}, "period_s of a sine waveform to be a finite number, got True"),
+        ({"kind": "constant", "offset": 0.1}, "given by amplitude only, got offset as well"),
+        ({"kind": "sine", "period_s": 1.0, "values": (1.0,)}, "got values as well"),
+        ({"kind": "step"}, "start_s of a step waveform to be a finite number, got None"),
+        ({"kind": "step", "start_s": -1.0}, "start_s of a step waveform >= 0"),
+        ({"kind": "table"}, "times_s of a table waveform to be one or more numbers"),
+        ({"kind": "table", "times_s": (1.0, 2.0), "values": (1.0,)}, "1 values at 2 times"),
+        ({"kind": "table", "times_s": (2.0, 2.0), "values": (1.0, 2.0)}, "rise strictly"),
+        ({"kind": "table", "times_s": (1.0,), "values": (math.nan,)}, "every one of values"),
+        ({"kind": "table", "times_s": [1.0], "values": (1.0,)}, "times_s of a table waveform"),
+    ],
+)
+def test_nonsense_is_refused(fields, message):
+    with pytest.raises(ConfigError, match=message):
+        Waveform(**fields)
+
+
+def test_unknown_keys_name_the_nearest():
+    with pytest.raises(ConfigError, match=r"'periods'.*Did you mean 'period_s'"):
+        Waveform.from_mapping({"kind": "sine", "periods": 3})
+    with pytest.raises(ConfigError, match="Missing key 'kind'"):
+        Waveform.from_mapping({"amplitude": 3})

@@ -1,0 +1,101 @@
+"""Throttle, noise and population dynamics told slowly: one robot, one column, one tick at a time."""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from swarm_forage_env.queues import EventRates
+from swarm_forage_env.rng import Stream, stream_rng
+from tests.reference.motion import limited_wheels
+
+
+def throttle_gain(command: tuple[float, float], strength: float) -> float:
+    """Factor on both wheels of a robot with this command in [-1, 1]."""
+    left, right = limited_wheels(*command)
+    if left == 0.0 and right == 0.0:
+        return 1.0
+    return 1.0 - max(0.0, strength) * abs(left + right) / (abs(left) + abs(right))
+
+
+def noisy_row(
+    row: list[float], draws: dict[str, list[float]], sigma: float, size_m: tuple[float, float]
+) -> list[float]:
+    """One observation row with Gaussian noise of standard deviation sigma on all sensors, draws by group."""
+    noisy = list(row)
+
+    def add(start: int, group: str, units: list[float], low: float) -> None:
+        for k, (draw, unit) in enumerate(zip(draws[group], units, strict=True)):
+            noisy[start + k] = min(1.0, max(low, row[start + k] + sigma * draw * unit))
+
+    add(0, "proximity", [1.0] * 24, 0.0)
+    add(24, "light", [1.0] * 24, 0.0)
+    add(48, "ground", [1.0] * 4, 0.0)
+    add(52, "wheel_speed", [0.01 / 0.20] * 2, -1.0)
+    add(54, "position", [2.0 / size_m[0], 2.0 / size_m[1]], -1.0)
+    angle = math.atan2(row[57], row[56]) + sigma * draws["heading"][0]
+    noisy[56:58] = math.cos(angle), math.sin(angle)
+    return noisy
+
+
+class SlowPopulation:
+    """The four processes, asked in every single tick; draws what the fast one draws."""
+
+    def __init__(self, rates: EventRates, n_robots: int, seed: int, *, initial: int, most: int) -> None:
+        self.rates = {name: getattr(rates, name) for name in ("death", "birth", "malfunction", "repair")}
+        streams = stream_rng(seed, Stream.POPULATION).spawn(8)
+        self.times = dict(zip(self.rates, streams[0::2], strict=True))
+        self.choices = dict(zip(self.rates, streams[1::2], strict=True))
+        self.n_robots, self.most = n_robots, most
+        self.at_work = set(range(initial))
+        self.in_repair: deque[int] = deque()
+        self.n_born, self.dead = initial, set[int]()
+        self.due = {name: self.wait(name) for name in self.rates}
+
+    def wait(self, name: str) -> float:
+        rate = self.rates[name]
+        return math.inf if rate == 0.0 else math.floor(self.times[name].exponential() / rate)
+
+    def happen(self, name: str, tick: int) -> None:
+        self.due[name] = tick + self.wait(name)
+
+    def luckiest(self, name: str, rows: set[int]) -> int:
+        lots = self.choices[name].random(self.n_robots)
+        return max(rows, key=lambda row: lots[row])
+
+    def tick(self, tick: int) -> None:
+        present = self.at_work | set(self.in_repair)
+        if tick >= self.due["death"] and present:
+            victim = self.luckiest("death", present)
+            self.at_work.discard(victim)
+            if victim in self.in_repair:
+                self.in_repair.remove(victim)
+            self.dead.add(victim)
+            self.happen("death", tick)
+        if (
+            tick >= self.due["birth"]
+            and self.n_born < self.n_robots
+            and len(self.at_work) + len(self.in_repair) < self.most
+        ):
+            self.at_work.add(self.n_born)
+            self.n_born += 1
+            self.happen("birth", tick)
+        if tick >= self.due["malfunction"] and self.at_work:
+            victim = self.luckiest("malfunction", self.at_work)
+            self.at_work.remove(victim)
+            self.in_repair.append(victim)
+            self.happen("malfunction", tick)
+        if tick >= self.due["repair"]:
+            if self.in_repair:
+                self.at_work.add(self.in_repair.popleft())
+            self.happen("repair", tick)
+
+
+def standard_draws(rng: np.random.Generator, n_robots: int) -> list[dict[str, list[float]]]:
+    """What `SensorNoise` draws for one tick with all groups noisy: per robot and group."""
+    sizes = {"proximity": 24, "light": 24, "ground": 4, "wheel_speed": 2, "position": 2, "heading": 1}
+    rows = rng.standard_normal((n_robots, sum(sizes.values())), dtype=np.float32).tolist()
+    ends = np.cumsum(list(sizes.values())).tolist()
+    return [
+        {name: row[end - size : end] for (name, size), end in zip(sizes.items(), ends, strict=True)} for row in rows
+    ]
