@@ -70,8 +70,8 @@ def proximity(
     sight_squared = sight * sight
     wall_sight = radius + reach
     for i in range(position.shape[0]):
-        row = obs[i, 0:24]
-        row[:] = 0.0
+        for k in range(24):
+            obs[i, k] = 0.0
         near[i] = False
         if not present[i]:
             continue
@@ -88,7 +88,7 @@ def proximity(
                 sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
                 gap = min(_beam_to_wall(west, east, cos, radius), _beam_to_wall(south, north, sin, radius))
                 if gap <= reach:
-                    row[k] = proximity_reading(gap)
+                    obs[i, k] = proximity_reading(gap)
         cell_x = int(x / cell_m)
         cell_y = int(y / cell_m)
         for step_x in range(-1, 2):
@@ -104,5 +104,5 @@ def proximity(
                             sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
                             gap = _beam_to_disc(dx, dy, cos, sin, radius)
                             if gap <= reach:
-                                row[k] = max(row[k], proximity_reading(gap))
+                                obs[i, k] = max(obs[i, k], proximity_reading(gap))
                     j = next_in_bin[j]

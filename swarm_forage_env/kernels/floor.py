@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from swarm_forage_env.detection import BEAM_ANGLES_RAD
-from swarm_forage_env.layout import SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
+from swarm_forage_env.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
 from swarm_forage_env.types import BoolArray, FloatArray, IntArray, ObsArray
 
 CELLS_PER_M = 5.0
@@ -81,8 +81,8 @@ def light(
     90 degrees between sensor axis and light; lights add up; clamped to 1.
     """
     for i in range(position.shape[0]):
-        row = obs[i, start : start + 24]
-        row[:] = 0.0
+        for k in range(start, start + 24):
+            obs[i, k] = 0.0
         if not present[i]:
             continue
         for lamp in range(lights.shape[0]):
@@ -101,7 +101,7 @@ def light(
             away = _FIRST_SENSOR_RAD + first * _SENSOR_STEP_RAD - bearing
             k = int(first) % 24
             while away < 0.5 * math.pi:
-                row[k] = min(1.0, row[k] + base * (1.0 - abs(away) / (0.5 * math.pi)))
+                obs[i, start + k] = min(1.0, obs[i, start + k] + base * (1.0 - abs(away) / (0.5 * math.pi)))
                 away += _SENSOR_STEP_RAD
                 k = 0 if k == 23 else k + 1
 
@@ -125,8 +125,10 @@ def line_of_sight(
     ny, nx = floor.shape
     cell_start, object_start, cache_start = starts
     for i in range(position.shape[0]):
-        obs[i, cell_start : cell_start + 2] = 0.0
-        obs[i, object_start : cache_start + 4 * VISIBLE_CACHES] = 0.0
+        obs[i, cell_start] = 0.0
+        obs[i, cell_start + 1] = 0.0
+        for k in range(object_start, cache_start + CACHE_FIELDS * VISIBLE_CACHES):
+            obs[i, k] = 0.0
         if not present[i]:
             continue
         cell_x = min(nx - 1, max(0, int(position[i, 0] * CELLS_PER_M)))
@@ -139,20 +141,21 @@ def line_of_sight(
                 if 0 <= x < nx and 0 <= y < ny and floor[y, x] >= 0:
                     obs[i, column] = (floor[y, x] + 1) / n_objects
                 column += 1
-        _visible_caches(obs[i, cache_start:], cell_x, cell_y, nx, ny, n_objects, caches, half_side, position[i])
+        if caches[0].shape[0] > 0:
+            _visible_caches(cell_x, cell_y, position, caches, half_side, i, obs, cache_start, (nx, ny, n_objects))
 
 
 @njit(cache=True)
 def _visible_caches(
-    row: ObsArray,
     cell_x: int,
     cell_y: int,
-    nx: int,
-    ny: int,
-    n_objects: int,
+    position: FloatArray,
     caches: tuple[BoolArray, IntArray, IntArray, IntArray],
     half_side: int,
-    position: FloatArray,
+    i: int,
+    obs: ObsArray,
+    start: int,
+    sizes: tuple[int, int, int],
 ) -> None:
     """List up to VISIBLE_CACHES caches whose square meets the window, nearest centre first, ties by slot."""
     alive, centre, serial, count = caches
@@ -167,8 +170,8 @@ def _visible_caches(
             reach = half_side + _HALF_WINDOW
             if abs(centre[slot, 0] - cell_x) > reach or abs(centre[slot, 1] - cell_y) > reach:
                 continue
-            dx = (centre[slot, 0] + 0.5) / CELLS_PER_M - position[0]
-            dy = (centre[slot, 1] + 0.5) / CELLS_PER_M - position[1]
+            dx = (centre[slot, 0] + 0.5) / CELLS_PER_M - position[i, 0]
+            dy = (centre[slot, 1] + 0.5) / CELLS_PER_M - position[i, 1]
             distance = dx * dx + dy * dy
             listed = distance < last_distance or (distance == last_distance and slot <= last_slot)
             if not listed and distance < best_distance:
@@ -176,17 +179,21 @@ def _visible_caches(
                 best_distance = distance
         if best < 0:
             return
-        write_cache(row[4 * place :], serial[best], centre[best, 0], centre[best, 1], count[best], nx, ny, n_objects)
+        fields = (serial[best], centre[best, 0], centre[best, 1], count[best])
+        write_cache(obs, i, start + CACHE_FIELDS * place, fields, sizes)
         last_distance = best_distance
         last_slot = best
 
 
 @njit(cache=True)
 def write_cache(
-    row: ObsArray, serial: int, cell_x: int, cell_y: int, count: int, nx: int, ny: int, n_objects: int
+    obs: ObsArray, i: int, start: int, fields: tuple[int, int, int, int], sizes: tuple[int, int, int]
 ) -> None:
-    """Write the four fields of a cache: serial x 2^-24, centre x, y as position, count / M."""
-    row[0] = serial / SERIAL_SCALE
-    row[1] = (2 * cell_x + 1) / nx - 1.0
-    row[2] = (2 * cell_y + 1) / ny - 1.0
-    row[3] = count / n_objects
+    """Write the fields of a cache into four columns of row i: serial x 2^-24, centre x, y as position, count / M.
+
+    `fields` = serial, centre cell x, y, count; `sizes` = cells along x, along y, objects.
+    """
+    obs[i, start] = fields[0] / SERIAL_SCALE
+    obs[i, start + 1] = (2 * fields[1] + 1) / sizes[0] - 1.0
+    obs[i, start + 2] = (2 * fields[2] + 1) / sizes[1] - 1.0
+    obs[i, start + 3] = fields[3] / sizes[2]

@@ -3,6 +3,7 @@
 from numba import njit
 
 from swarm_forage_env.kernels.floor import write_cache
+from swarm_forage_env.layout import EVENT_SCALE
 from swarm_forage_env.types import BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 
@@ -49,22 +50,22 @@ def own_status(
     `events` = code (N,), event_object (N,), event_cache (N, 4); `sizes` = cells along x, along y, objects.
     """
     code, event_object, event_cache = events
-    nx, ny, n_objects = sizes
+    n_objects = sizes[2]
     for i in range(carried_object.shape[0]):
-        row = obs[i, start : start + 10]
-        row[:] = 0.0
+        for k in range(start, start + 10):
+            obs[i, k] = 0.0
         if not present[i]:
             continue
         if carried_object[i] >= 0:
-            row[0] = 1.0
-            row[3] = (carried_object[i] + 1) / n_objects
+            obs[i, start] = 1.0
+            obs[i, start + 3] = (carried_object[i] + 1) / n_objects
         if pending_kind[i] != 0:
-            row[1] = 1.0
+            obs[i, start + 1] = 1.0
         if active[i]:
-            row[2] = 1.0
+            obs[i, start + 2] = 1.0
         if code[i] != 0:
-            row[4] = (event_object[i] + 1) / n_objects
-            row[5] = code[i] / 16.0
+            obs[i, start + 4] = (event_object[i] + 1) / n_objects
+            obs[i, start + 5] = code[i] / EVENT_SCALE
             if event_cache[i, 0] > 0:
-                cache = event_cache[i]
-                write_cache(row[6:], cache[0], cache[1], cache[2], cache[3], nx, ny, n_objects)
+                fields = (event_cache[i, 0], event_cache[i, 1], event_cache[i, 2], event_cache[i, 3])
+                write_cache(obs, i, start + 6, fields, sizes)
