@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection
 from functools import cached_property
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
@@ -31,7 +31,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     `agents` with the observation column `active` at 0; only permanent death terminates, only the horizon truncates.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo types it as an attribute of instances
         "name": "swarm_forage_v0",
         "render_modes": ["rgb_array"],
         "render_fps": 5,
@@ -368,4 +368,5 @@ def parallel_env(
 
 def env(scenario: str | ScenarioConfig = "warehouse_small", **options: Any) -> Any:
     """Create the agent-by-agent (AEC) form by PettingZoo's own conversion; arguments as `parallel_env`."""
-    return parallel_to_aec(parallel_env(scenario, **options))
+    parallel = parallel_env(scenario, **options)
+    return parallel_to_aec(parallel)  # pyright: ignore[reportArgumentType] - it wants an action type that may be None

@@ -52,6 +52,7 @@ class Physics:
         self._space.collision_slop = COLLISION_SLOP_M
         self._space.collision_bias = 0.0  # any overlap beyond the slop is undone in the next substep
         self._add_walls(config)
+        self._bodies: list[pymunk.Body] = []
         self._shapes: list[pymunk.Circle] = []
         moment = pymunk.moment_for_circle(MASS_KG, 0.0, config.robots.radius_m)
         for (x, y), angle in zip(position.tolist(), heading.tolist(), strict=True):
@@ -61,6 +62,7 @@ class Physics:
             disc = pymunk.Circle(body, config.robots.radius_m)
             disc.friction = FRICTION
             self._space.add(body, disc)
+            self._bodies.append(body)
             self._shapes.append(disc)
         self._poses = pymunk.batch.Buffer()
         self._write = pymunk.batch.Buffer()
@@ -95,15 +97,15 @@ class Physics:
 
         Bodies parked on one spot would be tested against each other in every substep, only to be told apart by filter.
         """
-        disc = self._shapes[row]
-        disc.filter = pymunk.ShapeFilter(categories=0, mask=0)
-        disc.body.position = (-10.0 - row, -10.0)
-        self._space.reindex_shapes_for_body(disc.body)
+        body = self._bodies[row]
+        self._shapes[row].filter = pymunk.ShapeFilter(categories=0, mask=0)
+        body.position = (-10.0 - row, -10.0)
+        self._space.reindex_shapes_for_body(body)
 
     def place(self, row: int, x: float, y: float, angle: float) -> None:
         """Put a robot's body (back) into the world at a pose in m and rad."""
-        disc = self._shapes[row]
-        disc.filter = pymunk.ShapeFilter()
-        disc.body.position = (x, y)
-        disc.body.angle = angle
-        self._space.reindex_shapes_for_body(disc.body)
+        body = self._bodies[row]
+        self._shapes[row].filter = pymunk.ShapeFilter()
+        body.position = (x, y)
+        body.angle = angle
+        self._space.reindex_shapes_for_body(body)

@@ -1,7 +1,7 @@
 """Where robots start: uniform positions and headings without overlap."""
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from swarm_forage_env.config import ConfigError, ScenarioConfig
 from swarm_forage_env.types import FloatArray
@@ -24,7 +24,7 @@ def draw_start_poses(config: ScenarioConfig, rng: np.random.Generator) -> tuple[
     high = np.array([config.arena.width_m - margin, config.arena.height_m - margin])
     position = rng.uniform(low, high, (n_robots, 2))
     for _ in range(_TRIALS):
-        pairs = cKDTree(position).query_pairs(2 * config.robots.radius_m, output_type="ndarray")
+        pairs = KDTree(position).query_pairs(2 * config.robots.radius_m, output_type="ndarray")
         if len(pairs) == 0:
             return position, -rng.uniform(-np.pi, np.pi, n_robots)
         again = np.unique(pairs.max(axis=1))

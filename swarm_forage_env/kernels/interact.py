@@ -470,5 +470,5 @@ def interact(world: World, rules: Rules, gripper: ActionArray, tick: int, chance
     for phase in range(4):
         for place in range(n_queued):
             if world.queue[n_robots + place] == phase:
-                i = world.queue[place]
+                i = int(world.queue[place])
                 _serve(world, rules, _band_now(world, gripper, i), i, chance[i])
