@@ -2,16 +2,18 @@
 
 import dataclasses
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env.layout import EVENT_SCALE, observation_layout
+from swarm_forage_env.layout import CACHE_FIELDS, EVENT_SCALE, SERIAL_SCALE, VISIBLE_CACHES, observation_layout
 from swarm_forage_env.policy import Event, SwarmTask
 from swarm_forage_env.quirks import Quirks
 
 GREYS = {"floor": 1.0, "nest": 0.7, "cache": 0.4, "object": 0.0}
 CELL_M = 0.2
+Cache: TypeAlias = tuple[int, tuple[int, int], int]
+"""Serial, centre cell, number of objects."""
 
 
 def make_task(n_robots: int = 1, **changes: Any) -> SwarmTask:
@@ -104,9 +106,25 @@ class Observations:
         self.set("carrying", 0.0 if object_row is None else 1.0, robots)
         self.set("cargo", 0.0 if object_row is None else (object_row + 1) / self.task.n_objects, robots)
 
-    def event(self, event: Event, robots: Any = slice(None)) -> None:
-        """Set what happened in the last step."""
+    def event(
+        self, event: Event, robots: Any = slice(None), object_row: int | None = None, cache: Cache | None = None
+    ) -> None:
+        """Set what happened in the last step, and what it was about."""
         self.set("event", int(event) / EVENT_SCALE, robots)
+        self.set("event_object", 0.0 if object_row is None else (object_row + 1) / self.task.n_objects, robots)
+        self.set("event_cache", 0.0 if cache is None else self._cache_fields(cache), robots)
+
+    def caches(self, *visible: Cache, robots: Any = slice(None)) -> None:
+        """Show caches, nearest first."""
+        fields = np.zeros((VISIBLE_CACHES, CACHE_FIELDS))
+        for place, cache in enumerate(visible):
+            fields[place] = self._cache_fields(cache)
+        self.set("los_cache", fields.ravel(), robots)
+
+    def _cache_fields(self, cache: Cache) -> tuple[float, ...]:
+        serial, (x, y), count = cache
+        share = self._share((x + 0.5) * CELL_M, (y + 0.5) * CELL_M)
+        return serial / SERIAL_SCALE, *share, count / self.task.n_objects
 
     def window(self, objects: dict[tuple[int, int], int], robots: Any = slice(None)) -> None:
         """Show objects: offset in cells from the robot's own cell, -2 .. 2 each -> object row."""

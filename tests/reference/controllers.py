@@ -81,6 +81,7 @@ class ReferenceRobot:
     depth: float = 0.0
     target: int = -1
     goal: tuple[float, float] = (0.0, 0.0)
+    tolerance: float = 0.02
     draws: np.ndarray = field(default_factory=lambda: np.zeros(4))
 
     def act(self, row: np.ndarray, draws: np.ndarray) -> tuple[float, float, float]:
@@ -219,7 +220,7 @@ class ReferenceRobot:
                     self.vector = "avoidance"
                     continue
                 distance = math.dist(self.goal, self.position)
-                return distance <= 0.02, force + self.arrive(distance)
+                return distance <= self.tolerance, force + self.arrive(distance)
             else:
                 if self.obstacle():
                     force += self.avoid()

@@ -1,0 +1,170 @@
+"""Which cache to go to, and which isolated object to found a cache at."""
+
+import math
+
+import numpy as np
+
+from .cache_memory import OneTaskMemory, cache_density, covers
+from .compiling import Row, kernel
+from .machines import ACQUIRE, TRANSPORT, Senses
+from .memory import OneMemory, density
+from .tasks import DRAW_POINT_X, DRAW_POINT_Y
+
+
+@kernel
+def cache_utility(
+    cache_x: float, cache_y: float, count: float, x: float, y: float, pheromone: float, c: np.record
+) -> float:
+    """Utility of an existing cache: U = exp(density) count / (|cache - robot| |cache - nest|).
+
+    Full caches near the robot and near the nest are good, for taking and for adding alike.
+
+    Args:
+        cache_x: Centre of the cache, m.
+        cache_y: The same along y.
+        count: Remembered number of objects.
+        x: Robot position, m.
+        y: The same along y.
+        pheromone: Density of the cache.
+        c: Constants of the run.
+    """
+    robot_x, robot_y = cache_x - x, cache_y - y
+    nest_x, nest_y = cache_x - c.nest_x_m, cache_y - c.nest_y_m
+    product = (robot_x * robot_x + robot_y * robot_y) * (nest_x * nest_x + nest_y * nest_y)
+    return math.exp(pheromone) * count / math.sqrt(product)
+
+
+@kernel
+def is_large_enough(cache: np.record, c: np.record) -> bool:
+    """Whether a cache is remembered with enough objects to take one."""
+    return cache.count >= c.smallest_cache
+
+
+@kernel
+def select_cache(robot: np.record, senses: Senses, c: np.record, draws: Row, memory: OneTaskMemory) -> bool:
+    """Choose the remembered cache of highest utility and a random point in it as goal.
+
+    Left out are the cache that the robot stands in, so that one which has just dropped must leave before it can come
+    back; caches to be left alone in this task; and, for taking, caches with too few objects.
+
+    Returns:
+        Whether there is one; then goal and tolerance of the robot are set.
+    """
+    takes = robot.activity == ACQUIRE
+    best = 0.0
+    best_entry = -1
+    for entry in range(robot.n_caches):
+        cache = memory.caches[entry]
+        if covers(cache, senses.x, senses.y, c):
+            continue
+        if (takes and (cache.no_pickup or not is_large_enough(cache, c))) or (not takes and cache.no_drop):
+            continue
+        centre_x = (cache.cell_x + 0.5) * c.cell_m
+        centre_y = (cache.cell_y + 0.5) * c.cell_m
+        pheromone = cache_density(robot, memory.caches, entry, c.log_keep)
+        utility = cache_utility(centre_x, centre_y, cache.count, senses.x, senses.y, pheromone, c)
+        if utility > best:
+            best = utility
+            best_entry = entry
+    if best_entry < 0:
+        return False
+    spread = max(0.0, c.cache_side_m - 2.0 * c.cache_margin_m)
+    robot.goal_x_m = (memory.caches[best_entry].cell_x + 0.5) * c.cell_m + spread * (draws[DRAW_POINT_X] - 0.5)
+    robot.goal_y_m = (memory.caches[best_entry].cell_y + 0.5) * c.cell_m + spread * (draws[DRAW_POINT_Y] - 0.5)
+    robot.goal_tolerance_m = c.cache_tolerance_m
+    return True
+
+
+@kernel
+def cache_is_known(robot: np.record, c: np.record, memory: OneTaskMemory) -> bool:
+    """Whether the goal still lies in a remembered cache, which has enough objects if the robot wants one."""
+    for entry in range(robot.n_caches):
+        cache = memory.caches[entry]
+        if covers(cache, robot.goal_x_m, robot.goal_y_m, c):
+            return robot.activity == TRANSPORT or is_large_enough(cache, c)
+    return False
+
+
+@kernel
+def isolated_object_utility(
+    object_x: float, object_y: float, x: float, y: float, pheromone: float, c: np.record
+) -> float:
+    """Utility of an isolated object for founding a cache: U = exp(density) / (|object - robot| |object - nest|).
+
+    Args:
+        object_x: Centre of the object, m.
+        object_y: The same along y.
+        x: Robot position, m.
+        y: The same along y.
+        pheromone: Density of the object.
+        c: Constants of the run.
+    """
+    robot_x, robot_y = object_x - x, object_y - y
+    nest_x, nest_y = object_x - c.nest_x_m, object_y - c.nest_y_m
+    product = (robot_x * robot_x + robot_y * robot_y) * (nest_x * nest_x + nest_y * nest_y)
+    # The floor stands for a robot exactly on the object, which nothing can surpass.
+    return math.exp(pheromone) / math.sqrt(max(product, 1e-12))
+
+
+@kernel
+def is_isolated(robot: np.record, entry: int, c: np.record, memory: OneTaskMemory) -> bool:
+    """Whether an object is remembered without another one, or a cache centre, within the proximity distance."""
+    objects = memory.objects
+    limit = c.proximity_m * c.proximity_m
+    for k in range(robot.n_caches):
+        dx = (memory.caches[k].cell_x - objects.cell_x[entry]) * c.cell_m
+        dy = (memory.caches[k].cell_y - objects.cell_y[entry]) * c.cell_m
+        if dx * dx + dy * dy <= limit:
+            return False
+    # What lies next in the list was seen next, and is probably near: begin there.
+    for step in range(1, robot.n_known):
+        other = entry + step
+        if other >= robot.n_known:
+            other -= robot.n_known
+        dx = (objects.cell_x[other] - objects.cell_x[entry]) * c.cell_m
+        dy = (objects.cell_y[other] - objects.cell_y[entry]) * c.cell_m
+        if dx * dx + dy * dy <= limit:
+            return False
+    return True
+
+
+@kernel
+def select_isolated_object(robot: np.record, senses: Senses, c: np.record, memory: OneTaskMemory) -> bool:
+    """Choose the isolated object of highest utility as goal.
+
+    Returns:
+        Whether there is one; then goal and tolerance of the robot are set.
+    """
+    objects = memory.objects
+    best = 0.0
+    best_entry = -1
+    half = 0.5 * c.cell_m
+    for entry in range(robot.n_known):
+        if not is_isolated(robot, entry, c, memory):
+            continue
+        x = objects.cell_x[entry] * c.cell_m + half
+        y = objects.cell_y[entry] * c.cell_m + half
+        pheromone = density(robot, objects, entry, c.log_keep)
+        utility = isolated_object_utility(x, y, senses.x, senses.y, pheromone, c)
+        if utility > best:
+            best = utility
+            best_entry = entry
+    if best_entry < 0:
+        return False
+    robot.goal_x_m = objects.cell_x[best_entry] * c.cell_m + half
+    robot.goal_y_m = objects.cell_y[best_entry] * c.cell_m + half
+    robot.goal_tolerance_m = c.founding_tolerance_m
+    return True
+
+
+@kernel
+def object_is_near(robot: np.record, senses: Senses, c: np.record, objects: OneMemory) -> bool:
+    """Whether an object is remembered within the founding distance of the robot."""
+    limit = c.founding_distance_m * c.founding_distance_m
+    half = 0.5 * c.cell_m
+    for entry in range(robot.n_known):
+        dx = objects.cell_x[entry] * c.cell_m + half - senses.x
+        dy = objects.cell_y[entry] * c.cell_m + half - senses.y
+        if dx * dx + dy * dy <= limit:
+            return True
+    return False

@@ -1,0 +1,263 @@
+"""Cache memory: which caches each robot has seen, where, with how many objects; and what it had better leave alone.
+
+The rule, for one robot and tick, W being its 5 x 5 window of cells:
+
+1. A remembered cache whose square meets W, but which is not seen, is forgotten. The place of the last one forgotten
+   stays known, as the place where a search for caches begins.
+2. Every cache seen is remembered at its centre cell with its number of objects and pheromone density 1; remembered
+   objects on its square are forgotten.
+3. Every density decays as those of objects do (see `memory`).
+
+Source: cache memory of the paper's task-allocating controllers.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from swarm_forage_env.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
+from swarm_forage_env.policy import SwarmTask
+from swarm_forage_env.types import IntArray
+
+from .compiling import Row, kernel
+from .memory import ObjectMemory, OneMemory, forget, memory_of, new_memory, object_row_of
+
+CACHE = np.dtype(
+    (
+        np.record,
+        np.dtype(
+            [
+                ("cell_x", np.int32),  # centre cell
+                ("cell_y", np.int32),
+                ("serial", np.int32),  # identity
+                ("count", np.int32),  # objects when last seen
+                ("seen", np.int32),  # tick of the robot's own clock at which it was last seen
+                ("no_pickup", np.bool_),  # not to be taken from
+                ("no_drop", np.bool_),  # not to be added to
+            ],
+            align=True,
+        ),
+    )
+)
+"""One remembered cache."""
+
+
+class TaskMemory(NamedTuple):
+    """Memories of all robots."""
+
+    objects: ObjectMemory
+    caches: np.ndarray
+    """(N, K) records of `CACHE`; row i holds a compact list of `n_caches[i]` caches, in no particular order."""
+    shunned: IntArray
+    """(N, M) by object row: the robot's `shun_round` in which it was to be left alone, 0 = never."""
+
+
+class OneTaskMemory(NamedTuple):
+    """`TaskMemory` of one robot."""
+
+    objects: OneMemory
+    caches: Row
+    shunned: Row
+
+
+def new_task_memory(task: SwarmTask) -> TaskMemory:
+    """Return empty memories; twice as many caches can be remembered as fit into the arena side by side."""
+    width_m, height_m = task.arena_size_m
+    n_side_by_side = int(width_m / task.cache_side_m + 1e-9) * int(height_m / task.cache_side_m + 1e-9)
+    shape = (task.n_robots, task.n_objects)
+    return TaskMemory(
+        objects=new_memory(*shape),
+        caches=np.zeros((task.n_robots, 2 * n_side_by_side), CACHE),
+        shunned=np.zeros(shape, np.int32),
+    )
+
+
+@kernel
+def task_memory_of(memory: TaskMemory, robot_index: int) -> OneTaskMemory:
+    """Return views of one robot's memory."""
+    return OneTaskMemory(
+        memory_of(memory.objects, robot_index), memory.caches[robot_index], memory.shunned[robot_index]
+    )
+
+
+@kernel
+def cache_density(robot: np.record, caches: Row, entry: int, log_keep: float) -> float:
+    """Pheromone density of a remembered cache, as `memory.density`."""
+    return math.exp(log_keep * (robot.clock - caches[entry].seen + 1))
+
+
+@kernel
+def cell_of(share: float, half_extent_m: float, c: np.record) -> int:
+    """Cell along one axis of a coordinate in observation units."""
+    return int((share + 1.0) * half_extent_m / c.cell_m)
+
+
+@kernel
+def find_cache(robot: np.record, caches: Row, cell_x: int, cell_y: int) -> int:
+    """List entry of the cache remembered at a centre cell, or -1."""
+    for entry in range(robot.n_caches):
+        if caches[entry].cell_x == cell_x and caches[entry].cell_y == cell_y:
+            return entry
+    return -1
+
+
+@kernel
+def covers(cache: np.record, x: float, y: float, c: np.record) -> bool:
+    """Whether a point (m) lies in a remembered cache's square."""
+    dx = abs((cache.cell_x + 0.5) * c.cell_m - x)
+    dy = abs((cache.cell_y + 0.5) * c.cell_m - y)
+    return max(dx, dy) <= 0.5 * c.cache_side_m
+
+
+@kernel
+def remember_cache(robot: np.record, memory: OneTaskMemory, fields: Row, c: np.record) -> None:
+    """Store a cache as seen now.
+
+    Args:
+        robot: Record of the robot.
+        memory: Edited.
+        fields: Serial, centre x, y and count as observations give them; serial 0 = no cache, nothing happens.
+        c: Constants of the run.
+    """
+    serial = int(fields[0] * SERIAL_SCALE + 0.5)
+    if serial == 0:
+        return
+    cell_x = cell_of(fields[1], c.half_width_m, c)
+    cell_y = cell_of(fields[2], c.half_height_m, c)
+    caches = memory.caches
+    entry = find_cache(robot, caches, cell_x, cell_y)
+    if entry < 0:
+        entry = _new_entry(robot, caches)
+    cache = caches[entry]
+    if cache.serial != serial:
+        cache.serial = serial
+        cache.cell_x = cell_x
+        cache.cell_y = cell_y
+        cache.no_pickup = False
+        cache.no_drop = False
+        _forget_objects_under(robot, memory.objects, cache, c)
+    cache.count = int(fields[3] * c.n_objects + 0.5)
+    cache.seen = robot.clock
+
+
+@kernel
+def _new_entry(robot: np.record, caches: Row) -> int:
+    """A list entry for a cache not known so far; with a full list, that of the one unseen for longest."""
+    if robot.n_caches < caches.shape[0]:
+        entry = robot.n_caches
+        robot.n_caches += 1
+    else:
+        entry = 0
+        for other in range(caches.shape[0]):
+            if caches[other].seen < caches[entry].seen:
+                entry = other
+    caches[entry].serial = 0
+    return entry
+
+
+@kernel
+def _forget_objects_under(robot: np.record, objects: OneMemory, cache: np.record, c: np.record) -> None:
+    """Forget objects on the square of a cache: they are inside it now."""
+    half = c.cell_m / 2.0
+    for entry in range(robot.n_known - 1, -1, -1):  # backwards: forgetting moves the last entry here
+        x = objects.cell_x[entry] * c.cell_m + half
+        y = objects.cell_y[entry] * c.cell_m + half
+        if covers(cache, x, y, c):
+            forget(robot, objects, objects.row[entry])
+
+
+@kernel
+def forget_cache(robot: np.record, caches: Row, entry: int, c: np.record) -> None:
+    """Remove a cache; the last list entry takes its place. The place of the last one of all is kept."""
+    last = robot.n_caches - 1
+    if last == 0:
+        robot.last_cache_x_m = (caches[entry].cell_x + 0.5) * c.cell_m
+        robot.last_cache_y_m = (caches[entry].cell_y + 0.5) * c.cell_m
+        robot.knows_last_cache = True
+    caches[entry] = caches[last]
+    robot.n_caches = last
+
+
+@kernel
+def _should_be_visible(robot: np.record, cache: np.record, c: np.record) -> bool:
+    """Whether a remembered cache's square meets the window."""
+    if c.cache_forget_unit_mismatch:  # quirk: metres are compared with cells, and one axis suffices
+        half = 0.5 * c.cache_side_m
+        x = (cache.cell_x + 0.5) * c.cell_m
+        y = (cache.cell_y + 0.5) * c.cell_m
+        in_x = robot.window_x < x + half and x - half < robot.window_x + WINDOW_CELLS
+        in_y = robot.window_y < y + half and y - half < robot.window_y + WINDOW_CELLS
+        return in_x or in_y
+    reach = c.cache_half_cells
+    in_x = cache.cell_x - reach < robot.window_x + WINDOW_CELLS and robot.window_x <= cache.cell_x + reach
+    in_y = cache.cell_y - reach < robot.window_y + WINDOW_CELLS and robot.window_y <= cache.cell_y + reach
+    return in_x and in_y
+
+
+@kernel
+def look_for_caches(robot: np.record, row: Row, c: np.record, memory: OneTaskMemory) -> None:
+    """One tick of the memory rule above, after `memory.look_around`."""
+    visible = row[c.los_cache : c.los_cache + VISIBLE_CACHES * CACHE_FIELDS]
+    for entry in range(robot.n_caches - 1, -1, -1):  # backwards: forgetting moves the last entry here
+        cache = memory.caches[entry]
+        if _should_be_visible(robot, cache, c) and not _is_listed(cache, visible, c):
+            forget_cache(robot, memory.caches, entry, c)
+    for place in range(VISIBLE_CACHES):
+        if visible[place * CACHE_FIELDS] <= 0.0:
+            break
+        remember_cache(robot, memory, visible[place * CACHE_FIELDS :], c)
+
+
+@kernel
+def _is_listed(cache: np.record, visible: Row, c: np.record) -> bool:
+    """Whether a remembered cache is among the visible ones, by its centre cell."""
+    for place in range(VISIBLE_CACHES):
+        fields = visible[place * CACHE_FIELDS :]
+        if fields[0] <= 0.0:
+            return False
+        same_x = cell_of(fields[1], c.half_width_m, c) == cache.cell_x
+        if same_x and cell_of(fields[2], c.half_height_m, c) == cache.cell_y:
+            return True
+    return False
+
+
+@kernel
+def shun_object(robot: np.record, memory: OneTaskMemory, object_row: int) -> None:
+    """Leave an object alone until `stop_shunning_objects`; nothing happens for row -1."""
+    if object_row >= 0:
+        memory.shunned[object_row] = robot.shun_round
+        robot.shunned_in_task = True
+
+
+@kernel
+def stop_shunning_objects(robot: np.record) -> None:
+    """Make every object selectable again."""
+    robot.shun_round += 1
+
+
+@kernel
+def stop_shunning_caches(robot: np.record, caches: Row) -> None:
+    """Make every cache selectable again."""
+    for entry in range(robot.n_caches):
+        caches[entry].no_pickup = False
+        caches[entry].no_drop = False
+
+
+@kernel
+def event_cache_entry(robot: np.record, row: Row, c: np.record, caches: Row) -> int:
+    """List entry of the cache that this step's event names; -1 if there is none or it is not remembered."""
+    if row[c.event_cache] <= 0.0:
+        return -1
+    return find_cache(
+        robot,
+        caches,
+        cell_of(row[c.event_cache + 1], c.half_width_m, c),
+        cell_of(row[c.event_cache + 2], c.half_height_m, c),
+    )
+
+
+@kernel
+def event_object_row(row: Row, c: np.record) -> int:
+    """Object row that this step's event names, or -1."""
+    return object_row_of(row[c.event_object], c)

@@ -1,0 +1,201 @@
+"""Where a Cache Starter lays its object: as near as allowed to half way between itself and the nest.
+
+The authors' program maximises a utility that grows without bound towards the midpoint m,
+
+    U(s) = 1 / (1 + exp(4 (e - 1))) / (max(1, |s - robot|) e),   e = |s - m|,
+
+under the constraints that s keeps the proximity distance from the nest's centre and from every remembered cache, and
+lies in a box. Its stochastic optimiser thus ends up near the allowed point nearest to m, which is computed here: our
+choice, exact and without iterations. That point is m itself; or m pushed out of one disc or into the box; or a crossing
+of two borders. A random offset, far below the distance at which robots count as arrived, stands for the optimiser's
+scatter.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .cache_memory import OneTaskMemory
+from .compiling import kernel
+from .machines import Senses
+from .tasks import DRAW_POINT_X, DRAW_POINT_Y
+
+_RIM_M = 1e-6
+"""Points on a border lie this far on its allowed side."""
+
+
+class Best(NamedTuple):
+    """The allowed point nearest to the midpoint among those looked at."""
+
+    x: float
+    y: float
+    distance: float
+    """Squared; infinite while none was allowed."""
+
+
+@kernel
+def _disc_centre(k: int, c: np.record, memory: OneTaskMemory) -> tuple[float, float]:
+    """Centre of forbidden disc k: the nest, then every remembered cache."""
+    if k == 0:
+        return c.nest_x_m, c.nest_y_m
+    cache = memory.caches[k - 1]
+    return (cache.cell_x + 0.5) * c.cell_m, (cache.cell_y + 0.5) * c.cell_m
+
+
+@kernel
+def is_allowed(robot: np.record, x: float, y: float, c: np.record, memory: OneTaskMemory) -> bool:
+    """Whether a cache may be started at a point, as far as the robot knows."""
+    if not (c.site_x_low_m <= x <= c.site_x_high_m and c.site_y_low_m <= y <= c.site_y_high_m):
+        return False
+    limit = c.proximity_m * c.proximity_m
+    for k in range(robot.n_caches + 1):
+        disc_x, disc_y = _disc_centre(k, c, memory)
+        dx = disc_x - x
+        dy = disc_y - y
+        if dx * dx + dy * dy < limit:
+            return False
+    return True
+
+
+@kernel
+def _better(
+    best: Best,
+    robot: np.record,
+    x: float,
+    y: float,
+    middle_x: float,
+    middle_y: float,
+    c: np.record,
+    memory: OneTaskMemory,
+) -> Best:
+    """Return the point (x, y) if it is allowed and nearer to the midpoint than `best`, else `best`."""
+    dx = x - middle_x
+    dy = y - middle_y
+    distance = dx * dx + dy * dy
+    if distance < best.distance and is_allowed(robot, x, y, c, memory):
+        return Best(x, y, distance)
+    return best
+
+
+@kernel
+def _edge_crossings(
+    best: Best, robot: np.record, k: int, middle_x: float, middle_y: float, c: np.record, memory: OneTaskMemory
+) -> Best:
+    """Look at the crossings of disc k with the four edges of the box."""
+    radius = c.proximity_m + _RIM_M
+    disc_x, disc_y = _disc_centre(k, c, memory)
+    for side in range(2):
+        edge = c.site_x_high_m if side else c.site_x_low_m
+        square = radius * radius - (edge - disc_x) * (edge - disc_x)
+        if square >= 0.0:
+            reach = math.sqrt(square)
+            best = _better(best, robot, edge, disc_y - reach, middle_x, middle_y, c, memory)
+            best = _better(best, robot, edge, disc_y + reach, middle_x, middle_y, c, memory)
+        edge = c.site_y_high_m if side else c.site_y_low_m
+        square = radius * radius - (edge - disc_y) * (edge - disc_y)
+        if square >= 0.0:
+            reach = math.sqrt(square)
+            best = _better(best, robot, disc_x - reach, edge, middle_x, middle_y, c, memory)
+            best = _better(best, robot, disc_x + reach, edge, middle_x, middle_y, c, memory)
+    return best
+
+
+@kernel
+def _disc_crossings(
+    best: Best,
+    robot: np.record,
+    k: int,
+    other: int,
+    middle_x: float,
+    middle_y: float,
+    c: np.record,
+    memory: OneTaskMemory,
+) -> Best:
+    """Look at the crossings of two discs."""
+    radius = c.proximity_m + _RIM_M
+    disc_x, disc_y = _disc_centre(k, c, memory)
+    other_x, other_y = _disc_centre(other, c, memory)
+    half_x = (other_x - disc_x) / 2.0
+    half_y = (other_y - disc_y) / 2.0
+    half = half_x * half_x + half_y * half_y
+    if half == 0.0 or half > radius * radius:
+        return best
+    # The crossings lie across the middle of the line between the centres.
+    share = math.sqrt((radius * radius - half) / half)
+    best = _better(
+        best, robot, disc_x + half_x - share * half_y, disc_y + half_y + share * half_x, middle_x, middle_y, c, memory
+    )
+    return _better(
+        best, robot, disc_x + half_x + share * half_y, disc_y + half_y - share * half_x, middle_x, middle_y, c, memory
+    )
+
+
+@kernel
+def nearest_allowed(
+    robot: np.record, middle_x: float, middle_y: float, turn: float, c: np.record, memory: OneTaskMemory
+) -> Best:
+    """Return the allowed point nearest to the midpoint.
+
+    Args:
+        robot: Record of the robot.
+        middle_x: The midpoint, m.
+        middle_y: The same along y.
+        turn: Direction in which a midpoint is pushed out that coincides with a disc's centre, rad.
+        c: Constants of the run.
+        memory: The robot's memory.
+    """
+    best = Best(0.0, 0.0, math.inf)
+    boxed_x = min(max(middle_x, c.site_x_low_m), c.site_x_high_m)
+    boxed_y = min(max(middle_y, c.site_y_low_m), c.site_y_high_m)
+    best = _better(best, robot, boxed_x, boxed_y, middle_x, middle_y, c, memory)
+    if best.distance == 0.0:
+        return best
+    radius = c.proximity_m + _RIM_M
+    for k in range(robot.n_caches + 1):
+        disc_x, disc_y = _disc_centre(k, c, memory)
+        dx = middle_x - disc_x
+        dy = middle_y - disc_y
+        distance = math.sqrt(dx * dx + dy * dy)
+        if distance == 0.0:
+            dx, dy, distance = math.cos(turn), math.sin(turn), 1.0
+        share = radius / distance
+        best = _better(best, robot, disc_x + share * dx, disc_y + share * dy, middle_x, middle_y, c, memory)
+        best = _edge_crossings(best, robot, k, middle_x, middle_y, c, memory)
+        for other in range(k):
+            best = _disc_crossings(best, robot, k, other, middle_x, middle_y, c, memory)
+    for corner in range(4):
+        x = c.site_x_low_m if corner % 2 else c.site_x_high_m
+        y = c.site_y_low_m if corner // 2 else c.site_y_high_m
+        best = _better(best, robot, x, y, middle_x, middle_y, c, memory)
+    return best
+
+
+@kernel
+def select_site(robot: np.record, senses: Senses, c: np.record, draws: np.ndarray, memory: OneTaskMemory) -> bool:
+    """Choose a site for a new cache as goal.
+
+    Returns:
+        Whether any point is allowed; then goal and tolerance of the robot are set.
+    """
+    turn = 2.0 * math.pi * draws[DRAW_POINT_X]
+    middle_x = 0.5 * (senses.x + c.nest_x_m)
+    middle_y = 0.5 * (senses.y + c.nest_y_m)
+    best = nearest_allowed(robot, middle_x, middle_y, turn, c, memory)
+    if best.distance == math.inf:
+        return False
+    length = c.site_jitter_m * draws[DRAW_POINT_Y]
+    if best.distance == 0.0:
+        length = c.site_offset_low_m + (c.site_offset_high_m - c.site_offset_low_m) * draws[DRAW_POINT_Y]
+    offset_x = length * math.cos(turn)
+    offset_y = length * math.sin(turn)
+    robot.goal_x_m = best.x
+    robot.goal_y_m = best.y
+    for side in range(2):  # the offset, or the opposite one where only that is allowed, or none
+        sign = 1.0 - 2.0 * side
+        if is_allowed(robot, best.x + sign * offset_x, best.y + sign * offset_y, c, memory):
+            robot.goal_x_m = best.x + sign * offset_x
+            robot.goal_y_m = best.y + sign * offset_y
+            break
+    robot.goal_tolerance_m = c.site_tolerance_m
+    return True

@@ -1,0 +1,19 @@
+"""STOCHM: stochastic task allocation among three tasks, with static caches half way to the nest.
+
+A robot works as Generalist (free object to nest), as Harvester (free object to cache) or as Collector (cache to nest).
+What it does next is drawn by `stoch_n1`, how it does it is in `task_machines`. Source: STOCHM of the paper, section
+"Candidate Algorithms".
+"""
+
+from typing import ClassVar
+
+from .task_policy import TaskPolicy
+from .tasks import STOCHM_PARAMETERS, TaskParameters
+
+
+class STOCHMPolicy(TaskPolicy):
+    """Generalists, Harvesters and Collectors around static caches; see `TaskPolicy`."""
+
+    caches: ClassVar[str] = "static"
+    default_parameters: ClassVar[TaskParameters] = STOCHM_PARAMETERS
+    n_tabs: ClassVar[int] = 1

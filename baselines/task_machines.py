@@ -1,0 +1,282 @@
+"""One tick of a robot that allocates tasks: memory, executive, the machine of its task.
+
+Every task is one machine with its own source and destination (`tasks.SOURCE`, `tasks.DESTINATION`):
+
+    ACQUIRE         on the way to the source, or searching it; there          -> WAIT_PICKUP
+    WAIT_PICKUP     stand, ask; cargo -> HOMING or TRANSPORT; refused         -> ACQUIRE
+    HOMING ...      to the nest, as in CRW; there                             -> WAIT_DROP
+    TRANSPORT       on the way to another destination, or searching it; there -> WAIT_DROP
+    WAIT_DROP       stand, ask to drop; dropped -> FINISHED; refused          -> HOMING or TRANSPORT
+    FINISHED        the executive ends the task and starts the next one in the same tick
+    LET_GO          aborted while carrying: stand and release; empty          -> ACQUIRE, of the next task
+
+Source: STOCHM and STOCHX of the paper, section "Candidate Algorithms".
+"""
+
+import numpy as np
+
+from swarm_forage_env.detection import sees_cache
+from swarm_forage_env.layout import CACHE_FIELDS
+from swarm_forage_env.policy import Event, Task
+from swarm_forage_env.types import ActionArray, BoolArray, FloatArray, ObsArray
+
+from .cache_choice import cache_is_known, object_is_near, select_cache, select_isolated_object
+from .cache_memory import (
+    OneTaskMemory,
+    TaskMemory,
+    event_cache_entry,
+    event_object_row,
+    look_for_caches,
+    remember_cache,
+    shun_object,
+    stop_shunning_caches,
+    stop_shunning_objects,
+    task_memory_of,
+)
+from .cache_sites import select_site
+from .compiling import Row, kernel
+from .machines import (
+    ACQUIRE,
+    DRAW_RESTART,
+    DRAW_WANDER,
+    FINISHED,
+    HOMING,
+    LET_GO,
+    NOT_EXPLORING,
+    TRANSPORT,
+    WAIT_DROP,
+    WAIT_PICKUP,
+    Senses,
+    acquire,
+    command,
+    deliver_and_leave,
+    explore,
+    explore_for_object,
+    follow_cargo,
+    go_to_goal,
+    new_robots,
+    random_walk,
+    restart_acquiring,
+    sense,
+    start_carrying,
+    start_vector,
+    stop_vector,
+)
+from .memory import forget, look_around, object_row_of
+from .object_choice import object_is_known, object_is_reached, select_best_object
+from .stoch_n1 import NO_TASK, Allocation, after_tick, end_task, next_task
+from .tasks import DESTINATION, DRAW_ABORT, DRAW_MOVE, DRAW_PARTITION, DRAW_SWITCH, DROP_GRIP, SOURCE, Goal
+
+_OBJECT = int(Goal.OBJECT)
+_CACHE = int(Goal.CACHE)
+_NEST = int(Goal.NEST)
+_SITE = int(Goal.SITE)
+_ISOLATED_OBJECT = int(Goal.ISOLATED_OBJECT)
+_STARTER = int(Task.STARTER)
+_FINISHER = int(Task.FINISHER)
+_TRANSFERER = int(Task.TRANSFERER)
+_CACHE_TOO_NEAR = int(Event.CACHE_TOO_NEAR)
+
+
+def new_task_robots(n_robots: int) -> np.ndarray:
+    """Return (n_robots,) records of robots that have no task yet and have seen nothing."""
+    robots = new_robots(
+        n_robots,
+        [
+            ("last_cache_x_m", np.float64),  # where the last remembered cache was, once none is left
+            ("last_cache_y_m", np.float64),
+            ("n_caches", np.int32),  # remembered caches
+            ("shun_round", np.int32),  # objects stamped with this number are left alone
+            ("goal_kind", np.int8),  # `tasks.Goal` code of what it acquires
+            ("knows_last_cache", np.bool_),
+            ("shunned_in_task", np.bool_),  # an object, during the current task
+            ("shunned_cache_in_task", np.bool_),
+        ],
+    )
+    robots["shun_round"] = 1
+    return robots
+
+
+@kernel
+def _is_shunned(robot: np.record, memory: OneTaskMemory, object_row: int) -> bool:
+    return memory.shunned[object_row] == robot.shun_round
+
+
+@kernel
+def select_goal(robot: np.record, senses: Senses, c: np.record, draws: Row, memory: OneTaskMemory) -> bool:
+    """Choose the best goal of the kind that the robot acquires; see `machines.acquire`."""
+    if robot.goal_kind == _OBJECT:
+        return select_best_object(robot, senses, c, memory.objects, memory, _is_shunned)
+    if robot.goal_kind == _CACHE:
+        return select_cache(robot, senses, c, draws, memory)
+    if robot.goal_kind == _SITE:
+        return select_site(robot, senses, c, draws, memory)
+    return select_isolated_object(robot, senses, c, memory)
+
+
+@kernel
+def goal_is_known(robot: np.record, c: np.record, memory: OneTaskMemory) -> bool:
+    """Whether the goal is still worth going to."""
+    if robot.goal_kind == _OBJECT:
+        return object_is_known(robot, c, memory.objects)
+    return robot.goal_kind != _CACHE or cache_is_known(robot, c, memory)
+
+
+@kernel
+def goal_is_reached(robot: np.record, senses: Senses, row: Row, c: np.record, memory: OneTaskMemory) -> bool:
+    """Whether what the robot came for is there."""
+    if robot.goal_kind == _OBJECT:
+        return object_is_reached(robot, senses, row, c, memory.objects)
+    if robot.goal_kind == _CACHE:
+        return sees_cache(row[c.ground : c.ground + 4])
+    return robot.goal_kind == _SITE or object_is_near(robot, senses, c, memory.objects)
+
+
+@kernel
+def search_for_goal(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
+    """One tick of the search that suits the goal; sites are not searched for, the robot stands."""
+    if robot.goal_kind == _OBJECT:
+        return explore_for_object(robot, senses, row, c, draws)
+    x = 0.0
+    y = 0.0
+    if robot.goal_kind == _CACHE:
+        x, y = search_from_last_cache(robot, senses, row, c, draws)
+    elif robot.goal_kind == _ISOLATED_OBJECT:
+        x, y = explore(robot, senses, c, draws)
+    return False, x, y
+
+
+@kernel
+def search_from_last_cache(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[float, float]:
+    """One tick of looking for caches: first to where the last known one was, if any, then at random."""
+    x = 0.0
+    y = 0.0
+    if robot.explore_ticks == NOT_EXPLORING:
+        robot.explore_ticks = 0
+        if robot.knows_last_cache:
+            robot.goal_x_m = robot.last_cache_x_m
+            robot.goal_y_m = robot.last_cache_y_m
+            robot.goal_tolerance_m = c.cache_tolerance_m
+            start_vector(robot)
+            robot.is_searching = True
+        if c.explore_double_start:  # quirk: starting runs the strategy once more
+            x, y = _search_step(robot, senses, row, c, draws, draws[DRAW_RESTART])
+    step_x, step_y = _search_step(robot, senses, row, c, draws, draws[DRAW_WANDER])
+    robot.explore_ticks += 1
+    return x + step_x, y + step_y
+
+
+@kernel
+def _search_step(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row, u: float) -> tuple[float, float]:
+    if not robot.is_searching:
+        return random_walk(robot, senses, c, u)
+    arrived, x, y = go_to_goal(robot, senses, row, c, draws)
+    if arrived:
+        stop_vector(robot)
+    return x, y
+
+
+@kernel
+def follow_events(
+    a: Allocation, i: int, robot: np.record, senses: Senses, row: Row, c: np.record, memory: OneTaskMemory
+) -> None:
+    """Let activity and memory follow what happened to the robot since its last tick."""
+    task = a.task[i]
+    loaded = HOMING if DESTINATION[task] == _NEST else TRANSPORT
+    if follow_cargo(robot, senses, loaded, FINISHED):
+        forget(robot, memory.objects, object_row_of(row[c.cargo], c))
+        if task == _TRANSFERER:
+            entry = event_cache_entry(robot, row, c, memory.caches)
+            if entry >= 0:
+                memory.caches[entry].no_drop = True
+                robot.shunned_cache_in_task = True
+    elif robot.activity == FINISHED:
+        if task in (_STARTER, _FINISHER):
+            shun_object(robot, memory, event_object_row(row, c))
+        elif task == _TRANSFERER:
+            entry = event_cache_entry(robot, row, c, memory.caches)
+            if entry >= 0:
+                memory.caches[entry].no_pickup = True
+                robot.shunned_cache_in_task = True
+    elif senses.event == _CACHE_TOO_NEAR:
+        remember_cache(robot, memory, row[c.event_cache : c.event_cache + CACHE_FIELDS], c)
+        if robot.activity == WAIT_DROP:
+            start_carrying(robot, TRANSPORT)
+    elif robot.activity == WAIT_PICKUP and SOURCE[task] == _CACHE and not cache_is_known(robot, c, memory):
+        restart_acquiring(robot)  # others have emptied the cache too far
+
+
+@kernel
+def manage_task(
+    a: Allocation, i: int, robot: np.record, senses: Senses, now: int, c: np.record, draws: Row, memory: OneTaskMemory
+) -> bool:
+    """End the current task if it is finished or given up, and start the next; returns whether one was started."""
+    if a.task[i] != NO_TASK:
+        if robot.activity != FINISHED and draws[DRAW_ABORT] >= a.p_abort[i, a.task[i]]:
+            return False
+        end_task(a, i, now, c)
+    next_task(a, i, now, c, draws[DRAW_MOVE], draws[DRAW_PARTITION], draws[DRAW_SWITCH])
+    if not robot.shunned_in_task:
+        stop_shunning_objects(robot)
+    if not (robot.shunned_cache_in_task and a.task[i] == _TRANSFERER):
+        stop_shunning_caches(robot, memory.caches)
+    robot.shunned_in_task = False
+    robot.shunned_cache_in_task = False
+    restart_acquiring(robot)
+    if senses.carrying:
+        robot.activity = LET_GO
+    return True
+
+
+@kernel
+def run_machine(
+    robot: np.record, task: int, senses: Senses, row: Row, c: np.record, draws: Row, memory: OneTaskMemory
+) -> tuple[float, float]:
+    """One tick of a task's machine; returns the force."""
+    if robot.activity not in (ACQUIRE, TRANSPORT):
+        return deliver_and_leave(robot, senses, row, c, draws)
+    robot.goal_kind = SOURCE[task] if robot.activity == ACQUIRE else DESTINATION[task]
+    found, x, y = acquire(
+        robot, senses, row, c, draws, memory, select_goal, goal_is_known, goal_is_reached, search_for_goal
+    )
+    if found:
+        robot.activity = WAIT_PICKUP if robot.activity == ACQUIRE else WAIT_DROP
+    return x, y
+
+
+@kernel
+def step_tasks(
+    obs: ObsArray,
+    active: BoolArray,
+    now: int,
+    draws: FloatArray,
+    constants: np.ndarray,
+    robots: np.ndarray,
+    memory: TaskMemory,
+    allocation: Allocation,
+    actions: ActionArray,
+) -> None:
+    """One tick for all robots: edits `robots` (N,), `memory` and `allocation`, writes `actions` (N, 3).
+
+    `draws` is (N, TASK_DRAWS) uniform in [0, 1), `now` the number of this tick, from 1. Inactive robots keep their
+    state; their action is zero.
+    """
+    c = constants[0]
+    for i in range(active.shape[0]):
+        action = actions[i]
+        if not active[i]:
+            action[:] = 0.0
+            continue
+        robot = robots[i]
+        row = obs[i]
+        known = task_memory_of(memory, i)
+        senses = sense(row, c)
+        look_around(robot, row, c, known.objects)
+        look_for_caches(robot, row, c, known)
+        follow_events(allocation, i, robot, senses, row, c, known)
+        has_started = manage_task(allocation, i, robot, senses, now, c, draws[i], known)
+        task = allocation.task[i]
+        x, y = run_machine(robot, task, senses, row, c, draws[i], known)
+        if not has_started:
+            after_tick(allocation, i, now, robot.activity, c)
+        command(robot, x, y, c, float(DROP_GRIP[task]), action)

@@ -1,0 +1,157 @@
+"""What STOCHM and STOCHX have in common: a policy that runs the task machines of `task_machines`."""
+
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from swarm_forage_env.policy import SwarmTask
+from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+
+from .cache_memory import new_task_memory
+from .memory import densities
+from .parameters import kernel_constants, with_overrides
+from .stoch_n1 import new_allocation
+from .task_machines import new_task_robots, step_tasks
+from .tasks import N_TASKS, TASK_DRAWS, TaskParameters
+
+
+def site_box_m(task: SwarmTask) -> tuple[float, float, float, float]:
+    """Return the box of allowed cache sites, half a nominal cache side inside the arena: x low, y low, x high, y high.
+
+    Under the quirk `site_box_truncated` its borders are truncated to whole metres.
+    """
+    width_m, height_m = task.arena_size_m
+    margin = task.cache_side_nominal_m / 2.0
+    box = (margin, margin, width_m - margin, height_m - margin)
+    if task.quirks.site_box_truncated:
+        x_low, y_low, x_high, y_high = (float(math.trunc(border)) for border in box)
+        return x_low, y_low, x_high, y_high
+    return box
+
+
+def task_constants(parameters: TaskParameters, task: SwarmTask, n_tabs: int) -> np.ndarray:
+    """Return `kernel_constants` with what task allocation and caches need besides."""
+    x_low, y_low, x_high, y_high = site_box_m(task)
+    # Quirk finisher_tolerance_mismatch: arriving and being accepted are different distances.
+    is_loose = task.quirks.finisher_tolerance_mismatch
+    loose_m = parameters.loose_founding_share * max(task.arena_size_m)
+    return kernel_constants(
+        parameters,
+        task,
+        **parameters.derived(),
+        n_tabs=n_tabs,
+        cache_half_cells=round(task.cache_side_m / task.cell_m) // 2,
+        cache_side_m=task.cache_side_m,
+        proximity_m=task.cache_side_nominal_m,
+        founding_tolerance_m=loose_m if is_loose else parameters.founding_distance_m,
+        site_x_low_m=x_low,
+        site_y_low_m=y_low,
+        site_x_high_m=x_high,
+        site_y_high_m=y_high,
+    )
+
+
+class TaskPolicy:
+    """Robots that allocate tasks among themselves, each by its own experience. An instance drives one run.
+
+    Subclasses say which part of the task graph they use and with which numbers.
+
+    Args:
+        parameters: All numbers of the controller; default those of the paper's study.
+        overrides: Single fields of `TaskParameters` by name.
+
+    Raises:
+        ParameterError: unknown name or a value that makes no sense.
+    """
+
+    default_parameters: ClassVar[TaskParameters]
+    n_tabs: ClassVar[int]
+    """Task allocation blocks in use, from the root of the graph."""
+    reads: ClassVar[tuple[str, ...]] = (
+        "proximity",
+        "light",
+        "ground",
+        "wheel_speed",
+        "position",
+        "heading",
+        "carrying",
+        "cargo",
+        "event_object",
+        "event",
+        "event_cache",
+        "los_cell",
+        "los_object",
+        "los_cache",
+    )
+
+    def __init__(self, parameters: TaskParameters | None = None, **overrides: float) -> None:
+        self.parameters = with_overrides(parameters or self.default_parameters, overrides)
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Start a run: estimates are drawn, nobody has a task, and nothing is remembered."""
+        self._rng = rng
+        self._constants = task_constants(self.parameters, task, self.n_tabs)
+        self._robots = new_task_robots(task.n_robots)
+        self._memory = new_task_memory(task)
+        self._allocation = new_allocation(task.n_robots, self.parameters, task.quirks, self.n_tabs, rng)
+        self._draws = np.zeros((task.n_robots, TASK_DRAWS))
+        self._actions = np.zeros((task.n_robots, 3), np.float32)
+        self._tick = 0
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
+        self._tick += 1
+        self._rng.random(out=self._draws)
+        step_tasks(
+            obs,
+            active,
+            self._tick,
+            self._draws,
+            self._constants,
+            self._robots,
+            self._memory,
+            self._allocation,
+            self._actions,
+        )
+        return self._actions
+
+    @property
+    def task(self) -> CodeArray:
+        """(N,) int8 `policy.Task` codes; a live view, read only."""
+        return self._allocation.task
+
+    @property
+    def task_shares(self) -> FloatArray:
+        """(8,) share of robots in each task, by `policy.Task` code; robots that have not acted yet have none."""
+        return np.bincount(self._allocation.task, minlength=N_TASKS) / len(self._allocation.task)
+
+    @property
+    def task_estimates(self) -> FloatArray:
+        """(N, 8) expected execution times in ticks, by `policy.Task` code, a copy."""
+        return self._allocation.estimate.copy()
+
+    @property
+    def activity(self) -> CodeArray:
+        """(N,) `machines.Activity` codes, a copy."""
+        return self._robots["activity"].copy()
+
+    @property
+    def n_known(self) -> IntArray:
+        """(N,) number of objects that each robot remembers, a copy."""
+        return self._robots["n_known"].copy()
+
+    @property
+    def n_caches(self) -> IntArray:
+        """(N,) number of caches that each robot remembers, a copy."""
+        return self._robots["n_caches"].copy()
+
+    def remembered_caches(self, robot_index: int) -> dict[int, tuple[int, int, int, float]]:
+        """Return the caches that one robot remembers: serial -> (centre cell x, y, objects, pheromone density)."""
+        robot = self._robots[robot_index]
+        caches = self._memory.caches[robot_index, : robot["n_caches"]]
+        density = densities(robot["clock"] - caches["seen"], self.parameters.evaporation_per_tick)
+        return {
+            int(cache["serial"]): (int(cache["cell_x"]), int(cache["cell_y"]), int(cache["count"]), float(value))
+            for cache, value in zip(caches, density, strict=True)
+        }
