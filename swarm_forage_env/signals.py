@@ -185,17 +185,32 @@ def _interpolation(ticks: list[float], values: tuple[float, ...]) -> Signal:
     return value
 
 
-def gather_waveform(mapping: Mapping[str, Any], key: str) -> dict[str, Any]:
+def gather_waveform(mapping: Mapping[str, Any], key: str, owner: type) -> dict[str, Any]:
     """Return `mapping` with the waveform under `key` built.
 
     Two forms are read: a table of its fields under `key` (as `to_mapping` writes it), and the name of its kind under
     `key` with its fields beside it, which is shorter: `{"waveform": "square", "amplitude": 0.2, "period_s": 5000}`.
+
+    Args:
+        mapping: Fields of a configuration.
+        key: Field that may hold a waveform.
+        owner: Dataclass of the configuration, for its other fields.
+
+    Raises:
+        ConfigError: values that describe no waveform, unknown keys beside its kind, or its fields without its kind.
     """
     values = dict(mapping)
     given = values.get(key)
-    if isinstance(given, str):
-        names = [item.name for item in fields(Waveform) if item.name != "kind" and item.name in values]
-        values[key] = Waveform.from_mapping({"kind": given, **{name: values.pop(name) for name in names}})
-    elif isinstance(given, Mapping):
+    if isinstance(given, Mapping):
         values[key] = Waveform.from_mapping(given)
+    wave_fields = [item.name for item in fields(Waveform) if item.name != "kind"]
+    if isinstance(given, str):
+        known = [*(item.name for item in fields(owner)), *wave_fields]
+        for name in values:
+            if name not in known:
+                raise ConfigError(f"Unknown key {name!r}.{suggestion(name, known)}")
+        beside = {name: values.pop(name) for name in wave_fields if name in values}
+        values[key] = Waveform.from_mapping({"kind": given, **beside})
+    elif key not in values and not values.keys().isdisjoint(wave_fields):
+        raise ConfigError(f"Missing key {key!r}, the kind of the waveform: one of {', '.join(WAVEFORM_KINDS)}.")
     return values

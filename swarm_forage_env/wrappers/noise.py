@@ -193,7 +193,7 @@ class SensorNoiseConfig(WrapperConfig):
 
         A waveform in place of a sigma is read as by `signals.gather_waveform`; groups may be one text, joined by "+".
         """
-        values = gather_waveform(mapping, "sigma")
+        values = gather_waveform(mapping, "sigma", cls)
         if isinstance(values.get("groups"), str):
             values["groups"] = values["groups"].split("+")
         sigmas = values.get("sigmas")
@@ -232,7 +232,7 @@ class ActuatorNoiseConfig(WrapperConfig):
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "ActuatorNoiseConfig":
         """Build the configuration from plain values; a waveform as `signals.gather_waveform` reads it."""
-        return from_mapping(cls, gather_waveform(mapping, "sigma"))
+        return from_mapping(cls, gather_waveform(mapping, "sigma", cls))
 
 
 def noise_levels(

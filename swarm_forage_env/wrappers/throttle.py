@@ -97,7 +97,7 @@ class ThrottleConfig(WrapperConfig):
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "ThrottleConfig":
         """Build the configuration from plain values; the waveform as `signals.gather_waveform` reads it."""
-        return from_mapping(cls, gather_waveform(mapping, "waveform"))
+        return from_mapping(cls, gather_waveform(mapping, "waveform", cls))
 
 
 def square_throttles() -> tuple[ThrottleConfig, ...]:

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 import metrics
 from swarm_forage_env.config import ConfigError, to_mapping
 from swarm_forage_env.signals import WAVEFORM_KINDS, Waveform, gather_waveform
-from swarm_forage_env.wrappers.throttle import IDEAL_THROTTLE, sine_throttles, square_throttles
+from swarm_forage_env.wrappers.noise import ActuatorNoiseConfig
+from swarm_forage_env.wrappers.throttle import IDEAL_THROTTLE, ThrottleConfig, sine_throttles, square_throttles
 
 DT_S = 0.2
 SAMPLES = range(1_000, 50_001, 1_000)
@@ -174,10 +175,10 @@ def test_waveforms_survive_json(kind):
 def test_a_waveform_may_be_named_with_its_fields_beside_it():
     flat = {"waveform": "square", "amplitude": 0.2, "period_s": 5_000, "carriers": True}
     expected = Waveform(kind="square", amplitude=0.2, period_s=5_000)
-    assert gather_waveform(flat, "waveform") == {"waveform": expected, "carriers": True}
+    assert gather_waveform(flat, "waveform", ThrottleConfig) == {"waveform": expected, "carriers": True}
     nested = {"waveform": {"kind": "square", "amplitude": 0.2, "period_s": 5_000}, "carriers": True}
-    assert gather_waveform(nested, "waveform") == {"waveform": expected, "carriers": True}
-    assert gather_waveform({"sigma": 0.1}, "sigma") == {"sigma": 0.1}
+    assert gather_waveform(nested, "waveform", ThrottleConfig) == {"waveform": expected, "carriers": True}
+    assert gather_waveform({"sigma": 0.1}, "sigma", ActuatorNoiseConfig) == {"sigma": 0.1}
     assert flat["waveform"] == "square", "the given mapping is left alone"
 
 
