@@ -247,7 +247,8 @@ def record(
     )
     spec = plan_runs(options, (controller,), n_seeds=1, first_seed=seed)[0]
     try:
-        with Progress(console=Console(stderr=True), transient=True) as bar:
+        screen = Console(stderr=True)
+        with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
             task = bar.add_task("pictures")
             written = record_run(
                 spec.scenario,
@@ -271,7 +272,3 @@ def _console() -> Console:
     if not console.is_terminal:
         console.width = _WIDTH_WITHOUT_TERMINAL
     return console
-
-
-if __name__ == "__main__":
-    main()
