@@ -201,7 +201,7 @@ def follow_events(
     elif senses.event == _CACHE_TOO_NEAR:
         remember_cache(robot, memory, row[c.event_cache : c.event_cache + CACHE_FIELDS], c)
         if robot.activity == WAIT_DROP:
-            start_carrying(robot, TRANSPORT)
+            start_carrying(robot, loaded)
     elif robot.activity == WAIT_PICKUP and SOURCE[task] == _CACHE and not cache_is_known(robot, c, memory):
         restart_acquiring(robot)  # others have emptied the cache too far
 

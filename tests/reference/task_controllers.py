@@ -169,7 +169,7 @@ class ReferenceTaskRobot(ReferenceRobot):
             if serial:
                 self.know(serial, cell, count, density=1.0 - RHO)
             if self.state == "wait for drop":
-                self.set_out("transport")
+                self.set_out(onward)
         elif self.state == "wait for pick-up" and JOBS[self.job][0] == "cache" and not self.valid():
             self.restart()
 
