@@ -177,13 +177,18 @@ def clear_centre(
     """Push a cache centre clear of `obstacles`, or None after `MAX_PASSES` passes.
 
     Each pass wraps the centre back to at least D from the border and shifts it by one cell in x and in y, with random
-    signs, for every obstacle that its square overlaps; a pass without overlap accepts.
+    signs, for every obstacle that its square overlaps; a pass without overlap accepts. The centre also keeps to the
+    cells on which objects may lie, because the last object of a cache is left there (only caches with a side below
+    15 % of the arena can come near those limits).
     """
     nx, ny = config.arena.n_cells
     margin = round(config.cache_side_nominal_m / CELL_M)
+    area = config.arena.distributable_cells
+    x_low, x_high = max(margin, area[0]), min(nx - margin, area[2]) - 1
+    y_low, y_high = max(margin, area[1]), min(ny - margin, area[3]) - 1
     x, y = centre_cell
     for _ in range(MAX_PASSES):
-        x, y = min(max(x, margin), nx - 1 - margin), min(max(y, margin), ny - 1 - margin)
+        x, y = min(max(x, x_low), x_high), min(max(y, y_low), y_high)
         overlapped = 0
         for obstacle in obstacles:
             if overlap_cells(cache_box((x, y), config.cache_side_cells), obstacle):

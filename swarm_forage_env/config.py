@@ -289,10 +289,11 @@ class ScenarioConfig:
     horizon_s: float = 10_000.0
     interval_s: float = 200.0
     """Length of a recording interval."""
-    physics_substeps: tuple[float, ...] = (0.7, 0.15, 0.15)
+    physics_substeps: tuple[float, ...] = (0.5, 0.2, 0.15, 0.15)
     """Shares of a tick that Chipmunk steps by. Free motion is exact for any; contacts are met one substep late, so the
     last ones bound how deep robots are pushed into each other when a tick ends: 3 % of a diameter for two robots
-    driving head-on, where five equal substeps leave 4 % and one leaves 30 %
+    driving head-on, where five equal substeps leave 4 % and one leaves 24 %. It takes at least three substeps after a
+    contact to settle a crowd: with (0.7, 0.15, 0.15) it squeezes robots through walls
     (`tests/science/test_physics_convergence.py`)."""
     quirks: Quirks = field(default_factory=Quirks)
 

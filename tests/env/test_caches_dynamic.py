@@ -207,19 +207,19 @@ boxes = st.tuples(st.integers(0, 140), st.integers(0, 70), st.integers(1, 20), s
     obstacles=st.lists(boxes, max_size=6),
     seed=st.integers(0, 99),
 )
-def test_an_accepted_centre_is_clear_and_away_from_the_border(centre, obstacles, seed):
+def test_an_accepted_centre_is_clear_and_a_place_for_an_object(centre, obstacles, seed):
     config = scenario("warehouse_small", caches="dynamic", side_share=0.05)
     accepted = clear_centre(centre, config, obstacles, np.random.default_rng(seed))
-    margin = round(config.cache_side_nominal_m / 0.2)
-    clamped = min(max(centre[0], margin), 159 - margin), min(max(centre[1], margin), 79 - margin)
+    # Objects may lie in the cells 24 .. 136 and 12 .. 68; with D = 1.6 m = 8 cells the border is farther away.
+    clamped = min(max(centre[0], 24), 136), min(max(centre[1], 12), 68)
     untouched = all(overlap_cells(cache_box(clamped, config.cache_side_cells), obstacle) == 0 for obstacle in obstacles)
     if untouched:
         assert accepted == clamped
     if accepted is not None:
         box = cache_box(accepted, config.cache_side_cells)
         assert all(overlap_cells(box, obstacle) == 0 for obstacle in obstacles)
-        assert margin <= accepted[0] <= 159 - margin
-        assert margin <= accepted[1] <= 79 - margin
+        assert 24 <= accepted[0] <= 136
+        assert 12 <= accepted[1] <= 68
 
 
 def test_a_centre_without_room_is_given_up():

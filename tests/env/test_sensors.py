@@ -9,7 +9,6 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.kernels.beams import proximity_reading
 from swarm_forage_env.policy import Event, Grip
 from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
-from swarm_forage_env.sensors import sense, sense_proximity
 from tests.reference import sensing
 from tests.worlds import act, build_cache, cell_centre, lay, load, put, stand, tidy_world
 
@@ -66,9 +65,7 @@ def test_every_slice_equals_its_twin_in_crowded_worlds(caches, seed):
     if caches == "dynamic":
         build_two_caches(env)
     random_events(env, rng)
-    sense_proximity(env.swarm, env.arena._suite)
-    obs = sense(env.swarm, env.objects, env.caches, env.events, env.arena._suite)
-    assert_matches_twin(env, obs)
+    assert_matches_twin(env, env.arena.observe())
 
 
 def build_two_caches(env: ForageEnv) -> None:
@@ -106,7 +103,7 @@ def test_events_and_cargo_are_seen_in_the_step_that_brings_them():
     stand(env, 2, (60, 42))
     act(env, {0: Grip.GRASP, 1: Grip.GRASP, 2: Grip.RELEASE})
     columns = env.layout
-    obs = env.arena._suite.obs
+    obs = env.arena.observe()
     assert obs[:, columns["interacting"]].ravel().tolist() == [1, 1, 1]
     assert_matches_twin(env, obs)
     assert act(env, {0: Grip.GRASP, 1: Grip.GRASP, 2: Grip.RELEASE}) == [
@@ -152,7 +149,7 @@ def test_rows_of_absent_robots_are_zero_and_those_in_repair_are_not():
         put(env, robot, *cell_centre((16, 40 + 2 * robot)))
     env.set_population(active=np.array([True, False, False]), present=np.array([True, True, False]))
     act(env, {})
-    obs = env.arena._suite.obs
+    obs = env.arena.observe()
     np.testing.assert_array_equal(obs[2], np.zeros(env.layout.size))
     assert obs[:, env.layout["active"]].ravel().tolist() == [1, 0, 0]
     assert obs[1, env.layout["ground"]] == pytest.approx([179 / 255] * 4)
@@ -166,7 +163,7 @@ def test_nearest_four_caches_are_listed_nearest_first():
         build_cache(env, [2 * pair, 2 * pair + 1], cell)
     put(env, 0, 12.12, 8.11)  # in cell (60, 40), a little to the upper right
     act(env, {})
-    obs = env.arena._suite.obs
+    obs = env.arena.observe()
     serials = obs[0, env.layout["los_cache"]][::4] * 2**24
     assert serials.tolist() == [1, 2, 6, 4]
     assert_matches_twin(env, obs)

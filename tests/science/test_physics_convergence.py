@@ -1,0 +1,155 @@
+"""How deep robots are pushed into each other, by how a tick is divided: the reason for the default substeps.
+
+Chipmunk moves bodies and resolves contacts afterwards, so a contact is met one substep late. All overlaps are shares
+of a robot's diameter when a tick ends, the only moment at which anything looks at poses.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import pdist
+
+from swarm_forage_env.config import with_overrides
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.physics import Physics
+from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.state import SwarmState
+
+DIAMETER_M = 2 * 0.085036758
+TOLERATED = 0.05
+BASE = scenario("warehouse_small")
+DEFAULT = BASE.physics_substeps
+MIDDLE = (16.0, 8.0)
+
+pytestmark = pytest.mark.slow
+
+
+def equal(n_substeps: int) -> tuple[float, ...]:
+    """A tick divided into equal parts."""
+    return (1.0 / n_substeps,) * n_substeps
+
+
+def deepest(swarm: SwarmState) -> float:
+    """Deepest overlap of any two robots."""
+    return float(1.0 - pdist(swarm.position).min() / DIAMETER_M)
+
+
+def drive(physics: Physics, swarm: SwarmState, heading: np.ndarray) -> None:
+    """One tick at full speed in these directions."""
+    physics.twist[:-1, 0], physics.twist[:-1, 1] = 0.10 * np.cos(heading), 0.10 * np.sin(heading)
+    physics.advance(swarm)
+
+
+def head_on_overlap(substeps: tuple[float, ...]) -> float:
+    """Deepest overlap of two robots that drive at each other, over many starting gaps and sideways offsets."""
+    config = with_overrides(BASE, n_robots=2, physics_substeps=substeps)
+    heading = np.array([0.0, math.pi])
+    worst = 0.0
+    for offset in np.linspace(0.0, 0.95, 12) * DIAMETER_M:
+        for gap in np.linspace(0.0, 0.04, 41):
+            ahead = math.sqrt(DIAMETER_M**2 - offset**2) + gap
+            swarm = SwarmState.empty(2)
+            physics = Physics(config, np.array([MIDDLE, (MIDDLE[0] + ahead, MIDDLE[1] + offset)]), heading)
+            for _ in range(8):
+                drive(physics, swarm, heading)
+                worst = max(worst, deepest(swarm))
+    return worst
+
+
+def crowd_overlap(substeps: tuple[float, ...], n_robots: int = 60, ticks: int = 300) -> float:
+    """Deepest overlap in a crowd in which every robot drives at one point."""
+    rng = np.random.default_rng(0)
+    start = rng.uniform((14.0, 6.0), (18.0, 10.0), (n_robots, 2))
+    while len(pairs := cKDTree(start).query_pairs(DIAMETER_M, output_type="ndarray")):
+        again = np.unique(pairs.max(axis=1))
+        start[again] = rng.uniform((14.0, 6.0), (18.0, 10.0), (len(again), 2))
+    swarm = SwarmState.empty(n_robots)
+    swarm.position[:] = start
+    config = with_overrides(BASE, n_robots=n_robots, physics_substeps=substeps)
+    physics = Physics(config, start, np.zeros(n_robots))
+    worst = 0.0
+    for _ in range(ticks):
+        towards = np.array(MIDDLE) - swarm.position
+        drive(physics, swarm, np.arctan2(towards[:, 1], towards[:, 0]))
+        worst = max(worst, deepest(swarm))
+    return worst
+
+
+@pytest.fixture(scope="module")
+def table() -> dict[int, float]:
+    """Overlap head-on by number of equal substeps."""
+    return {n_substeps: head_on_overlap(equal(n_substeps)) for n_substeps in (1, 2, 3, 4, 5, 10)}
+
+
+def test_overlap_shrinks_with_the_number_of_substeps(table):
+    print("\nequal substeps  deepest overlap head-on")  # noqa: T201 - the table that the choice rests on
+    for n_substeps, overlap in table.items():
+        print(f"{n_substeps:>14}  {overlap:.1%}")  # noqa: T201
+    overlaps = list(table.values())
+    assert overlaps == sorted(overlaps, reverse=True)
+    assert overlaps[-1] < 0.5 * overlaps[1]
+
+
+def test_five_is_the_smallest_number_of_equal_substeps_that_is_tolerable(table):
+    assert [n_substeps for n_substeps, overlap in table.items() if overlap < TOLERATED] == [5, 10]
+
+
+def test_the_default_does_with_fewer_steps_what_five_equal_ones_do(table):
+    assert len(DEFAULT) < 5
+    overlap = head_on_overlap(DEFAULT)
+    assert overlap < TOLERATED
+    assert overlap <= table[5]
+
+
+def test_free_motion_does_not_depend_on_the_substeps():
+    ends = []
+    for substeps in (equal(1), equal(10), DEFAULT):
+        env = ForageEnv(with_overrides(BASE, n_robots=1, n_objects=1, physics_substeps=substeps))
+        env.reset_batch(0)
+        rng = np.random.default_rng(0)
+        start = env.swarm.position[0].copy()
+        for _ in range(50):
+            env.step_batch(np.column_stack((rng.uniform(-0.5, 1.0, (1, 2)), [[1.0]])).astype(np.float32))
+        ends.append((env.swarm.position[0] - start, env.swarm.heading[0]))
+    for moved, heading in ends[1:]:
+        np.testing.assert_allclose(moved, ends[0][0], atol=1e-9)
+        assert heading == pytest.approx(ends[0][1], abs=1e-9)
+    assert np.linalg.norm(ends[0][0]) > 0.1
+
+
+@pytest.mark.parametrize("n_robots", [60, 150])
+def test_a_crowd_that_pushes_to_one_point_hardly_overlaps(n_robots):
+    """Far beyond what a swarm with avoidance does to itself."""
+    assert crowd_overlap(DEFAULT, n_robots) < TOLERATED
+
+
+def test_a_crowd_needs_substeps_after_the_contact():
+    """Why the default is not shorter: two short substeps do for a pair, but not for a crowd."""
+    shorter = (0.7, 0.15, 0.15)
+    assert head_on_overlap(shorter) < TOLERATED
+    assert crowd_overlap(shorter) > 2 * TOLERATED
+
+
+@pytest.mark.parametrize(
+    ("name", "n_robots"), [("warehouse_medium", 200), ("warehouse_small", 400), ("warehouse_small", 1000)]
+)
+def test_robots_that_drive_at_random_hardly_overlap(name, n_robots):
+    """Without any avoidance, in the densities of the study and beyond."""
+    env = ForageEnv(scenario(name, n_robots=n_robots))
+    env.reset_batch(0)
+    rng = np.random.default_rng(0)
+    worst, touching = 0.0, 0
+    command = rng.uniform(-1, 1, (n_robots, 2))
+    for _ in range(2_000):
+        turned = rng.random(n_robots) < 0.02
+        command[turned] = rng.uniform(-1, 1, (n_robots, 2))[turned]
+        env.step_batch(np.column_stack((command, np.ones(n_robots))).astype(np.float32))
+        pairs = cKDTree(env.swarm.position).query_pairs(DIAMETER_M, output_type="ndarray")
+        if len(pairs):
+            touching += len(pairs)
+            apart = np.linalg.norm(np.diff(env.swarm.position[pairs], axis=1)[:, 0], axis=1)
+            worst = max(worst, 1.0 - apart.min() / DIAMETER_M)
+    assert touching > 100
+    assert worst < TOLERATED
