@@ -66,8 +66,8 @@ def turn_heading(
 
 
 @njit(cache=True)
-def noisy_gain(gain: FloatArray, centre: float, factor: float, outer_gain: FloatArray) -> None:
-    """Turn draws (N, 2) with mean `centre` in `gain` into outer_gain * (1 + (draw - centre) * factor), in place."""
-    for i in range(gain.shape[0]):
+def noisy_gain(draws: ObsArray, centre: float, factor: float, outer_gain: FloatArray, wheel_gain: FloatArray) -> None:
+    """Write outer_gain * (1 + (draw - centre) * factor) into `wheel_gain`; all (N, 2)."""
+    for i in range(draws.shape[0]):
         for wheel in range(2):
-            gain[i, wheel] = outer_gain[i, wheel] * (1.0 + (gain[i, wheel] - centre) * factor)
+            wheel_gain[i, wheel] = outer_gain[i, wheel] * (1.0 + (float(draws[i, wheel]) - centre) * factor)

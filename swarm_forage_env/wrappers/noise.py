@@ -9,6 +9,7 @@ import numpy as np
 
 from swarm_forage_env.config import ConfigError, from_mapping, suggestion
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.kernels.gaussian import to_normal
 from swarm_forage_env.kernels.noise import noisy_gain, perturb_readings, turn_heading
 from swarm_forage_env.rng import Stream, stream_rng
 from swarm_forage_env.signals import Signal, Waveform, gather_waveform, require_number
@@ -117,6 +118,7 @@ class ActuatorNoise(SwarmWrapper):
         constant = Waveform(kind="constant", amplitude=sigma) if not isinstance(sigma, Waveform) else sigma
         self._signal = constant.signal(scenario.dt_s)
         self._unit_gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
+        self._draws: ObsArray = np.zeros((scenario.robots.n_robots, 2), np.float32)
         self._gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
 
     def on_reset(self, seed: int) -> None:
@@ -127,19 +129,18 @@ class ActuatorNoise(SwarmWrapper):
         """Multiply this tick's factors into the gains."""
         if not self._is_noisy:
             return wheel_gain
-        gain = self._gain
-        centre = _draw(self._rng, gain, is_uniform=self._is_uniform)
+        centre = _draw(self._rng, self._draws, is_uniform=self._is_uniform)
         factor = max(0.0, self._signal(self.world.tick + 1)) * (_UNIFORM_WIDTH if self._is_uniform else 1.0)
-        noisy_gain(gain, centre, factor, self._unit_gain if wheel_gain is None else wheel_gain)
-        return gain
+        noisy_gain(self._draws, centre, factor, self._unit_gain if wheel_gain is None else wheel_gain, self._gain)
+        return self._gain
 
 
-def _draw(rng: np.random.Generator, out: np.ndarray, *, is_uniform: bool) -> float:
-    """Fill `out` with standard normal draws or with uniform ones in [0, 1); returns their mean."""
+def _draw(rng: np.random.Generator, out: ObsArray, *, is_uniform: bool) -> float:
+    """Fill `out` with standard normal numbers, or with uniform ones in [0, 1); returns their mean."""
+    rng.random(out=out, dtype=np.float32)
     if is_uniform:
-        rng.random(out=out, dtype=out.dtype.type)
         return 0.5
-    rng.standard_normal(out=out, dtype=out.dtype.type)
+    to_normal(out)
     return 0.0
 
 

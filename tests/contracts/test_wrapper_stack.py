@@ -181,9 +181,9 @@ def test_wrappers_without_effect_change_nothing(names):
 # Streams
 
 
-def gains_and_noise(*names: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """What actuator noise multiplies in, and what sensor noise adds, in a stack of these wrappers."""
-    env, gains, noise = ForageEnv(world_config()), [], []
+def wheel_and_sensor_draws(*names: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """What actuator noise and sensor noise draw in a stack of these wrappers."""
+    env, wheels, sensors = ForageEnv(world_config()), [], []
     actions = np.zeros((ROBOTS, 3), np.float32)
     for config in sorted((ACTIVE[name] for name in names), key=lambda config: -config.stack_position):
         env = config.wrap(env)
@@ -193,18 +193,18 @@ def gains_and_noise(*names: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
         wrapper = env
         while not isinstance(wrapper, ForageEnv):
             if isinstance(wrapper, ActuatorNoise):
-                gains.append(wrapper._gain.copy())
+                wheels.append(wrapper._draws.copy())
             elif isinstance(wrapper, SensorNoise):
-                noise.append(wrapper._draws.copy())
+                sensors.append(wrapper._draws.copy())
             wrapper = wrapper.env
-    return gains, noise
+    return wheels, sensors
 
 
 def test_another_wrapper_or_a_lost_robot_shifts_nobodys_randomness():
-    gains, noise = gains_and_noise(*WRAPPERS)  # robots die and break in this one
-    np.testing.assert_array_equal(gains, gains_and_noise("actuator_noise")[0])
-    np.testing.assert_array_equal(noise, gains_and_noise("sensor_noise")[1])
-    np.testing.assert_array_equal(gains, gains_and_noise("actuator_noise", "throttle")[0])
+    wheels, sensors = wheel_and_sensor_draws(*WRAPPERS)  # robots die and break in this one
+    np.testing.assert_array_equal(wheels, wheel_and_sensor_draws("actuator_noise")[0])
+    np.testing.assert_array_equal(sensors, wheel_and_sensor_draws("sensor_noise")[1])
+    np.testing.assert_array_equal(wheels, wheel_and_sensor_draws("actuator_noise", "throttle")[0])
 
 
 # Stacks that would be wrong

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy import special, stats
 
 from swarm_forage_env.config import ConfigError
 from swarm_forage_env.detection import sees_cache, sees_nest, sees_object, sees_obstacle
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.kernels.gaussian import to_normal
 from swarm_forage_env.rng import Stream, stream_rng
 from swarm_forage_env.scenarios import scenario
 from swarm_forage_env.signals import Waveform
@@ -19,7 +21,7 @@ from swarm_forage_env.wrappers.noise import (
     noise_levels,
 )
 from tests.env.fake_world import FakeWorld
-from tests.reference.adversity import noisy_row, standard_draws
+from tests.reference.adversity import by_group, noisy_row
 from tests.worlds import assert_same_world, snapshot, tidy_world
 
 ROBOTS = 200
@@ -105,9 +107,10 @@ def test_equals_the_slow_twin(world):
     heading = rng.uniform(-np.pi, np.pi, ROBOTS)
     obs[:, world.layout["heading"]] = np.column_stack((np.cos(heading), np.sin(heading)))
     seen = noisy(world, obs, 1, sigma=0.2)[0]
-    draws = standard_draws(stream_rng(1, Stream.SENSOR_NOISE), ROBOTS)
-    for robot in range(ROBOTS):
-        expected = noisy_row(obs[robot].tolist(), draws[robot], 0.2, (48.0, 48.0))
+    draws = stream_rng(1, Stream.SENSOR_NOISE).random((ROBOTS, 57), dtype=np.float32)
+    to_normal(draws)
+    for robot, groups in enumerate(by_group(draws)):
+        expected = noisy_row(obs[robot].tolist(), groups, 0.2, (48.0, 48.0))
         np.testing.assert_allclose(seen[robot], expected, rtol=0, atol=2e-6)
 
 
@@ -289,6 +292,30 @@ def test_levels_of_the_study():
     assert {sensors.groups for sensors, _ in warehouses} == {NOISE_GROUPS}
     assert {sensors.groups for sensors, _ in rescue} == {("proximity", "light", "ground", "wheel_speed")}
     assert rescue[-1][0].sigma == 0.10
+
+
+# Draws
+
+
+def test_normal_draws_have_the_normal_distribution_function():
+    steps = np.concatenate((np.arange(0, 2**24, 4099), np.arange(20_000), 2**24 - 1 - np.arange(20_000)))
+    uniform = (steps.astype(np.float32) * np.float32(2.0**-24)).reshape(1, -1)
+    normal = uniform.copy()
+    to_normal(normal)
+    assert np.abs(special.ndtr(normal.astype(np.float64)) - (steps + 0.5) * 2.0**-24).max() < 2e-5
+    assert np.abs(normal).max() == pytest.approx(5.42, abs=0.005)
+    mirrored = ((2**24 - 1 - steps).astype(np.float32) * np.float32(2.0**-24)).reshape(1, -1)
+    to_normal(mirrored)
+    np.testing.assert_allclose(mirrored, -normal, atol=1e-6)
+    rising = np.argsort(steps, kind="stable")
+    assert np.all(np.diff(normal[0, rising]) >= 0.0)
+
+
+def test_normal_draws_are_normal():
+    draws = np.random.default_rng(0).random((1000, 300), dtype=np.float32)
+    to_normal(draws)
+    assert stats.kstest(draws.ravel(), "norm").pvalue > 0.01
+    assert stats.kurtosis(draws.ravel()) == pytest.approx(0.0, abs=4 * np.sqrt(24 / draws.size))
 
 
 # Actuators

@@ -91,11 +91,11 @@ class SlowPopulation:
             self.happen("repair", tick)
 
 
-def standard_draws(rng: np.random.Generator, n_robots: int) -> list[dict[str, list[float]]]:
-    """What `SensorNoise` draws for one tick with all groups noisy: per robot and group."""
+def by_group(draws: np.ndarray) -> list[dict[str, list[float]]]:
+    """What `SensorNoise` draws for one tick with all groups noisy, (N, 57), per robot and group."""
     sizes = {"proximity": 24, "light": 24, "ground": 4, "wheel_speed": 2, "position": 2, "heading": 1}
-    rows = rng.standard_normal((n_robots, sum(sizes.values())), dtype=np.float32).tolist()
     ends = np.cumsum(list(sizes.values())).tolist()
     return [
-        {name: row[end - size : end] for (name, size), end in zip(sizes.items(), ends, strict=True)} for row in rows
+        {name: row[end - size : end] for (name, size), end in zip(sizes.items(), ends, strict=True)}
+        for row in draws.tolist()
     ]
