@@ -42,6 +42,14 @@ Caches = Annotated[
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Any scenario field; may be repeated.")
 ]
+Wrappers = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--wrapper",
+        metavar="NAME:KEY=VALUE,...",
+        help="Disturb the swarm, e.g. sensor_noise:sigma=0.03 or population:death_per_tick=0.0001; may be repeated.",
+    ),
+]
 
 
 def main() -> None:
@@ -93,6 +101,7 @@ def run(
     side: Side = None,
     caches: Caches = None,
     settings: Settings = None,
+    wrappers: Wrappers = None,
     out: Annotated[Path | None, typer.Option(help="Folder for records; default results/SCENARIO.")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON.")] = False,
@@ -114,6 +123,7 @@ def run(
         caches=caches,
         horizon=horizon,
         settings=tuple(settings or ()),
+        wrappers=tuple(wrappers or ()),
     )
     specs = plan_runs(options, split_names(controller), n_seeds=seeds, first_seed=first_seed)
     store = RunStore(out or default_folder(scenario))
@@ -234,6 +244,7 @@ def record(
     side: Side = None,
     caches: Caches = None,
     settings: Settings = None,
+    wrappers: Wrappers = None,
 ) -> None:
     """Film a run."""
     from rich.progress import Progress
@@ -243,7 +254,13 @@ def record(
     from swarm_forage_env.rendering_view import RenderError
 
     options = WorldOptions(
-        scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
+        scenario=scenario,
+        robots=robots,
+        objects=objects,
+        side=side,
+        caches=caches,
+        settings=tuple(settings or ()),
+        wrappers=tuple(wrappers or ()),
     )
     spec = plan_runs(options, (controller,), n_seeds=1, first_seed=seed)[0]
     try:
@@ -259,6 +276,7 @@ def record(
                 speedup=speedup,
                 fps=fps,
                 size_px=size,
+                wrappers=spec.wrappers,
                 progress=lambda done, total: bar.update(task, completed=done, total=total),
             )
     except RenderError as error:

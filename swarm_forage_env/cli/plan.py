@@ -9,6 +9,7 @@ from swarm_forage_env.config import SECTIONS, ConfigError, ScenarioConfig, field
 from swarm_forage_env.policy import policy_class
 from swarm_forage_env.scenarios import scenario
 from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.wrappers.registry import parse_wrapper
 
 ASSUMED_ROBOT_TICKS_PER_S = 0.5e6
 """Speed that estimates assume per core, in robots times ticks per second; our choice: the low end of what scripted
@@ -29,6 +30,8 @@ class WorldOptions:
     horizon: float | None = None
     settings: tuple[str, ...] = ()
     """Words of the form key=value."""
+    wrappers: tuple[str, ...] = ()
+    """Words of the form name:key=value,key=value."""
 
 
 def split_names(text: str) -> tuple[str, ...]:
@@ -110,16 +113,17 @@ def plan_runs(
     """Return one specification per controller and seed.
 
     Raises:
-        ConfigError: see `build_scenario`; or an unknown controller.
+        ConfigError: see `build_scenario`; or an unknown controller or wrapper.
     """
     config, caches = build_scenario(options)
+    wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
     for name in controllers:
         try:
             policy_class(name)
         except ValueError as error:
             raise ConfigError(str(error)) from error
     return tuple(
-        plan_run(config, name, caches=caches, seed=seed)
+        plan_run(config, name, caches=caches, wrappers=wrappers, seed=seed)
         for name in controllers
         for seed in range(first_seed, first_seed + n_seeds)
     )

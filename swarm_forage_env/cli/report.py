@@ -76,8 +76,10 @@ def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[C
 def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummary]) -> Table:
     """Return the table of results, one row per controller."""
     first = specs[0].scenario
+    world = f"{first.name}: {first.robots.n_robots} robots, {first.objects.n_objects} objects, {first.horizon_s:g} s"
+    disturbed = ", ".join(config.name for config in specs[0].wrappers)
     table = Table(
-        title=f"{first.name}: {first.robots.n_robots} robots, {first.objects.n_objects} objects, {first.horizon_s:g} s",
+        title=f"{world}, with {disturbed}" if disturbed else world,
         caption=f"mean over seeds ({LEVEL:.0%} t interval); interference = share of active robot time",
     )
     picks = first.performance == "first_picked"

@@ -130,6 +130,16 @@ def test_set_changes_any_field_with_its_type(command):
     assert world["physics_substeps"] == [0.5, 0.5]
 
 
+def test_wrappers_disturb_the_run_and_are_part_of_its_record(command):
+    words = ("--wrapper", "actuator_noise:sigma=0.1", "--wrapper", "throttle:waveform=constant,amplitude=0.2")
+    code, out, _ = command(*RUN, *words, "--json")
+    assert code == 0
+    record = RunRecord.read(json.loads(out)["runs"][0]["file"])
+    assert record.adversity.tolist() == pytest.approx([0.2, 0.2])
+    assert "4 s, with throttle, actuator_noise" in command(*RUN, *words)[1]
+    assert [wrapper["wrapper"] for wrapper in json.loads(record.spec)["wrappers"]] == ["throttle", "actuator_noise"]
+
+
 @pytest.mark.parametrize("name", sorted(field_sections()))
 def test_every_field_can_be_set_to_the_value_it_has(name):
     from swarm_forage_env.cli.plan import parse_setting
@@ -307,6 +317,8 @@ def test_record_films_a_run(command):
         (("run", "--set", "team=maybe"), "Expected team to be true or false, got 'maybe'"),
         (("run", "--set", "nest_size_m=1"), "Expected nest_size_m to be numbers separated by commas"),
         (("run", "--set", "n_robots=3", "--robots", "4"), "Expected n_robots once"),
+        (("run", "--wrapper", "throtle:amplitude=1"), "Unknown wrapper 'throtle'. Did you mean 'throttle'?"),
+        (("run", "--wrapper", "actuator_noise:sigma"), "Expected the settings of wrapper actuator_noise as key=value"),
         (("run", "--out", "file"), "Expected a folder for run records, got the file file"),
         (("record", "--out", "x.avi"), "ending in .gif or .mp4"),
         (("record",), "Missing option '--out'"),
