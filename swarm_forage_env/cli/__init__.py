@@ -51,6 +51,15 @@ Wrappers = Annotated[
     ),
 ]
 
+ConfigFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        metavar="FILE.toml",
+        help="Scenario fields and wrappers, one table each; what other options say goes before it.",
+    ),
+]
+
 
 def main() -> None:
     """Run the command line and exit; whatever a person got wrong is one line on stderr."""
@@ -102,6 +111,7 @@ def run(
     caches: Caches = None,
     settings: Settings = None,
     wrappers: Wrappers = None,
+    config: ConfigFile = None,
     out: Annotated[Path | None, typer.Option(help="Folder for records; default results/SCENARIO.")] = None,
     jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON.")] = False,
@@ -124,6 +134,7 @@ def run(
         horizon=horizon,
         settings=tuple(settings or ()),
         wrappers=tuple(wrappers or ()),
+        config_file=config,
     )
     specs = plan_runs(options, split_names(controller), n_seeds=seeds, first_seed=first_seed)
     store = RunStore(out or default_folder(scenario))
@@ -245,6 +256,7 @@ def record(
     caches: Caches = None,
     settings: Settings = None,
     wrappers: Wrappers = None,
+    config: ConfigFile = None,
 ) -> None:
     """Film a run."""
     from rich.progress import Progress
@@ -261,6 +273,7 @@ def record(
         caches=caches,
         settings=tuple(settings or ()),
         wrappers=tuple(wrappers or ()),
+        config_file=config,
     )
     spec = plan_runs(options, (controller,), n_seeds=1, first_seed=seed)[0]
     try:

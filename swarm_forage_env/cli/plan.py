@@ -1,10 +1,11 @@
 """From command-line words to run specifications. Everything a person can get wrong raises a ConfigError here."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
+from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.config import SECTIONS, ConfigError, ScenarioConfig, field_sections, suggestion
 from swarm_forage_env.policy import policy_class
 from swarm_forage_env.scenarios import scenario
@@ -32,6 +33,8 @@ class WorldOptions:
     """Words of the form key=value."""
     wrappers: tuple[str, ...] = ()
     """Words of the form name:key=value,key=value."""
+    config_file: Path | None = None
+    """TOML file with scenario fields and wrappers; the other options go before it."""
 
 
 def split_names(text: str) -> tuple[str, ...]:
@@ -46,8 +49,14 @@ def split_names(text: str) -> tuple[str, ...]:
     return names
 
 
-def build_scenario(options: WorldOptions) -> tuple[ScenarioConfig, str | None]:
+def build_scenario(
+    options: WorldOptions, file_fields: Mapping[str, Any] | None = None
+) -> tuple[ScenarioConfig, str | None]:
     """Return the scenario, and which caches were asked for (None = those the policy is made for).
+
+    Args:
+        options: What the command line says.
+        file_fields: Scenario fields that hold where the command line says nothing.
 
     Raises:
         ConfigError: unknown names, values of a wrong type, or a world that cannot be.
@@ -65,6 +74,7 @@ def build_scenario(options: WorldOptions) -> tuple[ScenarioConfig, str | None]:
             f"Expected --side with search_and_rescue only, got it with {options.scenario}; "
             "other arenas change by --set width_m=... and --set height_m=..."
         )
+    overrides = {**(file_fields or {}), **overrides}
     config = scenario(options.scenario, **overrides)
     return config, overrides.get("caches")
 
@@ -113,10 +123,14 @@ def plan_runs(
     """Return one specification per controller and seed.
 
     Raises:
-        ConfigError: see `build_scenario`; or an unknown controller or wrapper.
+        ConfigError: see `build_scenario` and `read_config`; or an unknown controller or wrapper.
+        OSError: the configuration file cannot be read.
     """
-    config, caches = build_scenario(options)
+    file_fields, file_wrappers = ({}, ()) if options.config_file is None else read_config(options.config_file)
+    config, caches = build_scenario(options, file_fields)
     wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
+    named = {wrapper.name for wrapper in wrappers}
+    wrappers += tuple(wrapper for wrapper in file_wrappers if wrapper.name not in named)
     for name in controllers:
         try:
             policy_class(name)

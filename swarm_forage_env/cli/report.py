@@ -32,9 +32,8 @@ class Estimate:
     high: float
 
     def __str__(self) -> str:
-        if math.isnan(self.low):
-            return f"{self.mean:.2f} (n/a)"
-        return f"{self.mean:.2f} ({self.low:.2f} to {self.high:.2f})"
+        half = self.high - self.mean
+        return f"{self.mean:.2f} ± " + ("n/a" if math.isnan(half) else f"{half:.2f}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,13 +79,13 @@ def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummar
     disturbed = ", ".join(config.name for config in specs[0].wrappers)
     table = Table(
         title=f"{world}, with {disturbed}" if disturbed else world,
-        caption=f"mean over seeds ({LEVEL:.0%} t interval); interference = share of active robot time",
+        caption=f"± {LEVEL:.0%} t interval over seeds; interference: share of active robot time",
     )
     picks = first.performance == "first_picked"
     for name in ("controller", "caches"):
         table.add_column(name)
-    numbers = ["runs", *(["first pick-ups / 1,000 s"] if picks else []), "deliveries / 1,000 s"]
-    for name in (*numbers, "interference", "simulated s / wall s"):
+    numbers = ["runs", *(["first pick-ups\nper 1,000 s"] if picks else []), "deliveries\nper 1,000 s"]
+    for name in (*numbers, "interference", "simulated s\nper wall s"):
         table.add_column(name, justify="right")
     for row in summaries:
         rates = [*([str(row.first_pickups_per_1000_s)] if picks else []), str(row.deliveries_per_1000_s)]

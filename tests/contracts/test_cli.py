@@ -40,7 +40,7 @@ def test_run_shows_a_table_and_keeps_records_and_a_picture(command):
     code, out, err = command(*RUN, "--seeds", "2")
     assert code == 0
     assert "warehouse_small: 3 robots, 20 objects, 4 s" in out
-    for word in ("random", "none", "deliveries / 1,000 s", "interference", "simulated s / wall s", "95% t interval"):
+    for word in ("random", "none", "deliveries", "per 1,000 s", "interference", "simulated s", "± 95% t interval"):
         assert word in out
     folder = Path("results/warehouse_small")
     assert [record.seed for record in sorted(load(folder), key=lambda record: record.seed)] == [0, 1]
@@ -50,14 +50,14 @@ def test_run_shows_a_table_and_keeps_records_and_a_picture(command):
 
 def test_a_single_seed_has_no_interval(command):
     _, out, _ = command(*RUN)
-    assert "0.00 (n/a)" in out
+    assert "0.00 ± n/a" in out
 
 
 def test_first_pickups_are_shown_where_they_are_the_performance(command):
     words = ("run", "--controller", "random", "--scenario", "search_and_rescue", "--side", "16", "--jobs", "1")
     code, out, _ = command(*words, "--horizon", "4", "--set", "interval_s=2")
     assert code == 0
-    assert "first pick-ups / 1,000 s" in out
+    assert "first pick-ups" in out
     assert "12 robots, 80 objects" in out
 
 
