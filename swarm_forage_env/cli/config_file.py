@@ -1,0 +1,37 @@
+"""What `--config FILE.toml` says: fields of the scenario and wrappers, one table each."""
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from swarm_forage_env.config import ConfigError
+from swarm_forage_env.wrappers.registry import wrappers_from_mapping
+
+if TYPE_CHECKING:
+    from swarm_forage_env.wrappers.base import WrapperConfig
+
+
+def read_config(path: Path) -> "tuple[dict[str, Any], tuple[WrapperConfig, ...]]":
+    """Read a configuration file.
+
+    Args:
+        path: TOML file. Its table `scenario` holds scenario fields by name; every other table is a wrapper.
+
+    Returns:
+        Scenario fields, and wrapper configurations.
+
+    Raises:
+        ConfigError: no TOML, or tables that no wrapper has or refuses; names the file.
+        OSError: the file cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            tables = tomllib.load(file)
+        fields = tables.pop("scenario", {})
+        if not isinstance(fields, Mapping):
+            raise ConfigError(f"Expected scenario to be a table of fields, got {fields!r}.")
+        wrappers = wrappers_from_mapping(tables)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, ConfigError) as error:
+        raise ConfigError(f"Cannot use {path}: {error}") from error
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}, wrappers

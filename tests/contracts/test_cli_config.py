@@ -1,0 +1,94 @@
+"""`swarm-forage run --config FILE.toml`: scenario fields and wrappers from a file."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env import cli
+from swarm_forage_env.study.store import load
+
+CONFIG = """
+[scenario]
+n_robots = 3
+n_objects = 20
+horizon_s = 4.0
+interval_s = 2
+physics_substeps = [0.5, 0.5]
+
+[throttle]
+waveform = "constant"
+amplitude = 0.2
+
+[actuator_noise]
+sigma = 0.1
+"""
+
+
+@pytest.fixture
+def command(tmp_path, monkeypatch, capsys):
+    """Run with world.toml in an empty folder; returns exit code, stdout, stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(text, *words):
+        Path("world.toml").write_text(text)
+        monkeypatch.setattr(sys, "argv", ["swarm-forage", "run", "--controller", "random", "--jobs", "1", *words])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        shown = capsys.readouterr()
+        return end.value.code or 0, shown.out, shown.err
+
+    return call
+
+
+def stored_spec() -> dict:
+    """The specification of the one stored run."""
+    (record,) = load(Path("results/warehouse_small"))
+    return json.loads(record.spec)
+
+
+def test_a_file_gives_scenario_fields_and_wrappers(command):
+    assert command(CONFIG, "--config", "world.toml")[0] == 0
+    world, wrappers = stored_spec()["scenario"], stored_spec()["wrappers"]
+    assert (world["robots"]["n_robots"], world["objects"]["n_objects"], world["horizon_s"]) == (3, 20, 4.0)
+    assert world["physics_substeps"] == [0.5, 0.5]
+    assert [(wrapper["wrapper"], wrapper.get("sigma")) for wrapper in wrappers] == [
+        ("throttle", None),
+        ("actuator_noise", 0.1),
+    ]
+
+
+def test_other_options_go_before_the_file(command):
+    words = ("--robots", "2", "--set", "n_objects=9", "--wrapper", "actuator_noise:sigma=0.3")
+    assert command(CONFIG, "--config", "world.toml", *words)[0] == 0
+    world, wrappers = stored_spec()["scenario"], stored_spec()["wrappers"]
+    assert (world["robots"]["n_robots"], world["objects"]["n_objects"], world["horizon_s"]) == (2, 9, 4.0)
+    assert [(wrapper["wrapper"], wrapper.get("sigma")) for wrapper in wrappers] == [
+        ("throttle", None),
+        ("actuator_noise", 0.3),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("n_robots =", "Cannot use world.toml: Invalid value"),
+        ("scenario = 3", "Cannot use world.toml: Expected scenario to be a table of fields, got 3"),
+        ("[scenario]\nn_robot = 3", "Unknown scenario field 'n_robot'. Did you mean 'n_robots'?"),
+        ("[throtle]\namplitude = 1", "Cannot use world.toml: Unknown wrapper 'throtle'. Did you mean 'throttle'?"),
+        ("[actuator_noise]\nsigma = -1", "Cannot use world.toml: Expected actuator_noise.sigma >= 0, got -1"),
+    ],
+)
+def test_a_mistake_in_the_file_is_one_line_and_exit_code_2(command, text, complaint):
+    code, out, err = command(text, "--config", "world.toml")
+    assert (code, out) == (2, "")
+    assert complaint in err
+    assert len(err.splitlines()) == 1
+
+
+def test_a_missing_file_is_one_line(command):
+    code, _, err = command(CONFIG, "--config", "nowhere.toml")
+    assert code == 1
+    assert "nowhere.toml" in err
+    assert len(err.splitlines()) == 1
