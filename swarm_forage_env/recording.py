@@ -77,7 +77,7 @@ class RunRecord:
     run_id: Annotated[str, Column("", "hash of the run's specification")]
     scenario: Annotated[str, Column("", "name of the scenario")]
     controller: Annotated[str, Column("", "name of the policy")]
-    n_robots: Annotated[int, Column("", "swarm size N, all rows that can appear")]
+    n_robots: Annotated[int, Column("robots", "swarm size N, all rows that can appear")]
     criterion: Annotated[str, Column("", "what a study varied, 'none' for a single run")]
     criterion_value: Annotated[float, Column("", "value of the criterion")]
     seed: Annotated[int, Column("", "seed of the run")]

@@ -1,0 +1,24 @@
+"""What `metrics` reads by name is what records hold: the border between the two is a list of columns."""
+
+from metrics.study_table import CURVE_COLUMNS
+from swarm_forage_env.recording import schema_table
+
+NOT_RECORDED = {"deaths_per_s", "malfunctions_per_s", "births_per_s", "repairs_per_s"}
+"""Rates are part of a run's specification, not measured; who scores a study adds them."""
+
+
+def recorded_units() -> dict[str, str]:
+    """Unit by column of a record, contributed ones included."""
+    rows = [line.split() for line in schema_table().splitlines()[1:]]
+    return {name: unit for name, _, unit, *_ in rows}
+
+
+def test_every_column_that_measures_read_is_recorded():
+    assert set(CURVE_COLUMNS) - recorded_units().keys() == NOT_RECORDED
+
+
+def test_units_agree():
+    units = recorded_units()
+    for name, column in CURVE_COLUMNS.items():
+        if name not in NOT_RECORDED:
+            assert units[name] == (column.unit or "-"), name
