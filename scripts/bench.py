@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,12 +29,15 @@ from rich.table import Table
 import swarm_forage_env.arena as arena_module
 from swarm_forage_env.config import ScenarioConfig, with_overrides
 from swarm_forage_env.env import parallel_env
+from swarm_forage_env.kernels.gaussian import to_normal
 from swarm_forage_env.physics import Physics
 from swarm_forage_env.policy import load_policy, policy_names
 from swarm_forage_env.rng import Stream, stream_rng
 from swarm_forage_env.scenarios import warehouse_medium, warehouse_small
 from swarm_forage_env.study.run import build_stack, run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.registry import parse_wrapper
 
 OBJECTS_PER_M2 = 0.35
 PHASES = ("physics", "sensing", "policy", "recording", "rest")
@@ -204,11 +207,16 @@ def scaling_rows(ticks: int, repeats: int) -> Iterator[Row]:
     yield Row("CRW, N = 16,384, peak memory", memory, "GiB", "< 2", memory < 2)
 
 
-def _cost_per_robot_tick(scenario: ScenarioConfig, ticks: int) -> float:
-    """Microseconds per robot-tick of the loop alone, after a short run-in."""
+def _cost_per_robot_tick(
+    scenario: ScenarioConfig,
+    ticks: int,
+    wrappers: Sequence[WrapperConfig] = (),
+    beside: Callable[[], object] | None = None,
+) -> float:
+    """Microseconds per robot-tick of the loop alone, after a short run-in; `beside` is called in every tick, too."""
     policy = load_policy("crw")
     spec = run_spec(scenario, "crw", ticks + 20)
-    recorder = build_stack(spec.scenario, reads=getattr(policy, "reads", None))
+    recorder = build_stack(spec.scenario, wrappers, reads=getattr(policy, "reads", None))
     world = recorder.world
     policy.reset(world.task, stream_rng(0, Stream.POLICY))
     obs = recorder.reset_batch(0)
@@ -217,7 +225,45 @@ def _cost_per_robot_tick(scenario: ScenarioConfig, ticks: int) -> float:
         if tick == 20:
             started = time.perf_counter()
         obs, _, _, _ = recorder.step_batch(policy.act(obs, world.active))
+        if beside is not None:
+            beside()
     return (time.perf_counter() - started) / ticks / scenario.robots.n_robots * 1e6
+
+
+def wrapper_rows(ticks: int, repeats: int) -> Iterator[Row]:
+    """What four active wrappers add for 200 robots, and how much of it are the random numbers that they draw.
+
+    The adversities whisper: wrappers work as hard as ever, but the swarm behaves, and so costs, as without them. The
+    draws are measured in place, in a run without wrappers that draws the same numbers in every tick.
+    """
+    whisper = 1e-9
+    wrappers = [
+        parse_wrapper(f"sensor_noise:sigma={whisper}"),
+        parse_wrapper("population:malfunction_per_tick=0.001,repair_per_tick=0.001005556"),
+        parse_wrapper(f"throttle:waveform=sine,amplitude={whisper},offset={whisper},period_s=10000"),
+        parse_wrapper(f"actuator_noise:sigma={whisper}"),
+    ]
+    scenario, rng = warehouse_medium(), np.random.default_rng(0)
+    columns = sum(part.size for part in parallel_env(scenario).layout if part.noise_group) - 1  # heading: one angle
+    readings, wheels = np.zeros((200, columns), np.float32), np.zeros((200, 2), np.float32)
+
+    def draw() -> None:
+        for numbers in (readings, wheels):
+            rng.random(out=numbers, dtype=np.float32)
+            to_normal(numbers)
+
+    _cost_per_robot_tick(scenario, 5, wrappers)
+    shares: list[tuple[float, float]] = []
+    for _ in range(repeats):
+        bare = _cost_per_robot_tick(scenario, ticks)
+        drawing = _cost_per_robot_tick(scenario, ticks, beside=draw)
+        wrapped = _cost_per_robot_tick(scenario, ticks, wrappers)
+        shares.append((drawing / bare - 1.0, wrapped / bare - 1.0))
+    beyond = statistics.median(wrapped - drawing for drawing, wrapped in shares)
+    drawing, wrapped = (statistics.median(column) for column in zip(*shares, strict=True))
+    yield Row("four wrappers, N = 200, over none", 100 * wrapped, "%", "-", None)
+    yield Row("random draws of the wrappers alone", 100 * drawing, "%", "-", None)
+    yield Row("four wrappers beyond their draws", 100 * beyond, "%", "< 15", beyond < 0.15)
 
 
 def start_rows(repeats: int) -> Iterator[Row]:
@@ -244,6 +290,8 @@ def rows(ticks: int, repeats: int, only: str) -> Iterator[Row]:
             yield rate_row(case, scenario, policy, target or None, ticks, repeats)
     if only in "scaling crw, n = 4,096 16,384":
         yield from scaling_rows(ticks, repeats)
+    if only in "four wrappers, n = 200":
+        yield from wrapper_rows(ticks, repeats)
     if only in "dict api":
         rate = agent_steps_per_second(ticks // 4, repeats)
         yield Row("PettingZoo dict API, N = 200", rate / 1e3, "k agent-steps/s", ">= 150", rate >= 150_000)
