@@ -4,8 +4,9 @@
     scripts/bench --quick     fewer repeats, shorter runs
     scripts/bench --only crw  cases whose name contains "crw"
 
-A robot-tick is one robot for one control step of 0.2 s. Machines differ and are shared: compare ratios within one
-table, not single numbers between tables.
+A robot-tick is one robot for one control step of 0.2 s. Times are processor time of the one measuring process, so that
+other work on the machine counts as little as possible. Machines differ: compare ratios within one table, not single
+numbers between tables.
 """
 
 import argparse
@@ -79,9 +80,9 @@ def robot_ticks_per_second(scenario: ScenarioConfig, policy: str, ticks: int, re
     spec = run_spec(scenario, policy, ticks)
     rates = []
     for _ in range(repeats):
-        started = time.perf_counter()
+        started = time.process_time()
         run_one(spec)
-        rates.append(ticks * scenario.robots.n_robots / (time.perf_counter() - started))
+        rates.append(ticks * scenario.robots.n_robots / (time.process_time() - started))
     return statistics.median(rates)
 
 
@@ -91,9 +92,9 @@ def stopwatch(owner: Any, name: str, total: list[float]) -> Iterator[None]:
     original: Callable[..., Any] = getattr(owner, name)
 
     def timed(*args: Any, **options: Any) -> Any:
-        started = time.perf_counter()
+        started = time.process_time()
         result = original(*args, **options)
-        total[0] += time.perf_counter() - started
+        total[0] += time.process_time() - started
         return result
 
     setattr(owner, name, timed)
@@ -120,11 +121,11 @@ def tick_shares(scenario: ScenarioConfig, policy_name: str, ticks: int) -> dict[
         stopwatch(policy, "act", spent["policy"]),
         stopwatch(recorder, "after_step", spent["recording"]),
     ):
-        started = time.perf_counter()
+        started = time.process_time()
         for _ in range(ticks):
             actions = policy.act(obs, world.active)
             obs, _, _, _ = recorder.step_batch(actions, tasks=getattr(policy, "task", None))
-        total = time.perf_counter() - started
+        total = time.process_time() - started
     spent["rest"][0] = total - sum(seconds[0] for seconds in spent.values())
     return {phase: seconds[0] / ticks * 1e6 for phase, seconds in spent.items()}
 
@@ -138,27 +139,27 @@ def agent_steps_per_second(ticks: int, repeats: int) -> float:
     env.step(drawn[0])
     rates = []
     for _ in range(repeats):
-        started = time.perf_counter()
+        started = time.process_time()
         for tick in range(ticks):
             env.step(drawn[tick % len(drawn)])
-        rates.append(ticks * env.num_agents / (time.perf_counter() - started))
+        rates.append(ticks * env.num_agents / (time.process_time() - started))
     return statistics.median(rates)
 
 
 FIRST_TICK = """
 import time
-started = time.perf_counter()
+started = time.process_time()
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import plan_run
 from swarm_forage_env.scenarios import warehouse_small
 run_one(plan_run(warehouse_small(horizon_s=1.0, interval_s=1.0), "crw"))
-print(time.perf_counter() - started)
+print(time.process_time() - started)
 """
 IMPORT = """
 import time
-started = time.perf_counter()
+started = time.process_time()
 import swarm_forage_env
-print(time.perf_counter() - started)
+print(time.process_time() - started)
 """
 PEAK_MEMORY = """
 import resource, sys
@@ -223,11 +224,11 @@ def _cost_per_robot_tick(
     started = 0.0
     for tick in range(ticks + 20):
         if tick == 20:
-            started = time.perf_counter()
+            started = time.process_time()
         obs, _, _, _ = recorder.step_batch(policy.act(obs, world.active))
         if beside is not None:
             beside()
-    return (time.perf_counter() - started) / ticks / scenario.robots.n_robots * 1e6
+    return (time.process_time() - started) / ticks / scenario.robots.n_robots * 1e6
 
 
 def wrapper_rows(ticks: int, repeats: int) -> Iterator[Row]:
