@@ -264,6 +264,7 @@ STUDY_TABLE = [
 ]
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize(("sigma", "obstacle", "object_seen", "area_seen"), STUDY_TABLE)
 def test_decisions_under_the_noise_of_the_study(world, sigma, obstacle, object_seen, area_seen):
     layout, samples = world.layout, 60
