@@ -38,6 +38,11 @@ def test_relative_links_lead_to_files(page):
     assert [target for target in targets if not (page.parent / target).exists()] == []
 
 
+def test_index_lists_every_page():
+    listed = set(re.findall(r"\]\((\w+\.md)\)", (ROOT / "docs/index.md").read_text()))
+    assert {page.name for page in (ROOT / "docs").glob("*.md")} - {"index.md"} == listed
+
+
 def test_readme_table_names_every_scenario():
     from swarm_forage_env import SCENARIO_NAMES, scenario
 
