@@ -169,7 +169,12 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """Say who is at work and who is in the world; see `ForagingArena.set_population`.
 
         `terminated` (N,) names the robots that learners shall see as terminated from the next step on.
+
+        Raises:
+            ValueError: wrong shapes, or a robot that is active but not present.
         """
+        if terminated is not None and terminated.shape != self._terminated.shape:
+            raise ValueError(f"Expected terminated with shape {self._terminated.shape}, got {terminated.shape}.")
         self.arena.set_population(active=active, present=present)
         if terminated is not None:
             self._terminated[:] = terminated
@@ -204,7 +209,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """Advance one tick at array level.
 
         Args:
-            actions: (N, 3) float32, rows of robots that are away included (and ignored).
+            actions: (N, 3) float32, rows of robots that are away included (and ignored); other numbers are converted.
             wheel_gain: (N, 2) factor per wheel on the limited speed; wrappers multiply theirs in.
             tasks: (N,) int8 `policy.Task` codes, if the policy tells them.
 
@@ -212,9 +217,14 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             Observations (N, D) and rewards (N,) in reused buffers, terminated (N,) for the dead, truncated.
 
         Raises:
-            ActionError: wrong shape or an active robot's action that is not finite.
+            ActionError: no numbers, wrong shape, or an active robot's action that is not finite.
         """
         expected = self._actions.shape
+        try:
+            # Kernels are compiled for contiguous float32 only; anything else would be compiled anew, for a minute.
+            actions = np.ascontiguousarray(actions, np.float32)
+        except (TypeError, ValueError) as error:
+            raise ActionError(f"Expected actions with shape (n_robots, 3) = {expected}: {error}.") from error
         if actions.shape != expected:
             raise ActionError(
                 f"Expected actions with shape (n_robots, 3) = {expected}, got {actions.shape}; "

@@ -27,11 +27,13 @@ def run_conserved(env: ForageEnv, policy, ticks: int, *, seed: int, population: 
         assert_conserved(env)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize(("name", "caches", "policy"), RUNS)
 def test_objects_are_conserved(name, caches, policy):
     run_conserved(make(name, caches), fresh(policy), 60, seed=3)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("side_share", [0.03, 0.2])
 @pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
 @pytest.mark.parametrize("name", DENSE)
@@ -56,6 +58,7 @@ def test_objects_are_conserved_as_the_authors_program_does_it(caches):
     run_conserved(ForageEnv(config), BusyPolicy(), 150, seed=2, population=True)
 
 
+@pytest.mark.compiled
 def test_the_busy_runs_do_something():
     """The checks above mean little unless caches form and dissolve, objects move and robots deliver."""
     config = scenario(

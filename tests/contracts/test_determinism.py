@@ -87,6 +87,7 @@ def elsewhere() -> dict[str, str]:
     return json.loads(process.stdout)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize(("name", "caches", "policy"), RUNS)
 def test_a_seed_is_a_run(name, caches, policy, elsewhere):
     env = make(name, caches)

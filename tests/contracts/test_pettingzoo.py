@@ -222,6 +222,31 @@ def test_batches_of_the_wrong_shape(shape):
     assert world.tick == 0
 
 
+def test_batches_of_other_numbers_are_converted():
+    actions = np.random.default_rng(0).integers(-8, 9, (5, 3)) / 8  # exact in float32
+    reference = parallel_env(**SMALL)
+    reference.reset_batch(0)
+    expected = reference.step_batch(actions.astype(np.float32))[0]
+    for other in (
+        actions,
+        np.asfortranarray(actions, np.float32),
+        np.repeat(actions, 2, axis=0)[::2],
+        actions.tolist(),
+    ):
+        world = parallel_env(**SMALL)
+        world.reset_batch(0)
+        np.testing.assert_array_equal(world.step_batch(other)[0], expected)
+
+
+@pytest.mark.parametrize("actions", [[["a", "b", "c"]] * 5, None, [[0.0, 0.0, 0.0]] * 4 + [[0.0]], {}])
+def test_batches_that_are_no_numbers(actions):
+    world = parallel_env(**SMALL)
+    world.reset_batch(0)
+    with pytest.raises(ActionError, match=r"Expected actions with shape \(n_robots, 3\) = \(5, 3\)"):
+        world.step_batch(actions)
+    assert world.tick == 0
+
+
 @pytest.mark.parametrize(
     "action",
     [np.zeros(2), np.zeros((1, 3)), 0.5, "abc", None, np.zeros(3, np.complex128)],

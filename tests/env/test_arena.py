@@ -157,6 +157,14 @@ def test_impossible_populations_are_refused(active, present, message):
     assert env.swarm.carried_object[3] == 0
 
 
+def test_terminated_is_one_flag_per_robot():
+    env = tidy_world()
+    gone = population(env, gone=(1,))
+    with pytest.raises(ValueError, match=r"terminated with shape \(4,\), got \(3,\)"):
+        env.set_population(**gone, terminated=np.ones(3, np.bool_))
+    assert env.swarm.present.all()
+
+
 def test_only_permanent_death_terminates():
     env = tidy_world()
     away = population(env, away=(0,), gone=(1,))
