@@ -107,7 +107,12 @@ def _register_environments() -> None:
         kwargs = {"scenario": name}
         pettingzoo.register("parallel", env_id, "swarm_forage_env.env:parallel_env", kwargs=kwargs)
         pettingzoo.register("aec", env_id, "swarm_forage_env.env:env", kwargs=kwargs)
-        gymnasium.register(env_id, "swarm_forage_env.adapters:JointForageEnv", kwargs=kwargs)
+        gymnasium.register(
+            env_id,
+            "swarm_forage_env.adapters:JointForageEnv",
+            kwargs=kwargs,
+            vector_entry_point="swarm_forage_env.adapters:SwarmVectorEnv",
+        )
 
 
 _register_environments()

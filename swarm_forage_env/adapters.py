@@ -1,18 +1,30 @@
-"""The swarm as one Gymnasium environment: joint observations, joint actions, one reward."""
+"""Gymnasium views of the swarm: one agent for all robots, or every robot a sub-environment of a vector environment."""
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
 
-from swarm_forage_env.config import ScenarioConfig
-from swarm_forage_env.env import ForageEnv, parallel_env
-from swarm_forage_env.types import ActionArray, ObsArray
+from swarm_forage_env.config import ScenarioConfig, with_overrides
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.learning.arenas import ArenaBatch, ArenaStep
+from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.processes import ArenaProcesses
+from swarm_forage_env.learning.worlds import World, WorldPlan
+from swarm_forage_env.scenarios import scenario as preset
+from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.wrappers.base import WrapperConfig
 
-if TYPE_CHECKING:
-    from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+
+def _configured(scenario: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
+    if isinstance(scenario, ScenarioConfig):
+        return with_overrides(scenario, **overrides)
+    return preset(scenario, **overrides)
 
 
 class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
@@ -29,7 +41,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
         self,
         scenario: str | ScenarioConfig = "warehouse_small",
         *,
-        wrappers: "Iterable[WrapperConfig]" = (),
+        wrappers: Iterable[WrapperConfig] = (),
         max_cycles: int | None = None,
         render_mode: str | None = None,
         **overrides: Any,
@@ -46,21 +58,35 @@ class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
         Raises:
             ConfigError: unknown preset or field, or values that describe no world.
         """
-        self.world = parallel_env(scenario, max_cycles=max_cycles, render_mode=render_mode, **overrides)
+        self._world = World(
+            WorldPlan(
+                scenario=_configured(scenario, overrides),
+                wrappers=tuple(wrappers),
+                max_cycles=max_cycles,
+                render_mode=render_mode,
+            )
+        )
         self.render_mode = render_mode
-        self._env: ForageEnv | SwarmWrapper = self.world
-        for config in sorted(wrappers, key=lambda config: config.stack_position, reverse=True):
-            self._env = config.wrap(self._env)
         n_robots = self.world.scenario.robots.n_robots
         self.observation_space = spaces.Box(-1.0, 1.0, (n_robots, self.world.layout.size), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (n_robots, 3), np.float32)
 
+    @property
+    def world(self) -> ForageEnv:
+        """The parallel environment at the bottom; another one after a reset that changed the scenario."""
+        return self._world.base
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[ObsArray, dict[str, Any]]:
-        """Start an episode; returns observations (N, D) and info. `options` is accepted and ignored."""
+        """Start an episode; returns observations (N, D) and info.
+
+        Args:
+            seed: Seed of this episode and of the sequence of those after it.
+            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `World.reset`.
+        """
         super().reset(seed=seed)
-        return self._env.reset_batch(seed).copy(), self._info()
+        return self._world.reset(seed, options).copy(), self._info()
 
     def step(self, action: ActionArray) -> tuple[ObsArray, float, bool, bool, dict[str, Any]]:
         """Advance one tick.
@@ -71,7 +97,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
         Raises:
             ActionError: wrong shape or an active robot's action that is not finite.
         """
-        obs, reward, terminated, truncated = self._env.step_batch(np.asarray(action, np.float32))
+        obs, reward, terminated, truncated = self._world.step(np.asarray(action, np.float32))
         # float64 before the sum: the total of a large swarm should not depend on the order of rows.
         return obs.copy(), float(reward.sum(dtype=np.float64)), bool(terminated.all()), truncated, self._info()
 
@@ -81,7 +107,179 @@ class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
 
     def close(self) -> None:
         """Close the wrapped stack."""
-        self._env.close()
+        self._world.env.close()
 
     def _info(self) -> dict[str, Any]:
         return {"active": self.world.active.copy()}
+
+
+class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
+    """Every robot of every arena as a sub-environment that one shared policy acts in.
+
+    Sub-environment `a * N + i` is robot i of arena a. How rows end, stay absent and start anew is told in
+    `learning.arenas`: an arena starts anew within the step that ends it (`AutoresetMode.SAME_STEP`), so that
+    `infos["final_obs"]` holds the last observations; a dead robot terminates once and is a row of zeros until then.
+
+    Infos are arrays over rows, with masks under the name with an underscore in front, as Gymnasium does it:
+    `active` always; `final_obs` (objects, None elsewhere) and `final_info` ({}) of rows that are done; `episode`
+    (return "r", steps "l", seconds since creation "t") of rows whose episode ended.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - declared like this by Gymnasium
+        **ForageEnv.metadata,
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(
+        self,
+        scenario: str | ScenarioConfig = "warehouse_small",
+        *,
+        num_envs: int = 1,
+        n_arenas: int | None = None,
+        n_processes: int = 0,
+        interface: InterfaceConfig | None = None,
+        wrappers: Iterable[WrapperConfig] = (),
+        max_cycles: int | None = None,
+        render_mode: str | None = None,
+        **overrides: Any,
+    ) -> None:
+        """Create the environment.
+
+        Args:
+            scenario: Name of a preset, or a complete configuration.
+            num_envs: Robots in all arenas together, a multiple of the scenario's; 1, which is what
+                `gymnasium.make_vec` says when nobody asked for a number, leaves the choice to `n_arenas`.
+            n_arenas: Arenas that run side by side; default as many as `num_envs` needs, at least one.
+            n_processes: Processes that the arenas are spread over; 0 = all in this process.
+            interface: What a learner sees and does; default full observations and continuous actions.
+            wrappers: What disturbs the swarm (noise, throttle, population ...), in any order.
+            max_cycles: Ticks until truncation; default the scenario's horizon.
+            render_mode: None or "rgb_array".
+            overrides: Scenario fields by name (`n_robots=20`).
+
+        Raises:
+            ConfigError: unknown preset or field, or values that describe no world.
+            ValueError: num_envs and n_arenas that do not fit together, or more processes than arenas.
+        """
+        choice = interface or InterfaceConfig()
+        plan = WorldPlan(
+            scenario=_configured(scenario, overrides),
+            wrappers=tuple(wrappers),
+            max_cycles=max_cycles,
+            render_mode=render_mode,
+            reads=choice.reads,
+        )
+        arenas = _number_of_arenas(num_envs, n_arenas, plan.scenario.robots.n_robots)
+        self._arenas: ArenaBatch | ArenaProcesses = (
+            ArenaProcesses(plan, choice, arenas, n_processes) if n_processes else ArenaBatch(plan, choice, arenas)
+        )
+        self.interface = self._arenas.interface
+        self.n_arenas, self.n_robots = arenas, self._arenas.n_robots
+        self.num_envs = self._arenas.n_rows
+        self.render_mode = render_mode
+        self.single_observation_space = self.interface.observation_space
+        self.single_action_space = self.interface.action_space
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._started = time.perf_counter()
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[ObsArray, dict[str, Any]]:
+        """Start an episode in every arena; returns observations (num_envs, d) and infos.
+
+        Args:
+            seed: Arena a runs seed + a; or one seed per arena.
+            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `World.reset`.
+
+        Raises:
+            ValueError: a list of seeds that is not as long as there are arenas.
+        """
+        if seed is None or isinstance(seed, int | np.integer):
+            seeds = [None if seed is None else int(seed) + arena for arena in range(self.n_arenas)]
+        else:
+            seeds = list(seed)
+        if len(seeds) != self.n_arenas:
+            raise ValueError(f"Expected one seed per arena ({self.n_arenas}), got {len(seeds)}.")
+        super().reset(seed=seeds[0])
+        obs, active = self._arenas.reset(seeds, [options] * self.n_arenas)
+        return obs, self._with_masks({"active": active})
+
+    def step(self, actions: np.ndarray) -> tuple[ObsArray, np.ndarray, BoolArray, BoolArray, dict[str, Any]]:
+        """Step every arena by one decision.
+
+        Args:
+            actions: (num_envs,) or (num_envs, k); those of absent robots are ignored.
+
+        Returns:
+            Observations (num_envs, d), rewards, terminations, truncations (num_envs,) and infos, all new.
+        """
+        step = self._arenas.step(np.asarray(actions, self.single_action_space.dtype))
+        return step.obs, step.rewards, step.terminated, step.truncated, self._infos(step)
+
+    def _infos(self, step: ArenaStep) -> dict[str, Any]:
+        infos = self._with_masks({"active": step.active})
+        if len(step.ended) == 0:
+            return infos
+        is_done = np.zeros(self.num_envs, np.bool_)
+        is_done[step.ended] = True
+        final_obs = np.full(self.num_envs, None, object)
+        for row, obs in zip(step.ended.tolist(), step.final_obs, strict=True):
+            final_obs[row] = obs
+        infos |= {"final_obs": final_obs, "_final_obs": is_done, "final_info": {}, "_final_info": is_done.copy()}
+        rows = step.ended[step.is_episode]
+        if len(rows):
+            is_episode = np.zeros(self.num_envs, np.bool_)
+            is_episode[rows] = True
+            returns, lengths = np.zeros(self.num_envs, np.float32), np.zeros(self.num_envs, np.int32)
+            returns[rows], lengths[rows] = step.returns[step.is_episode], step.lengths[step.is_episode]
+            seconds = np.where(is_episode, round(time.perf_counter() - self._started, 6), 0.0)
+            infos |= {"episode": {"r": returns, "l": lengths, "t": seconds}, "_episode": is_episode}
+        return infos
+
+    def _with_masks(self, columns: dict[str, np.ndarray]) -> dict[str, Any]:
+        return columns | {f"_{name}": np.ones(self.num_envs, np.bool_) for name in columns}
+
+    def action_masks(self) -> BoolArray:
+        """Return which discrete actions make sense now, (num_envs, number of actions)."""
+        return self._arenas.action_masks()
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Return one picture (height, width, 3) per arena when created with render_mode="rgb_array", else None."""
+        if self.render_mode is None:
+            return None
+        return tuple(picture for picture in self._arenas.render() if picture is not None)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Call a method of every arena's environment, or read an attribute; returns one result per arena."""
+        return tuple(self._arenas.call_method(name, range(self.n_arenas), *args, **kwargs))
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute of every arena's environment."""
+        return tuple(self._arenas.get_attribute(name, range(self.n_arenas)))
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of every arena's environment: one value for all, or a list or tuple of one per arena."""
+        per_arena = list(values) if isinstance(values, list | tuple) else [values] * self.n_arenas
+        if len(per_arena) != self.n_arenas:
+            raise ValueError(f"Expected one value per arena ({self.n_arenas}), got {len(per_arena)}.")
+        for arena, value in enumerate(per_arena):
+            self._arenas.set_attribute(name, value, [arena])
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close all arenas and end their processes."""
+        self._arenas.close()
+
+
+def _number_of_arenas(num_envs: int, n_arenas: int | None, n_robots: int) -> int:
+    if n_arenas is None:
+        n_arenas = 1 if num_envs == 1 else num_envs // n_robots
+    if num_envs not in (1, n_arenas * n_robots):
+        raise ValueError(
+            f"Expected num_envs to be a multiple of n_robots = {n_robots} (one sub-environment per robot), "
+            f"and n_arenas times that where both are given; got num_envs = {num_envs}, n_arenas = {n_arenas}."
+        )
+    return n_arenas
