@@ -41,11 +41,12 @@ class Drive:
             twist: (N + 1, 3) written: world velocity x, y in m/s and turn rate in rad/s.
 
         Raises:
-            ActionError: an active robot's action is NaN or infinite.
+            ActionError: an active robot's action or gain is NaN or infinite.
         """
+        gain = self._unit_gain if wheel_gain is None else wheel_gain
         bad = drive(
             actions,
-            self._unit_gain if wheel_gain is None else wheel_gain,
+            gain,
             swarm.active,
             swarm.pending_kind,
             swarm.facing,
@@ -56,5 +57,6 @@ class Drive:
         )
         if bad >= 0:
             raise ActionError(
-                f"Expected finite actions, got {actions[bad].tolist()} for robot_{bad}; nothing was stepped."
+                f"Expected finite actions and wheel gains, got {actions[bad].tolist()} and {gain[bad].tolist()} for "
+                f"robot_{bad}; the world was not stepped."
             )

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarm_forage_env.actuators import Drive
 from swarm_forage_env.caches import create_static_caches, found_caches, n_cache_slots, restore_static_caches
-from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env.config import ConfigError, ScenarioConfig, suggestion
 from swarm_forage_env.interactions import Interactions
 from swarm_forage_env.interference import mark_interference
 from swarm_forage_env.kernels.floor import CELLS_PER_M
@@ -38,13 +38,20 @@ class ForagingArena:
         Args:
             config: The scenario.
             reads: Observation slices that are looked at; the sensors of others may stay zero. Default: all.
+
+        Raises:
+            ConfigError: a name in `reads` that no slice has.
         """
         self.config = config
         arena = config.arena
         self.layout = observation_layout(arena.width_m, arena.height_m, config.objects.n_objects)
         self.reads = self.layout.names if reads is None else tuple(reads)
         for name in self.reads:
-            self.layout.part(name)
+            if name not in self.layout.names:
+                hint = suggestion(name, self.layout.names)
+                raise ConfigError(
+                    f"Unknown observation slice {name!r} in reads.{hint} Known: {', '.join(self.layout.names)}."
+                )
         self._drive = Drive(config)
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
         self._scratch = np.zeros(config.objects.n_objects)

@@ -1,6 +1,6 @@
 """ForageEnv: the PettingZoo skin over the arena. Arrays inside, per-agent dicts built once at the outermost layer."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -11,7 +11,7 @@ from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_forage_env.actuators import ActionError
 from swarm_forage_env.arena import ForagingArena
-from swarm_forage_env.config import CELL_M, ScenarioConfig, with_overrides
+from swarm_forage_env.config import CELL_M, ConfigError, ScenarioConfig, with_overrides
 from swarm_forage_env.layout import WHEEL_SCALE_MPS, ObservationLayout
 from swarm_forage_env.policy import SwarmTask
 from swarm_forage_env.rewards import RewardModel
@@ -55,15 +55,21 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             reads: Observation slices that will be looked at; others may stay zero (faster). Default: all.
 
         Raises:
-            ValueError: max_cycles below 1 or an unknown render mode.
+            ConfigError: no ScenarioConfig, or an unknown slice in `reads`.
+            ValueError: max_cycles is no whole number >= 1, or an unknown render mode.
         """
+        if not isinstance(scenario, ScenarioConfig):
+            raise ConfigError(
+                f"Expected a ScenarioConfig, got {scenario!r}; `parallel_env` takes names of presets, too."
+            )
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"Expected render_mode None or 'rgb_array', got {render_mode!r}.")
-        if max_cycles is not None and max_cycles < 1:
-            raise ValueError(f"Expected max_cycles >= 1, got {max_cycles}.")
+        is_whole = isinstance(max_cycles, int | np.integer) and not isinstance(max_cycles, bool)
+        if max_cycles is not None and not (is_whole and max_cycles >= 1):
+            raise ValueError(f"Expected a whole number max_cycles >= 1, got {max_cycles!r}.")
         self.scenario = scenario
         self.render_mode = render_mode
-        self.max_cycles = scenario.horizon_ticks if max_cycles is None else max_cycles
+        self.max_cycles = scenario.horizon_ticks if max_cycles is None else int(max_cycles)
         self.arena = ForagingArena(scenario, reads=reads)
         n_robots = scenario.robots.n_robots
         self._rewards = RewardModel(scenario.reward, scenario.arena.nest_centre_m, n_robots)
@@ -136,29 +142,36 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     # Truth, for wrappers, recorders and pictures
 
     @property
+    def _world(self) -> ForagingArena:
+        """The arena once it holds a world; raises RuntimeError before the first reset."""
+        if self.seed_value is None:
+            raise RuntimeError("There is no world before the first reset. Call reset before step, state or render.")
+        return self.arena
+
+    @property
     def swarm(self) -> SwarmState:
         """Robots; read only."""
-        return self.arena.swarm
+        return self._world.swarm
 
     @property
     def objects(self) -> ObjectState:
         """Objects and the floor; read only."""
-        return self.arena.objects
+        return self._world.objects
 
     @property
     def caches(self) -> CacheState:
         """Caches; read only."""
-        return self.arena.caches
+        return self._world.caches
 
     @property
     def events(self) -> StepEvents:
         """This tick's events and the cumulative counters; read only."""
-        return self.arena.events
+        return self._world.events
 
     @property
     def active(self) -> BoolArray:
         """(N,) robots of the tasked swarm; read only."""
-        return self.arena.swarm.active
+        return self._world.swarm.active
 
     @property
     def tick(self) -> int:
@@ -175,7 +188,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """
         if terminated is not None and terminated.shape != self._terminated.shape:
             raise ValueError(f"Expected terminated with shape {self._terminated.shape}, got {terminated.shape}.")
-        self.arena.set_population(active=active, present=present)
+        self._world.set_population(active=active, present=present)
         if terminated is not None:
             self._terminated[:] = terminated
 
@@ -194,10 +207,30 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             raise ValueError(f"Expected seed to be a non-negative integer or None, got {seed!r}.")
         else:
             self._seeds = np.random.default_rng(seed)
+        obs = self.arena.reset(int(seed))
         self.seed_value = int(seed)
         self._terminated[:] = False
         self.agents = list(self.possible_agents)
-        return self.arena.reset(self.seed_value)
+        return obs
+
+    def checked_actions(self, actions: ActionArray) -> ActionArray:
+        """Return `actions` as a contiguous (N, 3) float32 array, itself where it is one; values are not looked at.
+
+        Raises:
+            ActionError: no numbers, or another shape.
+        """
+        expected = self._actions.shape
+        try:
+            # Kernels are compiled for contiguous float32 only; anything else would be compiled anew, for a minute.
+            checked = np.ascontiguousarray(actions, np.float32)
+        except (TypeError, ValueError) as error:
+            raise ActionError(f"Expected actions with shape (n_robots, 3) = {expected}: {error}.") from error
+        if checked.shape != expected:
+            raise ActionError(
+                f"Expected actions with shape (n_robots, 3) = {expected}, got {checked.shape}; "
+                "pass one row per robot, inactive ones included."
+            )
+        return checked
 
     def step_batch(
         self,
@@ -217,22 +250,15 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             Observations (N, D) and rewards (N,) in reused buffers, terminated (N,) for the dead, truncated.
 
         Raises:
-            ActionError: no numbers, wrong shape, or an active robot's action that is not finite.
+            ActionError: no numbers, wrong shape, or an active robot's action or gain that is not finite.
+            RuntimeError: before the first reset.
         """
-        expected = self._actions.shape
-        try:
-            # Kernels are compiled for contiguous float32 only; anything else would be compiled anew, for a minute.
-            actions = np.ascontiguousarray(actions, np.float32)
-        except (TypeError, ValueError) as error:
-            raise ActionError(f"Expected actions with shape (n_robots, 3) = {expected}: {error}.") from error
-        if actions.shape != expected:
+        arena = self._world
+        actions = self.checked_actions(actions)
+        if wheel_gain is not None and wheel_gain.shape != (len(actions), 2):
             raise ActionError(
-                f"Expected actions with shape (n_robots, 3) = {expected}, got {actions.shape}; "
-                "pass one row per robot, inactive ones included."
+                f"Expected wheel_gain with shape (n_robots, 2) = {(len(actions), 2)}, got {wheel_gain.shape}."
             )
-        if self.seed_value is None:
-            raise RuntimeError("Call reset before step.")
-        arena = self.arena
         self._rewards.remember(arena.swarm)
         obs = arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
         reward = self._rewards.reward(arena.swarm, arena.events)
@@ -287,6 +313,8 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             raise RuntimeError(
                 "Call reset before step." if self.seed_value is None else "All agents are done; call reset first."
             )
+        if not isinstance(actions, Mapping):
+            raise ActionError(f"Expected actions as a dict by agent, got {type(actions).__name__}.")
         if actions.keys() != self._row_of.keys() and set(actions) != set(agents):
             missing = [agent for agent in agents if agent not in actions]
             foreign = [agent for agent in actions if agent not in agents]
@@ -318,6 +346,9 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
         Per robot: x, y as in the observation, cos and sin of the heading, carrying, active (zeros when not present).
         Then per object: x, y of its cell (of its carrier while carried, zeros while waiting), status / 3.
+
+        Raises:
+            RuntimeError: before the first reset.
         """
         swarm, objects, arena = self.swarm, self.objects, self.scenario.arena
         size = np.array([arena.width_m, arena.height_m])

@@ -38,10 +38,11 @@ def drive(
 
     `limits` holds wheel scale, centre-speed limit, wheel-difference limit (m/s) and wheel base (m). The velocity is
     the chord of the exact arc over one tick, so that free motion is exact however the tick is divided.
-    Returns -1, or the first active row with a command that is not finite; then nothing is written.
+    Returns -1, or the first active row with a command or gain that is not finite; then nothing is written.
     """
     for i in range(facing.shape[0]):
-        if active[i] and not math.isfinite(float(actions[i, 0]) + float(actions[i, 1]) + float(actions[i, 2])):
+        command = float(actions[i, 0]) + float(actions[i, 1]) + float(actions[i, 2])
+        if active[i] and not math.isfinite(command + wheel_gain[i, 0] + wheel_gain[i, 1]):
             return i
     scale, max_speed, max_difference, wheel_base = limits[0], limits[1], limits[2], limits[3]
     for i in range(facing.shape[0]):

@@ -119,7 +119,11 @@ class SwarmWrapper(BaseParallelWrapper):
             actions: (N, 3) float32 in [-1, 1].
             wheel_gain: (N, 2) factors on the wheel speeds, None = all 1.
             tasks: (N,) int8 `policy.Task` codes, None = the policy has no tasks.
+
+        Raises:
+            ActionError: as `ForageEnv.step_batch`; for a wrong shape before any wrapper has done anything.
         """
+        actions = self.world.checked_actions(actions)
         self.before_step()
         obs, reward, terminated, truncated = self._inner.step_batch(
             actions, wheel_gain=self.gain(actions, wheel_gain), tasks=tasks

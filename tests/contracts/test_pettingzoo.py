@@ -197,6 +197,13 @@ def test_robots_in_repair_stay_agents():
 # Errors that help
 
 
+def test_nothing_is_there_before_reset():
+    world = parallel_env(render_mode="rgb_array", **SMALL)
+    for look in (world.state, world.render, *(lambda name=name: getattr(world, name) for name in ("swarm", "active"))):
+        with pytest.raises(RuntimeError, match="before the first reset"):
+            look()
+
+
 def test_step_before_reset():
     world = parallel_env(**SMALL)
     with pytest.raises(RuntimeError, match="Call reset before step"):
@@ -247,6 +254,16 @@ def test_batches_that_are_no_numbers(actions):
     assert world.tick == 0
 
 
+@pytest.mark.parametrize("gain", [np.ones((1, 2)), np.ones(2), np.full((5, 2), np.nan)], ids=["row", "flat", "nan"])
+def test_wheel_gains_are_two_finite_numbers_per_robot(gain):
+    world = parallel_env(**SMALL)
+    world.reset(seed=0)
+    with pytest.raises(ActionError, match=r"wheel.gain"):
+        world.step_batch(np.zeros((5, 3), np.float32), wheel_gain=gain)
+    assert world.tick == 0
+    assert np.isfinite(world.swarm.position).all()
+
+
 @pytest.mark.parametrize(
     "action",
     [np.zeros(2), np.zeros((1, 3)), 0.5, "abc", None, np.zeros(3, np.complex128)],
@@ -277,6 +294,8 @@ def test_missing_and_foreign_agents_are_named():
         world.step(actions)
     with pytest.raises(ActionError, match="missing"):
         world.step({})
+    with pytest.raises(ActionError, match="a dict by agent, got ndarray"):
+        world.step(np.zeros((5, 3)))
 
 
 def test_actions_that_are_not_finite_name_the_robot():
@@ -312,8 +331,11 @@ def test_resets_without_a_seed_continue_the_sequence_of_the_last_seed():
 
 
 def test_constructor_errors():
-    with pytest.raises(ValueError, match="max_cycles >= 1, got 0"):
-        parallel_env(max_cycles=0, **SMALL)
+    for max_cycles in (0, 2.5, "5", True):
+        with pytest.raises(ValueError, match=f"max_cycles >= 1, got {max_cycles!r}"):
+            parallel_env(max_cycles=max_cycles, **SMALL)
+    with pytest.raises(ConfigError, match=r"ScenarioConfig, got 'warehouse_small'; `parallel_env`"):
+        ForageEnv("warehouse_small")
     with pytest.raises(ValueError, match="render_mode None or 'rgb_array', got 'human'"):
         parallel_env(render_mode="human", **SMALL)
     with pytest.raises(ConfigError, match="warehouse_small"):

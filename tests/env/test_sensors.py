@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from swarm_forage_env.config import ConfigError
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.kernels.beams import proximity_reading
 from swarm_forage_env.policy import Event, Grip
@@ -197,8 +198,10 @@ def test_reading_nothing_leaves_the_dear_slices_out():
 
 
 def test_unknown_slice_to_read_is_refused():
-    with pytest.raises(KeyError, match="lidar"):
-        ForageEnv(scenario("warehouse_small", n_robots=3), reads=("lidar",))
+    with pytest.raises(ConfigError, match=r"'lidr' in reads.*Known: proximity, light"):
+        ForageEnv(scenario("warehouse_small", n_robots=3), reads=("lidr",))
+    with pytest.raises(ConfigError, match="Did you mean 'proximity'"):
+        ForageEnv(scenario("warehouse_small", n_robots=3), reads=("proximty",))
 
 
 # Declared bounds

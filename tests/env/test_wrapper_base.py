@@ -7,6 +7,7 @@ import pytest
 from pettingzoo.test import parallel_api_test
 from pettingzoo.utils import BaseParallelWrapper
 
+from swarm_forage_env.actuators import ActionError
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.wrappers.base import STACK_ORDER, SwarmWrapper
 from swarm_forage_env.wrappers.recorder import RunRecorder
@@ -73,6 +74,16 @@ def test_hooks_run_inwards_before_the_step_and_outwards_after_it(stack):
         ("outer", "observe"),
         ("outer", "after_step"),
     ]
+
+
+@pytest.mark.parametrize("actions", [np.zeros((3, 3), np.float32), np.zeros((4, 2), np.float32), None])
+def test_actions_of_a_wrong_shape_are_refused_before_any_hook(stack, actions):
+    stack.reset_batch(7)
+    Logging.log.clear()
+    with pytest.raises(ActionError, match=r"\(n_robots, 3\) = \(4, 3\)"):
+        stack.step_batch(actions)
+    assert Logging.log == []
+    assert stack.world.calls == []
 
 
 def test_a_reset_without_seed_hands_on_the_seed_that_was_drawn(stack):
