@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, TypeVar, cast
 
+from swarm_forage_env.layout import WHEEL_SCALE_MPS
 from swarm_forage_env.quirks import Quirks
 from swarm_forage_env.regions import PLACEMENTS, Box, capacity, distributable_box
 
@@ -20,6 +21,8 @@ CACHE_KINDS = ("none", "static", "dynamic")
 PERFORMANCE_MEASURES = ("collected", "first_picked")
 MAX_DISC_SHARE = 0.4
 """Robot discs may cover at most this share of the start area; beyond it random starting poses stop being findable."""
+MAX_CELLS = 100_000_000
+"""Largest floor, 2 km square (our choice: its codes take 400 MB; the largest arena of the paper has 409,600 cells)."""
 
 
 class ConfigError(ValueError):
@@ -46,7 +49,8 @@ def _require_positive(section: str, **values: Any) -> None:
 def _require_whole(section: str, minimum: int, **values: Any) -> None:
     for name, value in values.items():
         is_whole = isinstance(value, int) and not isinstance(value, bool)
-        _require(is_whole, f"Expected {section}.{name} to be a whole number, got {value!r}.")
+        hint = "; convert it with int()" if hasattr(value, "__index__") and not isinstance(value, bool) else ""
+        _require(is_whole, f"Expected {section}.{name} to be a whole number, got {value!r}{hint}.")
         _require(value >= minimum, f"Expected {section}.{name} >= {minimum}, got {value}.")
 
 
@@ -105,6 +109,10 @@ class ArenaConfig:
                 abs(cells - round(cells)) < 1e-6 and cells >= 10,
                 f"Expected arena.{name} to be a multiple of {CELL_M} m and at least 2 m, got {extent}.",
             )
+        _require(
+            math.prod(self.n_cells) <= MAX_CELLS,
+            f"Expected an arena of at most {MAX_CELLS:,} cells of {CELL_M} m, got {self.width_m} x {self.height_m} m.",
+        )
         _require_pair("arena", nest_centre_m=self.nest_centre_m, nest_size_m=self.nest_size_m)
         x_low, y_low, x_high, y_high = self.nest_cells
         nx, ny = self.n_cells
@@ -325,6 +333,12 @@ class ScenarioConfig:
             f"Expected cache.side_share to give caches of at least one cell ({CELL_M} m), got {self.cache.side_share} "
             f"of max(X, Y) = {max(self.arena.width_m, self.arena.height_m)} m.",
         )
+        speed = min(self.robots.max_speed_mps, WHEEL_SCALE_MPS)
+        _require(
+            speed * self.dt_s <= self.robots.radius_m,
+            f"Expected robots to drive at most their radius of {self.robots.radius_m} m per tick (or they pass through "
+            f"each other), got {speed} m/s for dt_s = {self.dt_s} s; lower dt_s or max_speed_mps.",
+        )
         self._check_room_for_robots()
         self._check_room_for_objects()
 
@@ -452,8 +466,11 @@ def from_mapping(config_class: type[_C], mapping: Mapping[str, Any], *, where: s
     """Build a configuration dataclass from nested mappings (TOML, JSON).
 
     Raises:
-        ConfigError: an unknown key, with the nearest valid one.
+        ConfigError: no mapping, or an unknown key, with the nearest valid one.
     """
+    if not isinstance(cast("Any", mapping), Mapping):
+        name = where.rstrip(".") or config_class.__name__
+        raise ConfigError(f"Expected {name} as a table of fields, got {mapping!r}.")
     fields = {item.name: item for item in dataclasses.fields(config_class)}  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     for key, value in mapping.items():

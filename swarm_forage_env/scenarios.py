@@ -118,7 +118,7 @@ def _side_for(n_robots: int) -> float:
     )
 
 
-def scenario(name: str, **overrides: Any) -> ScenarioConfig:
+def scenario(name: str, /, **overrides: Any) -> ScenarioConfig:
     """Return a preset by name with fields overridden.
 
     Args:

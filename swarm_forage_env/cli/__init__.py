@@ -72,7 +72,10 @@ def main() -> None:
         code = _complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined]
     except (ConfigError, RecordError) as error:
         code = _complain(str(error), EXIT_USAGE)
-    except (OSError, ImportError) as error:
+    except OSError as error:
+        named = f"{error.strerror}: {error.filename}" if error.strerror and error.filename else str(error)
+        code = _complain(named, EXIT_FAILURE)
+    except ImportError as error:
         code = _complain(str(error), EXIT_FAILURE)
     except (KeyboardInterrupt, typer.Abort):
         code = _complain("interrupted", EXIT_INTERRUPTED)

@@ -22,8 +22,7 @@ def read_config(path: Path) -> "tuple[dict[str, Any], tuple[WrapperConfig, ...]]
         Scenario fields, and wrapper configurations.
 
     Raises:
-        ConfigError: no TOML, or tables that no wrapper has or refuses; names the file.
-        OSError: the file cannot be read.
+        ConfigError: not readable, no TOML, or tables that no wrapper has or refuses; names the file.
     """
     try:
         with path.open("rb") as file:
@@ -32,6 +31,8 @@ def read_config(path: Path) -> "tuple[dict[str, Any], tuple[WrapperConfig, ...]]
         if not isinstance(fields, Mapping):
             raise ConfigError(f"Expected scenario to be a table of fields, got {fields!r}.")
         wrappers = wrappers_from_mapping(tables)
+    except OSError as error:
+        raise ConfigError(f"Cannot use {path}: {error.strerror or error}.") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, ConfigError) as error:
         raise ConfigError(f"Cannot use {path}: {error}") from error
     return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}, wrappers

@@ -124,7 +124,6 @@ def plan_runs(
 
     Raises:
         ConfigError: see `build_scenario` and `read_config`; or an unknown controller or wrapper.
-        OSError: the configuration file cannot be read.
     """
     file_fields, file_wrappers = ({}, ()) if options.config_file is None else read_config(options.config_file)
     config, caches = build_scenario(options, file_fields)

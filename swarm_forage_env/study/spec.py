@@ -25,8 +25,8 @@ class RunSpec:
     """One run as data: the world, who controls it, what disturbs it, and the seed.
 
     Raises:
-        ConfigError: parameters that JSON cannot hold, two wrappers of one kind, a bad seed, or a horizon that is
-            not a whole number of recording intervals.
+        ConfigError: no ScenarioConfig, parameters that JSON cannot hold, two wrappers of one kind, a bad seed, or a
+            horizon that is not a whole number of recording intervals.
     """
 
     scenario: ScenarioConfig
@@ -44,6 +44,8 @@ class RunSpec:
     def __post_init__(self) -> None:
         if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < _MAX_SEED:
             raise ConfigError(f"Expected seed to be a whole number in [0, 2^63), got {self.seed!r}.")
+        if not isinstance(self.scenario, ScenarioConfig):
+            raise ConfigError(f"Expected scenario to be a ScenarioConfig, got {self.scenario!r}.")
         whole_intervals(self.scenario)
         try:
             plain = json.loads(json.dumps(dict(self.parameters), allow_nan=False))
@@ -97,7 +99,10 @@ class RunSpec:
             raise ConfigError(f"Missing key {missing[0]!r} in a run specification.")
         values = dict(mapping)
         values["scenario"] = from_mapping(ScenarioConfig, values["scenario"], where="scenario.")
-        values["wrappers"] = tuple(_wrapper_from_mapping(entry) for entry in values.get("wrappers", ()))
+        wrappers = values.get("wrappers", ())
+        if not isinstance(wrappers, (list, tuple)):
+            raise ConfigError(f"Expected wrappers as a list of tables, got {wrappers!r}.")
+        values["wrappers"] = tuple(_wrapper_from_mapping(entry) for entry in wrappers)
         return cls(**values)
 
     def to_json(self) -> str:
@@ -140,10 +145,10 @@ def plan_run(scenario: ScenarioConfig, policy: str, *, caches: str | None = None
 
 
 def _wrapper_from_mapping(entry: Mapping[str, Any]) -> "WrapperConfig":
-    values = dict(entry)
+    values = dict(entry) if isinstance(entry, Mapping) else {}
     name = values.pop("wrapper", None)
     if not isinstance(name, str):
-        raise ConfigError(f"Missing key 'wrapper' (its name) in the wrapper {values!r}.")
+        raise ConfigError(f"Missing key 'wrapper' (its name) in the wrapper {entry!r}.")
     return wrapper_config_class(name).from_mapping(values)
 
 

@@ -120,6 +120,8 @@ def test_set_changes_any_field_with_its_type(command):
         "walk_probability=0.5",
         "--set",
         "static_size=3",
+        "--set",
+        "name=depot",
     )
     _, out, _ = command(*RUN, *words, "--set", "physics_substeps=0.5,0.5", "--dry-run", "--json")
     world = json.loads(out)["runs"][0]["spec"]["scenario"]
@@ -127,6 +129,7 @@ def test_set_changes_any_field_with_its_type(command):
     assert world["arena"]["nest_size_m"] == [2.0, 4.0]
     assert world["objects"]["walk_probability"] == 0.5
     assert world["cache"]["static_size"] == 3
+    assert world["name"] == "depot"
     assert world["physics_substeps"] == [0.5, 0.5]
 
 
@@ -314,6 +317,7 @@ def test_record_films_a_run(command):
         (("run", "--set", "n_robots=x"), "Expected n_robots to be a whole number, got 'x'"),
         (("run", "--set", "dt_s=fast"), "Expected dt_s to be a number, got 'fast'"),
         (("run", "--set", "dt_s=nan"), "finite number"),
+        (("run", "--set", "width_m=1e9"), "at most 100,000,000 cells"),
         (("run", "--set", "team=maybe"), "Expected team to be true or false, got 'maybe'"),
         (("run", "--set", "nest_size_m=1"), "Expected nest_size_m to be numbers separated by commas"),
         (("run", "--set", "n_robots=3", "--robots", "4"), "Expected n_robots once"),
@@ -355,6 +359,8 @@ def test_a_folder_that_cannot_be_made_is_one_line(command):
     Path("file").write_text("")
     code, _, err = command(*RUN, "--out", "file/inside")
     assert code == 1
+    assert "Errno" not in err
+    assert "Not a directory: file" in err
     assert err.count("\n") == 1
 
 

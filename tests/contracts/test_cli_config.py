@@ -89,6 +89,6 @@ def test_a_mistake_in_the_file_is_one_line_and_exit_code_2(command, text, compla
 
 def test_a_missing_file_is_one_line(command):
     code, _, err = command(CONFIG, "--config", "nowhere.toml")
-    assert code == 1
-    assert "nowhere.toml" in err
+    assert code == 2
+    assert "Cannot use nowhere.toml: No such file or directory" in err
     assert len(err.splitlines()) == 1

@@ -137,6 +137,15 @@ def test_mappings_with_unknown_parts_are_refused():
     for wrapper, message in (({"wrapper": "fog"}, "Unknown wrapper 'fog'"), ({"sigma": 1}, "Missing key 'wrapper'")):
         with pytest.raises(ConfigError, match=message):
             RunSpec.from_mapping({**BASE.to_mapping(), "wrappers": [wrapper]})
+    for part, message in (
+        ({"scenario": "warehouse_small"}, "Expected scenario as a table of fields, got 'warehouse_small'"),
+        ({"wrappers": "fog"}, "Expected wrappers as a list of tables, got 'fog'"),
+        ({"wrappers": ["fog"]}, "Missing key 'wrapper' .* 'fog'"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            RunSpec.from_mapping({**BASE.to_mapping(), **part})
+    with pytest.raises(ConfigError, match="Expected scenario to be a ScenarioConfig, got 'warehouse_small'"):
+        RunSpec(scenario="warehouse_small", policy="crw")
 
 
 @pytest.mark.parametrize("policy", policy_names())

@@ -5,6 +5,7 @@ import json
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from swarm_forage_env.config import (
@@ -140,6 +141,8 @@ def test_mapping_refuses_a_value_where_a_section_belongs():
     mapping = to_mapping(scenario("warehouse_small")) | {"objects": 200}
     with pytest.raises(ConfigError, match=r"Expected objects to be a ObjectConfig, got 200"):
         from_mapping(ScenarioConfig, mapping)
+    with pytest.raises(ConfigError, match=r"Expected ScenarioConfig as a table of fields, got 'warehouse_small'"):
+        from_mapping(ScenarioConfig, "warehouse_small")
 
 
 @pytest.mark.parametrize(
@@ -148,7 +151,11 @@ def test_mapping_refuses_a_value_where_a_section_belongs():
         ({"n_robots": 0}, ("robots.n_robots >= 1", "got 0")),
         ({"n_robots": -4}, ("robots.n_robots >= 1", "got -4")),
         ({"n_robots": 2.0}, ("robots.n_robots to be a whole number", "got 2.0")),
-        ({"n_robots": True}, ("robots.n_robots to be a whole number", "got True")),
+        ({"n_robots": True}, ("robots.n_robots to be a whole number", "got True.")),
+        ({"n_robots": np.int64(5)}, ("robots.n_robots to be a whole number", "convert it with int()")),
+        ({"width_m": 1e9}, ("at most 100,000,000 cells", "1000000000.0 x ")),
+        ({"dt_s": 1.0}, ("at most their radius of 0.085036758 m per tick", "0.1 m/s for dt_s = 1.0 s")),
+        ({"max_speed_mps": 5.0, "dt_s": 0.5}, ("at most their radius", "got 0.2 m/s")),
         ({"radius_m": -0.1}, ("robots.radius_m > 0", "got -0.1")),
         ({"wheel_base_m": math.nan}, ("robots.wheel_base_m to be a finite number", "got nan")),
         ({"max_speed_mps": math.inf}, ("robots.max_speed_mps to be a finite number", "got inf")),
