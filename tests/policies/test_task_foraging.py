@@ -1,0 +1,109 @@
+"""STOCHM and STOCHX in the real world: caches come about and are used, and nobody starves."""
+
+import numpy as np
+import pytest
+
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policy import load_policy
+from swarm_forage_env.rng import Stream, stream_rng
+from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.state import Counter, ObjectStatus
+
+SCENARIOS = ["warehouse_small", "warehouse_medium", "search_and_rescue"]
+CACHES = {"stochm": "static", "stochx": "dynamic"}
+
+
+class Run:
+    """A run of one policy, with counters after every fifth."""
+
+    def __init__(self, scenario_name: str, policy_name: str, ticks: int, seed: int) -> None:
+        self.env = ForageEnv(scenario(scenario_name, caches=CACHES[policy_name]))
+        obs = self.env.reset_batch(seed)
+        self.policy = load_policy(policy_name)
+        self.policy.reset(self.env.task, stream_rng(seed, Stream.POLICY))
+        self.seen: set[int] = set()
+        self.fifths: list[np.ndarray] = []
+        before = self.counters
+        for tick in range(1, ticks + 1):
+            obs, *_ = self.env.step_batch(self.policy.act(obs, self.env.active), tasks=self.policy.task)
+            self.seen |= set(self.policy.task.tolist())
+            if tick % (ticks // 5) == 0:
+                self.fifths.append(self.counters - before)
+                before = self.counters
+
+    @property
+    def counters(self) -> np.ndarray:
+        return self.env.events.counters.copy()
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("policy_name", CACHES)
+def test_swarms_deliver_and_use_caches(policy_name):
+    run = Run("warehouse_medium", policy_name, ticks=2000, seed=1)
+    counters = run.counters
+    assert counters[Counter.COLLECTED] >= 10
+    assert counters[Counter.CACHE_PICKUPS] >= 20
+    assert counters[Counter.CACHE_DROPS] >= 10
+    assert run.seen == (set(range(1, 8)) if policy_name == "stochx" else {1, 2, 3})
+    held = np.count_nonzero(run.env.objects.status == ObjectStatus.CARRIED)
+    taken = counters[Counter.FREE_PICKUPS] + counters[Counter.CACHE_PICKUPS]
+    left = counters[Counter.COLLECTED] + counters[Counter.CACHE_DROPS] + counters[Counter.FLOOR_DROPS]
+    assert taken == left + held, "every object that is picked up is dropped once"
+
+
+@pytest.mark.compiled
+def test_stochx_founds_caches_in_the_medium_warehouse():
+    assert Run("warehouse_medium", "stochx", ticks=300, seed=2).counters[Counter.CACHES_CREATED] > 0
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("policy_name", CACHES)
+def test_a_run_repeats_with_its_seed_and_changes_with_it(policy_name):
+    first, again, other = (Run("warehouse_small", policy_name, ticks=300, seed=seed) for seed in (4, 4, 5))
+    np.testing.assert_array_equal(first.env.swarm.position, again.env.swarm.position)
+    np.testing.assert_array_equal(first.policy.task_estimates, again.policy.task_estimates)
+    assert np.any(first.policy.task_estimates != other.policy.task_estimates)
+
+
+@pytest.mark.compiled
+def test_what_robots_remember_of_caches_is_true_while_they_see_them():
+    run = Run("warehouse_small", "stochm", ticks=3000, seed=6)
+    caches = run.env.caches
+    true = dict(zip(caches.serial[caches.alive].tolist(), caches.cell[caches.alive].tolist(), strict=True))
+    remembered = [run.policy.remembered_caches(robot) for robot in range(50)]
+    assert sum(len(known) for known in remembered) == run.policy.n_caches.sum() > 0
+    for known in remembered:
+        for serial, (x, y, count, density) in known.items():
+            assert [x, y] == true.get(serial, [x, y])
+            assert count >= 2
+            assert 0.9 < density < 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario_name", SCENARIOS)
+@pytest.mark.parametrize("policy_name", CACHES)
+def test_nobody_starves_and_caches_are_used_to_the_end(scenario_name, policy_name):
+    """A full run of 10,000 s delivers and takes from caches in its last fifth."""
+    run = Run(scenario_name, policy_name, ticks=50_000, seed=10)
+    assert len(run.fifths) == 5
+    deliveries = [int(fifth[Counter.COLLECTED]) for fifth in run.fifths]
+    assert deliveries[-1] >= max(deliveries) // 2
+    assert run.fifths[-1][Counter.CACHE_PICKUPS] > 0
+    assert run.fifths[-1][Counter.CACHE_DROPS] > 0
+
+
+@pytest.mark.slow
+def test_the_static_cache_of_the_small_warehouse_is_kept_in_use():
+    run = Run("warehouse_small", "stochm", ticks=50_000, seed=11)
+    assert run.counters[Counter.CACHES_ALIVE] > 0.9 * 50_000
+    for fifth in run.fifths:
+        assert fifth[Counter.CACHE_PICKUPS] > 10
+        assert fifth[Counter.CACHE_DROPS] > 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario_name", SCENARIOS)
+def test_stochx_makes_its_own_caches_in_nearly_every_run(scenario_name):
+    runs = [Run(scenario_name, "stochx", ticks=50_000, seed=seed).counters for seed in range(20, 24)]
+    with_caches = [run[Counter.CACHES_CREATED] > 0 and run[Counter.CACHE_PICKUPS] > 0 for run in runs]
+    assert sum(with_caches) >= 3
