@@ -7,8 +7,9 @@ from swarm_forage_env.codes import Counter, Event
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
 from tests.contracts.busy import BusyPolicy, change_population
+from tests.contracts.foraging import quick_world
 from tests.contracts.test_determinism import DENSE, RUNS, fresh, make, side
 from tests.worlds import assert_conserved
 
@@ -31,6 +32,16 @@ def run_conserved(env: ForageEnv, policy, ticks: int, *, seed: int, population: 
 @pytest.mark.parametrize(("name", "caches", "policy"), RUNS)
 def test_objects_are_conserved(name, caches, policy):
     run_conserved(make(name, caches), fresh(policy), 60, seed=3)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("policy", ["crw", "dpo"])
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_objects_are_conserved_while_controllers_forage(name, policy):
+    env = ForageEnv(quick_world(name))
+    run_conserved(env, fresh(policy), env.max_cycles, seed=3)
+    assert env.events.counters[Counter.COLLECTED] > 10
+    assert env.events.counters[Counter.OBJECTS_MOVED] > 100
 
 
 @pytest.mark.compiled

@@ -16,7 +16,9 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policy import Policy, load_policy, policy_names
 from swarm_forage_env.rng import Stream, stream_rng
 from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.study.run import build_stack
 from tests.contracts.busy import BusyPolicy, change_population
+from tests.contracts.foraging import mild_wrappers, quick_world
 
 ROOT = Path(__file__).resolve().parents[2]
 TICKS = 60
@@ -36,6 +38,9 @@ RUNS = [
     for name in SCENARIO_NAMES
     for caches in made_for(policy)
 ]
+
+
+EPISODES = [(name, policy) for name in SCENARIO_NAMES for policy in ("crw", "dpo")]
 
 
 def make(name: str, caches: str) -> ForageEnv:
@@ -67,9 +72,28 @@ def fresh(policy: str) -> Policy:
     return BusyPolicy() if policy == "busy" else load_policy(policy)
 
 
+def episode_digest(name: str, policy_name: str) -> str:
+    """Fingerprint of a whole episode through all wrappers, and of its record."""
+    recorder = build_stack(quick_world(name, interval_s=60.0), mild_wrappers())
+    policy, world, seen = load_policy(policy_name), recorder.world, hashlib.sha256()
+    policy.reset(world.task, stream_rng(17, Stream.POLICY))
+    obs, truncated = recorder.reset_batch(17), False
+    while not truncated:
+        seen.update(obs.tobytes() + world.active.tobytes())
+        obs, reward, terminated, truncated = recorder.step_batch(policy.act(obs, world.active))
+        seen.update(reward.tobytes() + terminated.tobytes())
+    columns = {**recorder.columns(), **recorder.contributed()}
+    assert columns["collected"].sum() > 5
+    assert columns["malfunctions"].sum() > 5
+    for column in columns.values():
+        seen.update(column.tobytes())
+    return seen.hexdigest()
+
+
 def all_digests() -> dict[str, str]:
     """Fingerprints of all runs, for another process."""
-    return {f"{name} {caches} {policy}": digest(make(name, caches), fresh(policy), 17) for name, caches, policy in RUNS}
+    runs = {f"{name} {caches} {policy}": digest(make(name, caches), fresh(policy), 17) for name, caches, policy in RUNS}
+    return runs | {f"{name} {policy}": episode_digest(name, policy) for name, policy in EPISODES}
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +121,12 @@ def test_a_seed_is_a_run(name, caches, policy, elsewhere):
     assert other != first, "another seed"
     assert digest(env, fresh(policy), 17) == first, "the same instance, reset after another run"
     assert elsewhere[f"{name} {caches} {policy}"] == first, "another process"
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("name", "policy"), EPISODES)
+def test_a_seed_is_a_whole_episode_through_all_wrappers(name, policy, elsewhere):
+    assert episode_digest(name, policy) == elsewhere[f"{name} {policy}"]
 
 
 def test_a_reset_in_the_middle_of_a_run_leaves_nothing_behind():
