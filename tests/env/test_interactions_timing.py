@@ -7,7 +7,10 @@ from swarm_forage_env.codes import Counter, Event, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policy import Grip
 from swarm_forage_env.quirks import Quirks
+from swarm_forage_env.scenarios import scenario
 from tests.worlds import (
+    BASE_CELL,
+    CORNER_CACHE,
     NEST_CELL,
     OPEN_CELL,
     WALL_CELL,
@@ -15,7 +18,9 @@ from tests.worlds import (
     assert_conserved,
     build_cache,
     cell_centre,
+    count,
     depot,
+    events_of,
     lay,
     load,
     put,
@@ -26,19 +31,7 @@ from tests.worlds import (
 NONE, PICKED_UP, PICKED_FROM_CACHE = Event.NONE, Event.PICKED_UP, Event.PICKED_FROM_CACHE
 DELIVERED, DROPPED, ELSEWHERE, JOINED = Event.DELIVERED, Event.DROPPED, Event.DROPPED_ELSEWHERE, Event.JOINED_CACHE
 NOTHING_HERE, VANISHED, TOO_NEAR = Event.NOTHING_HERE, Event.VANISHED, Event.CACHE_TOO_NEAR
-BASE_CELL = (60, 40)
-CORNER_CACHE = (40, 20)
-"""Centre of a cache clear of the nest, within the proximity distance of the open cell."""
 FAR_CELL = (110, 60)
-
-
-def events_of(env: ForageEnv, grip: float, ticks: int, robot: int = 0) -> list[Event]:
-    """Events of a robot that sends the same command for some ticks."""
-    return [act(env, {robot: grip})[robot] for _ in range(ticks)]
-
-
-def count(env: ForageEnv, counter: Counter) -> int:
-    return int(env.events.counters[counter])
 
 
 # Timing
@@ -296,6 +289,17 @@ def test_cargo_of_a_dying_robot_is_placed_elsewhere_when_it_cannot_lie(cell):
     kill(env, 0)
     assert 120 <= env.objects.cell[3, 0] < 136
     assert count(env, Counter.COLLECTED) == 0, "a death in the nest is no delivery"
+    assert_conserved(env)
+
+
+def test_cargo_does_not_lie_in_a_nest_amid_the_objects():
+    # In the medium warehouse the nest stands inside of the box where objects may lie.
+    env = ForageEnv(scenario("warehouse_medium", n_robots=1, n_objects=5))
+    env.reset_batch(0)
+    stand(env, 0, (120, 120))
+    load(env, 0, 3)
+    kill(env, 0)
+    assert env.objects.status[3] == ObjectStatus.FREE
     assert_conserved(env)
 
 
