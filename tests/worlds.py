@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env.caches import create_cache
-from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, Event
+from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, Counter, Event
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policy import Grip
 from swarm_forage_env.scenarios import scenario
@@ -18,6 +18,10 @@ from swarm_forage_env.state import ObjectStatus
 
 NEST_CELL = (16, 40)
 OPEN_CELL = (60, 40)
+BASE_CELL = OPEN_CELL
+"""Centre of the cache that a test is about."""
+CORNER_CACHE = (40, 20)
+"""Centre of a cache clear of the nest, within the proximity distance of the open cell."""
 WALL_CELL = (60, 5)
 """A cell outside of the distributable box, where nothing may lie."""
 
@@ -109,6 +113,16 @@ def act(env: ForageEnv, grips: Mapping[int, float]) -> list[Event]:
         actions[robot, 2] = grip
     env.step_batch(actions)
     return [Event(code) for code in env.events.code.tolist()]
+
+
+def events_of(env: ForageEnv, grip: float, ticks: int, robot: int = 0) -> list[Event]:
+    """Step some ticks in which one robot sends the same gripper command; return its events."""
+    return [act(env, {robot: grip})[robot] for _ in range(ticks)]
+
+
+def count(env: ForageEnv, counter: Counter) -> int:
+    """Return a cumulative counter."""
+    return int(env.events.counters[counter])
 
 
 def snapshot(env: ForageEnv) -> dict[str, np.ndarray]:

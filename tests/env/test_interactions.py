@@ -11,6 +11,8 @@ from swarm_forage_env.kernels.interact import DELIVER_ONLY, FOUND, GRASP, RELEAS
 from swarm_forage_env.policy import Grip
 from swarm_forage_env.scenarios import scenario
 from tests.worlds import (
+    BASE_CELL,
+    CORNER_CACHE,
     NEST_CELL,
     OPEN_CELL,
     WALL_CELL,
@@ -19,7 +21,9 @@ from tests.worlds import (
     build_cache,
     cell_centre,
     clear,
+    count,
     depot,
+    events_of,
     lay,
     load,
     put,
@@ -31,18 +35,6 @@ NONE, PICKED_UP, PICKED_FROM_CACHE = Event.NONE, Event.PICKED_UP, Event.PICKED_F
 DELIVERED, DROPPED, ELSEWHERE, JOINED = Event.DELIVERED, Event.DROPPED, Event.DROPPED_ELSEWHERE, Event.JOINED_CACHE
 NOTHING_HERE, TOO_NEAR = Event.NOTHING_HERE, Event.CACHE_TOO_NEAR
 ANY_RELEASE = (Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.FOUND)
-BASE_CELL = (60, 40)
-CORNER_CACHE = (40, 20)
-"""Centre of a cache clear of the nest, within the proximity distance of the open cell."""
-
-
-def events_of(env: ForageEnv, grip: float, ticks: int, robot: int = 0) -> list[Event]:
-    """Events of a robot that sends the same command for some ticks."""
-    return [act(env, {robot: grip})[robot] for _ in range(ticks)]
-
-
-def count(env: ForageEnv, counter: Counter) -> int:
-    return int(env.events.counters[counter])
 
 
 @pytest.mark.parametrize(
