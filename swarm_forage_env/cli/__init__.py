@@ -209,7 +209,7 @@ def list_everything() -> None:
 
 
 @app.command()
-def info(name: Annotated[str, typer.Argument(help="A scenario or a controller.")]) -> None:
+def info(name: Annotated[str, typer.Argument(help="A scenario, an environment id or a controller.")]) -> None:
     """Show all fields and spaces of a scenario, or what a controller is."""
     from swarm_forage_env.cli.show import information
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import inspect
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -29,11 +30,12 @@ def overview() -> tuple[Table, Table]:
 
 
 def information(name: str) -> str:
-    """Return everything about a scenario or a controller as text.
+    """Return everything about a scenario (by name or environment id) or a controller as text.
 
     Raises:
         ConfigError: neither a scenario nor a controller has that name.
     """
+    name = re.sub(r"^swarm_forage/(\w+)-v\d+$", r"\1", name)
     if name in scenarios.SCENARIO_NAMES:
         return "\n".join(_scenario_lines(scenarios.scenario(name), _first_line(getattr(scenarios, name))))
     if name in policy_names():
