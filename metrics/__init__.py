@@ -2,6 +2,8 @@
 
 Every measure is a function of curves, arrays of shape (..., T) over recording intervals; it knows nothing of robots,
 files or policies. `docs/metrics.md` explains inputs and variants, `docs/errata.md` what the paper's print gets wrong.
+`score_policy` is the front door: it runs a policy in all that the measures need and makes one table
+(`docs/scoring.md`).
 Names load on first use (PEP 562), so importing the package compiles nothing.
 """
 
@@ -13,6 +15,7 @@ from .scalability import efficiency, raw_performance, scalability, skipped_inter
 
 if TYPE_CHECKING:
     from .catalog import METRICS, Measure
+    from .comparison import Comparison, compare_tables
     from .curves import CurveError
     from .distance import aligned_l1, dtw, noise_floor
     from .earlier import fractional_maintenance, projective_performance, weighted_combination
@@ -23,9 +26,19 @@ if TYPE_CHECKING:
     from .population import availability, population_robustness, population_weight, ratio_for_availability
     from .queues import PopulationError, PopulationRates, QueueStats, mean_away, queue_statistics
     from .robustness import mean_signed_difference, noise_robustness
+    from .score_table import Score, ScoreTable
+    from .scoring import compare_policies, score_curves, score_policy
     from .statistics import Summary, aggregate, bootstrap_measure, normalize
 
 __all__ = [
+    # from policies and files of curves to tables of scores
+    "score_policy",
+    "compare_policies",
+    "score_curves",
+    "compare_tables",
+    "Score",
+    "ScoreTable",
+    "Comparison",
     # interference
     "t_lost_fraction",
     "performance_lost",
@@ -78,6 +91,8 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Comparison": "comparison",
+    "compare_tables": "comparison",
     "METRICS": "catalog",
     "Measure": "catalog",
     "CurveError": "curves",
@@ -108,6 +123,11 @@ _HOMES = {
     "queue_statistics": "queues",
     "mean_signed_difference": "robustness",
     "noise_robustness": "robustness",
+    "Score": "score_table",
+    "ScoreTable": "score_table",
+    "compare_policies": "scoring",
+    "score_curves": "scoring",
+    "score_policy": "scoring",
     "Summary": "statistics",
     "aggregate": "statistics",
     "bootstrap_measure": "statistics",

@@ -5,9 +5,12 @@ here, `layout`, `detection`, `quirks` and `types`, and from nothing else of the 
 """
 
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import entry_points
+from pathlib import PurePath
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
@@ -21,6 +24,11 @@ from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
 
 POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
 """Entry-point group under which installed packages offer policies by name."""
+POLICY_FILE_ENTRY_POINTS = "swarm_forage_env.policy_files"
+"""Entry-point group of what opens policy files: the name is the file's suffix without its dot, the value is called with
+the path and the parameters of a run."""
+_LOCAL_POLICIES: dict[str, Callable[..., "Policy"]] = {}
+"""Names that `local_policy` lends to policies of this process."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -136,12 +144,26 @@ def policy_names() -> tuple[str, ...]:
     return tuple(sorted({point.name for point in entry_points(group=POLICY_ENTRY_POINTS)}))
 
 
+def is_policy_file(name: str) -> bool:
+    """Return whether `name` is that of a file which an installed package opens as a policy, by its suffix."""
+    return bool(entry_points(group=POLICY_FILE_ENTRY_POINTS, name=_suffix(name)))
+
+
+def _suffix(name: str) -> str:
+    return PurePath(name).suffix.removeprefix(".").lower()
+
+
 def policy_class(name: str) -> Callable[..., Policy]:
-    """Return the class (or factory) registered under `name`.
+    """Return the class (or factory) registered under `name`, or what opens the policy file of that name.
 
     Raises:
         ValueError: no installed policy has that name; the message lists the known ones.
     """
+    if name in _LOCAL_POLICIES:
+        return _LOCAL_POLICIES[name]
+    if is_policy_file(name):
+        (opener,) = entry_points(group=POLICY_FILE_ENTRY_POINTS, name=_suffix(name))
+        return partial(opener.load(), name)
     for point in entry_points(group=POLICY_ENTRY_POINTS):
         if point.name == name:
             return point.load()
@@ -151,6 +173,26 @@ def policy_class(name: str) -> Callable[..., Policy]:
     raise ValueError(f"Unknown policy {name!r}.{hint} Installed policies: {', '.join(known) or 'none'}.")
 
 
+@contextmanager
+def local_policy(name: str, factory: Callable[..., Policy]) -> Generator[None]:
+    """Let `name` stand for `factory` meanwhile, in this process only: workers do not know it, so run with jobs=1.
+
+    Args:
+        name: A name that no installed policy has.
+        factory: Builds a fresh policy for each run.
+
+    Raises:
+        ValueError: the name is taken, or looks like a policy file.
+    """
+    if name in _LOCAL_POLICIES or name in policy_names() or is_policy_file(name):
+        raise ValueError(f"Expected a name of its own for the policy, got {name!r}, which stands for another one.")
+    _LOCAL_POLICIES[name] = factory
+    try:
+        yield
+    finally:
+        del _LOCAL_POLICIES[name]
+
+
 def load_policy(name: str, parameters: Mapping[str, Any] | None = None) -> Policy:
-    """Return a fresh policy by registered name, built with keyword `parameters`."""
+    """Return a fresh policy by registered name or from a policy file, built with keyword `parameters`."""
     return policy_class(name)(**dict(parameters or {}))

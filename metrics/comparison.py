@@ -1,0 +1,290 @@
+"""Which of several policies is better, and whether the runs can tell."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
+
+from .curves import CurveError, FloatArray
+from .score_table import Score, ScoreTable, aligned, percent, plain, spread
+from .statistics import Summary, aggregate
+
+FAMILY_ERROR = 0.05
+"""Probability of one or more false differences within a measure."""
+TEST = (
+    "Differences: first policy minus second, runs paired by seed, mean with half of Student's 95 % interval. "
+    "* = significant: two-sided paired t test, p at most 0.05 after Holm's correction over all levels and pairs of "
+    "policies of a measure. Relative = per unit of the performance compared with, tested as a measure of its own: "
+    "amounts and distances grow with performance, so a swarm that does little has little to lose."
+)
+"""How differences are tested, for people."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Difference:
+    """Score of one policy minus that of another, in one row."""
+
+    measure: str
+    at: str
+    n_robots: tuple[int, ...]
+    first: str
+    second: str
+    is_relative: bool
+    """Whether scores relative to performance are compared, or the scores themselves."""
+    summary: Summary
+    """Of the differences of runs with the same seed."""
+    p: float
+    """Of the paired t test; NaN where it cannot be made (fewer than two pairs, infinite scores)."""
+    p_holm: float
+    """The same after Holm's correction over all differences of the measure of this kind."""
+    better: str
+    """The better policy if the difference is significant, else empty."""
+
+    @property
+    def key(self) -> tuple[str, str, bool, str, str, tuple[int, ...]]:
+        """Who is compared in what."""
+        return self.first, self.second, self.is_relative, self.measure, self.at, self.n_robots
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether p_holm is at most `FAMILY_ERROR`."""
+        return self.p_holm <= FAMILY_ERROR
+
+    def cell(self) -> str:
+        """Return the difference as a text, with its half interval and a star if it is significant."""
+        return spread(self.summary, is_share=self.is_relative) + (" *" if self.is_significant else "")
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the difference as plain values."""
+        return {
+            "measure": self.measure,
+            "at": self.at,
+            "n_robots": list(self.n_robots),
+            "first": self.first,
+            "second": self.second,
+            "relative": self.is_relative,
+            "difference": plain(self.summary.mean),
+            "lower": plain(self.summary.lower),
+            "upper": plain(self.summary.upper),
+            "n_pairs": self.summary.n_used,
+            "p": plain(self.p),
+            "p_holm": plain(self.p_holm),
+            "significant": self.is_significant,
+            "better": self.better,
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Comparison:
+    """Score tables side by side, with the differences between all pairs of policies."""
+
+    tables: tuple[ScoreTable, ...]
+    differences: tuple[Difference, ...]
+
+    @property
+    def policies(self) -> tuple[str, ...]:
+        """Names of the policies, in the order given."""
+        return tuple(table.policy for table in self.tables)
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of policies that are compared."""
+        return tuple(combinations(self.policies, 2))
+
+    def rows(self) -> tuple[Score, ...]:
+        """Return one score per row, of the first policy that has it."""
+        rows = {score.key: score for table in reversed(self.tables) for score in reversed(table.scores)}
+        ordered = dict.fromkeys(score.key for table in self.tables for score in table.scores)
+        return tuple(rows[key] for key in ordered)
+
+    def score(self, policy: str, row: Score) -> Score | None:
+        """Return the score of a policy in a row, None if it has none."""
+        table = next(table for table in self.tables if table.policy == policy)
+        return next((score for score in table.scores if score.key == row.key), None)
+
+    def difference(self, pair: tuple[str, str], row: Score, *, is_relative: bool = False) -> Difference | None:
+        """Return the difference of a pair of policies in a row, None where there is nothing to compare."""
+        key = (*pair, is_relative, *row.key)
+        return next((d for d in self.differences if d.key == key), None)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return everything as plain values, ready for JSON."""
+        return {
+            "test": TEST,
+            "tables": [table.to_mapping() for table in self.tables],
+            "differences": [difference.to_mapping() for difference in self.differences],
+        }
+
+    def value_rows(self) -> list[tuple[str, ...]]:
+        """Return the values side by side as texts, a row of headings first."""
+        header = ("measure", "at", "better", *self.policies)
+        words = {True: "higher", False: "lower"}
+        rows = self.rows()
+        return [header, *((row.measure, row.at, words[row.higher_is_better], *self._values(row)) for row in rows)]
+
+    def difference_rows(self, pairs: Sequence[tuple[str, str]] | None = None) -> list[tuple[str, ...]]:
+        """Return the differences of pairs of policies (default: all) as texts, a row of headings first."""
+        pairs = self.pairs if pairs is None else pairs
+        lines = [("measure", "at", *(f"{first} - {second}" for first, second in pairs))]
+        for row in self.rows():
+            for is_relative in (False, True):
+                found = [self.difference(pair, row, is_relative=is_relative) for pair in pairs]
+                if any(found):
+                    name = f"{row.measure}, relative" if is_relative else row.measure
+                    lines.append((name, row.at, *("-" if d is None else d.cell() for d in found)))
+        return lines
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what must not be overlooked, policy by policy; what holds for all of them once."""
+        per_table = [table.notes() for table in self.tables]
+        shared = [note for note in per_table[0] if all(note in notes for notes in per_table)]
+        own = [
+            f"{table.policy}: {note}"
+            for table, notes in zip(self.tables, per_table, strict=True)
+            for note in notes
+            if note not in shared
+        ]
+        return (*shared, *own)
+
+    def __str__(self) -> str:
+        values, differences = aligned(self.value_rows()), aligned(self.difference_rows())
+        return "\n".join([*values, "", *differences, "", TEST, *self.notes()])
+
+    def _values(self, row: Score) -> tuple[str, ...]:
+        return tuple(_cell(self.score(policy, row)) for policy in self.policies)
+
+
+def compare_tables(tables: Sequence[ScoreTable]) -> Comparison:
+    """Compare score tables of the same experiments: all pairs of policies, row by row, runs paired by seed.
+
+    Raises:
+        CurveError: fewer than two tables, or two of the same name.
+    """
+    names = [table.policy for table in tables]
+    if len(names) < 2 or len(set(names)) < len(names):
+        raise CurveError(f"Expected two or more policies of different names to compare, got {', '.join(names)}.")
+    scores = {table.policy: {score.key: score for score in table.scores} for table in tables}
+    found: list[_Pair] = []
+    for first, second in combinations(names, 2):
+        for key, score in scores[first].items():
+            other = scores[second].get(key)
+            if other is not None:
+                found += _pairs(score, other, first, second)
+    p_values = np.array([paired_p(pair.values) for pair in found])
+    corrected = np.full(len(found), math.nan)
+    for family in {pair.family for pair in found}:
+        mine = np.array([pair.family == family for pair in found])
+        corrected[mine] = holm(p_values[mine])
+    differences = tuple(
+        _difference(pair, float(p), float(p_holm)) for pair, p, p_holm in zip(found, p_values, corrected, strict=True)
+    )
+    return Comparison(tables=tuple(tables), differences=differences)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Pair:
+    """What is tested once."""
+
+    score: Score
+    first: str
+    second: str
+    is_relative: bool
+    values: FloatArray
+    """Differences of runs with the same seed, (R,)."""
+
+    @property
+    def family(self) -> tuple[str, bool]:
+        """Tests that are corrected together."""
+        return self.score.measure, self.is_relative
+
+
+def _pairs(score: Score, other: Score, first: str, second: str) -> list[_Pair]:
+    kinds = ((False, score.per_seed, other.per_seed), (True, score.relative_per_seed, other.relative_per_seed))
+    return [
+        _Pair(
+            score=score, first=first, second=second, is_relative=is_relative, values=_paired_differences(mine, theirs)
+        )
+        for is_relative, mine, theirs in kinds
+        if mine and theirs
+    ]
+
+
+def paired_p(differences: FloatArray) -> float:
+    """Two-sided p value of the paired t test that the mean difference is zero.
+
+    Args:
+        differences: One per pair of runs, (R,).
+
+    Returns:
+        The p value; NaN for fewer than two pairs or a difference that is not finite. Where all differences are equal
+        Student's t does not exist: 1 if they are zero, else that of the sign test, 2^(1 - R).
+    """
+    n_pairs = differences.size
+    if n_pairs < 2 or not np.isfinite(differences).all():
+        return math.nan
+    spread = float(differences.std(ddof=1))
+    mean = float(differences.mean())
+    if spread == 0.0:
+        return 1.0 if mean == 0.0 else 2.0 ** (1 - n_pairs)
+    t = abs(mean) * math.sqrt(n_pairs) / spread
+    return 2.0 * float(stdtr(n_pairs - 1, -t))
+
+
+def holm(p_values: FloatArray) -> FloatArray:
+    """Adjust p values of one family for testing many at once (Holm 1979); NaN values are no tests and stay NaN.
+
+    Args:
+        p_values: (K,).
+
+    Returns:
+        Adjusted values (K,), at most 1: rejecting where they are at most alpha keeps the probability of any false
+        rejection at alpha.
+    """
+    adjusted = np.full(p_values.shape, math.nan)
+    tests = np.flatnonzero(~np.isnan(p_values))
+    order = tests[np.argsort(p_values[tests], kind="stable")]
+    factors = np.arange(order.size, 0, -1)
+    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(factors * p_values[order]))
+    return adjusted
+
+
+def _paired_differences(first: Mapping[int, float], second: Mapping[int, float]) -> FloatArray:
+    """Differences of runs with the same seed, without those in which a score does not exist."""
+    with np.errstate(invalid="ignore"):
+        values = np.array([first[seed] - second[seed] for seed in first if seed in second], dtype=np.float64)
+    undefined = [math.isnan(first[seed]) or math.isnan(second[seed]) for seed in first if seed in second]
+    return values[~np.array(undefined, dtype=bool)]
+
+
+def _difference(pair: _Pair, p: float, p_holm: float) -> Difference:
+    values, score = pair.values, pair.score
+    summary = Summary(mean=math.nan, std=math.nan, lower=math.nan, upper=math.nan, n_used=values.size, n_nan=0)
+    if values.size and np.isfinite(values).all():
+        summary = aggregate(values)
+    better = ""
+    if p_holm <= FAMILY_ERROR:
+        better = pair.first if (summary.mean > 0.0) == score.higher_is_better else pair.second
+    return Difference(
+        measure=score.measure,
+        at=score.at,
+        n_robots=score.n_robots,
+        first=pair.first,
+        second=pair.second,
+        is_relative=pair.is_relative,
+        summary=summary,
+        p=p,
+        p_holm=p_holm,
+        better=better,
+    )
+
+
+def _cell(score: Score | None) -> str:
+    """Value with its half interval, what it is relative to performance, and "!" where runs are missing."""
+    if score is None:
+        return "-"
+    relative = "" if score.relative is None else f" ({percent(score.relative.mean)})"
+    return spread(score.summary) + relative + (" !" if score.is_partial else "")

@@ -1,0 +1,229 @@
+"""What scoring returns: one row per measure and level, with everything needed to read it."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from .catalog import METRICS
+from .forecast import PopulationForecast
+from .statistics import Summary, aggregate
+
+if TYPE_CHECKING:
+    import polars as pl
+
+HEADER = ("measure", "at", "robots", "value", "95 % interval", "noise floor", "relative", "runs", "better", "unit")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Score:
+    """One measure at one level of what it varies."""
+
+    measure: str
+    """Name in `METRICS`."""
+    at: str
+    """The level in words: "N = 25 to 50", "throttle 0.4"."""
+    criterion: str
+    """What is varied."""
+    x: float
+    """The level as a number: the larger swarm size, or the criterion's value."""
+    n_robots: tuple[int, ...]
+    """Swarm sizes that enter, the reference run's included."""
+    unit: str
+    summary: Summary
+    """Mean over runs with Student's interval; a value per run, so that its runs pair experiments by seed."""
+    per_seed: Mapping[int, float]
+    """Value of each run by its seed."""
+    n_lost: int = 0
+    """Runs that failed or have no partner."""
+    noise_floor: float | None = None
+    """For distances: mean distance between two different reference runs, what a perfect swarm scores by chance."""
+    relative_per_seed: Mapping[int, float] = field(default_factory=dict[int, float])
+    """For amounts and distances: value of each run over the total performance it compares with, which makes policies of
+    different performance comparable; NaN where that performance is zero."""
+    of_mean_curves: Summary | None = None
+    """For scalability and distances: the measure of the mean curves with a bootstrap interval."""
+    beside: Mapping[str, float] = field(default_factory=dict[str, float])
+    """Further numbers to read with the value."""
+    note: str = ""
+    """What one has to know about this row, empty if nothing."""
+
+    @property
+    def higher_is_better(self) -> bool:
+        """Direction of the measure."""
+        return METRICS[self.measure].higher_is_better
+
+    @property
+    def relative(self) -> Summary | None:
+        """Mean over runs of `relative_per_seed` with its interval; None for measures that are relative themselves."""
+        return aggregate(list(self.relative_per_seed.values())) if self.relative_per_seed else None
+
+    @property
+    def key(self) -> tuple[str, str, tuple[int, ...]]:
+        """What the row is about, the same for all policies."""
+        return self.measure, self.at, self.n_robots
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the row as texts under `HEADER`."""
+        summary = self.summary
+        runs = str(summary.n_used) + (f" of {summary.n_used + summary.n_nan + self.n_lost}" if self.is_partial else "")
+        return (
+            self.measure,
+            self.at,
+            ", ".join(map(str, self.n_robots)),
+            number(summary.mean),
+            interval(summary),
+            "" if self.noise_floor is None else number(self.noise_floor),
+            "" if self.relative is None else percent(self.relative.mean),
+            runs,
+            "higher" if self.higher_is_better else "lower",
+            self.unit,
+        )
+
+    @property
+    def is_partial(self) -> bool:
+        """Whether runs are missing from the value."""
+        return self.summary.n_nan + self.n_lost > 0
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the row as plain values; numbers that JSON does not have are None."""
+        summary, means, relative = self.summary, self.of_mean_curves, self.relative
+        return {
+            "measure": self.measure,
+            "symbol": METRICS[self.measure].symbol,
+            "at": self.at,
+            "criterion": self.criterion,
+            "x": self.x,
+            "n_robots": list(self.n_robots),
+            "unit": self.unit,
+            "higher_is_better": self.higher_is_better,
+            "neutral": METRICS[self.measure].neutral,
+            "value": plain(summary.mean),
+            "std": plain(summary.std),
+            "lower": plain(summary.lower),
+            "upper": plain(summary.upper),
+            "n_runs": summary.n_used,
+            "n_nan": summary.n_nan,
+            "n_lost": self.n_lost,
+            "noise_floor": plain(self.noise_floor),
+            "relative": bounds(relative),
+            "of_mean_curves": bounds(means),
+            "beside": {name: plain(value) for name, value in self.beside.items()},
+            "per_seed": {str(seed): plain(value) for seed, value in self.per_seed.items()},
+            "note": self.note,
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScoreTable:
+    """All scores of one policy in one world."""
+
+    policy: str
+    scenario: str
+    """Name of the world; empty where nobody told."""
+    scores: tuple[Score, ...]
+    forecasts: tuple[PopulationForecast, ...] = ()
+    """What the queue model predicts for a changing population, beside what the runs showed."""
+    missing: Mapping[str, str] = field(default_factory=dict[str, str])
+    """Measure -> why it could not be computed."""
+    failures: tuple[str, ...] = ()
+    """Runs that failed, one line each."""
+    settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    """How the runs were made: budget, length, seeds, folder."""
+
+    def __getitem__(self, measure: str) -> tuple[Score, ...]:
+        """Return the rows of one measure.
+
+        Raises:
+            KeyError: there are none; the message says why.
+        """
+        rows = tuple(score for score in self.scores if score.measure == measure)
+        if not rows:
+            raise KeyError(f"No score for {measure!r}: {self.missing.get(measure, 'it was not asked for')}")
+        return rows
+
+    def notes(self) -> tuple[str, ...]:
+        """Return everything that must not be overlooked: rows with a note, missing measures, failed runs."""
+        rows = [f"{score.measure}, {score.at}: {score.note}" for score in self.scores if score.note]
+        absent = [f"{measure} is not computed: {reason}" for measure, reason in self.missing.items()]
+        return (*rows, *absent, *(f"failed: {failure}" for failure in self.failures))
+
+    def to_frame(self) -> "pl.DataFrame":
+        """Return the rows as a table; what a row holds more than a table can is left to `to_mapping`."""
+        import polars as pl
+
+        rows: list[dict[str, Any]] = []
+        for score in self.scores:
+            row = score.to_mapping()
+            del row["per_seed"], row["beside"]
+            for name in ("relative", "of_mean_curves"):
+                values = row.pop(name) or [None, None, None]
+                row |= dict(zip((name, f"{name}_lower", f"{name}_upper"), values, strict=True))
+            row["n_robots"] = " ".join(map(str, score.n_robots))
+            rows.append({"policy": self.policy, "scenario": self.scenario, **row})
+        return pl.DataFrame(rows, infer_schema_length=None)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the table as plain values, ready for JSON."""
+        return {
+            "policy": self.policy,
+            "scenario": self.scenario,
+            "settings": dict(self.settings),
+            "scores": [score.to_mapping() for score in self.scores],
+            "population": [forecast.to_mapping() for forecast in self.forecasts],
+            "missing": dict(self.missing),
+            "failures": list(self.failures),
+        }
+
+    def __str__(self) -> str:
+        where = f" in {self.scenario}" if self.scenario else ""
+        return "\n".join(
+            [f"{self.policy}{where}", *aligned([HEADER, *(score.cells() for score in self.scores)]), *self.notes()]
+        )
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return rows of texts as lines with columns under each other."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def number(value: float) -> str:
+    """Return a number with about four digits; a dash where there is none."""
+    if math.isnan(value):
+        return "-"
+    if math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+
+
+def percent(value: float) -> str:
+    """Return a share in percent; a dash where there is none."""
+    return "-" if not math.isfinite(value) else f"{100.0 * value:.3g} %"
+
+
+def interval(summary: Summary) -> str:
+    """Return the bounds of an interval."""
+    if math.isnan(summary.lower):
+        return "-"
+    return f"{number(summary.lower)} to {number(summary.upper)}"
+
+
+def plain(value: float | None) -> float | None:
+    """Return the value, or None where JSON has no such number."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+def spread(summary: Summary, *, is_share: bool = False) -> str:
+    """Return a mean with half of its interval, to two digits of the latter."""
+    factor, unit = (100.0, " %") if is_share else (1.0, "")
+    mean, half = factor * summary.mean, factor * (summary.upper - summary.mean)
+    if not (math.isfinite(mean) and math.isfinite(half)):
+        return number(mean) + (unit if math.isfinite(mean) else "")
+    decimals = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 2
+    return f"{mean:.{decimals}f} ± {half:.{decimals}f}{unit}"
+
+
+def bounds(summary: Summary | None) -> list[float | None] | None:
+    """Return mean, lower and upper bound as plain values; None where there is no summary."""
+    return None if summary is None else [plain(value) for value in (summary.mean, summary.lower, summary.upper)]

@@ -1,0 +1,173 @@
+"""Trained policies in files: models that stable-baselines3 saved (`*.zip`), networks of our own (`*.npz`).
+
+`policy.policy_class` finds what opens a file by its suffix, in every process, so that a path is a policy wherever a
+name is one.
+"""
+
+import hashlib
+import pickle
+from functools import lru_cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from swarm_forage_env.learning.interface import ACTIONS, OBSERVATIONS, InterfaceConfig, LearnerInterface
+from swarm_forage_env.learning.network import Network, NetworkPolicy
+from swarm_forage_env.policy import SwarmTask
+from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
+
+_DIGEST_DIGITS = 16
+
+
+class ModelError(ValueError):
+    """A file that is no model, or a model that cannot steer this swarm."""
+
+
+class ModelPolicy:
+    """A model saved by stable-baselines3 (PPO, A2C, DQN, SAC, TD3, DDPG), acting without exploration.
+
+    A model of one robot is applied to every robot, whatever the swarm size; what it sees and does, of the choices in
+    `learning.interface`, is told from its spaces. A model of the whole swarm, (N, D) to (N, 3), works for its own N
+    only. Nothing is normalised: a model trained behind `VecNormalize` sees other numbers than it was trained on.
+
+    Opening a model runs code that the file contains. Open only what you trust.
+    """
+
+    def __init__(self, path: str | Path, *, digest: str | None = None, decision_ticks: int = 1) -> None:
+        """Open the model.
+
+        Args:
+            path: The saved file.
+            digest: What `file_digest` returned when the run was planned; a file that has changed since is refused.
+            decision_ticks: Ticks for which an action is kept, as in training; the file does not tell.
+
+        Raises:
+            ImportError: stable-baselines3 is not installed.
+            ModelError: the file is missing, has changed, or holds no such model.
+            ConfigError: decision_ticks below 1.
+        """
+        self._path = Path(path)
+        self._network = _open_model(str(path), _checked_digest(path, digest))
+        self._decision_ticks = InterfaceConfig(decision_ticks=decision_ticks).decision_ticks
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Find out how the model sees and steers this swarm.
+
+        Raises:
+            ModelError: it sees or does something else.
+        """
+        self._interface = self._fitting_interface(task)
+        self._ticks_left = 0
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Return the model's deterministic choice, (N, 3) float32."""
+        if self._ticks_left == 0:
+            seen = obs if self._interface is None else self._interface.observe(obs)
+            self._actions, _ = self._network.predict(seen, deterministic=True)
+            self._ticks_left = self._decision_ticks
+        self._ticks_left -= 1
+        if self._interface is None:
+            return np.asarray(self._actions, np.float32)
+        return self._interface.command(self._actions, obs)
+
+    def _fitting_interface(self, task: SwarmTask) -> LearnerInterface | None:
+        """Return the interface whose spaces are those of the model; None for a model of the whole swarm."""
+        n_robots, size = task.n_robots, task.layout.size
+        spaces_of_model = (self._network.observation_space, self._network.action_space)
+        found = tuple(_describe(space) for space in spaces_of_model)
+        if found == (f"Box({n_robots}, {size})", f"Box({n_robots}, 3)"):
+            return None
+        seen: list[str] = []
+        for observation, actions, automatic in product(OBSERVATIONS, ACTIONS, (False, True)):
+            config = InterfaceConfig(observation=observation, actions=actions, automatic_gripper=automatic)
+            interface = LearnerInterface(config, task)
+            fitting = (_describe(interface.observation_space), _describe(interface.action_space))
+            if found == fitting:
+                return interface
+            seen.append(" to ".join(fitting))
+        raise ModelError(
+            f"Expected a model of one robot, from observations to actions {', '.join(seen)}, or of these {n_robots} "
+            f"robots together, Box({n_robots}, {size}) to Box({n_robots}, 3); {self._path.name} goes from "
+            f"{' to '.join(found)}."
+        )
+
+
+def open_network(path: str | Path, *, digest: str | None = None) -> NetworkPolicy:
+    """Return the policy of a network file; see `learning.network`.
+
+    Args:
+        path: The file.
+        digest: As in `ModelPolicy`.
+
+    Raises:
+        ModelError: the file is missing or has changed.
+        NetworkError: it holds no network.
+    """
+    _checked_digest(path, digest)
+    return NetworkPolicy(Network.load(path))
+
+
+def file_digest(path: str | Path) -> str:
+    """Return a short hash of a policy file, which makes its content part of a run's identity.
+
+    Raises:
+        ModelError: the file cannot be read.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise ModelError(f"Cannot read the policy file {path}: {error.strerror or error}.") from error
+    return hashlib.blake2b(content, digest_size=_DIGEST_DIGITS // 2).hexdigest()
+
+
+def _checked_digest(path: str | Path, planned: str | None) -> str:
+    found = file_digest(path)
+    if planned not in (None, found):
+        raise ModelError(
+            f"Expected {path} as it was when the run was planned (digest {planned}), got a file that has changed since "
+            f"({found}); plan the run again."
+        )
+    return found
+
+
+def _describe(space: spaces.Space[Any]) -> str:
+    """Return kind and size of a space, which is what has to agree."""
+    size = space.n if isinstance(space, spaces.Discrete) else ", ".join(map(str, space.shape or ()))
+    return f"{type(space).__name__}({size})"
+
+
+@lru_cache(maxsize=2)
+def _open_model(path: str, digest: str) -> Any:  # noqa: ARG001 - the digest makes a changed file a new entry
+    """Return the policy network of a saved model, in evaluation mode, on the CPU.
+
+    The network alone, not the algorithm around it, which for off-policy methods would allocate its replay buffer.
+    """
+    try:
+        from stable_baselines3.common.policies import ActorCriticPolicy
+        from stable_baselines3.common.save_util import load_from_zip_file
+    except ImportError as error:
+        raise ImportError(
+            f"The model {path} needs stable-baselines3: pip install 'swarm-forage-env[train]' 'torch==2.13.0'"
+        ) from error
+
+    try:
+        data, parameters, _ = load_from_zip_file(path, device="cpu")
+        if data is None:
+            raise ModelError("it holds no description of a policy")
+        settings = dict(data["policy_kwargs"])
+        settings.pop("device", None)
+        if issubclass(data["policy_class"], ActorCriticPolicy):
+            settings.setdefault("use_sde", data["use_sde"])  # the other algorithms keep it among the settings
+        network = data["policy_class"](data["observation_space"], data["action_space"], lambda _: 0.0, **settings)
+        weights: Any = parameters["policy"]
+        network.load_state_dict(weights)
+    except (ValueError, LookupError, TypeError, AssertionError, RuntimeError, pickle.UnpicklingError) as error:
+        reason = " ".join(str(error).split())
+        raise ModelError(
+            f"Expected {path} to be a model saved by stable-baselines3, but it cannot be opened: {reason}."
+        ) from error
+    network.set_training_mode(False)
+    return network

@@ -1,0 +1,290 @@
+"""The experiments behind the measures: ladders of swarm sizes and of adversity, at three budgets.
+
+An experiment is what one criterion at one value asks of a run; every experiment is run once per seed. Criteria, the
+value each of them varies, and its reference run:
+
+    population_size       number of robots; reference: one robot
+    throttle              amplitude of the waveform by which robots lose speed; reference: value 0, ideal throttle
+    noise                 standard deviation of sensor and actuator noise; reference: the undisturbed run
+    population_dynamics   rates of malfunctions and repairs, or of deaths; reference: the undisturbed run
+    none                  the undisturbed run itself
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+from swarm_forage_env.config import ConfigError, ScenarioConfig, suggestion
+from swarm_forage_env.quirks import AUTHORS_PROGRAM
+from swarm_forage_env.scenarios import (
+    SEARCH_AND_RESCUE_OBJECTS,
+    robots_at_density,
+    scenario,
+    search_and_rescue,
+)
+from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, noise_levels
+from swarm_forage_env.wrappers.population import PopulationConfig, death_levels, malfunction_levels
+from swarm_forage_env.wrappers.throttle import ThrottleConfig, sine_throttles, square_throttles
+
+CRITERIA = ("population_size", "throttle", "noise", "population_dynamics")
+UNDISTURBED = "none"
+"""Criterion of the runs that nothing is varied in."""
+STUDY_HORIZON_S = 10_000.0
+"""Length of the study's runs; the period of its throttle waveforms is made for it."""
+SIZE_SWEEP_OBJECTS = {"warehouse_small": 512, "warehouse_medium": 2048}
+"""Objects while the swarm size varies (study configuration): enough for the largest swarm."""
+STUDY_LARGEST_SIZE = 2.56
+"""Largest swarm of the size sweeps in units of the usual one: 128 of 50 and 512 of 200 (study configuration)."""
+SIGMA_MAX = {"warehouse_small": 0.03, "warehouse_medium": 0.03, "search_and_rescue": 0.10}
+"""Highest noise of the robustness studies (paper)."""
+STUDY_SIZES_OF_MALFUNCTIONS = (50, 200)
+MALFUNCTION_PER_TICK = 0.001
+AWAY_SHARE = 0.9
+"""Share of the swarm away in the equilibrium of an unlimited queue at the study's malfunction and repair rates."""
+
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Budget:
+    """How much computing a score may cost."""
+
+    horizon_s: float
+    """Length of a run. Throttle waveforms are compressed to it, so that they pass as many cycles as in the study;
+    population rates and noise stay as they are."""
+    interval_s: float
+    """Length of a recording interval."""
+    n_seeds: int
+    n_sizes: int | None
+    """Swarm sizes from one robot up, the largest the scenario's own; None = the sweep of the study."""
+    n_levels: int | None
+    """Levels of each kind of adversity, evenly spread up to the study's strongest; None = all of the study."""
+
+    def __post_init__(self) -> None:
+        for name, least in (("n_seeds", 1), ("n_sizes", 2), ("n_levels", 1)):
+            value = getattr(self, name)
+            if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
+                raise ConfigError(f"Expected {name} of a budget to be a whole number >= {least}, got {value!r}.")
+
+
+BUDGETS: dict[str, Budget] = {
+    "quick": Budget(horizon_s=4_000.0, interval_s=100.0, n_seeds=4, n_sizes=3, n_levels=2),
+    "standard": Budget(horizon_s=10_000.0, interval_s=200.0, n_seeds=16, n_sizes=5, n_levels=4),
+    "paper": Budget(horizon_s=STUDY_HORIZON_S, interval_s=200.0, n_seeds=192, n_sizes=None, n_levels=None),
+}
+"""quick: minutes, tells large differences; standard: about an hour per controller on a few cores; paper: the sizes,
+levels, length and number of runs of the study."""
+
+
+def budget(name: str) -> Budget:
+    """Return a budget by name; raises ConfigError on an unknown one."""
+    if name not in BUDGETS:
+        raise ConfigError(f"Unknown budget {name!r}.{suggestion(name, BUDGETS)} Known: {', '.join(BUDGETS)}.")
+    return BUDGETS[name]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Experiment:
+    """What is run once per seed."""
+
+    criterion: str
+    """One of `CRITERIA`, or `UNDISTURBED`."""
+    value: float
+    scenario: ScenarioConfig
+    wrappers: tuple[WrapperConfig, ...] = ()
+
+    @property
+    def population(self) -> PopulationConfig | None:
+        """Rates of the population dynamics, if there are any."""
+        return next((config for config in self.wrappers if isinstance(config, PopulationConfig)), None)
+
+
+def plan_experiments(base: ScenarioConfig, criteria: Collection[str], budget: Budget) -> tuple[Experiment, ...]:
+    """Return the experiments of `criteria`, reference runs included, none of them twice.
+
+    Args:
+        base: The world; its horizon and recording interval are replaced by those of the budget.
+        criteria: Some of `CRITERIA`.
+        budget: How many sizes and levels, and how long a run is.
+
+    Raises:
+        ConfigError: an unknown criterion, a swarm of one robot where sizes are varied, or a size that the world has no
+            room for.
+    """
+    for name in criteria:
+        if name not in CRITERIA:
+            raise ConfigError(f"Unknown criterion {name!r}.{suggestion(name, CRITERIA)} Known: {', '.join(CRITERIA)}.")
+    world = replace(base, horizon_s=budget.horizon_s, interval_s=budget.interval_s)
+    experiments: list[Experiment] = []
+    if "population_size" in criteria:
+        experiments += [
+            Experiment(criterion="population_size", value=sized.robots.n_robots, scenario=sized)
+            for sized in size_ladder(world, budget.n_sizes)
+        ]
+    if "noise" in criteria or "population_dynamics" in criteria:
+        experiments.append(Experiment(criterion=UNDISTURBED, value=0.0, scenario=world))
+    levels = {"throttle": _throttle_levels, "noise": _noise_levels, "population_dynamics": _population_levels}
+    for criterion, of_study in levels.items():
+        if criterion in criteria:
+            reference, disturbed = of_study(world)
+            chosen = spread(disturbed, budget.n_levels)
+            experiments += [
+                Experiment(criterion=criterion, value=value, scenario=world, wrappers=wrappers)
+                for value, wrappers in (*reference, *chosen)
+            ]
+    return tuple(experiments)
+
+
+def plan_specs(
+    experiments: Sequence[Experiment],
+    policy: str,
+    *,
+    seeds: Sequence[int],
+    parameters: Mapping[str, Any] | None = None,
+    caches: str | None = None,
+) -> tuple[RunSpec, ...]:
+    """Return one specification per experiment and seed, seed by seed.
+
+    So an interrupted study has whole sets of experiments, and the estimate of the remaining time settles early.
+
+    Args:
+        experiments: What to run.
+        policy: Registered name.
+        seeds: Seeds of the runs; all experiments share them, which pairs their worlds.
+        parameters: Of the policy.
+        caches: Which caches the world has; default those that the policy is made for.
+
+    Raises:
+        ConfigError: see `study.spec.RunSpec`.
+        ValueError: no installed policy has that name.
+    """
+    return tuple(
+        plan_run(
+            experiment.scenario,
+            policy,
+            caches=caches,
+            parameters=parameters or {},
+            wrappers=experiment.wrappers,
+            criterion=experiment.criterion,
+            criterion_value=experiment.value,
+            seed=seed,
+        )
+        for seed in seeds
+        for experiment in experiments
+    )
+
+
+def spread(levels: Sequence[_T], count: int | None) -> tuple[_T, ...]:
+    """Return `count` of `levels`, evenly spread and ending with the last one; None = all."""
+    if count is None or count >= len(levels):
+        return tuple(levels)
+    return tuple(levels[(index + 1) * len(levels) // count - 1] for index in range(count))
+
+
+def size_ladder(world: ScenarioConfig, count: int | None) -> tuple[ScenarioConfig, ...]:
+    """Return the same world with one robot, more robots, up to the swarm it was made for (or that of the study).
+
+    In search and rescue the arena grows with the swarm; the one-robot run is in the smallest arena.
+
+    Args:
+        world: The world at its usual size.
+        count: Number of sizes; None = powers of two up to 2.56 times the usual size (which gives the study's 128 and
+            512), or all eight arenas of search and rescue.
+
+    Raises:
+        ConfigError: one robot has no smaller size, or there is no room for the largest.
+    """
+    n_robots = world.robots.n_robots
+    if n_robots < 2:
+        raise ConfigError("Expected a scenario of at least 2 robots where swarm sizes are compared, got 1.")
+    if world.name == "search_and_rescue":
+        return _growing_arenas(world, count)
+    if count is None:
+        sizes = {2**power for power in range(64) if 2**power <= STUDY_LARGEST_SIZE * n_robots}
+    else:
+        # Halves of halves, so that neighbours differ by the same factor: 1, 25, 50 or 1, 6, 12, 25, 50.
+        sizes = {1, *(max(2, n_robots >> halvings) for halvings in range(count - 1))}
+    if world.objects.n_objects == _preset_objects(world.name):
+        world = replace(world, objects=replace(world.objects, n_objects=SIZE_SWEEP_OBJECTS[world.name]))
+    return tuple(replace(world, robots=replace(world.robots, n_robots=size)) for size in sorted(sizes))
+
+
+def _preset_objects(name: str) -> int | None:
+    """Number of objects of a preset whose size sweep has another one."""
+    return scenario(name).objects.n_objects if name in SIZE_SWEEP_OBJECTS else None
+
+
+def _growing_arenas(world: ScenarioConfig, count: int | None) -> tuple[ScenarioConfig, ...]:
+    """Search and rescue at constant density, one robot in the smallest arena first."""
+    base_side = world.arena.width_m
+    density = world.robots.n_robots / (base_side * base_side)
+    if world.robots.n_robots == robots_at_density(base_side):
+        density = robots_at_density(1000.0) / 1e6  # that of the preset, free of the truncation to whole robots
+    smallest = min(SEARCH_AND_RESCUE_OBJECTS)
+    sides = [float(side) for side in SEARCH_AND_RESCUE_OBJECTS if count is None or side < base_side]
+    sides = sides if count is None else [*spread(sides, min(count - 2, len(sides))), base_side]
+    if count == 2:
+        sides = [base_side]
+    ladder = [_in_arena(world, float(smallest), 1)]
+    for side in sides:
+        sized = world if side == base_side else _in_arena(world, side, robots_at_density(side, density))
+        if sized.robots.n_robots > ladder[-1].robots.n_robots:
+            ladder.append(sized)
+    return tuple(ladder)
+
+
+def _in_arena(world: ScenarioConfig, side_m: float, n_robots: int) -> ScenarioConfig:
+    """Return `world` in the search and rescue arena of that side, everything else as it is."""
+    preset = search_and_rescue(side_m=side_m)
+    return replace(
+        world,
+        arena=preset.arena,
+        robots=replace(world.robots, n_robots=n_robots),
+        objects=replace(world.objects, n_objects=preset.objects.n_objects),
+    )
+
+
+_Level = tuple[float, tuple[WrapperConfig, ...]]
+"""Criterion value, and the wrappers that make it."""
+
+
+def _throttle_levels(world: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    configs = sine_throttles() if world.name == "search_and_rescue" else square_throttles()
+    ideal, *levels = (_compressed(config, world.horizon_s / STUDY_HORIZON_S) for config in configs)
+    return [(0.0, (ideal,))], [(config.waveform.amplitude, (config,)) for config in levels]
+
+
+def _compressed(config: ThrottleConfig, factor: float) -> ThrottleConfig:
+    period_s = config.waveform.period_s
+    if period_s is None:
+        return config
+    return replace(config, waveform=replace(config.waveform, period_s=period_s * factor))
+
+
+def _noise_levels(world: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    groups = STUDY_NOISE_GROUPS if world.quirks == AUTHORS_PROGRAM else NOISE_GROUPS
+    levels: list[_Level] = []
+    for sensor, actuator in noise_levels(SIGMA_MAX.get(world.name, max(SIGMA_MAX.values())), groups=groups):
+        assert isinstance(actuator.sigma, float), "levels are constant"
+        levels.append((actuator.sigma, (sensor, actuator)))
+    return [], levels[1:]  # the first is sigma = 0, the undisturbed run
+
+
+def _population_levels(world: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    if world.name == "search_and_rescue":
+        return [], [(config.death_per_tick, (config,)) for config in death_levels()]
+    return [], [(float(factor), (config,)) for factor, config in enumerate(_malfunctions(world.robots.n_robots), 1)]
+
+
+def _malfunctions(n_robots: int) -> tuple[PopulationConfig, ...]:
+    """Rates of the study, or their like for other swarm sizes (our choice: the same share of the swarm away)."""
+    if n_robots in STUDY_SIZES_OF_MALFUNCTIONS:
+        return malfunction_levels(n_robots)
+    away = AWAY_SHARE * n_robots  # rho / (1 - rho) with rho = malfunctions / repairs
+    repair = MALFUNCTION_PER_TICK * (1.0 + 1.0 / away)
+    return tuple(
+        PopulationConfig(malfunction_per_tick=factor * MALFUNCTION_PER_TICK, repair_per_tick=factor * repair)
+        for factor in range(1, 9)
+    )
