@@ -34,7 +34,7 @@ from .cache_memory import (
     task_memory_of,
 )
 from .cache_sites import select_site
-from .compiling import Row, kernel
+from .compiling import Row, inline_kernel, kernel
 from .machines import (
     ACQUIRE,
     DRAW_RESTART,
@@ -176,7 +176,7 @@ def _search_step(robot: np.record, senses: Senses, row: Row, c: np.record, draws
     return x, y
 
 
-@kernel
+@inline_kernel
 def follow_events(
     a: Allocation, i: int, robot: np.record, senses: Senses, row: Row, c: np.record, memory: OneTaskMemory
 ) -> None:
@@ -206,7 +206,7 @@ def follow_events(
         restart_acquiring(robot)  # others have emptied the cache too far
 
 
-@kernel
+@inline_kernel
 def manage_task(
     a: Allocation, i: int, robot: np.record, senses: Senses, now: int, c: np.record, draws: Row, memory: OneTaskMemory
 ) -> bool:
@@ -228,7 +228,7 @@ def manage_task(
     return True
 
 
-@kernel
+@inline_kernel
 def run_machine(
     robot: np.record, task: int, senses: Senses, row: Row, c: np.record, draws: Row, memory: OneTaskMemory
 ) -> tuple[float, float]:
