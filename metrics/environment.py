@@ -56,7 +56,7 @@ def waveform(
             "Expected finite numbers and frequency >= 0 cycles per tick, got "
             f"frequency={frequency}, amplitude={amplitude}, offset={offset}, phase={phase}."
         )
-    cycles = frequency * np.asarray(ticks, dtype=np.float64)
+    cycles = np.asarray(ticks, dtype=np.float64) / _period(frequency)
     if kind_name == "constant":
         return np.full_like(cycles, amplitude)[()]
     if kind_name == "sawtooth":
@@ -65,6 +65,18 @@ def waveform(
     if kind_name == "square":
         sine = np.where(sine >= 0.0, 1.0, -1.0)
     return (amplitude * sine + offset)[()]
+
+
+def _period(frequency: float) -> float:
+    """Period in ticks, whole where the frequency is the reciprocal of a whole number.
+
+    The environment divides by the period. The product of frequency and ticks, or a period that is rounded twice, lands
+    on the other side of some half periods, where a square wave then has the other sign.
+    """
+    if frequency == 0.0:
+        return math.inf
+    period = 1.0 / frequency
+    return float(round(period)) if math.isclose(period, round(period), rel_tol=1e-12) else period
 
 
 def environment_scaling(

@@ -11,6 +11,8 @@ import typer
 from rich.console import Console
 
 if TYPE_CHECKING:
+    from metrics.score_table import ScoreTable
+    from metrics.scoring import ScoringPlan
     from swarm_forage_env.study.runner import StudyResult
     from swarm_forage_env.study.spec import RunSpec
     from swarm_forage_env.study.store import RunStore
@@ -59,6 +61,15 @@ ConfigFile = Annotated[
         help="Scenario fields and wrappers, one table each; what other options say goes before it.",
     ),
 ]
+
+Measures = Annotated[str | None, typer.Option("--measures", help="Names separated by commas; default all.")]
+Budget = Annotated[str, typer.Option("--budget", help="quick, standard or paper: how long, how many runs and levels.")]
+ScoreSeeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per experiment; default the budget's.")]
+ScoreHorizon = Annotated[float | None, typer.Option("--horizon", help="Seconds per run; default the budget's.")]
+Out = Annotated[Path | None, typer.Option("--out", help="Folder for records; default results/SCENARIO.")]
+Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Processes; default one per core.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and an estimate, run nothing.")]
 
 
 def main() -> None:
@@ -197,6 +208,117 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
         notes.print(f"  again, alone: swarm-forage rerun {store.failure_path(failure.run_id)}", markup=False)
     if result.failures:
         raise typer.Exit(EXIT_FAILURE)
+
+
+@app.command()
+def score(
+    policy: Annotated[str | None, typer.Option(help="Name of a controller, or file of a trained policy.")] = None,
+    curves: Annotated[
+        Path | None, typer.Option(help="Score curves from elsewhere instead: a CSV or Parquet file (docs/scoring.md).")
+    ] = None,
+    scenario: Scenario = "warehouse_small",
+    measures: Measures = None,
+    budget: Budget = "standard",
+    seeds: ScoreSeeds = None,
+    horizon: ScoreHorizon = None,
+    robots: Robots = None,
+    objects: Objects = None,
+    side: Side = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    out: Out = None,
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Run a policy in all that the measures of swarm engineering need, and score it.
+
+    Swarms of several sizes, throttled, noisy and failing robots; one table with intervals and noise floors. Runs that
+    the folder holds already are not repeated.
+    """
+    from swarm_forage_env.cli.plan import WorldOptions, default_folder
+    from swarm_forage_env.cli.scoring import ScoreOptions, build_plan, tables_of_file
+
+    if (policy is None) == (curves is None):
+        raise typer.BadParameter("Expected either --policy or --curves.")
+    if curves is not None:
+        _show_scores(tables_of_file(curves, measures), None, as_json=as_json)
+        return
+    world = WorldOptions(
+        scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
+    )
+    options = ScoreOptions(policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon)
+    folder = out or default_folder(scenario)
+    _score(build_plan(world, options), folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run)
+
+
+@app.command()
+def compare(
+    policies: Annotated[str, typer.Option(help="Names or files of two or more policies, separated by commas.")],
+    scenario: Scenario = "warehouse_small",
+    measures: Measures = None,
+    budget: Budget = "standard",
+    seeds: ScoreSeeds = None,
+    horizon: ScoreHorizon = None,
+    robots: Robots = None,
+    objects: Objects = None,
+    side: Side = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    out: Out = None,
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Score policies in the same worlds, seed by seed, and say which differences are significant."""
+    from swarm_forage_env.cli.plan import WorldOptions, default_folder
+    from swarm_forage_env.cli.scoring import ScoreOptions, build_plan
+
+    world = WorldOptions(
+        scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
+    )
+    options = ScoreOptions(policies=policies, measures=measures, budget=budget, seeds=seeds, horizon=horizon)
+    plan = build_plan(world, options, at_least=2)
+    _score(plan, out or default_folder(scenario), "comparison.png", jobs, as_json=as_json, dry_run=dry_run)
+
+
+def _score(plan: "ScoringPlan", folder: Path, picture: str, jobs: int | None, *, as_json: bool, dry_run: bool) -> None:
+    from metrics.scoring import run_scores
+    from swarm_forage_env.cli.scoring import plan_json, plan_text
+    from swarm_forage_env.study.runner import StudyInterrupted, available_cores
+    from swarm_forage_env.study.store import RunStore
+
+    if dry_run:
+        show = plan_json if as_json else plan_text
+        typer.echo(show(plan, RunStore(folder), jobs or available_cores()))
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        tables = run_scores(plan, out=folder, jobs=jobs, progress=True)
+    except StudyInterrupted as interrupt:
+        _complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    _show_scores(tables, folder / picture, as_json=as_json)
+    if any(table.failures for table in tables):
+        raise typer.Exit(EXIT_FAILURE)
+
+
+def _show_scores(tables: "tuple[ScoreTable, ...]", picture: Path | None, *, as_json: bool) -> None:
+    from swarm_forage_env.cli.scoring import compared, comparison_text, draw, json_text, table_text
+
+    comparison = compared(tables)
+    drawn = None
+    if picture is not None:
+        try:
+            drawn = draw(tables, picture)
+        except ImportError:
+            typer.echo("No picture without matplotlib: pip install 'swarm-forage-env[plots]'", err=True)
+    if as_json:
+        typer.echo(json_text(tables, comparison, drawn))
+    else:
+        typer.echo(table_text(tables[0]) if comparison is None else comparison_text(comparison))
+    if drawn is not None:
+        typer.echo(f"picture {drawn}", err=True)
 
 
 @app.command("list")

@@ -1,0 +1,81 @@
+"""Facts that `metrics` and the environment state separately, because neither may import the other: they agree."""
+
+import numpy as np
+import pytest
+
+from metrics import waveform
+from metrics.score_rows import MEASURE_CRITERIA
+from metrics.study_table import CRITERIA, CURVE_COLUMNS, UNDISTURBED, study_curves
+from swarm_forage_env.recording import RunRecord
+from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.signals import Waveform
+from swarm_forage_env.study import experiments
+from swarm_forage_env.study.run import run_one
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.wrappers.population import PopulationConfig
+from swarm_forage_env.wrappers.throttle import ThrottleConfig
+
+TICKS = np.arange(1, 50_001)
+DT_S = 0.2
+
+
+@pytest.mark.parametrize("period_s", [10_000.0, 5_000.0, 4_000.0, 2_000.0, 777.0, 60.0])
+@pytest.mark.parametrize("phase", [0.0, 0.3])
+@pytest.mark.parametrize("kind", ["sine", "square", "sawtooth"])
+def test_waveforms_agree_at_every_tick_of_a_run(kind, phase, period_s):
+    signal = Waveform(kind=kind, amplitude=0.4, offset=0.35, period_s=period_s, phase=phase).signal(DT_S)
+    measured = waveform(kind, TICKS, frequency=DT_S / period_s, amplitude=0.4, offset=0.35, phase=phase)
+    np.testing.assert_allclose(measured, [signal(tick) for tick in TICKS.tolist()], rtol=0.0, atol=1e-13)
+
+
+def test_constant_waveforms_agree():
+    signal = Waveform(kind="constant", amplitude=0.1).signal(DT_S)
+    np.testing.assert_array_equal(
+        waveform("constant", TICKS[:5], amplitude=0.1), [signal(tick) for tick in range(1, 6)]
+    )
+
+
+def test_criteria_have_the_same_names():
+    assert {*experiments.CRITERIA, experiments.UNDISTURBED} == set(CRITERIA)
+    assert experiments.UNDISTURBED == UNDISTURBED
+    assert set(MEASURE_CRITERIA.values()) <= set(experiments.CRITERIA)
+
+
+@pytest.fixture(scope="module")
+def record() -> RunRecord:
+    """A run in which every column that measures read has something in it."""
+    wave = Waveform(kind="square", amplitude=0.2, offset=0.2, period_s=4.0)
+    population = PopulationConfig(death_per_tick=0.02, malfunction_per_tick=0.3, repair_per_tick=0.3)
+    world = scenario("warehouse_small", n_robots=4, n_objects=20, horizon_s=12.0, interval_s=3.0)
+    return run_one(
+        RunSpec(
+            scenario=world,
+            policy="random",
+            wrappers=(ThrottleConfig(waveform=wave), population),
+            criterion="throttle",
+            criterion_value=0.2,
+            seed=3,
+        )
+    )
+
+
+def test_arrays_hold_what_the_record_holds(record):
+    (study,) = study_curves(record.to_frame())
+    (runs,) = study.experiments
+    assert (study.controller, runs.criterion, runs.value, runs.n_robots) == ("random", "throttle", 0.2, 4)
+    assert runs.seeds == (3,)
+    np.testing.assert_array_equal(study.t_end_s, [3.0, 6.0, 9.0, 12.0])
+    columns = record.columns()
+    assert runs.curves.keys() == {
+        name
+        for name, column in CURVE_COLUMNS.items()
+        if name in columns and column.kind in ("amount", "fraction", "number")
+    }
+    for name, curve in runs.curves.items():
+        np.testing.assert_array_equal(curve, [columns[name]], err_msg=name)
+
+
+def test_conditions_are_the_mean_of_the_waveform_over_each_interval(record):
+    (study,) = study_curves(record.to_frame())
+    wave = waveform("square", np.arange(1, 61), frequency=DT_S / 4.0, amplitude=0.2, offset=0.2)
+    np.testing.assert_allclose(study.experiments[0].curves["adversity"][0], wave.reshape(4, 15).mean(axis=1))
