@@ -5,9 +5,11 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from swarm_forage_env.config import ScenarioConfig
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import Policy, load_policy
+from swarm_forage_env.policy import Grip, Policy, load_policy
 from swarm_forage_env.recording import RunRecord, software_versions
 from swarm_forage_env.rng import Stream, stream_rng
 from swarm_forage_env.study.spec import RunSpec
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
 WARM_UP_TICKS = 5
-"""Ticks of a warm-up run: enough to reach every kernel that a tick always calls."""
+"""Ticks of a warm-up run under its policy: enough to reach every kernel that a tick always calls."""
 
 
 def build_stack(
@@ -80,10 +82,17 @@ def run_one(spec: RunSpec) -> RunRecord:
 
 
 def warm_up(spec: RunSpec) -> None:
-    """Step a run a few ticks, so that its kernels are compiled and cached before many processes need them."""
+    """Step a run a few ticks, so that its kernels are compiled and cached before many processes need them.
+
+    A policy may ask for nothing so early in a run, so one more tick has every robot grasp: interactions are the
+    dearest kernel to compile.
+    """
     policy = load_policy(spec.policy, spec.parameters)
     recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
     _drive(recorder, policy, spec.seed, max_ticks=WARM_UP_TICKS)
+    grasping = np.zeros((spec.scenario.robots.n_robots, 3), np.float32)
+    grasping[:, 2] = Grip.GRASP
+    recorder.step_batch(grasping)
     recorder.close()
 
 

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarm_forage_env.policy import RandomPolicy, from_callable
+from swarm_forage_env.kernels import interact
+from swarm_forage_env.policy import Grip, RandomPolicy, from_callable
 from swarm_forage_env.recording import RecordError, RunRecord
 from swarm_forage_env.scenarios import scenario
 from swarm_forage_env.study import runner
@@ -118,6 +119,13 @@ def test_warm_up_stops_after_a_few_ticks(monkeypatch):
     monkeypatch.setattr(RandomPolicy, "act", counted)
     warm_up(SPECS[0])
     assert len(ticks) == 5
+
+
+def test_warm_up_reaches_the_interactions_of_a_policy_that_asks_for_nothing(monkeypatch):
+    served = []
+    monkeypatch.setattr(interact, "interact", lambda *arguments: served.append(arguments[2].copy()))
+    warm_up(replace(SPECS[0], policy="crw"))
+    assert [actions[:, 2].tolist() for actions in served] == [[Grip.GRASP] * 3]
 
 
 def test_outcomes_come_in_the_order_of_their_specifications(tmp_path):
