@@ -27,7 +27,7 @@ from .machines import (
     new_robots,
     sense,
 )
-from .memory import ObjectMemory, densities, forget, look_around, memory_of, new_memory, object_row_of
+from .memory import ObjectMemory, forget, look_around, memory_of, new_memory, object_row_of, remembered_objects
 from .object_choice import MemoryParameters, object_is_known, object_is_reached, select_object
 from .parameters import kernel_constants, with_overrides
 
@@ -135,11 +135,4 @@ class DPOPolicy:
 
     def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
         """Return what one robot remembers: object row -> (cell x, cell y, pheromone density)."""
-        robot = self._robots[robot_index]
-        count = int(robot["n_known"])
-        rows, cells_x, cells_y, seen = (part[robot_index, :count] for part in self._memory[:4])
-        density = densities(robot["clock"] - seen, self.parameters.evaporation_per_tick)
-        return {
-            int(row): (int(x), int(y), float(value))
-            for row, x, y, value in zip(rows, cells_x, cells_y, density, strict=True)
-        }
+        return remembered_objects(self._memory, self._robots, robot_index, self.parameters.evaporation_per_tick)

@@ -165,3 +165,16 @@ def density(robot: np.record, memory: OneMemory, entry: int, log_keep: float) ->
 def densities(ages_ticks: IntArray, evaporation_per_tick: float) -> FloatArray:
     """Pheromone densities after `ages_ticks` ticks without sight, for inspection."""
     return np.exp(math.log1p(-evaporation_per_tick) * (ages_ticks + 1.0))
+
+
+def remembered_objects(
+    memory: ObjectMemory, robots: np.ndarray, robot_index: int, evaporation_per_tick: float
+) -> dict[int, tuple[int, int, float]]:
+    """Return what one robot remembers, for inspection: object row -> (cell x, cell y, pheromone density)."""
+    robot = robots[robot_index]
+    rows, cells_x, cells_y, seen = (part[robot_index, : robot["n_known"]] for part in memory[:4])
+    density = densities(robot["clock"] - seen, evaporation_per_tick)
+    return {
+        int(row): (int(x), int(y), float(value))
+        for row, x, y, value in zip(rows, cells_x, cells_y, density, strict=True)
+    }

@@ -9,7 +9,7 @@ from swarm_forage_env.policy import SwarmTask
 from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 from .cache_memory import new_task_memory
-from .memory import densities
+from .memory import densities, remembered_objects
 from .parameters import kernel_constants, with_overrides
 from .stoch_n1 import new_allocation
 from .task_machines import new_task_robots, step_tasks
@@ -145,6 +145,10 @@ class TaskPolicy:
     def n_caches(self) -> IntArray:
         """(N,) number of caches that each robot remembers, a copy."""
         return self._robots["n_caches"].copy()
+
+    def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
+        """Return the objects that one robot remembers: object row -> (cell x, cell y, pheromone density)."""
+        return remembered_objects(self._memory.objects, self._robots, robot_index, self.parameters.evaporation_per_tick)
 
     def remembered_caches(self, robot_index: int) -> dict[int, tuple[int, int, int, float]]:
         """Return the caches that one robot remembers: serial -> (centre cell x, y, objects, pheromone density)."""

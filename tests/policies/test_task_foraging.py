@@ -16,10 +16,13 @@ CACHES = {"stochm": "static", "stochx": "dynamic"}
 class Run:
     """A run of one policy, with counters after every fifth."""
 
-    def __init__(self, scenario_name: str, policy_name: str, ticks: int, seed: int) -> None:
-        self.env = ForageEnv(scenario(scenario_name, caches=CACHES[policy_name]))
-        obs = self.env.reset_batch(seed)
+    def __init__(
+        self, scenario_name: str, policy_name: str, ticks: int, seed: int, *, declared_only: bool = False
+    ) -> None:
         self.policy = load_policy(policy_name)
+        reads = self.policy.reads if declared_only else None
+        self.env = ForageEnv(scenario(scenario_name, caches=CACHES[policy_name]), reads=reads)
+        obs = self.env.reset_batch(seed)
         self.policy.reset(self.env.task, stream_rng(seed, Stream.POLICY))
         self.seen: set[int] = set()
         self.fifths: list[np.ndarray] = []
@@ -63,6 +66,16 @@ def test_a_run_repeats_with_its_seed_and_changes_with_it(policy_name):
     np.testing.assert_array_equal(first.env.swarm.position, again.env.swarm.position)
     np.testing.assert_array_equal(first.policy.task_estimates, again.policy.task_estimates)
     assert np.any(first.policy.task_estimates != other.policy.task_estimates)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("policy_name", CACHES)
+def test_only_declared_slices_are_needed(policy_name):
+    full, reduced = (
+        Run("warehouse_medium", policy_name, ticks=300, seed=4, declared_only=declared) for declared in (False, True)
+    )
+    np.testing.assert_array_equal(full.env.swarm.position, reduced.env.swarm.position)
+    np.testing.assert_array_equal(full.counters, reduced.counters)
 
 
 @pytest.mark.compiled

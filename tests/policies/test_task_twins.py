@@ -113,6 +113,7 @@ def twin_of(policy, i: int, task) -> ReferenceTaskRobot:
     )
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("quirks", [Quirks(), AUTHORS_PROGRAM], ids=["as described", "authors' program"])
 @pytest.mark.parametrize("policy_class", [STOCHMPolicy, STOCHXPolicy])
 def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
@@ -146,6 +147,9 @@ def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
     for i, twin in enumerate(twins):
         known = {cache.serial: (*cell, cache.count) for cell, cache in twin.caches.items()}
         assert {serial: value[:3] for serial, value in policy.remembered_caches(i).items()} == known
+        assert {row: cell for row, (*cell, _) in policy.remembered(i).items()} == {
+            row: list(cell) for row, (cell, _) in twin.memory.known.items()
+        }
         estimates = policy.task_estimates[i]
         assert {name: estimates[code] for code, name in enumerate(TASKS) if name} == pytest.approx(twin.estimates)
     tasks = list(Task)[1:] if policy_class is STOCHXPolicy else list(Task)[1:4]
