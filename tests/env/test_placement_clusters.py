@@ -149,8 +149,9 @@ def test_no_room_for_the_clusters():
 def test_an_arena_narrower_than_a_cluster():
     corridor = scenario(
         "search_and_rescue",
-        side_m=2_100.0,
+        side_m=16.0,
         width_m=2.0,
+        height_m=2_100.0,
         nest_centre_m=(1.0, 1_050.0),
         nest_size_m=(0.4, 0.4),
         start_margin_m=0.5,
