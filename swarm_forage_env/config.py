@@ -22,7 +22,7 @@ PERFORMANCE_MEASURES = ("collected", "first_picked")
 MAX_DISC_SHARE = 0.4
 """Robot discs may cover at most this share of the start area; beyond it random starting poses stop being findable."""
 MAX_CELLS = 200_000_000
-"""Largest floor, 2.8 km square (our choice: its codes take 800 MB; the largest arena of the paper has 409,600 cells)."""
+"""Largest floor, 2.8 km square (our choice: its codes take 800 MB; the largest of the paper has 409,600 cells)."""
 
 
 class ConfigError(ValueError):
