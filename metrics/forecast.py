@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from .queues import PopulationRates, mean_away, queue_statistics
 from .statistics import Summary, aggregate
 from .study_table import POPULATION, RunCurves, StudyCurves
@@ -13,16 +11,17 @@ from .study_table import POPULATION, RunCurves, StudyCurves
 FORECAST_HEADER = (
     "level",
     "robots",
-    "at work: model",
-    "runs",
-    "s in the swarm per departure: model",
-    "runs",
-    "s out of it: model",
-    "runs",
-    "s per repair, runs",
-    "equilibrium",
+    "at work: predicted",
+    "observed",
+    "s in per departure: predicted",
+    "observed",
+    "s out: predicted",
+    "observed",
+    "s per repair: observed",
+    "without end",
     "printed",
 )
+"""Headings of `PopulationForecast.cells`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,12 +107,10 @@ def _forecast(level: RunCurves, rates: PopulationRates, horizon_s: float) -> Pop
     at_work = level.curves["n_active"].mean(axis=-1)
     queue = queue_statistics(rates)
     departures = _departures(level, rates)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        time_in, time_out = (
-            horizon_s * np.array([at_work.sum(), (n_robots - at_work).sum()]) / departures
-            if departures
-            else (math.nan, math.nan)
-        )
+    time_in = time_out = math.nan
+    if departures > 0.0:
+        time_in = horizon_s * float(at_work.sum()) / departures
+        time_out = horizon_s * float((n_robots - at_work).sum()) / departures
     return PopulationForecast(
         level=level.value,
         n_robots=n_robots,
@@ -122,9 +119,9 @@ def _forecast(level: RunCurves, rates: PopulationRates, horizon_s: float) -> Pop
         predicted_at_work=n_robots - away,
         observed_at_work=aggregate(at_work),
         predicted_time_in_s=(n_robots - away) / rates.lam,
-        observed_time_in_s=float(time_in),
+        observed_time_in_s=time_in,
         predicted_time_out_s=away / rates.lam,
-        observed_time_out_s=float(time_out),
+        observed_time_out_s=time_out,
         observed_time_per_repair_s=_time_per_repair(level),
         equilibrium_time_out_s=queue.time,
         printed_time_out_s=queue.time_printed,

@@ -1,5 +1,6 @@
 """From the curves of a study to rows of scores: which experiments each measure compares, and in which order."""
 
+import difflib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -85,7 +86,9 @@ def check_measures(measures: Sequence[str] | None) -> tuple[str, ...]:
         return tuple(MEASURE_CRITERIA)
     for name in measures:
         if name not in MEASURE_CRITERIA:
-            raise CurveError(f"Unknown measure {name!r}; known: {', '.join(MEASURE_CRITERIA)}.")
+            close = difflib.get_close_matches(name, MEASURE_CRITERIA, n=1)
+            hint = f" Did you mean {close[0]!r}?" if close else ""
+            raise CurveError(f"Unknown measure {name!r}.{hint} Known: {', '.join(MEASURE_CRITERIA)}.")
     if not measures:
         raise CurveError(f"Expected one or more measures of {', '.join(MEASURE_CRITERIA)}, got none.")
     return tuple(name for name in MEASURE_CRITERIA if name in measures)

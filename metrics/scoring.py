@@ -5,6 +5,7 @@ The one file of this package that knows runs. It imports `swarm_forage_env` when
 
 import copy
 import inspect
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -219,9 +220,7 @@ def plan_scores(
     world = scenarios.scenario(scenario) if isinstance(scenario, str) else scenario
     named = policies.items() if isinstance(policies, Mapping) else [(None, policy) for policy in policies]
     contestants = tuple(_contestant(policy, name, parameters or {}, world) for name, policy in named)
-    labels = [contestant.label for contestant in contestants]
-    if len(set(labels)) < len(labels):
-        raise CurveError(f"Expected policies of different names, got {', '.join(labels)}; give a mapping from names.")
+    contestants = _told_apart(contestants)
     return ScoringPlan(
         contestants=contestants,
         experiments=experiments.plan_experiments(world, {MEASURE_CRITERIA[name] for name in wanted}, allowed),
@@ -259,6 +258,19 @@ def run_scores(
             with local_policy(contestant.policy, contestant.factory):
                 results.append(run_all(plan.specs_of(contestant), store=store, jobs=1, progress=progress))
     return tuple(_table(plan, contestant, results, out) for contestant in plan.contestants)
+
+
+def _told_apart(contestants: tuple[Contestant, ...]) -> tuple[Contestant, ...]:
+    """Name files of equal names by their whole paths; raises CurveError if policies still have equal names."""
+    counts = Counter(contestant.label for contestant in contestants)
+    contestants = tuple(
+        replace(contestant, label=contestant.policy) if counts[contestant.label] > 1 else contestant
+        for contestant in contestants
+    )
+    labels = [contestant.label for contestant in contestants]
+    if len(set(labels)) < len(labels):
+        raise CurveError(f"Expected policies of different names, got {', '.join(labels)}; give a mapping from names.")
+    return contestants
 
 
 def _seeds(seeds: int | Sequence[int] | None, default: int) -> tuple[int, ...]:

@@ -132,6 +132,8 @@ class StudyCurves:
     experiments: tuple[RunCurves, ...]
     t_end_s: FloatArray | None
     """Ends of the intervals, (T,); None where the table does not tell."""
+    where: str = "the table"
+    """Name of the table in error messages."""
 
     @property
     def horizon_s(self) -> float | None:
@@ -160,8 +162,8 @@ class StudyCurves:
         for reference in (*own, *shared):
             return reference
         raise CurveError(
-            f"Expected a reference run for {level.describe()} of {self.controller}: the same swarm size with criterion "
-            f"{level.criterion} and value 0, or with criterion {UNDISTURBED}; got neither."
+            f"Expected a reference run for {level.describe()} of {self.controller} in {self.where}: the same swarm "
+            f"size with criterion {level.criterion} and value 0, or with criterion {UNDISTURBED}; got neither."
         )
 
 
@@ -186,7 +188,7 @@ def read_curves(path: str | Path) -> tuple[StudyCurves, ...]:
     file = Path(path)
     studies = study_curves(_read_frame(file), where=str(file), controller=file.stem)
     for study in studies:
-        _check_comparable(study, str(file))
+        _check_comparable(study)
     return studies
 
 
@@ -209,14 +211,14 @@ def study_curves(frame: "pl.DataFrame", *, where: str = "the table", controller:
     )
 
 
-def _check_comparable(study: StudyCurves, where: str) -> None:
+def _check_comparable(study: StudyCurves) -> None:
     """Check that there is a reference for everything that is varied, and that runs can be paired."""
     for criterion in (THROTTLE, NOISE, POPULATION):
         study.levels(criterion)
     if not _shared_seeds(study.experiments):
         raise CurveError(
-            f"Expected runs with numbers in common over all experiments of {study.controller} in {where}, got none; "
-            "number the runs of each experiment alike (column seed)."
+            f"Expected runs with numbers in common over all experiments of {study.controller} in {study.where}, "
+            "got none; number the runs of each experiment alike (column seed)."
         )
 
 
@@ -315,7 +317,7 @@ def _study(frame: "pl.DataFrame", where: str, controller: str) -> StudyCurves:
             f"Expected the swarm sizes of {whose} in rising order, got {', '.join(map(str, sizes))}; sort the table by "
             "n_robots, and look whether each size stands beside its own curve."
         )
-    return StudyCurves(controller=controller, experiments=experiments, t_end_s=_clock(experiments, whose))
+    return StudyCurves(controller=controller, experiments=experiments, t_end_s=_clock(experiments, whose), where=where)
 
 
 def _runs(frame: "pl.DataFrame", whose: str) -> RunCurves:
