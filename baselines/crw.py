@@ -34,7 +34,7 @@ from .machines import (
     new_robots,
     sense,
 )
-from .parameters import ControllerParameters, kernel_constants, with_overrides
+from .parameters import ControllerParameters, kernel_constants, require_observations, with_overrides
 
 
 @kernel
@@ -88,6 +88,7 @@ class CRWPolicy:
 
     def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
         """Start a run: every robot explores."""
+        self._task = task
         self._rng = rng
         self._constants = kernel_constants(self.parameters, task)
         self._robots = new_robots(task.n_robots)
@@ -96,6 +97,7 @@ class CRWPolicy:
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
+        require_observations(obs, self._task)
         self._rng.random(out=self._draws)
         step_crw(obs, active, self._draws, self._constants, self._robots, self._actions)
         return self._actions

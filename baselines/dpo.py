@@ -29,7 +29,7 @@ from .machines import (
 )
 from .memory import ObjectMemory, forget, look_around, memory_of, new_memory, object_row_of, remembered_objects
 from .object_choice import MemoryParameters, object_is_known, object_is_reached, select_object
-from .parameters import kernel_constants, with_overrides
+from .parameters import kernel_constants, require_observations, with_overrides
 
 
 @kernel
@@ -110,6 +110,7 @@ class DPOPolicy:
 
     def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
         """Start a run: every robot explores and remembers nothing."""
+        self._task = task
         self._rng = rng
         self._constants = kernel_constants(self.parameters, task, **self.parameters.derived())
         self._robots = new_robots(task.n_robots)
@@ -119,6 +120,7 @@ class DPOPolicy:
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
+        require_observations(obs, self._task)
         self._rng.random(out=self._draws)
         step_dpo(obs, active, self._draws, self._constants, self._robots, self._memory, self._actions)
         return self._actions

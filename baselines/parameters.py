@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from swarm_forage_env.policy import SwarmTask
+from swarm_forage_env.types import ObsArray
 
 COLUMNS = (
     "proximity",
@@ -87,6 +88,24 @@ class ControllerParameters:
                 f"Expected wander_circle_radius > wander_circle_distance = {self.wander_circle_distance}, "
                 f"got {self.wander_circle_radius}; otherwise the robot would wander backwards."
             )
+
+
+class ObservationError(ValueError):
+    """Observations that are not those of the swarm that the policy was reset for."""
+
+
+def require_observations(obs: ObsArray, task: SwarmTask) -> None:
+    """Refuse observations of another shape; compiled kernels would read beyond them.
+
+    Raises:
+        ObservationError: `obs` is not (n_robots, layout.size).
+    """
+    expected = (task.n_robots, task.layout.size)
+    if obs.shape != expected:
+        raise ObservationError(
+            f"Expected observations with shape (n_robots, columns) = {expected}, got {obs.shape}; "
+            "call reset with the task of this environment."
+        )
 
 
 P = TypeVar("P", bound=ControllerParameters)

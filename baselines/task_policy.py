@@ -10,7 +10,7 @@ from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray
 
 from .cache_memory import new_task_memory
 from .memory import densities, remembered_objects
-from .parameters import kernel_constants, with_overrides
+from .parameters import kernel_constants, require_observations, with_overrides
 from .stoch_n1 import new_allocation
 from .task_machines import new_task_robots, step_tasks
 from .tasks import N_TASKS, TASK_DRAWS, TaskParameters
@@ -90,6 +90,7 @@ class TaskPolicy:
 
     def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
         """Start a run: estimates are drawn, nobody has a task, and nothing is remembered."""
+        self._task = task
         self._rng = rng
         self._constants = task_constants(self.parameters, task, self.n_tabs)
         self._robots = new_task_robots(task.n_robots)
@@ -101,6 +102,7 @@ class TaskPolicy:
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
+        require_observations(obs, self._task)
         self._tick += 1
         self._rng.random(out=self._draws)
         step_tasks(

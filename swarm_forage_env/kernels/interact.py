@@ -398,8 +398,6 @@ def _continue(world: World, rules: Rules, i: int, kind: int, target: int, chance
     _forget_pending(world, i)
     if same:
         _take_effect(world, rules, i, kind, target, chance)
-    elif kind == TOO_NEAR:
-        _report(world, i, _CACHE_TOO_NEAR, -1, target)
     else:
         _report(world, i, _VANISHED, -1, -1)
 

@@ -119,13 +119,13 @@ def test_a_robot_pushed_out_of_the_nest_has_lost_it():
     assert env.swarm.carried_object[0] == 0
 
 
-def test_a_cache_that_appears_nearby_refuses_a_running_site_drop():
+def test_a_site_drop_is_lost_when_a_cache_appears_nearby_and_refused_when_asked_again():
     env = tidy_world(caches="dynamic")
     stand(env, 0, OPEN_CELL)
     load(env, 0, 4)
     act(env, {0: Grip.SITE})
     build_cache(env, [0, 1], CORNER_CACHE)
-    assert act(env, {0: Grip.SITE})[0] == TOO_NEAR
+    assert events_of(env, Grip.SITE, 2) == [VANISHED, TOO_NEAR]
     assert env.swarm.carried_object[0] == 4
 
 

@@ -2,12 +2,15 @@
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
 from baselines.object_choice import MemoryParameters
-from baselines.parameters import ControllerParameters, ParameterError, kernel_constants
+from baselines.parameters import ControllerParameters, ObservationError, ParameterError, kernel_constants
+from baselines.stochm import STOCHMPolicy
+from baselines.stochx import STOCHXPolicy
 from swarm_forage_env.policy import Policy, load_policy
 from swarm_forage_env.quirks import Quirks
 from tests.policies.observations import make_task
@@ -59,3 +62,12 @@ def test_durations_become_ticks_and_quirks_reach_the_kernels():
     assert constants.explore_double_start == 0
     task = make_task(quirks=Quirks(explore_double_start=True))
     assert kernel_constants(ControllerParameters(), task)[0].explore_double_start == 1
+
+
+@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, STOCHMPolicy, STOCHXPolicy])
+def test_observations_of_another_swarm_are_refused(policy_class):
+    policy = policy_class()
+    policy.reset(make_task(4), np.random.default_rng(0))
+    for rows, columns in ((3, policy._task.layout.size), (4, 10)):
+        with pytest.raises(ObservationError, match=rf"\(n_robots, columns\) = \(4, .*got \({rows}, {columns}\)"):
+            policy.act(np.zeros((rows, columns), np.float32), np.ones(rows, np.bool_))

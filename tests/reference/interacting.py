@@ -134,10 +134,7 @@ class SlowWorld:
                 self.finish(robot, request, chance)
             else:
                 del self.pending[robot]
-                if request is not None and request[0] == "too near":
-                    self.report(robot, Event.CACHE_TOO_NEAR, cache=request[1])
-                else:
-                    self.report(robot, Event.VANISHED)
+                self.report(robot, Event.VANISHED)
             return
         self.pending.pop(robot, None)
         if request is None:
