@@ -443,7 +443,8 @@ def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
         if name in SECTIONS:
             _require(
                 isinstance(value, SECTIONS[name]),
-                f"Expected {name} to be a {SECTIONS[name].__name__}, got {value!r}.",
+                f"Expected {name} to be a {SECTIONS[name].__name__}, got {value!r}; single fields of it are given by "
+                f"their own names: {', '.join(item.name for item in dataclasses.fields(SECTIONS[name]))}.",
             )
             top[name] = value
         elif name not in table:

@@ -137,4 +137,9 @@ def scenario(name: str, /, **overrides: Any) -> ScenarioConfig:
         raise ConfigError(
             f"Unknown scenario {name!r}.{suggestion(str(name), builders)} Known: {', '.join(SCENARIO_NAMES)}."
         )
+    if "side_m" in overrides and name != "search_and_rescue":
+        raise ConfigError(
+            f"Expected side_m with search_and_rescue only, got it with {name}; "
+            "other arenas change by width_m and height_m."
+        )
     return builders[name](**overrides)

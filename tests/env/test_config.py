@@ -235,6 +235,11 @@ def test_section_of_a_wrong_class_is_refused():
         dataclasses.replace(base, arena=base.robots)
 
 
+def test_a_value_for_a_whole_section_is_told_the_fields():
+    with pytest.raises(ConfigError, match=r"RobotConfig, got 3; single fields .* own names: n_robots,"):
+        scenario("warehouse_small", robots=3)
+
+
 def test_configurations_are_frozen_and_hashable():
     config = scenario("warehouse_small")
     assert hash(config) == hash(scenario("warehouse_small"))

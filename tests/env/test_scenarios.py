@@ -157,3 +157,8 @@ def test_every_preset_takes_overrides(name):
     config = scenario(name, n_robots=12, horizon_s=100.0, caches="static", quirks=AUTHORS_PROGRAM)
     assert (config.robots.n_robots, config.horizon_ticks) == (12, 500)
     assert (config.caches, config.quirks) == ("static", AUTHORS_PROGRAM)
+
+
+def test_a_side_is_refused_where_arenas_have_two():
+    with pytest.raises(ConfigError, match=r"with search_and_rescue only, got it with warehouse_small; .* width_m"):
+        scenario("warehouse_small", side_m=16.0)
