@@ -1,0 +1,150 @@
+"""Which policy is better, and whether the runs can tell: pairing, t test, Holm's correction."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from metrics import CurveError, aggregate, compare_tables
+from metrics.comparison import Comparison, holm, paired_p
+from metrics.score_table import Score, ScoreTable
+
+NAN = math.nan
+
+
+def score(values, *, measure="raw_performance", at="N = 4", relative=None) -> Score:
+    per_seed = dict(enumerate(values)) if isinstance(values, list) else values
+    return Score(
+        measure=measure,
+        at=at,
+        criterion="population_size",
+        x=4.0,
+        n_robots=(4,),
+        unit="objects",
+        summary=aggregate(list(per_seed.values())),
+        per_seed=per_seed,
+        relative_per_seed=dict(enumerate(relative or [])),
+    )
+
+
+def compared(**tables) -> Comparison:
+    return compare_tables(
+        [
+            ScoreTable(policy=name, scenario="", scores=tuple(scores) if isinstance(scores, list) else (scores,))
+            for name, scores in tables.items()
+        ]
+    )
+
+
+def test_the_paired_test_is_that_of_scipy():
+    values = np.array([1.0, 2.5, -0.5, 3.0, 2.0])
+    assert paired_p(values) == pytest.approx(stats.ttest_1samp(values, 0.0).pvalue, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [([0.0, 0.0, 0.0], 1.0), ([2.0, 2.0, 2.0], 0.25), ([1.0], NAN), ([], NAN), ([math.inf, 1.0], NAN)],
+    ids=["all zero", "all equal", "one pair", "no pair", "infinite"],
+)
+def test_where_students_t_does_not_exist(values, expected):
+    assert paired_p(np.array(values)) == pytest.approx(expected, nan_ok=True)
+
+
+def test_holms_example_by_hand():
+    # Sorted 0.01, 0.03, 0.04 times 3, 2, 1: 0.03, 0.06, 0.04, never falling.
+    np.testing.assert_allclose(holm(np.array([0.04, 0.01, NAN, 0.03])), [0.06, 0.03, NAN, 0.06])
+    np.testing.assert_allclose(holm(np.array([0.9, 0.8])), [1.0, 1.0])
+    assert holm(np.empty(0)).size == 0
+
+
+def test_differences_pair_runs_by_seed():
+    (difference,) = compared(a=score({0: 5.0, 1: 7.0, 3: 9.0}), b=score({1: 4.0, 0: 3.0, 2: 100.0})).differences
+    assert difference.summary.mean == pytest.approx(2.5)
+    assert difference.summary.n_used == 2
+
+
+@pytest.mark.parametrize(("measure", "better"), [("raw_performance", "a"), ("adaptability", "b"), ("scalability", "a")])
+def test_the_better_policy_is_named_by_the_direction_of_the_measure(measure, better):
+    high, low = [10.0, 11.0, 10.5, 10.2], [1.0, 1.2, 0.9, 1.1]
+    (difference,) = compared(a=score(high, measure=measure), b=score(low, measure=measure)).differences
+    assert difference.is_significant
+    assert difference.better == better
+    assert difference.cell().endswith(" *")
+
+
+def test_a_difference_within_the_noise_is_not_significant():
+    (difference,) = compared(a=score([1.0, 2.0, 3.0]), b=score([2.0, 1.0, 3.5])).differences
+    assert not difference.is_significant
+    assert difference.better == ""
+    assert "*" not in difference.cell()
+
+
+def test_the_correction_is_over_levels_and_pairs_of_a_measure_and_nothing_else():
+    rng = np.random.default_rng(1)
+    levels = {name: [rng.normal(size=6).tolist() for _ in range(2)] for name in "abc"}
+    tables = {
+        name: [
+            score(runs[0], at="N = 2"),
+            score(runs[1], at="N = 4"),
+            score(runs[0], measure="scalability"),
+        ]
+        for name, runs in levels.items()
+    }
+    found = compared(**tables).differences
+    raw = [d for d in found if d.measure == "raw_performance"]
+    assert len(raw) == 6
+    np.testing.assert_allclose([d.p_holm for d in raw], holm(np.array([d.p for d in raw])))
+    other = [d for d in found if d.measure == "scalability"]
+    np.testing.assert_allclose([d.p_holm for d in other], holm(np.array([d.p for d in other])))
+
+
+def test_relative_values_are_tested_on_their_own():
+    high, low = [10.0, 11.0, 12.0], [1.0, 2.2, 2.9]
+    comparison = compared(
+        a=score(high, measure="adaptability", relative=[0.5, 0.6, 0.4]),
+        b=score(low, measure="adaptability", relative=[0.4, 0.6, 0.5]),
+    )
+    (row,) = comparison.rows()
+    assert comparison.difference(("a", "b"), row).is_significant
+    assert not comparison.difference(("a", "b"), row, is_relative=True).is_significant
+    assert [line[0] for line in comparison.difference_rows()] == ["measure", "adaptability", "adaptability, relative"]
+
+
+def test_undefined_runs_do_not_count_and_infinite_ones_forbid_the_test():
+    (difference,) = compared(a=score([1.0, NAN, 3.0]), b=score([0.0, 1.0, 1.5])).differences
+    assert difference.summary.n_used == 2
+    (difference,) = compared(a=score([1.0, -math.inf]), b=score([0.0, 1.0])).differences
+    assert math.isnan(difference.p)
+    assert not difference.is_significant
+
+
+def test_rows_that_only_one_policy_has_are_shown_and_not_compared():
+    comparison = compared(a=[score([1.0, 2.0]), score([1.0, 2.0], at="N = 9")], b=score([1.0, 2.0]))
+    assert [line[1:] for line in comparison.value_rows()][2][-1] == "-"
+    assert len(comparison.differences) == 1
+    assert len(comparison.difference_rows()) == 2
+
+
+def test_notes_of_all_policies_are_told_once():
+    tables = [
+        ScoreTable(policy=name, scenario="", scores=(score([1.0]),), missing={"reactivity": "x"}, failures=failures)
+        for name, failures in (("a", ()), ("b", ("run 7",)))
+    ]
+    assert compare_tables(tables).notes() == ("reactivity is not computed: x", "b: failed: run 7")
+
+
+@pytest.mark.parametrize("names", [["a"], ["a", "a"], []])
+def test_policies_need_different_names(names):
+    with pytest.raises(CurveError, match="two or more policies"):
+        compare_tables([ScoreTable(policy=name, scenario="", scores=()) for name in names])
+
+
+def test_false_alarms_are_as_rare_as_promised():
+    """Three equal policies at two levels: any significant difference in at most 5 % of studies, up to chance."""
+    rng = np.random.default_rng(3)
+    alarms = 0
+    for _ in range(400):
+        tables = {name: [score(rng.normal(size=5).tolist(), at=at) for at in "xy"] for name in "abc"}
+        alarms += any(difference.is_significant for difference in compared(**tables).differences)
+    assert alarms <= 32  # 20 expected at most; 32 is exceeded by chance in 0.4 % of such tests

@@ -1,0 +1,197 @@
+"""From curves to rows: which experiments are compared, what stands beside a value, what is noted."""
+
+import math
+
+import numpy as np
+import pytest
+
+import metrics
+from metrics import METRICS, CurveError, PopulationRates
+from metrics.score_rows import MEASURE_CRITERIA, check_measures, score_study
+from metrics.score_table import HEADER, ScoreTable
+from metrics.study_table import RunCurves, StudyCurves, study_curves
+from tests.scores.curve_tables import CROWDING, rows, table
+
+IDEAL = [[4.0, 6.0, 5.0, 6.0], [5.0, 5.0, 7.0, 4.0], [6.0, 4.0, 5.0, 5.0]]
+SLOWED = [[4.0, 5.0, 2.0, 3.0], [5.0, 5.0, 3.0, 2.0], [5.0, 4.0, 2.0, 3.0]]
+CLOCK = [100.0, 200.0, 300.0, 400.0]
+SIGNAL = [0.1, 0.1, 0.6, 0.6]
+
+
+def scored(*parts, measures=None):
+    (study,) = study_curves(table(*parts))
+    return score_study(study, measures)[0]
+
+
+def throttled(ideal=IDEAL, slowed=SLOWED):
+    common = {"criterion": "throttle", "t_end_s": CLOCK}
+    return (
+        rows(9, ideal, criterion_value=0.0, adversity=0.1, **common),
+        rows(9, slowed, criterion_value=0.3, adversity=SIGNAL, **common),
+    )
+
+
+def test_measures_of_the_table_are_those_of_the_catalog():
+    assert set(MEASURE_CRITERIA) == set(METRICS)
+    assert check_measures(["scalability", "efficiency", "scalability"]) == ("efficiency", "scalability")
+
+
+@pytest.mark.parametrize(("names", "message"), [(["scalabilty"], "Did you mean 'scalability'"), ([], "got none")])
+def test_unknown_measures_are_refused(names, message):
+    with pytest.raises(CurveError, match=message):
+        check_measures(names)
+
+
+def test_one_value_per_run_and_students_interval_over_them():
+    (score,) = scored(rows(3, IDEAL), measures=["raw_performance"])
+    assert score.per_seed == {0: 21.0, 1: 21.0, 2: 20.0}
+    assert score.summary == metrics.aggregate([21.0, 21.0, 20.0])
+    assert (score.unit, score.relative) == ("objects per run", None)
+
+
+def test_the_unit_names_the_length_of_a_run_where_it_is_known():
+    (score,) = scored(rows(3, IDEAL, t_end_s=CLOCK), measures=["efficiency"])
+    assert score.unit == "objects per robot in 400 s"
+
+
+def test_sizes_are_compared_with_the_next_smaller_one():
+    found = scored(rows(1, IDEAL), rows(2, IDEAL), rows(8, IDEAL), measures=["task_emergence", "scalability"])
+    assert [(score.measure, score.at, score.x, score.n_robots) for score in found] == [
+        ("task_emergence", "N = 1 to 2", 2, (1, 2)),
+        ("task_emergence", "N = 2 to 8", 8, (2, 8)),
+        ("scalability", "N = 1 to 2", 2, (1, 2)),
+        ("scalability", "N = 2 to 8", 8, (2, 8)),
+    ]
+
+
+def test_spatial_emergence_takes_three_swarms():
+    (study,) = study_curves(CROWDING)
+    found, _ = score_study(study, ["spatial_emergence"])
+    assert [score.n_robots for score in found] == [(1, 2), (1, 2, 4)]
+
+
+def test_distances_are_those_of_the_runs_with_the_same_seed():
+    reactivity, adaptability = scored(*throttled(), measures=["reactivity", "adaptability"])
+    np.testing.assert_allclose(list(reactivity.per_seed.values()), metrics.reactivity(IDEAL, SLOWED, SIGNAL, 0.1))
+    np.testing.assert_allclose(list(adaptability.per_seed.values()), metrics.adaptability(IDEAL, SLOWED))
+    assert (reactivity.at, reactivity.x, reactivity.unit) == ("throttle 0.3", 0.3, "objects (DTW)")
+
+
+def test_distances_come_with_noise_floor_mean_curves_and_what_they_do_not_tell():
+    reactivity, _ = scored(*throttled(), measures=["reactivity", "adaptability"])
+    assert reactivity.noise_floor == pytest.approx(metrics.noise_floor(IDEAL).mean())
+    by_hand = metrics.bootstrap_measure(
+        lambda ideal, slowed: metrics.reactivity(ideal, slowed, SIGNAL, 0.1), IDEAL, SLOWED, order="mean_curve", seed=1
+    )
+    assert reactivity.of_mean_curves.mean == pytest.approx(by_hand.mean)
+    assert reactivity.of_mean_curves.upper == pytest.approx(by_hand.upper)
+    assert reactivity.beside["environment_distance"] == pytest.approx(1.0)
+    assert reactivity.beside["signed_difference"] == pytest.approx((np.sum(SLOWED) - np.sum(IDEAL)) / 12)
+
+
+def test_one_reference_run_has_no_noise_floor():
+    (score,) = scored(*throttled(IDEAL[:1], SLOWED[:1]), measures=["adaptability"])
+    assert score.noise_floor is None
+    assert math.isnan(score.summary.lower)
+
+
+def test_values_are_told_relative_to_the_performance_they_compare_with():
+    (score,) = scored(*throttled(), measures=["adaptability"])
+    expected = metrics.adaptability(IDEAL, SLOWED) / np.sum(IDEAL, axis=1)
+    np.testing.assert_allclose(list(score.relative_per_seed.values()), expected)
+    assert score.relative.mean == pytest.approx(expected.mean())
+
+
+def test_doing_nothing_is_noted_and_not_praised():
+    (score,) = scored(*throttled([[0.0] * 4] * 2, [[0.0] * 4] * 2), measures=["adaptability"])
+    assert score.summary.mean == 0.0
+    assert math.isnan(score.relative.mean)
+    assert "says nothing in 2 of 2 runs" in score.note
+
+
+def test_undefined_and_infinite_scalability_is_noted():
+    found = scored(rows(2, [[0.0], [1.0], [2.0]]), rows(4, [[0.0], [0.0], [3.0]]), measures=["scalability"])
+    assert "undefined in 1 of 3 runs" in found[0].note
+    assert "infinite in 1 of 3 runs" in found[0].note
+    assert (found[0].summary.n_used, found[0].summary.n_nan) == (2, 1)
+
+
+def test_population_measures_use_the_rates_of_the_level():
+    rates = PopulationRates(lambda_bd=0.02, mu_bd=0.021)
+    found = scored(
+        rows(9, IDEAL, criterion="none", criterion_value=0.0, t_end_s=CLOCK),
+        rows(
+            9,
+            SLOWED,
+            criterion="population_dynamics",
+            criterion_value=2.0,
+            t_end_s=CLOCK,
+            malfunctions_per_s=0.02,
+            repairs_per_s=0.021,
+        ),
+        measures=["population_robustness", "availability"],
+    )
+    expected = metrics.population_robustness(SLOWED, IDEAL, rates, horizon=400.0, n=9)
+    np.testing.assert_allclose(list(found[0].per_seed.values()), expected)
+    assert found[0].beside["weight"] == pytest.approx(metrics.population_weight(rates, horizon=400.0, n=9))
+    assert found[1].summary.mean == pytest.approx(metrics.availability(9, 1, 0.02 / 0.021), abs=1e-5)
+    assert "the same for every policy" in found[1].note
+
+
+def test_availability_is_told_once_per_ratio_of_rates():
+    levels = [
+        rows(9, IDEAL, criterion="population_dynamics", criterion_value=x, deaths_per_s=rate, **birth)
+        for x, rate, birth in ((1, 0.1, {}), (2, 0.2, {}), (3, 0.1, {"births_per_s": 0.2}))
+    ]
+    reference = rows(9, IDEAL, criterion="none", criterion_value=0.0)
+    found = scored(reference, *levels, measures=["availability"])
+    assert [score.summary.mean for score in found] == [0.0, pytest.approx(metrics.availability(9, 1, 0.5))]
+
+
+def lossy(n_planned: int, seeds: tuple[int, ...]) -> StudyCurves:
+    """A study of two sizes, of which the larger has lost runs."""
+    whole = RunCurves(
+        criterion="population_size",
+        value=1.0,
+        n_robots=1,
+        seeds=(0, 1, 2),
+        curves={"performance": np.ones((3, 2))},
+        n_planned=n_planned,
+    )
+    curves = {"performance": np.ones((len(seeds), 2))} if seeds else {}
+    larger = RunCurves(
+        criterion="population_size", value=4.0, n_robots=4, seeds=seeds, curves=curves, n_planned=n_planned
+    )
+    return StudyCurves(controller="mine", experiments=(whole, larger), t_end_s=np.array([1.0, 2.0]))
+
+
+def test_lost_runs_are_counted_and_noted():
+    (score,), _ = score_study(lossy(3, (0, 2)), ["task_emergence"])
+    assert tuple(score.per_seed) == (0, 2)
+    assert (score.n_lost, score.is_partial) == (1, True)
+    assert score.note.startswith("1 of 3 runs failed")
+    assert dict(zip(HEADER, score.cells(), strict=True))["runs"] == "2 of 3"
+
+
+def test_an_experiment_without_a_run_keeps_its_row():
+    found, missing = score_study(lossy(3, ()), ["raw_performance", "scalability"])
+    assert missing == {}
+    assert [math.isnan(score.summary.mean) for score in found] == [False, True, True]
+    assert [score.note for score in found[1:]] == ["3 of 3 runs failed or have no partner of the same seed"] * 2
+
+
+def test_tables_turn_into_frames_and_plain_values():
+    found = scored(*throttled())
+    result = ScoreTable(policy="mine", scenario="here", scores=found, missing={"efficiency": "no sizes"})
+    frame = result.to_frame()
+    assert frame["measure"].to_list() == [score.measure for score in found]
+    assert frame["relative"][0] == pytest.approx(found[0].relative.mean)
+    assert frame.columns[:2] == ["policy", "scenario"]
+    plain = result.to_mapping()
+    assert plain["scores"][0]["per_seed"]["0"] == found[0].per_seed[0]
+    assert plain["missing"] == {"efficiency": "no sizes"}
+    assert "efficiency is not computed: no sizes" in str(result)
+    with pytest.raises(KeyError, match="no sizes"):
+        result["efficiency"]
+    with pytest.raises(KeyError, match="not asked for"):
+        result["scalability"]
