@@ -146,8 +146,8 @@ def _open_model(path: str, digest: str) -> Any:  # noqa: ARG001 - the digest mak
     The network alone, not the algorithm around it, which for off-policy methods would allocate its replay buffer.
     """
     try:
-        from stable_baselines3.common.policies import ActorCriticPolicy
-        from stable_baselines3.common.save_util import load_from_zip_file
+        from stable_baselines3.common.policies import ActorCriticPolicy  # pyright: ignore[reportMissingImports]
+        from stable_baselines3.common.save_util import load_from_zip_file  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise ImportError(
             f"The model {path} needs stable-baselines3: pip install 'swarm-forage-env[train]' 'torch==2.13.0'"
