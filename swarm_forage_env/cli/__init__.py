@@ -10,17 +10,30 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from swarm_forage_env.cli.options import (
+    EXIT_FAILURE,
+    EXIT_INTERRUPTED,
+    EXIT_USAGE,
+    AsJson,
+    Caches,
+    ConfigFile,
+    DryRun,
+    Jobs,
+    Objects,
+    Out,
+    Robots,
+    Scenario,
+    Settings,
+    Side,
+    Wrappers,
+    complain,
+)
+from swarm_forage_env.cli.score_commands import compare, score
+
 if TYPE_CHECKING:
-    from metrics.score_table import ScoreTable
-    from metrics.scoring import ScoringPlan
     from swarm_forage_env.study.runner import StudyResult
     from swarm_forage_env.study.spec import RunSpec
     from swarm_forage_env.study.store import RunStore
-
-EXIT_FAILURE = 1
-EXIT_USAGE = 2
-EXIT_INTERRUPTED = 130
-"""What shells report for a program that Ctrl-C ended."""
 
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
 """Base of typer's complaints about arguments; typer gives it no public name."""
@@ -34,43 +47,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-Scenario = Annotated[str, typer.Option("--scenario", help="Preset; see 'swarm-forage list'.")]
-Robots = Annotated[int | None, typer.Option("--robots", min=1, help="Swarm size.")]
-Objects = Annotated[int | None, typer.Option("--objects", min=1, help="Number of objects.")]
-Side = Annotated[float | None, typer.Option("--side", help="Side of the arena in m (search_and_rescue only).")]
-Caches = Annotated[
-    str | None, typer.Option("--caches", help="none, static or dynamic; default: the controller's world.")
-]
-Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Any scenario field; may be repeated.")
-]
-Wrappers = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--wrapper",
-        metavar="NAME:KEY=VALUE,...",
-        help="Disturb the swarm, e.g. sensor_noise:sigma=0.03 or population:death_per_tick=0.0001; may be repeated.",
-    ),
-]
-
-ConfigFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--config",
-        metavar="FILE.toml",
-        help="Scenario fields and wrappers, one table each; what other options say goes before it.",
-    ),
-]
-
-Measures = Annotated[str | None, typer.Option("--measures", help="Names separated by commas; default all.")]
-Budget = Annotated[str, typer.Option("--budget", help="quick, standard or paper: how long, how many runs and levels.")]
-ScoreSeeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per experiment; default the budget's.")]
-ScoreHorizon = Annotated[float | None, typer.Option("--horizon", help="Seconds per run; default the budget's.")]
-Out = Annotated[Path | None, typer.Option("--out", help="Folder for records; default results/SCENARIO.")]
-Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Processes; default one per core.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and an estimate, run nothing.")]
-
 
 def main() -> None:
     """Run the command line and exit; whatever a person got wrong is one line on stderr."""
@@ -80,22 +56,17 @@ def main() -> None:
     try:
         code = app(standalone_mode=False)
     except _USAGE_ERROR as error:
-        code = _complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined]
+        code = complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined]
     except (ConfigError, RecordError) as error:
-        code = _complain(str(error), EXIT_USAGE)
+        code = complain(str(error), EXIT_USAGE)
     except OSError as error:
         named = f"{error.strerror}: {error.filename}" if error.strerror and error.filename else str(error)
-        code = _complain(named, EXIT_FAILURE)
+        code = complain(named, EXIT_FAILURE)
     except ImportError as error:
-        code = _complain(str(error), EXIT_FAILURE)
+        code = complain(str(error), EXIT_FAILURE)
     except (KeyboardInterrupt, typer.Abort):
-        code = _complain("interrupted", EXIT_INTERRUPTED)
+        code = complain("interrupted", EXIT_INTERRUPTED)
     sys.exit(code)
-
-
-def _complain(message: str, code: int) -> int:
-    typer.echo("swarm-forage: " + " ".join(message.split()), err=True)
-    return code
 
 
 @app.callback()
@@ -126,10 +97,10 @@ def run(
     settings: Settings = None,
     wrappers: Wrappers = None,
     config: ConfigFile = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for records; default results/SCENARIO.")] = None,
-    jobs: Annotated[int | None, typer.Option(min=1, help="Processes; default one per core.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the results as JSON.")] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the plan and an estimate, run nothing.")] = False,
+    out: Out = None,
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+    dry_run: DryRun = False,
 ) -> None:
     """Run controllers in a scenario and compare them.
 
@@ -182,7 +153,7 @@ def _run_specs(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None
     try:
         return run_all(specs, store=store, jobs=jobs, progress=True)
     except StudyInterrupted as interrupt:
-        _complain(f"{interrupt} They are in {store.folder}; the same command does the rest.", EXIT_INTERRUPTED)
+        complain(f"{interrupt} They are in {store.folder}; the same command does the rest.", EXIT_INTERRUPTED)
         raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
@@ -210,115 +181,8 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
         raise typer.Exit(EXIT_FAILURE)
 
 
-@app.command()
-def score(
-    policy: Annotated[str | None, typer.Option(help="Name of a controller, or file of a trained policy.")] = None,
-    curves: Annotated[
-        Path | None, typer.Option(help="Score curves from elsewhere instead: a CSV or Parquet file (docs/scoring.md).")
-    ] = None,
-    scenario: Scenario = "warehouse_small",
-    measures: Measures = None,
-    budget: Budget = "standard",
-    seeds: ScoreSeeds = None,
-    horizon: ScoreHorizon = None,
-    robots: Robots = None,
-    objects: Objects = None,
-    side: Side = None,
-    caches: Caches = None,
-    settings: Settings = None,
-    out: Out = None,
-    jobs: Jobs = None,
-    as_json: AsJson = False,
-    dry_run: DryRun = False,
-) -> None:
-    """Run a policy in all that the measures of swarm engineering need, and score it.
-
-    Swarms of several sizes, throttled, noisy and failing robots; one table with intervals and noise floors. Runs that
-    the folder holds already are not repeated.
-    """
-    from swarm_forage_env.cli.plan import WorldOptions, default_folder
-    from swarm_forage_env.cli.scoring import ScoreOptions, build_plan, tables_of_file
-
-    if (policy is None) == (curves is None):
-        raise typer.BadParameter("Expected either --policy or --curves.")
-    if curves is not None:
-        _show_scores(tables_of_file(curves, measures), None, as_json=as_json)
-        return
-    world = WorldOptions(
-        scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
-    )
-    options = ScoreOptions(policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon)
-    folder = out or default_folder(scenario)
-    _score(build_plan(world, options), folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run)
-
-
-@app.command()
-def compare(
-    policies: Annotated[str, typer.Option(help="Names or files of two or more policies, separated by commas.")],
-    scenario: Scenario = "warehouse_small",
-    measures: Measures = None,
-    budget: Budget = "standard",
-    seeds: ScoreSeeds = None,
-    horizon: ScoreHorizon = None,
-    robots: Robots = None,
-    objects: Objects = None,
-    side: Side = None,
-    caches: Caches = None,
-    settings: Settings = None,
-    out: Out = None,
-    jobs: Jobs = None,
-    as_json: AsJson = False,
-    dry_run: DryRun = False,
-) -> None:
-    """Score policies in the same worlds, seed by seed, and say which differences are significant."""
-    from swarm_forage_env.cli.plan import WorldOptions, default_folder
-    from swarm_forage_env.cli.scoring import ScoreOptions, build_plan
-
-    world = WorldOptions(
-        scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
-    )
-    options = ScoreOptions(policies=policies, measures=measures, budget=budget, seeds=seeds, horizon=horizon)
-    plan = build_plan(world, options, at_least=2)
-    _score(plan, out or default_folder(scenario), "comparison.png", jobs, as_json=as_json, dry_run=dry_run)
-
-
-def _score(plan: "ScoringPlan", folder: Path, picture: str, jobs: int | None, *, as_json: bool, dry_run: bool) -> None:
-    from metrics.scoring import run_scores
-    from swarm_forage_env.cli.scoring import plan_json, plan_text
-    from swarm_forage_env.study.runner import StudyInterrupted, available_cores
-    from swarm_forage_env.study.store import RunStore
-
-    if dry_run:
-        show = plan_json if as_json else plan_text
-        typer.echo(show(plan, RunStore(folder), jobs or available_cores()))
-        return
-    folder.mkdir(parents=True, exist_ok=True)
-    try:
-        tables = run_scores(plan, out=folder, jobs=jobs, progress=True)
-    except StudyInterrupted as interrupt:
-        _complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
-    _show_scores(tables, folder / picture, as_json=as_json)
-    if any(table.failures for table in tables):
-        raise typer.Exit(EXIT_FAILURE)
-
-
-def _show_scores(tables: "tuple[ScoreTable, ...]", picture: Path | None, *, as_json: bool) -> None:
-    from swarm_forage_env.cli.scoring import compared, comparison_text, draw, json_text, table_text
-
-    comparison = compared(tables)
-    drawn = None
-    if picture is not None:
-        try:
-            drawn = draw(tables, picture)
-        except ImportError:
-            typer.echo("No picture without matplotlib: pip install 'swarm-forage-env[plots]'", err=True)
-    if as_json:
-        typer.echo(json_text(tables, comparison, drawn))
-    else:
-        typer.echo(table_text(tables[0]) if comparison is None else comparison_text(comparison))
-    if drawn is not None:
-        typer.echo(f"picture {drawn}", err=True)
+app.command()(score)
+app.command()(compare)
 
 
 @app.command("list")
@@ -361,7 +225,7 @@ def rerun(file: Annotated[Path, typer.Argument(help="A record (.parquet) or a fa
     again = run_one(RunSpec.from_json(stored.spec))
     typer.echo(again.describe())
     if not again.same_results(stored):
-        raise typer.Exit(_complain(f"the results differ from those in {file}", EXIT_FAILURE))
+        raise typer.Exit(complain(f"the results differ from those in {file}", EXIT_FAILURE))
     typer.echo(f"bit for bit the same as {file}")
 
 

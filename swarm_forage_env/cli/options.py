@@ -1,0 +1,53 @@
+"""What several commands share: options, exit codes, complaints. Light, so that `--help` answers at once."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EXIT_FAILURE = 1
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130
+"""What shells report for a program that Ctrl-C ended."""
+
+Scenario = Annotated[str, typer.Option("--scenario", help="Preset; see 'swarm-forage list'.")]
+Robots = Annotated[int | None, typer.Option("--robots", min=1, help="Swarm size.")]
+Objects = Annotated[int | None, typer.Option("--objects", min=1, help="Number of objects.")]
+Side = Annotated[float | None, typer.Option("--side", help="Side of the arena in m (search_and_rescue only).")]
+Caches = Annotated[
+    str | None, typer.Option("--caches", help="none, static or dynamic; default: the controller's world.")
+]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Any scenario field; may be repeated.")
+]
+Wrappers = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--wrapper",
+        metavar="NAME:KEY=VALUE,...",
+        help="Disturb the swarm, e.g. sensor_noise:sigma=0.03 or population:death_per_tick=0.0001; may be repeated.",
+    ),
+]
+ConfigFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--config",
+        metavar="FILE.toml",
+        help="Scenario fields and wrappers, one table each; what other options say goes before it.",
+    ),
+]
+
+Measures = Annotated[str | None, typer.Option("--measures", help="Names separated by commas; default all.")]
+Budget = Annotated[str, typer.Option("--budget", help="quick, standard or paper: how long, how many runs and levels.")]
+ScoreSeeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per experiment; default the budget's.")]
+ScoreHorizon = Annotated[float | None, typer.Option("--horizon", help="Seconds per run; default the budget's.")]
+Out = Annotated[Path | None, typer.Option("--out", help="Folder for records; default results/SCENARIO.")]
+Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Processes; default one per core.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and an estimate, run nothing.")]
+
+
+def complain(message: str, code: int) -> int:
+    """Say one line on stderr; returns `code`."""
+    typer.echo("swarm-forage: " + " ".join(message.split()), err=True)
+    return code
