@@ -12,6 +12,8 @@ from swarm_forage_env.types import ObsArray
 COMPACT_COLUMNS = 23
 VIEW_REACH_M = 1.0
 """Distance that a direction of length 1 stands for: the side of the line-of-sight window."""
+_TIE_M2 = 1e-6
+"""Squared distances this close are a tie, which rounding must not decide."""
 _HALF_WINDOW = WINDOW_CELLS // 2
 _WINDOW = WINDOW_CELLS * WINDOW_CELLS
 _OWN_CELL = _WINDOW // 2
@@ -42,7 +44,7 @@ def nearest_object(row: ObsArray, starts: tuple[int, int, int], half_x: float, h
         if row[window + k] > 0.0:
             x = (k % WINDOW_CELLS - _HALF_WINDOW) / CELLS_PER_M - off_x
             y = (k // WINDOW_CELLS - _HALF_WINDOW) / CELLS_PER_M - off_y
-            if x * x + y * y < best:
+            if x * x + y * y < best - _TIE_M2:
                 best = x * x + y * y
                 best_x = x
                 best_y = y

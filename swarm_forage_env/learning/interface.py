@@ -176,7 +176,9 @@ class LearnerInterface:
             )
         if self._is_discrete:
             self._check_numbers(actions)
-            numbered_actions(actions, self._wheels, self._grips, obs, self._carrying, commands)
+            numbered_actions(
+                np.ascontiguousarray(actions, np.int32), self._wheels, self._grips, obs, self._carrying, commands
+            )
         elif self.config.automatic_gripper:
             commands[:, :2] = actions
         else:

@@ -8,11 +8,13 @@ import dataclasses
 import itertools
 import json
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from gymnasium import spaces
 
 from swarm_forage_env.config import ConfigError, suggestion
 from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
@@ -96,6 +98,16 @@ class Network:
                 value = np.tanh(value) if self.about.activation == "tanh" else np.maximum(value, 0.0)
         return value
 
+    def choose(self, rows: ObsArray, rng: np.random.Generator) -> np.ndarray:
+        """Return actions for observations (N, d): numbers (N,), or values in [-1, 1], one row per robot."""
+        outputs = self.outputs(rows)
+        if self.about.interface.actions != "discrete":
+            return np.clip(outputs, -1.0, 1.0)
+        if self.about.samples:
+            # Gumbel's trick: the largest of logits plus such noise is a draw by their probabilities.
+            outputs = outputs + rng.gumbel(size=outputs.shape)
+        return np.argmax(outputs, axis=1)
+
     def save(self, path: str | Path) -> None:
         """Write the file; an existing one is replaced."""
         layers = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
@@ -122,23 +134,55 @@ class Network:
         return cls(weights, biases, about)
 
 
-class NetworkPolicy:
-    """A trained network that drives every robot alike. An instance drives one run."""
+Choose: TypeAlias = Callable[[ObsArray, np.random.Generator], np.ndarray]
+"""From what a learner sees, (N, d), to its actions, one row per robot."""
+
+
+class LearnedPolicy:
+    """A trained controller, the same for every robot, in policy clothes. An instance drives one run.
+
+    Attributes:
+        reads: Observation slices that are looked at.
+        caches: World that the policy was trained in.
+    """
+
+    def __init__(self, interface: InterfaceConfig, choose: Choose, *, caches: str = "none") -> None:
+        """Take the controller.
+
+        Args:
+            interface: What it saw and did in training.
+            choose: The controller.
+            caches: World that it was trained in.
+        """
+        self.reads = interface.reads
+        self.caches = caches
+        self._config = interface
+        self._choose = choose
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Start a run."""
+        self._rng = rng
+        self._interface = LearnerInterface(self._config, task)
+        self._view = np.empty((task.n_robots, self._interface.layout.size), np.float32)
+        self._ticks_left = 0
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
+        if self._ticks_left == 0:
+            self._chosen = self._choose(self._interface.observe(obs, self._view), self._rng)
+            self._ticks_left = self._config.decision_ticks
+        self._ticks_left -= 1
+        return self._interface.command(self._chosen, obs)
+
+
+class NetworkPolicy(LearnedPolicy):
+    """A network file as a policy."""
 
     def __init__(self, network: Network) -> None:
-        """Take the network."""
+        """Take the network; raises NetworkError where it does not fit the interface it names."""
+        about = network.about
+        super().__init__(about.interface, network.choose, caches=about.caches)
         self._network = network
-        self._config = network.about.interface
-
-    @property
-    def caches(self) -> str:
-        """World that the policy was trained in."""
-        return self._network.about.caches
-
-    @property
-    def reads(self) -> tuple[str, ...] | None:
-        """Observation slices that are looked at."""
-        return self._config.reads
 
     def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
         """Start a run.
@@ -146,35 +190,13 @@ class NetworkPolicy:
         Raises:
             NetworkError: the network sees or does something else than its interface in this world.
         """
-        self._rng = rng
-        self._interface = LearnerInterface(self._config, task)
-        seen, done = self._interface.layout.size, self._interface.action_space
-        wanted = (seen, int(done.n) if self._is_discrete else done.shape[0])  # type: ignore[union-attr,index]
+        super().reset(task, rng)
+        space = self._interface.action_space
+        n_actions = int(space.n) if isinstance(space, spaces.Discrete) else space.shape[0]
+        wanted = (self._interface.layout.size, n_actions)
         found = (self._network.weights[0].shape[0], self._network.weights[-1].shape[1])
         if wanted != found:
             raise NetworkError(
                 f"Expected a network from {wanted[0]} columns to {wanted[1]} actions in this world, got one from "
                 f"{found[0]} to {found[1]}."
             )
-        self._view = np.empty((task.n_robots, seen), np.float32)
-        self._ticks_left = 0
-
-    @property
-    def _is_discrete(self) -> bool:
-        return self._config.actions == "discrete"
-
-    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
-        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
-        if self._ticks_left == 0:
-            self._actions = self._choose(self._network.outputs(self._interface.observe(obs, self._view)))
-            self._ticks_left = self._config.decision_ticks
-        self._ticks_left -= 1
-        return self._interface.command(self._actions, obs)
-
-    def _choose(self, outputs: np.ndarray) -> np.ndarray:
-        if not self._is_discrete:
-            return np.clip(outputs, -1.0, 1.0)
-        if self._network.about.samples:
-            # Gumbel's trick: the largest of logits plus such noise is a draw by their probabilities.
-            outputs = outputs - np.log(-np.log(self._rng.uniform(1e-12, 1.0, outputs.shape)))
-        return np.argmax(outputs, axis=1)

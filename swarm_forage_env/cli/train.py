@@ -1,0 +1,169 @@
+"""The command `swarm-forage train`: from its options to a plan, and what it shows meanwhile."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from swarm_forage_env.cli.config_file import read_config
+from swarm_forage_env.cli.plan import WorldOptions, build_scenario
+from swarm_forage_env.config import CELL_M, ConfigError, ScenarioConfig
+from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.plan import (
+    DEFAULT_STEPS,
+    Evaluation,
+    EvaluationPlan,
+    Stage,
+    TrainingPlan,
+    TrainingStatus,
+    read_plan,
+)
+from swarm_forage_env.learning.pretrained import plan_file
+from swarm_forage_env.wrappers.registry import parse_wrapper
+
+DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
+    "ppo": {"n_steps": 128, "batch_size": 3200, "n_epochs": 4, "gamma": 0.99, "gae_lambda": 0.98},
+    "a2c": {"n_steps": 32, "gamma": 0.99},
+    "dqn": {"buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 1024, "train_freq": 4},
+    "sac": {"buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 1024},
+}
+"""Arguments that suit hundreds of robots at once; our choice, the rest is the library's."""
+SMALL_START = 0.4
+"""Share of its size that an arena has in a small start; our choice."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TrainOptions:
+    """The options of the command that are not about the world; None = the default."""
+
+    algorithm: str | None = None
+    steps: int | None = None
+    n_arenas: int | None = None
+    seed: int | None = None
+    observation: str | None = None
+    actions: str | None = None
+    automatic_gripper: bool | None = None
+    decision_ticks: int | None = None
+    evaluate_every: int | None = None
+    small_start: bool = False
+    arguments: tuple[str, ...] = ()
+    """Words of the form key=number, for the algorithm."""
+
+
+def build_plan(world: WorldOptions, options: TrainOptions) -> TrainingPlan:
+    """Return the plan that the options describe: one stage in one world.
+
+    Raises:
+        ConfigError: whatever is wrong with them.
+    """
+    fields, wrappers = ({}, ()) if world.config_file is None else read_config(world.config_file)
+    scenario, _ = build_scenario(world, fields)
+    algorithm = options.algorithm or "ppo"
+    interface = InterfaceConfig(
+        observation=options.observation or "compact",
+        actions=options.actions or ("continuous" if algorithm == "sac" else "discrete"),
+        automatic_gripper=options.automatic_gripper is not False,
+        decision_ticks=options.decision_ticks or 5,
+    )
+    return TrainingPlan(
+        scenario=scenario,
+        wrappers=(*wrappers, *map(parse_wrapper, world.wrappers)),
+        algorithm=algorithm,
+        interface=interface,
+        n_arenas=options.n_arenas or 8,
+        options=DEFAULT_OPTIONS.get(algorithm, {}) | dict(map(_argument, options.arguments)),
+        stages=_stages(scenario, options),
+        evaluation=EvaluationPlan(every_steps=options.evaluate_every or 1_000_000),
+        seed=options.seed or 0,
+    )
+
+
+def _stages(scenario: ScenarioConfig, options: TrainOptions) -> tuple[Stage, ...]:
+    steps = options.steps or DEFAULT_STEPS
+    if not options.small_start:
+        return (Stage(steps=steps),)
+    return Stage(steps=max(1, steps // 3), scenario=small_arena(scenario)), Stage(steps=steps - steps // 3)
+
+
+def small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
+    """Return fields that shrink the arena to SMALL_START of its size with the nest in proportion.
+
+    Only along x for a single source, which lies opposite the nest: the other axis is no way home.
+    """
+    arena = scenario.arena
+    shares = (SMALL_START, 1.0 if scenario.objects.placement == "single_source" else SMALL_START)
+    width_m, height_m = (
+        round(extent * share / CELL_M) * CELL_M
+        for extent, share in zip((arena.width_m, arena.height_m), shares, strict=True)
+    )
+    (centre_x, centre_y), (size_x, size_y) = arena.nest_centre_m, arena.nest_size_m
+    return {
+        "width_m": width_m,
+        "height_m": height_m,
+        "nest_centre_m": (centre_x * shares[0], centre_y * shares[1]),
+        "nest_size_m": (size_x * shares[0], size_y * shares[1]),
+    }
+
+
+def named_plan(name: str) -> TrainingPlan:
+    """Return the plan of a file, or of a shipped policy by its name.
+
+    Raises:
+        ConfigError: there is none, or it cannot be used.
+    """
+    shipped = plan_file(name)
+    return read_plan(Path(name) if shipped is None else shipped)
+
+
+def _argument(word: str) -> tuple[str, float | int]:
+    name, _, text = word.partition("=")
+    for kind in (int, float):
+        try:
+            return name, kind(text)
+        except ValueError:
+            continue
+    raise ConfigError(f"Expected an argument of the algorithm as key=number, got {word!r}.")
+
+
+def run_training(plan: TrainingPlan, folder: Path, *, n_processes: int, resume: bool) -> None:
+    """Train, show how it goes, and say where the results are.
+
+    Raises:
+        ImportError: stable-baselines3 is not installed.
+        ConfigError: see `training.train`.
+    """
+    try:
+        from swarm_forage_env.learning.sb3.training import train
+    except ImportError as error:
+        raise ImportError(
+            f"Training needs stable-baselines3 and torch ({error}): "
+            "pip install 'swarm-forage-env[train]' 'torch==2.13.0'"
+        ) from error
+
+    console = Console(stderr=True, highlight=False)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        result = train(plan, folder, n_processes=n_processes, resume=resume, report=_reporter(plan, bar))
+    console.print(f"model {folder / 'model.zip'}" + (f", network {result.policy_file}" if result.policy_file else ""))
+
+
+def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | Evaluation], None]:
+    task = bar.add_task("training", total=plan.total_steps)
+    heading = f"{'decisions':>12} {'per 1,000 s':>12} {plan.evaluation.baseline:>8} {'interference':>13}"
+
+    def report(news: TrainingStatus | Evaluation) -> None:
+        nonlocal heading
+        if isinstance(news, Evaluation):
+            if heading:
+                bar.console.print(heading)
+                heading = ""
+            bar.console.print(
+                f"{news.steps:>12,} {news.performance:>12.1f} {news.baseline:>8.1f} {news.interference_fraction:>13.3f}"
+            )
+        else:
+            bar.update(task, completed=news.steps, description=f"mean return {news.episode_return:.2f}")
+
+    return report

@@ -1,0 +1,221 @@
+"""TrainingPlan: a training run as frozen data, read from TOML and written beside its results; and what it reports."""
+
+import dataclasses
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from swarm_forage_env.config import ConfigError, ScenarioConfig, suggestion, with_overrides
+from swarm_forage_env.config import from_mapping as config_from_mapping
+from swarm_forage_env.learning.interface import InterfaceConfig, interface_from_mapping
+from swarm_forage_env.scenarios import scenario as preset
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.registry import wrappers_from_mapping
+
+ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
+"""Algorithms of stable-baselines3 that train; the first two on rollouts, the others from replay."""
+DEFAULT_STEPS = 5_000_000
+
+
+def _require_whole(name: str, value: Any) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise ConfigError(f"Expected {name} to be a whole number >= 1, got {value!r}.")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Stage:
+    """A part of the training in a world of its own: a step of a curriculum."""
+
+    steps: int
+    """Decisions of single robots."""
+    scenario: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Fields of the plan's scenario that differ, by name; the number of robots cannot."""
+    options: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Arguments of the algorithm that differ from here on (`learning_rate`, `gamma` ...)."""
+
+    def __post_init__(self) -> None:
+        _require_whole("stage.steps", self.steps)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class EvaluationPlan:
+    """How the policy is judged meanwhile: whole runs of the plan's scenario, beside a scripted controller."""
+
+    every_steps: int = 1_000_000
+    """Decisions between two evaluations; there is one more at the end."""
+    horizon_s: float = 2000.0
+    """Length of a run, s."""
+    n_runs: int = 2
+    first_seed: int = 1_000_000
+    """Seeds are counted up from here, away from those of training."""
+    baseline: str = "crw"
+    """Controller to compare with, run once under the same seeds."""
+
+    def __post_init__(self) -> None:
+        _require_whole("evaluation.every_steps", self.every_steps)
+        _require_whole("evaluation.n_runs", self.n_runs)
+
+    def specs(self, scenario: ScenarioConfig, wrappers: tuple[WrapperConfig, ...], policy: str) -> tuple[RunSpec, ...]:
+        """Return one specification per run, in `scenario` but for its horizon.
+
+        Raises:
+            ConfigError: a horizon that is not a whole number of recording intervals.
+        """
+        world = with_overrides(scenario, horizon_s=self.horizon_s)
+        seeds = range(self.first_seed, self.first_seed + self.n_runs)
+        return tuple(RunSpec(scenario=world, policy=policy, wrappers=wrappers, seed=seed) for seed in seeds)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TrainingPlan:
+    """Everything that decides a training run, but for the machine and the installed versions.
+
+    Raises:
+        ConfigError: an unknown algorithm, sizes below 1, a stage whose world cannot be, or discrete actions for an
+            algorithm that has none (and the other way round).
+    """
+
+    scenario: ScenarioConfig
+    """The world to be mastered, rewards included; evaluations take place in it."""
+    wrappers: tuple[WrapperConfig, ...] = ()
+    """What disturbs the swarm, in training and in evaluations."""
+    algorithm: str = "ppo"
+    interface: InterfaceConfig = field(default_factory=InterfaceConfig)
+    n_arenas: int = 8
+    hidden: tuple[int, ...] = (64, 64)
+    """Sizes of the hidden layers of actor and critic."""
+    options: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Arguments of the algorithm's class; what is not here keeps the library's default."""
+    stages: tuple[Stage, ...] = (Stage(steps=DEFAULT_STEPS),)
+    evaluation: EvaluationPlan = field(default_factory=EvaluationPlan)
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.algorithm not in ALGORITHMS:
+            raise ConfigError(
+                f"Expected algorithm to be one of {', '.join(ALGORITHMS)}, got {self.algorithm!r}."
+                + suggestion(str(self.algorithm), ALGORITHMS)
+            )
+        unfit = {"dqn": "continuous", "sac": "discrete"}.get(self.algorithm)
+        if self.interface.actions == unfit:
+            raise ConfigError(f"Expected actions that {self.algorithm} can choose, got {unfit} ones.")
+        _require_whole("n_arenas", self.n_arenas)
+        for size in self.hidden:
+            _require_whole("hidden", size)
+        if not self.stages:
+            raise ConfigError("Expected at least one stage, got none.")
+        for stage in self.stages:
+            with_overrides(self.scenario, **stage.scenario)
+        self.evaluation.specs(self.scenario, self.wrappers, self.evaluation.baseline)
+
+    @property
+    def total_steps(self) -> int:
+        """Decisions of single robots in all stages."""
+        return sum(stage.steps for stage in self.stages)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the plan as nested plain values."""
+        plain = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
+        nested = {name: dataclasses.asdict(plain[name]) for name in ("scenario", "interface", "evaluation")}
+        wrappers = {config.name: config.to_mapping() for config in self.wrappers}
+        return {**plain, **nested, "wrappers": wrappers, "stages": [dataclasses.asdict(item) for item in self.stages]}
+
+    def write(self, path: Path) -> None:
+        """Write the plan as JSON."""
+        path.write_text(json.dumps(self.to_mapping(), indent=2) + "\n", encoding="utf-8")
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "TrainingPlan":
+        """Build a plan from nested plain values.
+
+        `scenario` is either complete, as `to_mapping` writes it, or a table with the `preset` it starts from and
+        fields by name. `wrappers` is a table of tables by name.
+
+        Raises:
+            ConfigError: unknown keys, or values that make no plan.
+        """
+        values = _known(cls, mapping, "")
+        scenario = dict(_table(values, "scenario"))
+        if "preset" in scenario:
+            values["scenario"] = preset(scenario.pop("preset"), **_tuples(scenario))
+        else:
+            values["scenario"] = config_from_mapping(ScenarioConfig, scenario, where="scenario.")
+        if "wrappers" in values:
+            values["wrappers"] = wrappers_from_mapping(_table(values, "wrappers"))
+        if "interface" in values:
+            values["interface"] = interface_from_mapping(dict(_table(values, "interface")))
+        if "evaluation" in values:
+            values["evaluation"] = EvaluationPlan(**_known(EvaluationPlan, _table(values, "evaluation"), "evaluation."))
+        if "stages" in values:
+            tables = [_known(Stage, table, "stages.") for table in values["stages"]]
+            values["stages"] = tuple(
+                Stage(**{**table, "scenario": _tuples(table.get("scenario", {}))}) for table in tables
+            )
+        return cls(**_tuples(values))
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Evaluation:
+    """How the policy did at some point of the training, beside the baseline; means over runs."""
+
+    steps: int
+    """Decisions of single robots so far."""
+    wall_time_s: float
+    """Since the training was started or resumed, s."""
+    performance: float
+    """What the scenario counts, per 1,000 simulated s."""
+    baseline: float
+    """The same of the baseline."""
+    interference_fraction: float
+    """Mean fraction of active robots in interference."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TrainingStatus:
+    """Where a training run stands."""
+
+    steps: int
+    """Decisions of single robots so far."""
+    wall_time_s: float
+    """Since the training was started or resumed, s."""
+    episode_return: float
+    """Mean return of the latest episodes, nan before the first."""
+
+
+def read_plan(path: Path) -> TrainingPlan:
+    """Read a plan from a TOML file, or from the JSON file that a training run leaves.
+
+    Raises:
+        ConfigError: the file cannot be read or holds no plan; the message names it.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        return TrainingPlan.from_mapping(json.loads(text) if path.suffix == ".json" else tomllib.loads(text))
+    except OSError as error:
+        raise ConfigError(f"Cannot read the plan {path}: {error.strerror or error}.") from error
+    except (ValueError, TypeError) as error:  # ConfigError, and what the two parsers raise
+        raise ConfigError(f"Cannot use the plan {path}: {error}") from error
+
+
+def _known(config_class: type, mapping: Mapping[str, Any], where: str) -> dict[str, Any]:
+    known = [item.name for item in dataclasses.fields(config_class)]
+    for key in mapping:
+        if key not in known:
+            raise ConfigError(f"Unknown key {where + key!r}.{suggestion(key, known)}")
+    return dict(mapping)
+
+
+def _table(values: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    table = values.get(key)
+    if not isinstance(table, Mapping):
+        raise ConfigError(f"Expected {key} to be a table, got {table!r}.")
+    return table
+
+
+def _tuples(mapping: Mapping[str, Any]) -> dict[str, Any]:
+    """Turn lists, the only sequences of TOML and JSON, into the tuples of configurations."""
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in mapping.items()}

@@ -1,0 +1,125 @@
+"""Networks in files: evaluated as by hand, read back as written, refused when broken."""
+
+import json
+
+import numpy as np
+import pytest
+
+from swarm_forage_env.env import parallel_env
+from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.network import LearnedPolicy, Network, NetworkAbout, NetworkError, NetworkPolicy
+from swarm_forage_env.policy import Policy
+
+
+def small_network(**about) -> Network:
+    """Two columns, two hidden units, two outputs."""
+    weights = (np.array([[1.0, -1.0], [0.0, 2.0]], np.float32), np.array([[1.0, 0.0], [0.0, 3.0]], np.float32))
+    biases = (np.array([0.0, 0.5], np.float32), np.array([0.25, 0.0], np.float32))
+    about = {"interface": InterfaceConfig(automatic_gripper=True)} | about
+    return Network(weights, biases, NetworkAbout(**about))
+
+
+def compact_network(n_actions: int, rng: np.random.Generator, **about) -> Network:
+    weights = tuple(rng.normal(size=size).astype(np.float32) for size in ((23, 8), (8, n_actions)))
+    biases = tuple(rng.normal(size=size).astype(np.float32) for size in (8, n_actions))
+    return Network(weights, biases, NetworkAbout(**about))
+
+
+@pytest.mark.parametrize(
+    ("activation", "expected"),
+    [
+        ("relu", [1.0 + 0.25, 3 * 0.5]),  # hidden: relu(1), relu(-1 + 1 + 0.5)
+        ("tanh", [np.tanh(1.0) + 0.25, 3 * np.tanh(0.5)]),
+    ],
+)
+def test_outputs_by_hand(activation, expected):
+    rows = np.array([[1.0, 0.5]], np.float32)
+    np.testing.assert_allclose(small_network(activation=activation).outputs(rows), [expected], rtol=1e-6)
+
+
+def test_continuous_choices_are_cut_to_the_range_of_actions():
+    rows = np.array([[1.0, 0.5]], np.float32)
+    chosen = small_network(activation="relu").choose(rows, np.random.default_rng(0))
+    assert chosen.tolist() == [[1.0, 1.0]]
+
+
+def test_discrete_choices_are_the_likeliest_or_drawn_by_their_probabilities():
+    interface = InterfaceConfig(actions="discrete")
+    rows = np.tile(np.array([[0.0, 0.0]], np.float32), (20_000, 1))
+    likeliest = small_network(interface=interface, activation="relu")
+    assert set(likeliest.choose(rows, np.random.default_rng(0)).tolist()) == {1}
+    drawn = small_network(interface=interface, activation="relu", samples=True).choose(rows, np.random.default_rng(0))
+    share = 1.0 / (1.0 + np.exp(0.25 - 1.5))  # softmax of the outputs 0.25 and 1.5
+    assert drawn.mean() == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / len(rows)))
+
+
+def test_files_give_back_what_was_written(tmp_path):
+    network = small_network(samples=True, caches="static", card={"by": ["hand", 1]})
+    network.save(tmp_path / "network.npz")
+    again = Network.load(tmp_path / "network.npz")
+    assert again.about == network.about
+    for one, other in zip((*network.weights, *network.biases), (*again.weights, *again.biases), strict=True):
+        np.testing.assert_array_equal(one, other, strict=True)
+
+
+@pytest.mark.parametrize("write", ["text", "no_network", "pickle", "foreign_key", "no_json"])
+def test_other_files_are_refused(tmp_path, write):
+    path = tmp_path / "network.npz"
+    if write == "text":
+        path.write_text("no archive")
+    elif write == "no_network":
+        np.savez(path, numbers=np.zeros(3))
+    elif write == "pickle":
+        np.savez(path, weight_0=np.array([{}], object), about=np.array("{}"))
+    else:
+        about = json.loads(small_network().about.to_json()) | {"colour": "red"}
+        np.savez(path, about=np.array("{" if write == "no_json" else json.dumps(about)))
+    with pytest.raises(NetworkError):
+        Network.load(path)
+    with pytest.raises(FileNotFoundError):
+        Network.load(tmp_path / "nothing.npz")
+
+
+def test_layers_that_do_not_follow_on_each_other_are_refused():
+    network = small_network()
+    with pytest.raises(NetworkError, match="follow on each other"):
+        Network((network.weights[0], np.zeros((3, 2), np.float32)), network.biases, network.about)
+    with pytest.raises(NetworkError, match="follow on each other"):
+        Network((), (), network.about)
+    with pytest.raises(NetworkError, match="activation of tanh, relu"):
+        small_network(activation="elu")
+
+
+@pytest.mark.parametrize("actions", ["continuous", "discrete"])
+def test_a_policy_keeps_its_choice_for_the_ticks_of_a_decision(actions):
+    env = parallel_env("warehouse_small", n_robots=4, n_objects=20)
+    interface = InterfaceConfig(observation="compact", actions=actions, automatic_gripper=True, decision_ticks=3)
+    network = compact_network(6 if actions == "discrete" else 2, np.random.default_rng(1), interface=interface)
+    policy = NetworkPolicy(network)
+    assert isinstance(policy, Policy)
+    policy.reset(env.task, np.random.default_rng(0))
+    obs = env.reset_batch(0)
+    wheels = []
+    for _ in range(12):
+        chosen = policy.act(obs, env.active).copy()
+        obs, *_ = env.step_batch(chosen)
+        wheels.append(chosen[:, :2])
+    for tick, chosen in enumerate(wheels):
+        np.testing.assert_array_equal(chosen, wheels[tick - tick % 3])
+    assert any(not np.array_equal(wheels[0], later) for later in wheels)
+
+
+def test_a_network_that_does_not_fit_its_interface_is_refused_at_the_start_of_a_run():
+    env = parallel_env("warehouse_small", n_robots=2, n_objects=20)
+    with pytest.raises(NetworkError, match="from 111 columns to 2 actions in this world, got one from 2 to 2"):
+        NetworkPolicy(small_network()).reset(env.task, np.random.default_rng(0))
+
+
+def test_any_function_becomes_a_policy_by_naming_its_interface():
+    env = parallel_env("warehouse_small", n_robots=3, n_objects=20)
+    interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
+    policy = LearnedPolicy(interface, lambda rows, rng: np.ones(len(rows), np.int64), caches="static")
+    policy.reset(env.task, np.random.default_rng(0))
+    assert policy.act(env.reset_batch(0), env.active)[:, :2].tolist() == [[0.5, 0.5]] * 3
+    assert policy.caches == "static"
+    assert "los_object" in policy.reads

@@ -1,0 +1,114 @@
+"""Training plans: from TOML, to JSON and back, and what is refused."""
+
+import pytest
+
+from swarm_forage_env.config import ConfigError
+from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
+from swarm_forage_env.learning.pretrained import plan_file
+from swarm_forage_env.scenarios import warehouse_small
+
+TOML = """
+algorithm = "dqn"
+n_arenas = 2
+hidden = [16]
+
+[scenario]
+preset = "warehouse_small"
+n_robots = 6
+nest_centre_m = [4.0, 8.0]
+
+[wrappers.sensor_noise]
+sigma = 0.02
+
+[interface]
+actions = "discrete"
+decision_ticks = 2
+
+[options]
+gamma = 0.9
+
+[[stages]]
+steps = 100
+scenario = { width_m = 20.0, nest_centre_m = [2.0, 8.0] }
+
+[[stages]]
+steps = 200
+options = { learning_rate = 0.1 }
+
+[evaluation]
+every_steps = 50
+horizon_s = 400.0
+"""
+
+
+@pytest.fixture
+def plan(tmp_path) -> TrainingPlan:
+    path = tmp_path / "plan.toml"
+    path.write_text(TOML)
+    return read_plan(path)
+
+
+def test_a_plan_says_what_its_file_says(plan):
+    assert plan.algorithm == "dqn"
+    assert plan.hidden == (16,)
+    assert plan.scenario == warehouse_small(n_robots=6, nest_centre_m=(4.0, 8.0))
+    assert [config.name for config in plan.wrappers] == ["sensor_noise"]
+    assert plan.interface == InterfaceConfig(actions="discrete", decision_ticks=2)
+    assert plan.stages[0] == Stage(steps=100, scenario={"width_m": 20.0, "nest_centre_m": (2.0, 8.0)})
+    assert plan.stages[1].options == {"learning_rate": 0.1}
+    assert plan.total_steps == 300
+    assert plan.evaluation == EvaluationPlan(every_steps=50, horizon_s=400.0)
+
+
+def test_evaluations_are_whole_runs_of_the_scenario_under_seeds_of_their_own(plan):
+    specs = plan.evaluation.specs(plan.scenario, plan.wrappers, "crw")
+    assert [spec.seed for spec in specs] == [1_000_000, 1_000_001]
+    assert {spec.scenario.horizon_s for spec in specs} == {400.0}
+    assert specs[0].wrappers == plan.wrappers
+
+
+def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
+    plan.write(tmp_path / "plan.json")
+    assert read_plan(tmp_path / "plan.json") == plan
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ('algorithm = "dqn"', 'algorithm = "dqm"', "Did you mean 'dqn'"),
+        ('algorithm = "dqn"', 'algorithm = "sac"', "actions that sac can choose, got discrete"),
+        ('actions = "discrete"', 'actions = "continuous"', "actions that dqn can choose, got continuous"),
+        ("n_arenas = 2", "n_arenas = 0", "n_arenas to be a whole number >= 1"),
+        ("n_arenas = 2", "arenas = 2", "Did you mean 'n_arenas'"),
+        ("steps = 100", "steps = 0", "steps to be a whole number"),
+        ("steps = 100", "step = 100", "Did you mean 'stages.steps'|stages.step"),
+        ("width_m = 20.0", "widht_m = 20.0", "Did you mean 'width_m'"),
+        ("horizon_s = 400.0", "horizon_s = 300.0", "interval"),
+        ("hidden = [16]", "hidden = [0]", "hidden to be a whole number"),
+        ("[interface]", "[[interface]]", "interface to be a table"),
+        ("sigma = 0.02", "sigma = -1.0", "sigma"),
+        ("[options]", "[options", "plan.toml"),
+    ],
+)
+def test_plans_that_cannot_be_are_refused_with_their_file(tmp_path, old, new, reason):
+    path = tmp_path / "plan.toml"
+    path.write_text(TOML.replace(old, new))
+    with pytest.raises(ConfigError, match=reason) as refusal:
+        read_plan(path)
+    assert str(path) in str(refusal.value)
+
+
+def test_a_plan_has_stages_and_a_readable_file(tmp_path):
+    with pytest.raises(ConfigError, match="at least one stage"):
+        TrainingPlan(scenario=warehouse_small(), stages=())
+    with pytest.raises(ConfigError, match="Cannot read the plan"):
+        read_plan(tmp_path / "nothing.toml")
+
+
+def test_the_plan_of_the_shipped_policy_is_a_plan():
+    path = plan_file("ppo_warehouse_small")
+    assert path is not None
+    plan = read_plan(path)
+    assert plan.scenario.robots.n_robots == 50
+    assert plan_file("crw") is None

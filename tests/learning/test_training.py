@@ -1,0 +1,161 @@
+"""Training by stable-baselines3: reproducible, resumable, judged beside a baseline, exported without loss."""
+
+import csv
+import dataclasses
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
+
+import torch
+from stable_baselines3 import DQN, PPO, SAC
+
+from swarm_forage_env.config import ConfigError
+from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.network import Network, NetworkError
+from swarm_forage_env.learning.plan import EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
+from swarm_forage_env.learning.sb3.export import export_network
+from swarm_forage_env.learning.sb3.training import train
+from swarm_forage_env.scenarios import warehouse_small
+
+NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
+DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True)
+
+
+def tiny_plan(**changes) -> TrainingPlan:
+    """Two stages of three rollouts, in seconds."""
+    plan = TrainingPlan(
+        scenario=warehouse_small(n_robots=4, n_objects=20, horizon_s=200.0),
+        interface=NUMBERED,
+        n_arenas=2,
+        hidden=(8,),
+        options={"n_steps": 16, "batch_size": 64},
+        stages=(
+            Stage(steps=384, scenario={"n_objects": 40}),
+            Stage(steps=384, options={"learning_rate": 1e-4, "gamma": 0.9}),
+        ),
+        evaluation=EvaluationPlan(every_steps=256, horizon_s=200.0, n_runs=1, baseline="random"),
+    )
+    return dataclasses.replace(plan, **changes)
+
+
+def weights(model) -> list[np.ndarray]:
+    return [value.detach().numpy() for value in model.policy.state_dict().values()]
+
+
+def same(one: list[np.ndarray], other: list[np.ndarray]) -> bool:
+    return all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+
+
+def test_ppo_twice_from_one_seed_gives_the_same_weights_after_20000_steps():
+    trained = []
+    for seed in (0, 0, 1):
+        env = SwarmVecEnv("warehouse_small", n_robots=20, n_arenas=2, interface=DRIVEN, n_objects=100)
+        model = PPO(
+            "MlpPolicy",
+            env,
+            n_steps=100,
+            batch_size=2000,
+            n_epochs=2,
+            policy_kwargs={"net_arch": [32]},
+            rollout_buffer_class=ActiveRolloutBuffer,
+            rollout_buffer_kwargs={"active_column": env.active_column},
+            seed=seed,
+            device="cpu",
+        ).learn(20_000)
+        assert model.num_timesteps == 20_000
+        trained.append(weights(model))
+    assert same(trained[0], trained[1])
+    assert not same(trained[0], trained[2])
+
+
+def test_a_plan_is_carried_out_stage_by_stage(tmp_path):
+    told = []
+    result = train(tiny_plan(), tmp_path, report=told.append)
+    assert result.model.num_timesteps == 768
+    assert result.model.gamma == 0.9
+    assert [evaluation.steps for evaluation in result.evaluations] == [256, 384, 640, 768]
+    assert [news for news in told if news in result.evaluations] == list(result.evaluations)
+    with (tmp_path / "evaluations.csv").open() as file:
+        assert [int(row["steps"]) for row in csv.DictReader(file)] == [256, 384, 640, 768]
+    about = Network.load(tmp_path / "policy.npz").about
+    best = max(evaluation.performance for evaluation in result.evaluations)
+    assert about.interface == NUMBERED
+    assert about.card["evaluation"]["performance"] == best
+    assert about.card["versions"]["torch"] == torch.__version__
+    assert {path.name for path in tmp_path.iterdir()} >= {"plan.json", "model.zip", "policy.npz"}
+
+
+def test_the_same_plan_gives_the_same_weights(tmp_path):
+    first, second = (train(tiny_plan(), tmp_path / name).model for name in "ab")
+    assert same(weights(first), weights(second))
+
+
+def test_training_goes_on_where_it_stopped(tmp_path):
+    plan = tiny_plan()
+    done = train(plan, tmp_path).model
+    again = train(plan, tmp_path, resume=True)
+    assert same(weights(done), weights(again.model))
+    assert len(again.evaluations) == 4
+
+    # As if it had been stopped after the first evaluation of the second stage.
+    other = tmp_path / "stopped"
+    stopped = train(dataclasses.replace(plan, stages=(plan.stages[0], Stage(steps=256))), other)
+    assert stopped.model.num_timesteps == 640
+    plan.write(other / "plan.json")
+    finished = train(plan, other, resume=True)
+    assert finished.model.num_timesteps == 768
+    assert finished.model.learning_rate == 1e-4
+    assert not same(weights(stopped.model), weights(finished.model))
+
+
+def test_folders_of_other_trainings_are_left_alone(tmp_path):
+    train(tiny_plan(stages=(Stage(steps=128),)), tmp_path)
+    with pytest.raises(ConfigError, match="resume it or go elsewhere"):
+        train(tiny_plan(), tmp_path)
+    with pytest.raises(ConfigError, match="another plan"):
+        train(tiny_plan(), tmp_path, resume=True)
+
+
+@pytest.mark.parametrize("algorithm", ["a2c", "dqn", "sac"])
+def test_other_algorithms_train(tmp_path, algorithm):
+    options = {"a2c": {"n_steps": 8}}.get(algorithm, {"buffer_size": 400, "learning_starts": 64, "batch_size": 16})
+    plan = tiny_plan(
+        algorithm=algorithm,
+        interface=DRIVEN if algorithm == "sac" else NUMBERED,
+        options=options,
+        stages=(Stage(steps=128),),
+    )
+    result = train(plan, tmp_path)
+    assert result.model.num_timesteps == 128
+    assert (result.policy_file is None) == (algorithm == "sac")
+    if algorithm in ("dqn", "sac"):
+        assert isinstance(result.model.replay_buffer, PresentReplayBuffer)
+
+
+@pytest.mark.parametrize(("algorithm", "interface"), [(PPO, NUMBERED), (PPO, DRIVEN), (DQN, NUMBERED)])
+def test_exported_networks_choose_as_the_model_does(algorithm, interface, tmp_path):
+    env = SwarmVecEnv("warehouse_small", n_robots=30, n_objects=100, interface=interface)
+    size = {"buffer_size": 100} if algorithm is DQN else {"n_steps": 8, "batch_size": 240}
+    model = algorithm("MlpPolicy", env, seed=3, device="cpu", **size)
+    network = export_network(model, interface)
+    network.save(tmp_path / "network.npz")
+    network = Network.load(tmp_path / "network.npz")
+    env.seed(0)
+    obs = env.reset()
+    for _ in range(20):
+        expected, _ = model.predict(obs, deterministic=True)
+        chosen = network.choose(obs, np.random.default_rng(0))
+        np.testing.assert_allclose(chosen, expected, atol=1e-5)
+        obs, *_ = env.step(expected)
+
+
+def test_models_that_a_network_file_cannot_hold_are_refused():
+    env = SwarmVecEnv("warehouse_small", n_robots=2, n_objects=20, interface=DRIVEN)
+    with pytest.raises(NetworkError, match="PPO, A2C or DQN"):
+        export_network(SAC("MlpPolicy", env, buffer_size=10, device="cpu"), DRIVEN)
+    odd = {"net_arch": [8], "activation_fn": torch.nn.ELU}
+    with pytest.raises(NetworkError, match="tanh and ReLU"):
+        export_network(PPO("MlpPolicy", env, n_steps=8, batch_size=16, policy_kwargs=odd, device="cpu"), DRIVEN)
