@@ -11,9 +11,10 @@ import os
 import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_origin, get_type_hints
 
 import numpy as np
@@ -150,6 +151,10 @@ class RunRecord:
         """Return the sum of a column over the run, per 1,000 simulated seconds."""
         return float(self.columns()[column].sum()) * 1000.0 / self.horizon_s
 
+    def made_by(self, versions: Mapping[str, str]) -> bool:
+        """Return whether the run was made by these `software_versions`, the commit included."""
+        return all(self.provenance.get(name, "") == versions.get(name, "") for name in (*PACKAGES, "commit"))
+
     def same_results(self, other: "RunRecord") -> bool:
         """Return whether both records hold the same keys and bit-equal columns; provenance may differ."""
         mine, theirs = self.columns(), other.columns()
@@ -276,11 +281,15 @@ def schema_table() -> str:
 
 
 @lru_cache(maxsize=1)
-def software_versions() -> dict[str, str]:
-    """Return the versions that results depend on, and the commit where the package runs from a checkout."""
+@cache
+def software_versions() -> Mapping[str, str]:
+    """Return the versions that results depend on, and the commit where the package runs from a checkout.
+
+    Looked up once per process: it asks git, and every run of a study needs it.
+    """
     versions = {name: metadata.version(name) for name in PACKAGES}
     commit = _commit()
-    return versions | ({"commit": commit} if commit else {})
+    return MappingProxyType(versions | ({"commit": commit} if commit else {}))
 
 
 def _commit() -> str:

@@ -13,10 +13,11 @@ PLAIN_LINE_EVERY_S = 10.0
 class RunProgress:
     """Context manager: a bar on a terminal, an occasional plain line elsewhere."""
 
-    def __init__(self, *, total: int, done: int = 0) -> None:
-        """Count `total` runs, of which `done` need not be run again."""
+    def __init__(self, *, total: int, done: int = 0, foreign: int = 0) -> None:
+        """Count `total` runs; `done` need not be run again, `foreign` of them were made by other versions."""
         self._total = total
         self._stored = done
+        self._foreign = foreign
         self._done = done
         self._failed = 0
         self._console = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -28,7 +29,16 @@ class RunProgress:
         self._last_line = self._started
         if self._stored:
             self._console.print(f"{self._stored} of {self._total} runs are stored already.")
-        if self._console.is_terminal:
+        if self._foreign:
+            self._console.print(
+                f"{self._foreign} of them were made by another version or commit of the packages; "
+                "give another folder to run them afresh."
+            )
+        if self._done == self._total:
+            return self
+        if not self._console.is_terminal:
+            self._console.print(f"{self._done}/{self._total} runs, {self._remaining()}")
+        else:
             columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
             self._bar = Progress(*columns, TextColumn("{task.description}"), console=self._console)
             self._bar.add_task(self._remaining(), total=self._total, completed=self._done)
@@ -59,7 +69,7 @@ class RunProgress:
         if not left:
             return "all done" + failures
         if not ran:
-            return "no estimate yet" + failures
+            return "no estimate yet (the first run after an installation compiles for up to a minute)" + failures
         seconds = (time.monotonic() - self._started) / ran * left
         return f"about {duration(seconds)} left{failures}"
 

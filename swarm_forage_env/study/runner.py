@@ -25,7 +25,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, TypeAlias
 
-from swarm_forage_env.recording import RunRecord
+from swarm_forage_env.recording import RunRecord, software_versions
 from swarm_forage_env.study.progress import RunProgress
 from swarm_forage_env.study.run import run_one, warm_up
 from swarm_forage_env.study.spec import RunSpec
@@ -99,7 +99,11 @@ def run_all(
         outcomes |= {run_id: store.read(run_id) for run_id in planned if run_id in store}
     n_stored = len(outcomes)
     todo = [spec for run_id, spec in planned.items() if run_id not in outcomes]
-    display = RunProgress(total=len(planned), done=n_stored) if progress and todo else nullcontext()
+    versions = software_versions()
+    n_foreign = sum(
+        1 for outcome in outcomes.values() if isinstance(outcome, RunRecord) and not outcome.made_by(versions)
+    )
+    display = RunProgress(total=len(planned), done=n_stored, foreign=n_foreign) if progress else nullcontext()
     try:
         # Closing ends the workers at once, wherever the interrupt struck.
         with display as shown, closing(run_each(todo, store=store, executor=executor, jobs=jobs)) as fresh:
