@@ -29,6 +29,7 @@ from swarm_forage_env.cli.options import (
     complain,
 )
 from swarm_forage_env.cli.score_commands import compare, score
+from swarm_forage_env.cli.train_command import train
 
 if TYPE_CHECKING:
     from swarm_forage_env.study.runner import StudyResult
@@ -183,6 +184,7 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
 
 app.command()(score)
 app.command()(compare)
+app.command()(train)
 
 
 @app.command("list")
@@ -284,85 +286,6 @@ def record(
     except RenderError as error:
         raise typer.BadParameter(str(error)) from error
     typer.echo(f"wrote {written}")
-
-
-@app.command()
-def train(
-    out: Annotated[Path | None, typer.Option(help="Folder of the training; default results/training/NAME.")] = None,
-    plan: Annotated[
-        str | None,
-        typer.Option(help="TOML file with a training plan, or name of a shipped policy, instead of all below."),
-    ] = None,
-    scenario: Annotated[str | None, typer.Option(help="Preset; default warehouse_small.")] = None,
-    algorithm: Annotated[str | None, typer.Option("--algo", help="ppo, a2c, dqn or sac; default ppo.")] = None,
-    steps: Annotated[int | None, typer.Option(min=1, help="Decisions of single robots; default 5,000,000.")] = None,
-    arenas: Annotated[int | None, typer.Option(min=1, help="Arenas side by side; default 8.")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything; default 0.")] = None,
-    observation: Annotated[str | None, typer.Option(help="compact or full; default compact.")] = None,
-    actions: Annotated[
-        str | None, typer.Option(help="discrete or continuous; default discrete, for sac continuous.")
-    ] = None,
-    automatic_gripper: Annotated[
-        bool | None, typer.Option("--automatic-gripper/--own-gripper", help="Who grasps; default automatic.")
-    ] = None,
-    decision_ticks: Annotated[int | None, typer.Option(min=1, help="Ticks per decision; default 5.")] = None,
-    evaluate_every: Annotated[
-        int | None, typer.Option(min=1, help="Decisions between evaluations and checkpoints; default 1,000,000.")
-    ] = None,
-    small_start: Annotated[
-        bool, typer.Option("--small-start", help="Spend the first third in a smaller arena, where ways are short.")
-    ] = False,
-    arguments: Annotated[
-        list[str] | None,
-        typer.Option("--arg", metavar="KEY=NUMBER", help="Argument of the algorithm; may be repeated."),
-    ] = None,
-    robots: Robots = None,
-    objects: Objects = None,
-    side: Side = None,
-    caches: Caches = None,
-    settings: Settings = None,
-    wrappers: Wrappers = None,
-    config: ConfigFile = None,
-    processes: Annotated[int, typer.Option(min=0, help="Processes for the arenas; 0 = none of their own.")] = 0,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
-) -> None:
-    """Train one policy that every robot shares, beside evaluations of it and of a scripted controller.
-
-    Rewards are fields of the scenario: --set nest_progress=0.05 --set first_pickup=1. Ctrl-C loses what came after
-    the last checkpoint; the same command with --resume goes on.
-    """
-    from swarm_forage_env.cli.plan import WorldOptions
-    from swarm_forage_env.cli.train import TrainOptions, build_plan, named_plan, run_training
-
-    options = TrainOptions(
-        algorithm=algorithm,
-        steps=steps,
-        n_arenas=arenas,
-        seed=seed,
-        observation=observation,
-        actions=actions,
-        automatic_gripper=automatic_gripper,
-        decision_ticks=decision_ticks,
-        evaluate_every=evaluate_every,
-        small_start=small_start,
-        arguments=tuple(arguments or ()),
-    )
-    world = WorldOptions(
-        scenario=scenario or "warehouse_small",
-        robots=robots,
-        objects=objects,
-        side=side,
-        caches=caches,
-        settings=tuple(settings or ()),
-        wrappers=tuple(wrappers or ()),
-        config_file=config,
-    )
-    given = (scenario, options, world) != (None, TrainOptions(), WorldOptions(scenario=world.scenario))
-    if plan is not None and given:
-        raise typer.BadParameter("Expected --plan without options that the plan decides; write them into its file.")
-    chosen = build_plan(world, options) if plan is None else named_plan(plan)
-    name = Path(plan).stem if plan is not None else f"{chosen.scenario.name}_{chosen.algorithm}"
-    run_training(chosen, out or Path("results/training") / name, n_processes=processes, resume=resume)
 
 
 def _console() -> Console:
