@@ -1,0 +1,215 @@
+"""The commands `score` and `compare`, as a person uses them: words in, tables and exit code out."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env import cli
+from swarm_forage_env.policy import RandomPolicy
+from swarm_forage_env.study.experiments import BUDGETS, Budget
+from swarm_forage_env.study.store import RunStore, load
+
+WORLD = ("--robots", "3", "--objects", "20", "--jobs", "1", "--budget", "tiny")
+SCORE = ("score", "--policy", "random", *WORLD)
+COMPARE = ("compare", "--policies", "random,crw", *WORLD)
+FEW = ("--measures", "t_lost_fraction,adaptability")
+CURVES = "n_robots,seed,interval,performance\n2,0,0,3\n4,0,0,5\n"
+
+
+@pytest.fixture
+def command(tmp_path, monkeypatch, capsys):
+    """Run swarm-forage in an empty folder with a tiny budget; returns exit code, stdout, stderr."""
+    monkeypatch.chdir(tmp_path)
+    tiny = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=2, n_sizes=2, n_levels=1)
+    monkeypatch.setitem(BUDGETS, "tiny", tiny)
+
+    def call(*words):
+        monkeypatch.setattr(sys, "argv", ["swarm-forage", *words])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        shown = capsys.readouterr()
+        return end.value.code or 0, shown.out, shown.err
+
+    return call
+
+
+def test_score_shows_every_measure_keeps_records_and_draws_a_picture(command):
+    code, out, err = command(*SCORE)
+    assert code == 0
+    for word in ("random in warehouse_small", "95 % interval", "noise floor", "reactivity", "objects in 4 s", "higher"):
+        assert word in out
+    assert "Population: what the queueing model predicts" in out
+    folder = Path("results/warehouse_small")
+    assert len(load(folder)) == 14
+    assert (folder / "scores.png").read_bytes().startswith(b"\x89PNG")
+    assert "picture results/warehouse_small/scores.png" in err
+
+
+def test_compare_shows_values_differences_and_the_test(command):
+    code, out, _ = command(*COMPARE, *FEW, "--out", "here")
+    assert code == 0
+    assert out.splitlines()[0].split() == ["measure", "at", "better", "random", "crw"]
+    for word in ("random - crw", "paired t test", "Holm", "adaptability, relative", "throttle 0.4"):
+        assert word in out
+    assert Path("here/comparison.png").is_file()
+
+
+def test_json_is_the_only_thing_on_stdout(command):
+    _, out, _ = command(*SCORE, *FEW, "--json")
+    (table,) = json.loads(out)["tables"]
+    assert table["policy"] == "random"
+    assert table["settings"]["seeds"] == [0, 1]
+    score = next(score for score in table["scores"] if score["measure"] == "adaptability")
+    assert score["per_seed"].keys() == {"0", "1"}
+    assert (score["higher_is_better"], score["n_robots"], score["unit"]) == (False, [3], "objects (DTW)")
+    _, out, _ = command(*COMPARE, *FEW, "--json")
+    answer = json.loads(out)
+    assert [table["policy"] for table in answer["tables"]] == ["random", "crw"]
+    assert {difference["first"] for difference in answer["differences"]} == {"random"}
+    assert answer["picture"].endswith("comparison.png")
+
+
+def test_the_same_command_again_runs_nothing(command, monkeypatch):
+    _, first, _ = command(*SCORE, *FEW)
+    monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))
+    code, again, _ = command(*SCORE, *FEW)
+    assert (code, again) == (0, first)
+
+
+def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
+    code, out, _ = command(*COMPARE, "--dry-run")
+    assert code == 0
+    assert "random, crw in warehouse_small, budget tiny, 2 seeds" in out
+    assert "28 runs, 28 to do: roughly" in out
+    assert "population_dynamics" in out
+    assert not Path("results").exists()
+    command(*SCORE, *FEW)
+    _, out, _ = command(*COMPARE, *FEW, "--dry-run")
+    assert "16 runs, 8 to do" in out
+    _, out, _ = command(*COMPARE, *FEW, "--dry-run", "--json")
+    answer = json.loads(out)
+    assert answer["policies"] == ["random", "crw"]
+    assert sum(run["stored"] for run in answer["runs"]) == 8
+
+
+def test_seeds_length_and_world_can_be_chosen(command):
+    command(*SCORE, *FEW, "--seeds", "1", "--horizon", "2", "--set", "walk_probability=0.1", "--caches", "static")
+    records = load("results/warehouse_small")
+    assert {(record.seed, record.horizon_s) for record in records} == {(0, 2.0)}
+    assert all('"caches": "static"' in record.spec and '"walk_probability": 0.1' in record.spec for record in records)
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("score",), "Expected either --policy or --curves"),
+        (("score", "--policy", "crw", "--curves", "x.csv"), "Expected either --policy or --curves"),
+        (("score", "--policy", "crww"), "Unknown policy 'crww'. Did you mean 'crw'?"),
+        (("score", "--policy", "gone.zip"), "Cannot read the policy file"),
+        (("score", "--policy", "bad.npz"), "Expected"),
+        (("score", "--policy", "crw", "--scenario", "warehouse"), "Unknown scenario 'warehouse'"),
+        (("score", "--policy", "crw", "--measures", "reactivty"), "Did you mean 'reactivity'?"),
+        (("score", "--policy", "crw", "--measures", ","), "Expected one or more names"),
+        (("score", "--policy", "crw", "--budget", "huge"), "Unknown budget 'huge'"),
+        (("score", "--policy", "crw", "--seeds", "0"), "seeds"),
+        (("score", "--policy", "crw", "--horizon", "150"), "whole number of intervals"),
+        (("score", "--policy", "crw", "--robots", "1"), "at least 2 robots"),
+        (("score", "--policy", "crw", "--set", "interval_s=2"), "which the budget sets"),
+        (("compare", "--policies", "crw"), "Expected 2 or more policies"),
+        (("compare", "--policies", "crw,dpoo"), "Unknown policy 'dpoo'"),
+        (("compare",), "policies"),
+        (("score", "--curves", "gone.csv"), "Cannot read gone.csv: No such file"),
+        (("score", "--curves", "curves.csv", "--measures", "scalability"), "Expected the columns seed, interval"),
+    ],
+)
+def test_what_a_person_gets_wrong_is_one_line(command, words, reason):
+    Path("bad.npz").write_bytes(b"no network")
+    Path("curves.csv").write_text("n_robots,performance\n1,2\n")
+    code, out, err = command(*words)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert err.startswith("swarm-forage: ")
+    assert reason in err
+
+
+def test_curves_from_elsewhere_are_scored(command):
+    Path("curves.csv").write_text(CURVES)
+    code, out, _ = command("score", "--curves", "curves.csv")
+    assert code == 0
+    assert "task_emergence" in out
+    assert "reactivity is not computed: there are no runs with criterion throttle" in out
+    assert not Path("results").exists()
+    code, out, err = command("score", "--curves", "curves.csv", "--measures", "reactivity")
+    assert (code, out) == (2, "")
+    assert "Cannot compute reactivity for curves" in err
+
+
+def test_curves_of_several_policies_are_compared(command):
+    lines = CURVES.splitlines()
+    rows = [f"{name},{line}" for name in ("mine", "theirs") for line in lines[1:]]
+    Path("curves.csv").write_text("\n".join([f"controller,{lines[0]}", *rows]))
+    code, out, _ = command("score", "--curves", "curves.csv")
+    assert code == 0
+    assert "mine - theirs" in out
+
+
+def test_failed_runs_are_told_and_the_exit_code_says_so(command, monkeypatch):
+    act = RandomPolicy.act
+
+    def failing(self, obs, active):
+        if len(obs) == 3:
+            raise RuntimeError("no idea")
+        return act(self, obs, active)
+
+    monkeypatch.setattr(RandomPolicy, "act", failing)
+    code, out, _ = command(*SCORE, "--measures", "t_lost_fraction")
+    assert code == 1
+    assert "2 of 2 runs failed" in out
+    assert "RuntimeError: no idea" in out
+
+
+def test_ctrl_c_says_what_is_kept_and_how_to_go_on(command, monkeypatch):
+    def interrupt(self, task, rng):
+        raise KeyboardInterrupt
+
+    command(*SCORE, *FEW, "--seeds", "1")
+    monkeypatch.setattr(RandomPolicy, "reset", interrupt)
+    code, out, err = command(*SCORE, *FEW)
+    assert (code, out) == (130, "")
+    expected = "swarm-forage: Interrupted: 4 of 8 runs are finished and kept. They are in results/warehouse_small; "
+    assert err.splitlines()[-1] == expected + "the same command does the rest."
+
+
+def test_without_matplotlib_it_says_how_to_get_the_picture(command, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    code, out, err = command(*SCORE, *FEW)
+    assert code == 0
+    assert "adaptability" in out
+    assert "pip install 'swarm-forage-env[plots]'" in err
+    assert not Path("results/warehouse_small/scores.png").exists()
+
+
+@pytest.mark.slow
+def test_ctrl_c_with_worker_processes_and_going_on(tmp_path):
+    program = [sys.executable, "-m", "swarm_forage_env.cli", "score", "--policy", "random", "--budget", "quick"]
+    program += ["--measures", "noise_robustness", "--jobs", "2", "--out", str(tmp_path), "--horizon", "2000"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(program, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as process:
+        while not list(tmp_path.glob("*.parquet")) and process.poll() is None:
+            time.sleep(0.1)
+        os.killpg(process.pid, signal.SIGINT)
+        _, err = process.communicate(timeout=10)
+    assert process.returncode == 130
+    assert "the same command does the rest" in err
+    kept = set(RunStore(tmp_path).run_ids())
+    assert 1 <= len(kept) < 12
+    again = subprocess.run(program, capture_output=True, text=True, check=True)
+    assert f"{len(kept)} of 12 runs are stored already." in again.stderr
+    assert "noise_robustness" in again.stdout
+    assert kept < set(RunStore(tmp_path).run_ids())

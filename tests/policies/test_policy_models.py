@@ -1,0 +1,213 @@
+"""Trained policies in files: found by their suffix, opened with care, applied as they were trained."""
+
+import sys
+import zipfile
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from metrics import score_policy
+from metrics.scoring import plan_scores
+from swarm_forage_env.config import ConfigError
+from swarm_forage_env.env import parallel_env
+from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.learning.network import Network, NetworkAbout
+from swarm_forage_env.policy import is_policy_file, load_policy, local_policy, policy_class
+from swarm_forage_env.policy_models import ModelError, ModelPolicy, file_digest
+from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.study.experiments import Budget
+from swarm_forage_env.study.spec import RunSpec
+
+TINY = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=1, n_sizes=2, n_levels=1)
+ENV = parallel_env("warehouse_small", n_robots=4, n_objects=20)
+OBS = np.random.default_rng(1).uniform(-1.0, 1.0, (4, ENV.layout.size)).astype(np.float32)
+ACTIVE = np.ones(4, bool)
+SIZE = ENV.layout.size
+
+
+class Stage(gymnasium.Env):
+    """Spaces without a world, to build models from."""
+
+    def __init__(self, seen, done):
+        self.observation_space, self.action_space = seen, done
+
+
+def box(*shape):
+    return spaces.Box(-1.0, 1.0, shape, np.float32)
+
+
+def model(algorithm, path: Path, *, seen=None, done=None, **options):
+    """Save an untrained model; returns it and its file."""
+    library = pytest.importorskip("stable_baselines3")
+    stage = Stage(seen or box(SIZE), done or box(3))
+    made = getattr(library, algorithm)("MlpPolicy", stage, device="cpu", seed=1, **options)
+    made.save(path / "model.zip")
+    return made, path / "model.zip"
+
+
+def started(path, **parameters) -> ModelPolicy:
+    policy = load_policy(str(path), parameters)
+    policy.reset(ENV.task, np.random.default_rng(0))
+    return policy
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "options"),
+    [
+        ("PPO", {}),
+        ("PPO", {"use_sde": True, "policy_kwargs": {"net_arch": [16]}}),
+        ("A2C", {}),
+        ("SAC", {"buffer_size": 10}),
+        ("SAC", {"buffer_size": 10, "use_sde": True}),
+        ("TD3", {"buffer_size": 10}),
+        ("DDPG", {"buffer_size": 10}),
+    ],
+)
+def test_actions_are_those_of_the_algorithm_itself(tmp_path, algorithm, options):
+    made, path = model(algorithm, tmp_path, **options)
+    policy = started(path)
+    expected, _ = made.predict(OBS, deterministic=True)
+    actions = policy.act(OBS, ACTIVE)
+    np.testing.assert_array_equal(actions, expected)
+    assert (actions.shape, actions.dtype) == ((4, 3), np.float32)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "choices"),
+    [
+        ("PPO", {"observation": "compact", "actions": "discrete", "automatic_gripper": True}),
+        ("DQN", {"observation": "full", "actions": "discrete"}),
+        ("PPO", {"observation": "compact", "automatic_gripper": True}),
+    ],
+)
+def test_the_interface_of_a_model_is_told_from_its_spaces(tmp_path, algorithm, choices):
+    interface = LearnerInterface(InterfaceConfig(**choices), ENV.task)
+    options = {"buffer_size": 10} if algorithm == "DQN" else {}
+    made, path = model(algorithm, tmp_path, seen=interface.observation_space, done=interface.action_space, **options)
+    choice, _ = made.predict(interface.observe(OBS), deterministic=True)
+    np.testing.assert_array_equal(started(path).act(OBS, ACTIVE), interface.command(choice, OBS))
+
+
+def test_a_model_of_the_whole_swarm_sees_all_rows_at_once(tmp_path):
+    made, path = model("A2C", tmp_path, seen=box(4, SIZE), done=box(4, 3))
+    np.testing.assert_array_equal(started(path).act(OBS, ACTIVE), made.predict(OBS, deterministic=True)[0])
+    other = parallel_env("warehouse_small", n_robots=5, n_objects=20)
+    with pytest.raises(ModelError, match="these 5 robots together"):
+        load_policy(str(path)).reset(other.task, np.random.default_rng(0))
+
+
+def test_actions_are_kept_for_the_ticks_of_a_decision(tmp_path):
+    _, path = model("A2C", tmp_path)
+    policy = started(path, decision_ticks=2)
+    first, second, third = (policy.act(sign * OBS, ACTIVE).copy() for sign in (1.0, -1.0, -1.0))
+    np.testing.assert_array_equal(first, second)
+    assert np.any(third != second)
+    with pytest.raises(ConfigError, match="decision_ticks"):
+        load_policy(str(path), {"decision_ticks": 0})
+
+
+def test_a_model_that_sees_something_else_is_refused(tmp_path):
+    _, path = model("A2C", tmp_path, seen=box(7))
+    with pytest.raises(ModelError, match=r"model\.zip goes from Box\(7\) to Box\(3\)"):
+        started(path)
+
+
+def test_a_changed_file_is_refused(tmp_path):
+    _, path = model("A2C", tmp_path)
+    digest = file_digest(path)
+    load_policy(str(path), {"digest": digest})
+    model("A2C", tmp_path, policy_kwargs={"net_arch": [5]})
+    with pytest.raises(ModelError, match=f"digest {digest}.* changed since .*plan the run again"):
+        load_policy(str(path), {"digest": digest})
+
+
+def test_without_the_library_it_says_what_to_install(tmp_path, monkeypatch):
+    path = tmp_path / "unopened.zip"
+    path.write_bytes(b"x")
+    monkeypatch.setitem(sys.modules, "stable_baselines3.common.policies", None)
+    with pytest.raises(ImportError, match=r"pip install 'swarm-forage-env\[train\]' 'torch==2\.13\.0'"):
+        load_policy(str(path))
+
+
+@pytest.mark.parametrize("content", ["text", "empty zip", "other zip"])
+def test_files_that_are_no_models_are_refused(tmp_path, content):
+    pytest.importorskip("stable_baselines3")
+    path = tmp_path / "bad.zip"
+    if content == "text":
+        path.write_text("hello")
+    else:
+        with zipfile.ZipFile(path, "w") as archive:
+            if content == "other zip":
+                archive.writestr("data", "{}")
+    with pytest.raises(ModelError, match=r"Expected .*bad\.zip to be a model saved by stable-baselines3"):
+        load_policy(str(path))
+
+
+@pytest.mark.parametrize("name", ["gone.zip", "gone.npz"])
+def test_missing_files_are_refused(tmp_path, name):
+    with pytest.raises(ModelError, match=r"Cannot read the policy file .*: No such file"):
+        load_policy(str(tmp_path / name))
+
+
+@pytest.fixture
+def network_file(tmp_path) -> Path:
+    """A network that drives straight on, made for static caches."""
+    about = NetworkAbout(interface=InterfaceConfig(automatic_gripper=True), caches="static")
+    straight = np.full(2, 0.5, np.float32)
+    path = tmp_path / "straight.npz"
+    Network((np.zeros((SIZE, 2), np.float32),), (straight,), about).save(path)
+    return path
+
+
+def test_networks_are_policies_by_their_path(network_file):
+    policy = load_policy(str(network_file), {"digest": file_digest(network_file)})
+    policy.reset(ENV.task, np.random.default_rng(0))
+    np.testing.assert_array_equal(policy.act(OBS, ACTIVE)[:, :2], 0.5)
+    with pytest.raises(ModelError, match="changed since"):
+        load_policy(str(network_file), {"digest": "0"})
+
+
+def test_files_are_scored_under_the_name_of_the_file_in_the_world_they_are_made_for(network_file, tmp_path):
+    world = scenario("warehouse_small", n_robots=3, n_objects=20)
+    plan = plan_scores([network_file], world, budget=TINY, measures=["efficiency"])
+    assert plan.contestants[0].label == "straight"
+    assert {spec.scenario.caches for spec in plan.specs} == {"static"}
+    assert all(spec.parameters == {"digest": file_digest(network_file)} for spec in plan.specs)
+    assert all(RunSpec.from_json(spec.to_json()) == spec for spec in plan.specs)
+    found = score_policy(
+        str(network_file), world, budget=TINY, measures=["efficiency"], out=tmp_path / "runs", jobs=1, progress=False
+    )
+    assert (found.policy, found.failures) == ("straight", ())
+
+
+def test_files_of_equal_names_go_by_their_paths(network_file, tmp_path):
+    twin = tmp_path / "twin" / network_file.name
+    twin.parent.mkdir()
+    twin.write_bytes(network_file.read_bytes())
+    plan = plan_scores([network_file, twin], scenario("warehouse_small", n_robots=3), budget=TINY)
+    assert [contestant.label for contestant in plan.contestants] == [str(network_file), str(twin)]
+
+
+def test_names_are_no_files():
+    assert is_policy_file("a/b.ZIP")
+    assert is_policy_file("b.npz")
+    assert not is_policy_file("crw")
+    assert not is_policy_file("crw.py")
+
+
+def test_a_local_name_holds_for_a_while():
+    with local_policy("mine", lambda: "policy"):
+        assert policy_class("mine")() == "policy"
+        with pytest.raises(ValueError, match="name of its own"), local_policy("mine", list):
+            pass
+    with pytest.raises(ValueError, match="Unknown policy 'mine'"):
+        policy_class("mine")
+
+
+@pytest.mark.parametrize("name", ["crw", "model.zip"])
+def test_a_local_name_does_not_hide_another_policy(name):
+    with pytest.raises(ValueError, match="name of its own"), local_policy(name, list):
+        pass
