@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
 from .curves import CurveError, FloatArray
-from .score_table import Score, ScoreTable, aligned, percent, plain, spread
+from .score_table import Score, ScoreTable, aligned, forecast_lines, paragraph, percent, plain, spread
 from .statistics import Summary, aggregate
 
 FAMILY_ERROR = 0.05
@@ -22,6 +22,12 @@ TEST = (
     "amounts and distances grow with performance, so a swarm that does little has little to lose."
 )
 """How differences are tested, for people."""
+VALUES = (
+    "Values: mean over seeds with half of Student's 95 % interval; in brackets the mean relative to the performance "
+    "compared with; ! = runs are missing."
+)
+PAIRS_PER_TABLE = 6
+"""Pairs of policies side by side; more go into further tables."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -151,8 +157,10 @@ class Comparison:
         return (*shared, *own)
 
     def __str__(self) -> str:
-        values, differences = aligned(self.value_rows()), aligned(self.difference_rows())
-        return "\n".join([*values, "", *differences, "", TEST, *self.notes()])
+        lines = [*aligned(self.value_rows()), VALUES]
+        for start in range(0, len(self.pairs), PAIRS_PER_TABLE):
+            lines += ["", *aligned(self.difference_rows(self.pairs[start : start + PAIRS_PER_TABLE]))]
+        return "\n".join([*lines, TEST, *forecast_lines(self.tables), *paragraph(self.notes())])
 
     def _values(self, row: Score) -> tuple[str, ...]:
         return tuple(_cell(self.score(policy, row)) for policy in self.policies)

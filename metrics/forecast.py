@@ -8,6 +8,7 @@ from .queues import PopulationRates, mean_away, queue_statistics
 from .statistics import Summary, aggregate
 from .study_table import POPULATION, RunCurves, StudyCurves
 
+FORECAST_TITLE = "Population: what the queueing model predicts for runs of this length, beside what the runs showed"
 FORECAST_HEADER = (
     "level",
     "robots",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from .catalog import METRICS
-from .forecast import PopulationForecast
+from .forecast import FORECAST_HEADER, FORECAST_TITLE, PopulationForecast
 from .statistics import Summary, aggregate
 
 if TYPE_CHECKING:
@@ -177,9 +177,25 @@ class ScoreTable:
 
     def __str__(self) -> str:
         where = f" in {self.scenario}" if self.scenario else ""
-        return "\n".join(
-            [f"{self.policy}{where}", *aligned([HEADER, *(score.cells() for score in self.scores)]), *self.notes()]
-        )
+        rows = aligned([HEADER, *(score.cells() for score in self.scores)])
+        return "\n".join([f"{self.policy}{where}", *rows, *forecast_lines([self]), *paragraph(self.notes())])
+
+
+def forecast_lines(tables: Sequence[ScoreTable]) -> list[str]:
+    """Return forecasts and observations as lines, each once: often they are the same for all policies."""
+    lines: list[str] = []
+    shown: list[list[tuple[str, ...]]] = []
+    for table in tables:
+        rows = [forecast.cells() for forecast in table.forecasts]
+        if rows and rows not in shown:
+            shown.append(rows)
+            lines += ["", FORECAST_TITLE, *aligned([FORECAST_HEADER, *rows])]
+    return lines
+
+
+def paragraph(lines: Sequence[str]) -> list[str]:
+    """Return the lines with an empty one before them; nothing if there are none."""
+    return ["", *lines] if lines else []
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:

@@ -122,7 +122,7 @@ def _score(plan: "ScoringPlan", folder: Path, picture: str, jobs: int | None, *,
 
 
 def _show_scores(tables: "tuple[ScoreTable, ...]", picture: Path | None, *, as_json: bool) -> None:
-    from swarm_forage_env.cli.scoring import compared, comparison_text, draw, json_text, table_text
+    from swarm_forage_env.cli.scoring import compared, draw, json_text
 
     comparison = compared(tables)
     drawn = None
@@ -134,6 +134,6 @@ def _show_scores(tables: "tuple[ScoreTable, ...]", picture: Path | None, *, as_j
     if as_json:
         typer.echo(json_text(tables, comparison, drawn))
     else:
-        typer.echo(table_text(tables[0]) if comparison is None else comparison_text(comparison))
+        typer.echo(str(tables[0] if comparison is None else comparison))
     if drawn is not None:
         typer.echo(f"picture {drawn}", err=True)

@@ -6,22 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from metrics.comparison import TEST, Comparison, compare_tables
-from metrics.forecast import FORECAST_HEADER
+from metrics.comparison import Comparison, compare_tables
 from metrics.plots import draw_scores
-from metrics.score_table import HEADER, ScoreTable, aligned
+from metrics.score_table import ScoreTable, aligned
 from metrics.scoring import ScoringPlan, plan_scores, score_curves
 from swarm_forage_env.cli.plan import WorldOptions, build_scenario, estimated_seconds, split_names
 from swarm_forage_env.config import ConfigError
 from swarm_forage_env.study.progress import duration
 from swarm_forage_env.study.store import RunStore
 
-PAIRS_PER_TABLE = 6
-"""Pairs of policies side by side; more go into further tables."""
 _OF_THE_BUDGET = ("horizon_s", "interval_s")
-_FORECAST_TITLE = (
-    "Population: what the queueing model predicts for runs of this length, beside the runs (mean and 95 % interval)"
-)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -120,40 +114,6 @@ def plan_json(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
         "runs": runs,
     }
     return json.dumps(document, indent=1)
-
-
-def table_text(table: ScoreTable) -> str:
-    """Return the scores of one policy for people."""
-    where = f" in {table.scenario}" if table.scenario else ""
-    lines = [f"{table.policy}{where}", *aligned([HEADER, *(score.cells() for score in table.scores)])]
-    return "\n".join([*lines, *_forecast_lines([table]), *_notes(table.notes())])
-
-
-def comparison_text(comparison: Comparison) -> str:
-    """Return scores side by side and the differences of all pairs for people."""
-    lines = aligned(comparison.value_rows())
-    for start in range(0, len(comparison.pairs), PAIRS_PER_TABLE):
-        pairs = comparison.pairs[start : start + PAIRS_PER_TABLE]
-        lines += ["", *aligned(comparison.difference_rows(pairs))]
-    lines += ["", "Behind a value: half of its 95 % interval over seeds, and in brackets what it is relative to "
-              "performance. ! = runs are missing.", TEST]  # fmt: skip
-    return "\n".join([*lines, *_forecast_lines(comparison.tables), *_notes(comparison.notes())])
-
-
-def _forecast_lines(tables: Sequence[ScoreTable]) -> list[str]:
-    """Forecast and observation, once if all policies had the same."""
-    lines: list[str] = []
-    shown: list[list[tuple[str, ...]]] = []
-    for table in tables:
-        rows = [forecast.cells() for forecast in table.forecasts]
-        if rows and rows not in shown:
-            shown.append(rows)
-            lines += ["", _FORECAST_TITLE, *aligned([FORECAST_HEADER, *rows])]
-    return lines
-
-
-def _notes(notes: Sequence[str]) -> list[str]:
-    return ["", *notes] if notes else []
 
 
 def json_text(tables: Sequence[ScoreTable], comparison: Comparison | None, picture: Path | None) -> str:

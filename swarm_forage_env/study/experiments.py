@@ -74,8 +74,8 @@ BUDGETS: dict[str, Budget] = {
     "standard": Budget(horizon_s=10_000.0, interval_s=200.0, n_seeds=16, n_sizes=5, n_levels=4),
     "paper": Budget(horizon_s=STUDY_HORIZON_S, interval_s=200.0, n_seeds=192, n_sizes=None, n_levels=None),
 }
-"""quick: minutes, tells large differences; standard: about an hour per controller on a few cores; paper: the sizes,
-levels, length and number of runs of the study."""
+"""quick: about a minute per policy, tells large differences; standard: ten minutes to an hour per policy; paper: the
+sizes, levels, length and number of runs of the study. Times for the warehouses on two cores."""
 
 
 def budget(name: str) -> Budget:
