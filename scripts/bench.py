@@ -10,6 +10,8 @@ numbers between tables.
 """
 
 import argparse
+import importlib.util
+import math
 import os
 import platform
 import statistics
@@ -144,6 +146,51 @@ def agent_steps_per_second(ticks: int, repeats: int) -> float:
             env.step(drawn[tick % len(drawn)])
         rates.append(ticks * env.num_agents / (time.process_time() - started))
     return statistics.median(rates)
+
+
+def learning_rows(ticks: int, repeats: int) -> Iterator[Row]:
+    """The vector environment of stable-baselines3 with random actions, and what PPO adds around it, 50 robots."""
+    if importlib.util.find_spec("stable_baselines3") is None:
+        yield Row(
+            "VecEnv, N = 50, random actions", math.nan, "k robot-steps/s", ">= 400", None, "needs the train extra"
+        )
+        return
+    from stable_baselines3 import PPO
+
+    from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, SwarmVecEnv
+
+    env = SwarmVecEnv("warehouse_small")
+    env.seed(0)
+    env.reset()
+    drawn = np.random.default_rng(0).uniform(-1, 1, (100, env.num_envs, 3)).astype(np.float32)
+    env.step(drawn[0])
+    rates = []
+    for _ in range(repeats):
+        started = time.process_time()
+        for tick in range(ticks):
+            env.step(drawn[tick % len(drawn)])
+        rates.append(ticks * env.num_envs / (time.process_time() - started))
+    rate = statistics.median(rates)
+    yield Row("VecEnv, N = 50, random actions", rate / 1e3, "k robot-steps/s", ">= 400", rate >= 400_000)
+
+    n_steps = max(128, ticks // 10)
+    model = PPO(
+        "MlpPolicy",
+        env,
+        n_steps=n_steps,
+        batch_size=n_steps * env.num_envs // 4,
+        n_epochs=4,
+        rollout_buffer_class=ActiveRolloutBuffer,
+        rollout_buffer_kwargs={"active_column": env.active_column},
+        device="cpu",
+    )
+    spent = [0.0]
+    with stopwatch(env, "step_wait", spent):
+        started = time.process_time()
+        model.learn(n_steps * env.num_envs)
+        total = time.process_time() - started
+    note = f"environment {spent[0] / total:.0%}, PPO itself {1 - spent[0] / total:.0%} (4 epochs, 64 x 64)"
+    yield Row("PPO on it", n_steps * env.num_envs / total / 1e3, "k robot-steps/s", "-", None, note)
 
 
 FIRST_TICK = """
@@ -296,6 +343,8 @@ def rows(ticks: int, repeats: int, only: str) -> Iterator[Row]:
     if only in "dict api":
         rate = agent_steps_per_second(ticks // 4, repeats)
         yield Row("PettingZoo dict API, N = 200", rate / 1e3, "k agent-steps/s", ">= 150", rate >= 150_000)
+    if only in "learning vecenv ppo":
+        yield from learning_rows(ticks // 2, repeats)
     if only in "start import":
         yield from start_rows(repeats)
 

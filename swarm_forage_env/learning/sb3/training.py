@@ -222,7 +222,7 @@ class _Watch(BaseCallback):
         plan = self._plan
         specs = plan.evaluation.specs(plan.scenario, plan.wrappers, "policy")
         records = [run_policy(make_policy(), spec) for spec in specs]
-        performance = np.mean([record.performance.sum() for record in records]) / plan.evaluation.horizon_s * 1000.0
+        performance = np.mean([record.rate_per_1000_s("performance") for record in records])
         return float(performance), float(np.mean([record.interference_fraction.mean() for record in records]))
 
     def _write(self, evaluation: Evaluation) -> None:

@@ -1,0 +1,148 @@
+#!/usr/bin/env python
+"""PPO in one file, in the manner of CleanRL: plain torch on `gymnasium.make_vec`, nothing hidden.
+
+    pip install 'swarm-forage-env' 'torch==2.13.0'
+    python scripts/cleanrl_ppo.py --total-timesteps 1000000
+
+Differs from the textbook in two places, both because robots are sub-environments: arenas start anew within the step
+that ends them, so that the value of the last observation is added where an episode was cut off by time; and steps of
+robots that are not at work (`infos["active"]`) are in no minibatch.
+"""
+
+import argparse
+import time
+
+import gymnasium
+import numpy as np
+import torch
+from torch import nn
+
+import swarm_forage_env  # noqa: F401 - registers the environments
+from swarm_forage_env.learning.interface import InterfaceConfig
+
+
+class Agent(nn.Module):
+    """Actor and critic, two small networks."""
+
+    def __init__(self, n_columns: int, n_actions: int) -> None:
+        super().__init__()
+        self.actor, self.critic = self._network(n_columns, n_actions), self._network(n_columns, 1)
+
+    @staticmethod
+    def _network(n_inputs: int, n_outputs: int) -> nn.Sequential:
+        return nn.Sequential(nn.Linear(n_inputs, 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh(), nn.Linear(64, n_outputs))
+
+    def value(self, obs: torch.Tensor) -> torch.Tensor:
+        """Return values (n,)."""
+        return self.critic(obs).squeeze(-1)
+
+    def choices(self, obs: torch.Tensor) -> torch.distributions.Categorical:
+        """Return the distribution of actions."""
+        return torch.distributions.Categorical(logits=self.actor(obs))
+
+
+def parse() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--env-id", default="swarm_forage/warehouse_small-v0")
+    parser.add_argument("--n-arenas", type=int, default=8)
+    parser.add_argument("--n-robots", type=int, default=50)
+    parser.add_argument("--total-timesteps", type=int, default=1_000_000, help="decisions of single robots")
+    parser.add_argument("--num-steps", type=int, default=128)
+    parser.add_argument("--learning-rate", type=float, default=1e-3)
+    parser.add_argument("--gamma", type=float, default=0.99)
+    parser.add_argument("--gae-lambda", type=float, default=0.98)
+    parser.add_argument("--update-epochs", type=int, default=4)
+    parser.add_argument("--minibatch-size", type=int, default=3200)
+    parser.add_argument("--clip-coef", type=float, default=0.2)
+    parser.add_argument("--ent-coef", type=float, default=0.003)
+    parser.add_argument("--seed", type=int, default=0)
+    return parser.parse_args()
+
+
+def update(
+    agent: Agent, optimizer: torch.optim.Optimizer, batch: dict[str, torch.Tensor], args: argparse.Namespace
+) -> None:
+    """One PPO update over the steps of a rollout, (n,) each."""
+    for _ in range(args.update_epochs):
+        for chosen in torch.randperm(len(batch["obs"])).split(args.minibatch_size):
+            part = {name: values[chosen] for name, values in batch.items()}
+            choices = agent.choices(part["obs"])
+            ratio = (choices.log_prob(part["actions"]) - part["log_probs"]).exp()
+            advantages = (part["advantages"] - part["advantages"].mean()) / (part["advantages"].std() + 1e-8)
+            clipped = ratio.clamp(1 - args.clip_coef, 1 + args.clip_coef)
+            policy_loss = -torch.min(advantages * ratio, advantages * clipped).mean()
+            value_loss = 0.5 * (agent.value(part["obs"]) - part["returns"]).square().mean()
+            loss = policy_loss + value_loss - args.ent_coef * choices.entropy().mean()
+            optimizer.zero_grad()
+            loss.backward()
+            nn.utils.clip_grad_norm_(agent.parameters(), 0.5)
+            optimizer.step()
+
+
+@torch.no_grad()
+def rollout(envs, agent: Agent, obs: np.ndarray, active: np.ndarray, args: argparse.Namespace):
+    """Collect num_steps steps of every robot; returns the steps at work, and where things stand."""
+    shape = (args.num_steps, envs.num_envs)
+    seen = torch.zeros((*shape, obs.shape[1]))
+    actions, log_probs, values, rewards, dones = (torch.zeros(shape) for _ in range(5))
+    at_work, earned = torch.zeros(shape, dtype=torch.bool), 0.0
+    for step in range(args.num_steps):
+        seen[step], at_work[step] = torch.from_numpy(obs), torch.from_numpy(active)
+        choices = agent.choices(seen[step])
+        action = choices.sample()
+        actions[step], log_probs[step], values[step] = action, choices.log_prob(action), agent.value(seen[step])
+        obs, reward, terminated, truncated, infos = envs.step(action.numpy())
+        active = infos["active"]
+        earned += reward.mean() / args.num_steps
+        if truncated.any():  # cut off by time, not by death: what would have come is worth something
+            last = torch.from_numpy(np.stack(infos["final_obs"][truncated]))
+            reward[truncated] += args.gamma * agent.value(last).numpy()
+        rewards[step], dones[step] = torch.from_numpy(reward), torch.from_numpy(terminated | truncated)
+    advantages = torch.zeros(shape)
+    next_value, last = agent.value(torch.from_numpy(obs)), torch.zeros(envs.num_envs)
+    for step in reversed(range(args.num_steps)):
+        target = rewards[step] + args.gamma * next_value * (1 - dones[step])
+        # Away from work, a state is worth what follows from it; the network is not asked.
+        values[step] = torch.where(at_work[step], values[step], target)
+        last = target - values[step] + args.gamma * args.gae_lambda * (1 - dones[step]) * last
+        advantages[step], next_value = last, values[step]
+    batch = {
+        "obs": seen,
+        "actions": actions,
+        "log_probs": log_probs,
+        "advantages": advantages,
+        "returns": advantages + values,
+    }
+    return {name: values[at_work] for name, values in batch.items()}, obs, active, earned
+
+
+def main() -> None:
+    """Train, and print what a robot earns per decision."""
+    args = parse()
+    torch.manual_seed(args.seed)
+    torch.set_num_threads(1)
+    envs = gymnasium.make_vec(
+        args.env_id,
+        n_arenas=args.n_arenas,
+        n_robots=args.n_robots,
+        interface=InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5),
+        horizon_s=600.0,
+        first_pickup=1.0,
+        nest_progress=0.05,
+    )
+    narrow = {"width_m": 12.0, "nest_centre_m": (1.2, 8.0), "nest_size_m": (1.2, 12.8)}
+    obs, infos = envs.reset(seed=args.seed, options={"scenario": narrow})
+    agent = Agent(obs.shape[1], int(envs.single_action_space.n))  # type: ignore[attr-defined]
+    optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
+    active, started, steps = infos["active"], time.perf_counter(), 0
+    while steps < args.total_timesteps:
+        batch, obs, active, reward = rollout(envs, agent, obs, active, args)
+        update(agent, optimizer, batch, args)
+        steps += args.num_steps * envs.num_envs
+        print(f"{steps:>10,} decisions, {steps / (time.perf_counter() - started):,.0f} per s, reward {reward:.4f}")
+    envs.close()
+
+
+if __name__ == "__main__":
+    main()
