@@ -130,12 +130,19 @@ class LearnerInterface:
         self._grips = np.array([Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.FOUND], np.float32)
         self._commands = np.zeros((task.n_robots, 3), np.float32)
         self.layout = compact_layout(self._half_x, self._half_y) if self._is_compact else source
-        self.observation_space = spaces.Box(-1.0, 1.0, (self.layout.size,), np.float32)
-        self.action_space: spaces.Box | spaces.Discrete
+        self.observation_space = self.new_observation_space()
+        self.action_space = self.new_action_space()
+
+    def new_observation_space(self) -> spaces.Box:
+        """Return a space of its own, with a random state of its own, for one robot's row."""
+        return spaces.Box(-1.0, 1.0, (self.layout.size,), np.float32)
+
+    def new_action_space(self) -> spaces.Box | spaces.Discrete:
+        """Return a space of its own, with a random state of its own, for one robot's action."""
+        automatic = self.config.automatic_gripper
         if self._is_discrete:
-            self.action_space = spaces.Discrete(N_MOTIONS if config.automatic_gripper else N_MOTIONS + N_GRIPS)
-        else:
-            self.action_space = spaces.Box(-1.0, 1.0, (2 if config.automatic_gripper else 3,), np.float32)
+            return spaces.Discrete(N_MOTIONS if automatic else N_MOTIONS + N_GRIPS)
+        return spaces.Box(-1.0, 1.0, (2 if automatic else 3,), np.float32)
 
     @property
     def active_column(self) -> int:

@@ -11,8 +11,9 @@ from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.types import ActionArray, ObsArray
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
-RESET_OPTIONS = ("scenario",)
-"""Keys that the options of a reset may have."""
+SCENARIO_OPTION = "scenario"
+"""Key of the options of a reset that is read here. Others are left to those who put them there: both Gymnasium and
+PettingZoo hand options on to everything in the stack."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -81,7 +82,8 @@ class World:
                 changes.
 
         Raises:
-            ConfigError: an unknown option or field, or another number of robots; the world stays as it was.
+            ConfigError: an option that is nearly `scenario`, an unknown field, or another number of robots; the world
+                stays as it was.
         """
         overrides = _scenario_overrides(options)
         self.is_new = overrides is not None and overrides != self._overrides
@@ -103,11 +105,12 @@ def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | N
     """Return the overridden fields that `options` asks for, None when it does not speak of them."""
     if not options:
         return None
-    for key in options:
-        if key not in RESET_OPTIONS:
-            known = ", ".join(RESET_OPTIONS)
-            raise ConfigError(f"Unknown reset option {key!r}.{suggestion(key, RESET_OPTIONS)} Known: {known}.")
-    fields = options["scenario"]
+    if SCENARIO_OPTION not in options:
+        for key in options:
+            if suggestion(key, (SCENARIO_OPTION,)):
+                raise ConfigError(f"Unknown reset option {key!r}.{suggestion(key, (SCENARIO_OPTION,))}")
+        return None
+    fields = options[SCENARIO_OPTION]
     if not isinstance(fields, Mapping):
         raise ConfigError(f"Expected the reset option 'scenario' as fields by name, got {fields!r}.")
     return dict(fields)

@@ -212,7 +212,7 @@ class _Watch(BaseCallback):
         card = {
             "plan": plan.to_mapping(),
             "evaluation": asdict(evaluation),
-            "versions": software_versions() | {"torch": torch.__version__},
+            "versions": {**software_versions(), "torch": str(torch.__version__)},
         }
         network = export_network(self.model, plan.interface, caches=plan.scenario.caches, card=card)
         network.save(self._folder / POLICY_FILE)

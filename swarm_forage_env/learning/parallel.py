@@ -1,0 +1,174 @@
+"""The learner's interface under the PettingZoo API: for libraries that want one agent per robot and dictionaries."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from pettingzoo import ParallelEnv
+
+from swarm_forage_env.config import ScenarioConfig, with_overrides
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.learning.worlds import World, WorldPlan
+from swarm_forage_env.scenarios import scenario as preset
+from swarm_forage_env.types import BoolArray
+from swarm_forage_env.wrappers.base import WrapperConfig
+
+Infos = dict[str, dict[str, Any]]
+
+
+class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
+    """`ForageEnv` with the observations and actions of an `InterfaceConfig`; agents live and die as there.
+
+    `infos[agent]` holds `active` and, for discrete actions, `action_mask`: int8 (number of actions,), 1 = makes sense.
+    A step is one decision of `decision_ticks` ticks. Dictionaries cost more than the world itself; where a library can
+    take vector environments, `SwarmVectorEnv` is the faster way.
+    """
+
+    metadata: dict[str, Any] = {**ForageEnv.metadata, "name": "swarm_forage_learner_v0"}  # noqa: RUF012 - as PettingZoo
+
+    def __init__(
+        self,
+        scenario: str | ScenarioConfig = "warehouse_small",
+        *,
+        interface: InterfaceConfig | None = None,
+        wrappers: Iterable[WrapperConfig] = (),
+        max_cycles: int | None = None,
+        render_mode: str | None = None,
+        **overrides: Any,
+    ) -> None:
+        """Create the environment.
+
+        Args:
+            scenario: Name of a preset, or a complete configuration.
+            interface: What a learner sees and does; default full observations and continuous actions.
+            wrappers: What disturbs the swarm (noise, throttle, population ...), in any order. Trainers that need a
+                fixed number of agents take `deaths="absorbing"`.
+            max_cycles: Ticks until truncation; default the scenario's horizon.
+            render_mode: None or "rgb_array".
+            overrides: Scenario fields by name (`n_robots=20`).
+
+        Raises:
+            ConfigError: unknown preset or field, or values that describe no world.
+        """
+        self._config = interface or InterfaceConfig()
+        config = with_overrides(scenario, **overrides) if isinstance(scenario, ScenarioConfig) else None
+        self._world = World(
+            WorldPlan(
+                scenario=config or preset(str(scenario), **overrides),
+                wrappers=tuple(wrappers),
+                max_cycles=max_cycles,
+                render_mode=render_mode,
+                reads=self._config.reads,
+            )
+        )
+        self.render_mode = render_mode
+        self.possible_agents = list(self._world.base.possible_agents)
+        self.agents: list[str] = []
+        self._row_of = {agent: row for row, agent in enumerate(self.possible_agents)}
+        self._bind()
+        # One space object per agent: each has a random state of its own.
+        self._observation_space = {agent: self.interface.new_observation_space() for agent in self.possible_agents}
+        self._action_space = {agent: self.interface.new_action_space() for agent in self.possible_agents}
+
+    def _bind(self) -> None:
+        self.interface = LearnerInterface(self._config, self._world.base.task)
+
+    @property
+    def world(self) -> ForageEnv:
+        """The parallel environment at the bottom; another one after a reset that changed the scenario."""
+        return self._world.base
+
+    def observation_space(self, agent: str) -> spaces.Box:
+        """(d,) float32 in [-1, 1]."""
+        return self._observation_space[agent]
+
+    def action_space(self, agent: str) -> spaces.Box | spaces.Discrete:
+        """What one robot chooses from."""
+        return self._action_space[agent]
+
+    @property
+    def state_space(self) -> spaces.Box:
+        """Space of `state()`."""
+        return self.world.state_space
+
+    def state(self) -> np.ndarray:
+        """Return the global view, see `ForageEnv.state`."""
+        return self.world.state()
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], Infos]:
+        """Start a run; returns observations and infos per agent.
+
+        Args:
+            seed: Seed of this run and of the sequence of those after it.
+            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `World.reset`.
+        """
+        self._raw = self._world.reset(seed, options)
+        if self._world.is_new:
+            self._bind()
+        self.agents = list(self.possible_agents)
+        return self._per_agent(self.interface.observe(self._raw)), self._infos()
+
+    def step(
+        self, actions: dict[str, Any]
+    ) -> tuple[dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
+        """Advance by one decision, with one action per agent in `agents`.
+
+        Raises:
+            RuntimeError: not reset, or everybody is done.
+            ValueError: an agent without an action, or actions that are none.
+        """
+        if not self.agents:
+            raise RuntimeError("Call reset before step; no agent is left.")
+        missing = [agent for agent in self.agents if agent not in actions]
+        if missing:
+            raise ValueError(f"Expected an action for each of the {len(self.agents)} agents, missing {missing[:3]}.")
+        chosen = self._chosen(actions)
+        rewards = np.zeros(len(self.possible_agents))
+        raw, truncated = self._raw, False
+        dead: BoolArray = np.zeros(len(rewards), np.bool_)
+        for _ in range(self._config.decision_ticks):
+            raw, reward, dead, truncated = self._world.step(self.interface.command(chosen, raw))
+            rewards += reward
+            if truncated or dead.all():
+                break
+        self._raw = raw
+        results = (
+            self._per_agent(self.interface.observe(raw)),
+            self._per_agent(rewards.tolist()),
+            self._per_agent(dead.tolist()),
+            dict.fromkeys(self.agents, truncated),
+            self._infos(),
+        )
+        self.agents = [] if truncated else [agent for agent in self.agents if not dead[self._row_of[agent]]]
+        return results
+
+    def _chosen(self, actions: dict[str, Any]) -> np.ndarray:
+        space = self.interface.action_space
+        chosen = np.zeros((len(self.possible_agents), *(space.shape or ())), space.dtype)
+        for agent in self.agents:
+            chosen[self._row_of[agent]] = actions[agent]
+        return chosen
+
+    def _per_agent(self, rows: Any) -> dict[str, Any]:
+        return {agent: rows[self._row_of[agent]] for agent in self.agents}
+
+    def _infos(self) -> Infos:
+        active = self.world.active
+        infos: Infos = {agent: {"active": bool(active[self._row_of[agent]])} for agent in self.agents}
+        if self._config.actions == "discrete":
+            mask = self.interface.mask(self._raw).astype(np.int8)
+            for agent, info in infos.items():
+                info["action_mask"] = mask[self._row_of[agent]]
+        return infos
+
+    def render(self) -> np.ndarray | None:
+        """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
+        return self.world.render()
+
+    def close(self) -> None:
+        """Close the stack."""
+        self._world.env.close()

@@ -1,0 +1,92 @@
+"""The learner's interface under the PettingZoo API: its contract, and the same world as the rows of arenas."""
+
+import numpy as np
+import pytest
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+
+from swarm_forage_env.learning.arenas import ArenaBatch
+from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.parallel import ParallelLearnerEnv
+from swarm_forage_env.learning.worlds import WorldPlan
+from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+from swarm_forage_env.wrappers.registry import parse_wrapper
+
+INTERFACES = {
+    "full": InterfaceConfig(),
+    "driven": InterfaceConfig(observation="compact", automatic_gripper=True),
+    "numbered": InterfaceConfig(observation="compact", actions="discrete", decision_ticks=3),
+}
+
+
+@pytest.mark.parametrize("interface", INTERFACES.values(), ids=INTERFACES)
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_keeps_the_contract_of_pettingzoo(name, interface):
+    options = {"n_robots": 4, "interface": interface, "max_cycles": 40}
+    parallel_api_test(ParallelLearnerEnv(name, **options), num_cycles=50)
+    parallel_seed_test(lambda: ParallelLearnerEnv(name, **options), num_cycles=20)
+
+
+def test_keeps_it_with_deaths():
+    wrappers = [parse_wrapper("population:death_per_tick=0.2")]
+    env = ParallelLearnerEnv("warehouse_small", n_robots=4, wrappers=wrappers, max_cycles=60)
+    parallel_api_test(env, num_cycles=80)
+
+
+@pytest.mark.parametrize("interface", INTERFACES.values(), ids=INTERFACES)
+def test_shows_the_same_as_the_rows_of_an_arena(interface):
+    wrappers = (parse_wrapper("population:death_per_tick=0.02"), parse_wrapper("sensor_noise:sigma=0.02"))
+    world = scenario("warehouse_small", n_robots=6, n_objects=40, width_m=12.0, nest_centre_m=(1.2, 8.0),
+                     nest_size_m=(1.2, 12.8), tick=0.01)  # fmt: skip
+    env = ParallelLearnerEnv(world, interface=interface, wrappers=wrappers, max_cycles=100)
+    batch = ArenaBatch(
+        WorldPlan(scenario=world, wrappers=wrappers, max_cycles=100, reads=interface.reads), interface, 1
+    )
+    observations, infos = env.reset(seed=2)
+    rows, _ = batch.reset([2], [None])
+    n_deaths = 0
+    while env.agents:
+        for agent in env.agents:
+            row = int(agent.removeprefix("robot_"))
+            np.testing.assert_array_equal(observations[agent], rows[row])
+            if interface.actions == "discrete":
+                np.testing.assert_array_equal(infos[agent]["action_mask"], batch.action_masks()[row])
+        actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+        packed = np.zeros((6, *env.action_space("robot_0").shape), env.action_space("robot_0").dtype)
+        for agent, action in actions.items():
+            packed[int(agent.removeprefix("robot_"))] = action
+        step = batch.step(packed)
+        rows = step.obs
+        observations, rewards, terminations, truncations, infos = env.step(actions)
+        for agent in actions:
+            row = int(agent.removeprefix("robot_"))
+            assert rewards[agent] == pytest.approx(step.rewards[row])
+            assert terminations[agent] == step.terminated[row]
+            n_deaths += terminations[agent]
+        assert all(truncations.values()) == bool(step.truncated.any())
+    assert n_deaths > 0
+
+
+def test_a_reset_can_change_the_scenario():
+    env = ParallelLearnerEnv("warehouse_small", n_robots=3, interface=INTERFACES["numbered"])
+    env.reset(seed=0, options={"scenario": {"caches": "dynamic", "width_m": 24.0}})
+    assert env.world.scenario.caches == "dynamic"
+    assert env.state_space.contains(env.state())
+    env.reset()
+    assert env.world.scenario.arena.width_m == 24.0
+
+
+def test_actions_are_asked_of_everybody():
+    env = ParallelLearnerEnv("warehouse_small", n_robots=3)
+    with pytest.raises(RuntimeError, match="Call reset"):
+        env.step({})
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"missing \['robot_1'\]"):
+        env.step({"robot_0": np.zeros(3), "robot_2": np.zeros(3)})
+
+
+def test_draws_pictures():
+    pytest.importorskip("PIL", reason="needs the render extra: pillow")
+    env = ParallelLearnerEnv("warehouse_small", n_robots=3, render_mode="rgb_array")
+    env.reset(seed=0)
+    assert env.render().ndim == 3
+    env.close()
