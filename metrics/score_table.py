@@ -237,6 +237,7 @@ def spread(summary: Summary, *, is_share: bool = False) -> str:
     if not (math.isfinite(mean) and math.isfinite(half)):
         return number(mean) + (unit if math.isfinite(mean) else "")
     decimals = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 2
+    mean = round(mean, decimals) + 0.0  # no "-0"
     return f"{mean:.{decimals}f} ± {half:.{decimals}f}{unit}"
 
 
