@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_origin, get_type_hints
 
 import numpy as np
@@ -281,17 +280,14 @@ def schema_table() -> str:
 
 
 @lru_cache(maxsize=1)
-@cache
-def software_versions() -> Mapping[str, str]:
-    """Return the versions that results depend on, and the commit where the package runs from a checkout.
-
-    Looked up once per process: it asks git, and every run of a study needs it.
-    """
+def software_versions() -> dict[str, str]:
+    """Return the versions that results depend on, and the commit where the package runs from a checkout."""
     versions = {name: metadata.version(name) for name in PACKAGES}
     commit = _commit()
-    return MappingProxyType(versions | ({"commit": commit} if commit else {}))
+    return versions | ({"commit": commit} if commit else {})
 
 
+@cache  # git is asked once per process: every run of a study needs the answer
 def _commit() -> str:
     """Return the checked-out commit ("-dirty" appended when edited), or "" outside a checkout of this package."""
     here = Path(__file__)
