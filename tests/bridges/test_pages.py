@@ -1,0 +1,66 @@
+"""The bridges to other libraries carry: what their pages and scripts show trains, in processes of their own.
+
+Each needs a library that is too heavy for every test run; `scripts/test_bridges` installs them and runs these tests.
+"""
+
+import importlib.util
+import math
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLE = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
+PAGES = {"benchmarl": "benchmarl", "rllib": "ray", "torchrl": "torchrl"}
+"""Page in docs/bridges -> module that it needs."""
+
+
+def require(module: str, page: str) -> None:
+    if importlib.util.find_spec(module) is None:
+        pytest.skip(f"needs {module}: scripts/test_bridges {page}")
+
+
+def run(arguments: list[str], folder: Path) -> str:
+    result = subprocess.run(
+        [sys.executable, "-W", "ignore", *arguments], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr[-4000:]
+    return result.stdout
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_example_of_a_page_trains(page, tmp_path):
+    require(PAGES[page], page)
+    program = "\n".join(EXAMPLE.findall((ROOT / "docs" / "bridges" / f"{page}.md").read_text()))
+    (tmp_path / "example.py").write_text(f"{program}\nprint('losses', *losses)\n")
+    last = run(["example.py"], tmp_path).splitlines()[-1].split()
+    assert last[0] == "losses"
+    assert len(last) > 1
+    assert all(math.isfinite(float(loss)) for loss in last[1:])
+
+
+def test_cleanrl_trains(tmp_path):
+    require("torch", "cleanrl")
+    sizes = {"total-timesteps": 2000, "n-robots": 4, "n-arenas": 2, "num-steps": 64, "minibatch-size": 128}
+    words = [f"--{name}={size}" for name, size in sizes.items()]
+    lines = run([str(ROOT / "scripts" / "cleanrl_ppo.py"), *words], tmp_path).splitlines()
+    assert [int(line.split()[0].replace(",", "")) for line in lines] == [512, 1024, 1536, 2048]
+
+
+def test_the_example_of_stable_baselines3_trains_and_exports(tmp_path):
+    require("stable_baselines3", "sb3")
+    page = (ROOT / "docs" / "learning.md").read_text()
+    (example,) = [block for block in EXAMPLE.findall(page) if "stable_baselines3" in block]
+    (tmp_path / "example.py").write_text(example)
+    run(["example.py"], tmp_path)
+    assert (tmp_path / "policy.npz").exists()
+
+
+@pytest.mark.slow
+def test_train_ppo_trains_and_exports(tmp_path):
+    require("stable_baselines3", "sb3")
+    run([str(ROOT / "scripts" / "train_ppo.py"), "--steps", "2000", "--out", "example.npz"], tmp_path)
+    assert (tmp_path / "example.npz").exists()
