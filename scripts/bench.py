@@ -155,7 +155,7 @@ def learning_rows(ticks: int, repeats: int) -> Iterator[Row]:
             "VecEnv, N = 50, random actions", math.nan, "k robot-steps/s", ">= 400", None, "needs the train extra"
         )
         return
-    from stable_baselines3 import PPO
+    from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
 
     from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, SwarmVecEnv
 

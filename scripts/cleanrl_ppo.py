@@ -8,6 +8,7 @@ Differs from the textbook in two places, both because robots are sub-environment
 that ends them, so that the value of the last observation is added where an episode was cut off by time; and steps of
 robots that are not at work (`infos["active"]`) are in no minibatch.
 """
+# pyright: reportMissingImports=false
 
 import argparse
 import time

@@ -5,6 +5,7 @@ pip install 'swarm-forage-env[train]' 'torch==2.13.0'
 python scripts/train_ppo.py --steps 3000000 --out ppo_example.npz
 swarm-forage run --controller crw,ppo_example.npz
 """
+# pyright: reportMissingImports=false
 
 import argparse
 from pathlib import Path
@@ -20,7 +21,7 @@ NARROW = {"width_m": 12.0, "nest_centre_m": (1.2, 8.0), "nest_size_m": (1.2, 12.
 
 
 def main() -> None:
-    """Train in a narrow warehouse, where the way home is short, then in the real one; save the network."""
+    """Train in a narrow warehouse, where ways are short, then in the real one; save the network."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--steps", type=int, default=3_000_000, help="decisions of single robots")
     parser.add_argument("--out", type=Path, default=Path("ppo_example.npz"))

@@ -1,7 +1,7 @@
 """The command `swarm-forage train`: from its options to a plan, and what it shows meanwhile."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,8 @@ DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
     "sac": {"buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 1024},
 }
 """Arguments that suit hundreds of robots at once; our choice, the rest is the library's."""
+EPISODE_S = 1000.0
+"""Length of an episode, s; our choice: every start puts robots all over the arena, which teaches more than a long run."""
 SMALL_START = 0.4
 """Share of its size that an arena has in a small start; our choice."""
 
@@ -49,6 +51,7 @@ class TrainOptions:
     decision_ticks: int | None = None
     evaluate_every: int | None = None
     small_start: bool = False
+    horizon_s: float | None = None
     arguments: tuple[str, ...] = ()
     """Words of the form key=number, for the algorithm."""
 
@@ -60,7 +63,7 @@ def build_plan(world: WorldOptions, options: TrainOptions) -> TrainingPlan:
         ConfigError: whatever is wrong with them.
     """
     fields, wrappers = ({}, ()) if world.config_file is None else read_config(world.config_file)
-    scenario, _ = build_scenario(world, fields)
+    scenario, _ = build_scenario(replace(world, horizon=options.horizon_s or EPISODE_S), fields)
     algorithm = options.algorithm or "ppo"
     interface = InterfaceConfig(
         observation=options.observation or "compact",

@@ -37,6 +37,7 @@ def train(  # long: one parameter per option
         list[str] | None,
         typer.Option("--arg", metavar="KEY=NUMBER", help="Argument of the algorithm; may be repeated."),
     ] = None,
+    horizon: Annotated[float | None, typer.Option(help="Seconds per episode of the training; default 1,000.")] = None,
     robots: Robots = None,
     objects: Objects = None,
     side: Side = None,
@@ -66,6 +67,7 @@ def train(  # long: one parameter per option
         decision_ticks=decision_ticks,
         evaluate_every=evaluate_every,
         small_start=small_start,
+        horizon_s=horizon,
         arguments=tuple(arguments or ()),
     )
     world = WorldOptions(

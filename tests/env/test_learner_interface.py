@@ -28,6 +28,7 @@ def bound(env: ForageEnv, **choices) -> LearnerInterface:
     return LearnerInterface(InterfaceConfig(**choices), env.task)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 def test_the_compact_view_matches_its_twin_along_runs(caches, noise):
@@ -53,6 +54,20 @@ def test_the_compact_view_matches_its_twin_along_runs(caches, noise):
             kinds_seen += np.abs(view).sum(axis=0)
     if caches == "static" and not noise:
         assert kinds_seen.all(), "every column is put to the test in at least this world"
+
+
+def test_the_compact_view_of_robots_in_caches_and_of_robots_that_are_away_matches_its_twin():
+    env = tidy_world(n_robots=3, n_objects=8, caches="dynamic")
+    build_cache(env, [0, 1], OPEN_CELL)
+    x, y = cell_centre(OPEN_CELL)
+    put(env, 0, x + 0.3, y - 0.2, 2.0)
+    here = np.array([True, True, False])
+    env.set_population(active=here, present=here)
+    obs = env.arena.observe()
+    view = bound(env, observation="compact").observe(obs)
+    np.testing.assert_allclose(view, [compact_row(row, env.layout) for row in obs], atol=1e-5)
+    assert view[0, -1] == view[0, 7] == 1.0
+    assert not view[2].any()
 
 
 def test_the_view_of_a_robot_by_hand():
