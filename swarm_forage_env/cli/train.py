@@ -32,7 +32,7 @@ DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
 }
 """Arguments that suit hundreds of robots at once; our choice, the rest is the library's."""
 EPISODE_S = 1000.0
-"""Length of an episode, s; our choice: every start puts robots all over the arena, which teaches more than a long run."""
+"""Length of an episode, s; our choice: a start puts robots all over the arena, which teaches more than a long run."""
 SMALL_START = 0.4
 """Share of its size that an arena has in a small start; our choice."""
 
