@@ -25,7 +25,15 @@ from swarm_forage_env.learning.pretrained import plan_file
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
 DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
-    "ppo": {"n_steps": 128, "batch_size": 3200, "n_epochs": 4, "gamma": 0.99, "gae_lambda": 0.98},
+    "ppo": {
+        "n_steps": 128,
+        "batch_size": 3200,
+        "n_epochs": 4,
+        "gamma": 0.99,
+        "gae_lambda": 0.98,
+        "learning_rate": 0.001,
+        "ent_coef": 0.003,
+    },
     "a2c": {"n_steps": 32, "gamma": 0.99},
     "dqn": {"buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 1024, "train_freq": 4},
     "sac": {"buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 1024},
