@@ -8,8 +8,8 @@ Sources: the robot model of the paper's study (field of view, thresholds and gre
 import math
 
 import numpy as np
-from numba import njit
 
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.types import ObsArray
 
 OBSTACLE_ANGLE_RAD = 2.61
@@ -27,7 +27,7 @@ _BEAM_COS = np.cos(BEAM_ANGLES_RAD)
 _BEAM_SIN = np.sin(BEAM_ANGLES_RAD)
 
 
-@njit(cache=True)
+@kernel
 def ring_sum(readings: ObsArray) -> tuple[float, float]:
     """Sum 24 ring readings as polar vectors; returns the body-frame vector (forward, left)."""
     x = 0.0
@@ -39,7 +39,7 @@ def ring_sum(readings: ObsArray) -> tuple[float, float]:
     return x, y
 
 
-@njit(cache=True)
+@kernel
 def is_obstacle_vector(x: float, y: float) -> bool:
     """Obstacle rule on a summed proximity vector: too long, or pointing straight back."""
     length_squared = x * x + y * y
@@ -50,14 +50,14 @@ def is_obstacle_vector(x: float, y: float) -> bool:
     return abs(math.atan2(y, x)) > OBSTACLE_ANGLE_RAD
 
 
-@njit(cache=True)
+@kernel
 def sees_obstacle(proximity: ObsArray) -> bool:
     """Return whether one row of 24 proximity readings means an obstacle."""
     x, y = ring_sum(proximity)
     return is_obstacle_vector(x, y)
 
 
-@njit(cache=True)
+@kernel
 def _count_in_band(ground: ObsArray, low: float, high: float) -> int:
     count = 0
     for k in range(4):
@@ -67,19 +67,19 @@ def _count_in_band(ground: ObsArray, low: float, high: float) -> int:
     return count
 
 
-@njit(cache=True)
+@kernel
 def sees_nest(ground: ObsArray) -> bool:
     """Return whether at least 3 of 4 ground readings show the nest."""
     return _count_in_band(ground, NEST_GREY[0], NEST_GREY[1]) >= 3
 
 
-@njit(cache=True)
+@kernel
 def sees_object(ground: ObsArray) -> bool:
     """Return whether all 4 ground readings show an object."""
     return _count_in_band(ground, OBJECT_GREY[0], OBJECT_GREY[1]) == 4
 
 
-@njit(cache=True)
+@kernel
 def sees_cache(ground: ObsArray) -> bool:
     """Return whether at least 3 of 4 ground readings show a cache."""
     return _count_in_band(ground, CACHE_GREY[0], CACHE_GREY[1]) >= 3

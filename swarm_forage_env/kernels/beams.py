@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.kernels.neighbours import bin_of
 from swarm_forage_env.types import BoolArray, FloatArray, IntArray, ObsArray
@@ -16,7 +16,7 @@ _READING_NUMERATOR = 0.0100527
 _READING_OFFSET_M = 0.000163144
 
 
-@njit(cache=True)
+@kernel
 def proximity_reading(gap_m: float) -> float:
     """Reading for a free distance along a beam: 1 at contact, falling like 1 / distance (foot-bot sensor model)."""
     if gap_m < _CONTACT_M:
@@ -24,7 +24,7 @@ def proximity_reading(gap_m: float) -> float:
     return _READING_NUMERATOR / (gap_m + _READING_OFFSET_M)
 
 
-@njit(cache=True)
+@kernel
 def _beam_to_disc(dx: float, dy: float, cos: float, sin: float, radius: float) -> float:
     """Distance from a disc's centre along (cos, sin) to a disc of equal radius at (dx, dy), minus the radius."""
     along = dx * cos + dy * sin
@@ -37,7 +37,7 @@ def _beam_to_disc(dx: float, dy: float, cos: float, sin: float, radius: float) -
     return along - math.sqrt(room) - radius
 
 
-@njit(cache=True)
+@kernel
 def _beam_to_wall(to_low: float, to_high: float, direction: float, radius: float) -> float:
     """Free distance to the wall ahead on one axis; to_low and to_high are centre-to-wall distances."""
     if direction > 1e-12:
@@ -47,7 +47,7 @@ def _beam_to_wall(to_low: float, to_high: float, direction: float, radius: float
     return math.inf
 
 
-@njit(cache=True)
+@kernel
 def proximity(
     position: FloatArray,
     facing: FloatArray,

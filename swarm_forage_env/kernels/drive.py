@@ -2,12 +2,11 @@
 
 import math
 
-from numba import njit
-
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray
 
 
-@njit(cache=True)
+@kernel
 def limit_command(
     command_left: float, command_right: float, scale: float, max_speed: float, max_difference: float
 ) -> tuple[float, float]:
@@ -22,7 +21,7 @@ def limit_command(
     return speed - 0.5 * difference, speed + 0.5 * difference
 
 
-@njit(cache=True)
+@kernel
 def drive(
     actions: ActionArray,
     wheel_gain: FloatArray,
@@ -67,7 +66,7 @@ def drive(
     return -1
 
 
-@njit(cache=True)
+@kernel
 def unpack_poses(
     poses: FloatArray, present: BoolArray, position: FloatArray, heading: FloatArray, facing: FloatArray
 ) -> None:

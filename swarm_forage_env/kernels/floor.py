@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
 from swarm_forage_env.types import BoolArray, FloatArray, IntArray, ObsArray
@@ -24,7 +24,7 @@ _SENSOR_STEP_RAD = BEAM_ANGLES_RAD[1] - BEAM_ANGLES_RAD[0]
 _HALF_WINDOW = WINDOW_CELLS // 2
 
 
-@njit(cache=True)
+@kernel
 def grey_of(code: int) -> float:
     """Grey level of a floor code (state.CELL_*): object 0, nest 0.70, cache 0.40, empty 1."""
     if code >= 0:
@@ -36,7 +36,7 @@ def grey_of(code: int) -> float:
     return _GREY_CACHE
 
 
-@njit(cache=True)
+@kernel
 def ground(
     position: FloatArray, facing: FloatArray, present: BoolArray, floor: IntArray, obs: ObsArray, start: int
 ) -> None:
@@ -65,7 +65,7 @@ def ground(
             obs[i, start + k] = grey
 
 
-@njit(cache=True)
+@kernel
 def light(
     position: FloatArray,
     facing: FloatArray,
@@ -106,7 +106,7 @@ def light(
                 k = 0 if k == 23 else k + 1
 
 
-@njit(cache=True)
+@kernel
 def line_of_sight(
     position: FloatArray,
     present: BoolArray,
@@ -145,7 +145,7 @@ def line_of_sight(
             _visible_caches(cell_x, cell_y, position, caches, half_side, i, obs, cache_start, (nx, ny, n_objects))
 
 
-@njit(cache=True)
+@kernel
 def _visible_caches(
     cell_x: int,
     cell_y: int,
@@ -185,7 +185,7 @@ def _visible_caches(
         last_slot = best
 
 
-@njit(cache=True)
+@kernel
 def write_cache(
     obs: ObsArray, i: int, start: int, fields: tuple[int, int, int, int], sizes: tuple[int, int, int]
 ) -> None:

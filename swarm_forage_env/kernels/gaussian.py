@@ -6,9 +6,9 @@ up one by one in the outermost two. The distribution function is met to 2e-5 eve
 """
 
 import numpy as np
-from numba import njit
 from scipy.special import ndtri
 
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.types import ObsArray
 
 _CELLS = 4096
@@ -23,7 +23,7 @@ _HALF_STEP = np.float32(0.5 / _CELLS)
 _LAST = _CELLS - 1
 
 
-@njit(cache=True)
+@kernel
 def to_normal(draws: ObsArray) -> None:
     """Turn uniform draws (N, C), multiples of 2^-24 in [0, 1), into standard normal ones, in place."""
     for i in range(draws.shape[0]):

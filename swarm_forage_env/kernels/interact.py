@@ -7,9 +7,9 @@ that holds starts an interaction, which takes effect one tick later if the same 
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, Counter, Event, ObjectStatus
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray
 
 NO_REQUEST = 0
@@ -96,7 +96,7 @@ class Rules(NamedTuple):
     """At most one interaction per handler finishes in a tick (quirk `serialized_interactions`)."""
 
 
-@njit(cache=True)
+@kernel
 def clear_events(
     gripper: ActionArray,
     carried_object: IntArray,
@@ -119,7 +119,7 @@ def clear_events(
     return busy
 
 
-@njit(cache=True)
+@kernel
 def _cell(world: World, i: int) -> tuple[int, int]:
     ny, nx = world.floor.shape
     return (
@@ -128,20 +128,20 @@ def _cell(world: World, i: int) -> tuple[int, int]:
     )
 
 
-@njit(cache=True)
+@kernel
 def _floor_code(world: World, i: int) -> int:
     x, y = _cell(world, i)
     return world.floor[y, x]
 
 
-@njit(cache=True)
+@kernel
 def _in_nest(world: World, rules: Rules, i: int) -> bool:
     x = world.position[i, 0]
     y = world.position[i, 1]
     return rules.nest_x_low <= x <= rules.nest_x_high and rules.nest_y_low <= y <= rules.nest_y_high
 
 
-@njit(cache=True)
+@kernel
 def _cache_too_near(world: World, rules: Rules, i: int) -> int:
     """Slot of the nearest cache whose centre is within the proximity distance of robot i, or -1."""
     nearest = -1
@@ -157,7 +157,7 @@ def _cache_too_near(world: World, rules: Rules, i: int) -> int:
     return nearest
 
 
-@njit(cache=True)
+@kernel
 def band_of(grip: float) -> int:
     """Gripper band of a command."""
     if grip > 0.0:
@@ -171,7 +171,7 @@ def band_of(grip: float) -> int:
     return FOUND
 
 
-@njit(cache=True)
+@kernel
 def request_of(world: World, rules: Rules, band: int, i: int) -> tuple[int, int]:
     """What robot i asks for, given where it is, and the object row or cache slot that it is about (-1 = none)."""
     code = _floor_code(world, i)
@@ -199,7 +199,7 @@ def request_of(world: World, rules: Rules, band: int, i: int) -> tuple[int, int]
     return (SITE_DROP if band == SITE else FOUND_DROP), -1
 
 
-@njit(cache=True)
+@kernel
 def _report(world: World, i: int, event: int, row: int, slot: int) -> None:
     world.code[i] = event
     world.event_object[i] = row
@@ -211,14 +211,14 @@ def _report(world: World, i: int, event: int, row: int, slot: int) -> None:
         world.event_cache[i, 3] = world.cache_count[slot]
 
 
-@njit(cache=True)
+@kernel
 def _forget_pending(world: World, i: int) -> None:
     world.pending_kind[i] = NO_REQUEST
     world.pending_band[i] = 0
     world.pending_target[i] = -1
 
 
-@njit(cache=True)
+@kernel
 def _empty_hands(world: World, i: int) -> int:
     row = world.carried_object[i]
     world.carried_object[i] = -1
@@ -226,7 +226,7 @@ def _empty_hands(world: World, i: int) -> int:
     return row
 
 
-@njit(cache=True)
+@kernel
 def _displace(world: World, row: int) -> None:
     """Hand an object over to the distributor, which re-places it later in this tick."""
     world.status[row] = _WAITING
@@ -236,7 +236,7 @@ def _displace(world: World, row: int) -> None:
     world.displaced[last] += 1
 
 
-@njit(cache=True)
+@kernel
 def deliver(world: World, i: int) -> None:
     """Robot i leaves its object in the nest; the object re-enters the world through the distributor."""
     row = _empty_hands(world, i)
@@ -245,19 +245,20 @@ def deliver(world: World, i: int) -> None:
     _report(world, i, _DELIVERED, row, -1)
 
 
-@njit(cache=True)
+@kernel
 def drop_into_cache(world: World, i: int, slot: int) -> None:
     """Robot i adds its object to the cache it stands in."""
     row = _empty_hands(world, i)
     world.status[row] = _CACHED
     world.cache_slot[row] = slot
-    world.object_cell[row, :] = world.cache_cell[slot]
+    world.object_cell[row, 0] = world.cache_cell[slot, 0]
+    world.object_cell[row, 1] = world.cache_cell[slot, 1]
     world.cache_count[slot] += 1
     world.counters[_CACHE_DROPS] += 1
     _report(world, i, _JOINED_CACHE, row, slot)
 
 
-@njit(cache=True)
+@kernel
 def lay_on_floor(world: World, rules: Rules, i: int) -> bool:
     """Robot i lays its object on its cell if that is free, else the object is re-placed; returns whether it lies."""
     row = _empty_hands(world, i)
@@ -277,7 +278,7 @@ def lay_on_floor(world: World, rules: Rules, i: int) -> bool:
     return False
 
 
-@njit(cache=True)
+@kernel
 def _lift(world: World, i: int, row: int) -> None:
     world.status[row] = _CARRIED
     world.object_cell[row, :] = -1
@@ -288,7 +289,7 @@ def _lift(world: World, i: int, row: int) -> None:
     world.carriers[row] += 1
 
 
-@njit(cache=True)
+@kernel
 def take_from_floor(world: World, i: int, row: int) -> None:
     """Robot i picks up the free object under its centre."""
     world.floor[world.object_cell[row, 1], world.object_cell[row, 0]] = CELL_EMPTY
@@ -298,7 +299,7 @@ def take_from_floor(world: World, i: int, row: int) -> None:
     _report(world, i, _PICKED_UP, row, -1)
 
 
-@njit(cache=True)
+@kernel
 def take_from_cache(world: World, rules: Rules, i: int, slot: int, chance: float) -> None:
     """Robot i takes an object, uniform among the cache's contents (`chance` in [0, 1)); a last pair dissolves it."""
     wanted = int(chance * world.cache_count[slot])
@@ -319,7 +320,7 @@ def take_from_cache(world: World, rules: Rules, i: int, slot: int, chance: float
         _dissolve(world, rules, slot)
 
 
-@njit(cache=True)
+@kernel
 def _dissolve(world: World, rules: Rules, slot: int) -> None:
     """Remove a cache with one object left; the orphan lies free on the centre cell."""
     cx = world.cache_cell[slot, 0]
@@ -336,7 +337,7 @@ def _dissolve(world: World, rules: Rules, slot: int) -> None:
     world.counters[_DEPLETED] += 1
 
 
-@njit(cache=True)
+@kernel
 def drop_cargo(world: World, rules: Rules, i: int) -> None:
     """Robot i loses its cargo here, whatever is here: the rule for dying robots (cache, floor or re-placement)."""
     _forget_pending(world, i)
@@ -349,7 +350,7 @@ def drop_cargo(world: World, rules: Rules, i: int) -> None:
         lay_on_floor(world, rules, i)
 
 
-@njit(cache=True)
+@kernel
 def _handler_of(kind: int) -> int:
     if kind == FLOOR_PICKUP:
         return FREE_PICKUP_HANDLER
@@ -362,7 +363,7 @@ def _handler_of(kind: int) -> int:
     return CACHE_HANDLER
 
 
-@njit(cache=True)
+@kernel
 def _target_identity(world: World, kind: int, target: int) -> int:
     """What must stay the same while an interaction runs: the object row, or the serial of the cache."""
     if kind == CACHE_DROP or kind == CACHE_PICKUP:
@@ -370,7 +371,7 @@ def _target_identity(world: World, kind: int, target: int) -> int:
     return target
 
 
-@njit(cache=True)
+@kernel
 def _take_effect(world: World, rules: Rules, i: int, kind: int, target: int, chance: float) -> None:
     if kind == DELIVER:
         deliver(world, i)
@@ -386,7 +387,7 @@ def _take_effect(world: World, rules: Rules, i: int, kind: int, target: int, cha
         world.founded[last] += 1
 
 
-@njit(cache=True)
+@kernel
 def _continue(world: World, rules: Rules, i: int, kind: int, target: int, chance: float) -> None:
     """Finish the interaction that robot i has in progress, or report that its condition is lost."""
     same = kind == world.pending_kind[i] and _target_identity(world, kind, target) == world.pending_target[i]
@@ -402,7 +403,7 @@ def _continue(world: World, rules: Rules, i: int, kind: int, target: int, chance
         _report(world, i, _VANISHED, -1, -1)
 
 
-@njit(cache=True)
+@kernel
 def _serve(world: World, rules: Rules, band: int, i: int, chance: float) -> None:
     """Start, continue, refuse or cancel what robot i asks, by the state of the world at its turn."""
     kind, target = request_of(world, rules, band, i)
@@ -423,7 +424,7 @@ def _serve(world: World, rules: Rules, band: int, i: int, chance: float) -> None
         world.pending_target[i] = _target_identity(world, kind, target)
 
 
-@njit(cache=True)
+@kernel
 def _phase_of(kind: int, band: int) -> int:
     """Order within a tick: deliver 0, cache drop 1, floor drops 2, pick-ups 3, those that find nothing yet included."""
     if kind == DELIVER:
@@ -435,7 +436,7 @@ def _phase_of(kind: int, band: int) -> int:
     return 2
 
 
-@njit(cache=True)
+@kernel
 def _band_now(world: World, gripper: ActionArray, i: int) -> int:
     """Band that robot i sends; a robot in repair keeps sending the band of its running interaction."""
     if world.active[i]:
@@ -443,7 +444,7 @@ def _band_now(world: World, gripper: ActionArray, i: int) -> int:
     return world.pending_band[i]
 
 
-@njit(cache=True)
+@kernel
 def interact(world: World, rules: Rules, gripper: ActionArray, tick: int, chance: FloatArray) -> None:
     """Serve all requests of one tick, phase by phase; within a phase lowest (row - tick) mod N first.
 

@@ -1,16 +1,16 @@
 """The obstacle rule over a swarm, and the robot-tick counters."""
 
 import numpy as np
-from numba import njit
 
 from swarm_forage_env.codes import Counter
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.detection import sees_obstacle
 from swarm_forage_env.types import BoolArray, FloatArray, ObsArray
 
 _INTERFERING, _ACTIVE, _PRESENT = int(Counter.INTERFERING), int(Counter.ACTIVE), int(Counter.PRESENT)
 
 
-@njit(cache=True)
+@kernel
 def mark(
     obs: ObsArray,
     near: BoolArray,

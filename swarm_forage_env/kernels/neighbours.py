@@ -1,17 +1,16 @@
 """Neighbour search: robots binned into a hash table of square cells."""
 
-from numba import njit
-
+from swarm_forage_env.compiling import inline_kernel, kernel
 from swarm_forage_env.types import BoolArray, FloatArray, IntArray
 
 
-@njit(cache=True, inline="always")
+@inline_kernel
 def bin_of(cell_x: int, cell_y: int, n_bins: int) -> int:
     """Hash of a cell into [0, n_bins), n_bins a power of two."""
     return ((cell_x * 73856093) ^ (cell_y * 19349663)) & (n_bins - 1)
 
 
-@njit(cache=True)
+@kernel
 def bin_robots(
     position: FloatArray, present: BoolArray, cell_m: float, first_in_bin: IntArray, next_in_bin: IntArray
 ) -> None:

@@ -2,12 +2,11 @@
 
 import math
 
-from numba import njit
-
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.types import BoolArray, FloatArray, IntArray, ObsArray
 
 
-@njit(cache=True)
+@kernel
 def perturb_readings(
     obs: ObsArray,
     present: BoolArray,
@@ -43,7 +42,7 @@ def perturb_readings(
                 row[k] = min(one, max(low, row[k] + (draw[k] - shift) * factor[k]))
 
 
-@njit(cache=True)
+@kernel
 def turn_heading(
     obs: ObsArray, present: BoolArray, draws: ObsArray, centre: float, factors: ObsArray, start: int, column: int
 ) -> None:
@@ -65,7 +64,7 @@ def turn_heading(
         obs[i, start + 1] = min(1.0, max(-1.0, x * sin + y * cos))
 
 
-@njit(cache=True)
+@kernel
 def noisy_gain(draws: ObsArray, centre: float, factor: float, outer_gain: FloatArray, wheel_gain: FloatArray) -> None:
     """Write outer_gain * (1 + (draw - centre) * factor) into `wheel_gain`; all (N, 2)."""
     for i in range(draws.shape[0]):

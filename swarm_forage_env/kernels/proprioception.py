@@ -1,13 +1,12 @@
 """What a robot knows of itself: wheels, pose, cargo, and the event of this tick."""
 
-from numba import njit
-
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.kernels.floor import write_cache
 from swarm_forage_env.layout import EVENT_SCALE
 from swarm_forage_env.types import BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 
-@njit(cache=True)
+@kernel
 def own_motion(
     position: FloatArray,
     facing: FloatArray,
@@ -34,7 +33,7 @@ def own_motion(
         obs[i, start + 5] = facing[i, 1]
 
 
-@njit(cache=True)
+@kernel
 def own_status(
     carried_object: IntArray,
     pending_kind: CodeArray,

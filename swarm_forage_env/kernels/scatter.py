@@ -4,9 +4,9 @@ Floor codes are those of `codes`: an object row >= 0, else CELL_EMPTY, nest or c
 """
 
 import numpy as np
-from numba import njit
 
 from swarm_forage_env.codes import CELL_EMPTY
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.types import FloatArray, IntArray
 
 UNLIMITED = int(np.iinfo(np.int32).max)
@@ -17,7 +17,7 @@ DRAWS = 3 + 2 * TRIES
 """Uniform numbers per object: group, region, listed cell, then x and y of each try."""
 
 
-@njit(cache=True)
+@kernel
 def count_objects(floor: IntArray, x_low: int, y_low: int, x_high: int, y_high: int) -> int:
     """Return how many objects lie in the half-open box, whoever put them there."""
     count = 0
@@ -28,7 +28,7 @@ def count_objects(floor: IntArray, x_low: int, y_low: int, x_high: int, y_high: 
     return count
 
 
-@njit(cache=True)
+@kernel
 def draw_free_cell(
     floor: IntArray, x_low: int, y_low: int, x_high: int, y_high: int, draws: FloatArray
 ) -> tuple[int, int]:
@@ -61,7 +61,7 @@ def draw_free_cell(
     return -1, -1
 
 
-@njit(cache=True)
+@kernel
 def draw_source_cell(
     floor: IntArray,
     regions: IntArray,
@@ -97,7 +97,7 @@ def draw_source_cell(
     return -1, -1
 
 
-@njit(cache=True)
+@kernel
 def scatter(
     rows: IntArray,
     floor: IntArray,

@@ -1,11 +1,10 @@
 """How a swarm divides over tasks, summed tick by tick."""
 
-from numba import njit
-
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.types import BoolArray, CodeArray, FloatArray
 
 
-@njit(cache=True)
+@kernel
 def add_task_shares(tasks: CodeArray, active: BoolArray, shares: FloatArray) -> bool:
     """Add this tick's share of active robots in each task; nothing is added while no robot is active.
 

@@ -1,12 +1,11 @@
 """Wheel gains of throttled robots."""
 
-from numba import njit
-
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.kernels.drive import limit_command
 from swarm_forage_env.types import ActionArray, FloatArray, IntArray
 
 
-@njit(cache=True)
+@kernel
 def throttle(
     actions: ActionArray,
     strength: float,

@@ -1,9 +1,9 @@
 """Random walk of free objects on the floor grid. Random numbers are passed in."""
 
 import numpy as np
-from numba import njit
 
 from swarm_forage_env.codes import CELL_EMPTY, ObjectStatus
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.types import CodeArray, FloatArray, IntArray
 
 _FREE = int(ObjectStatus.FREE)
@@ -17,7 +17,7 @@ after the cells 5, 40, 43, 45, 47, 50 ... 91 and 95, 100, 105 ... 155, and nowhe
 """
 
 
-@njit(cache=True)
+@kernel
 def crosses_open_border(x: int, y: int, dx: int, dy: int) -> bool:
     """Return whether a one-cell step crosses, in x or in y, a border that leaves a rounding gap (`OPEN_BORDERS`)."""
     border_x = x if dx > 0 else x - 1
@@ -27,7 +27,7 @@ def crosses_open_border(x: int, y: int, dx: int, dy: int) -> bool:
     return open_x or open_y
 
 
-@njit(cache=True)
+@kernel
 def can_step(
     floor: IntArray, area: tuple[int, int, int, int], x: int, y: int, dx: int, dy: int, self_conflict: bool
 ) -> bool:
@@ -44,7 +44,7 @@ def can_step(
     return not self_conflict or crosses_open_border(x, y, dx, dy)
 
 
-@njit(cache=True)
+@kernel
 def walk(
     floor: IntArray,
     status: CodeArray,
