@@ -1,7 +1,7 @@
 """Gymnasium views of the swarm: one agent for all robots, or every robot a sub-environment of a vector environment."""
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import gymnasium
@@ -10,21 +10,14 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from swarm_forage_env.config import ScenarioConfig, with_overrides
+from swarm_forage_env.config import ScenarioConfig
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.learning.arenas import ArenaBatch, ArenaStep
+from swarm_forage_env.learning.arenas import ArenaStep
 from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.processes import ArenaProcesses
-from swarm_forage_env.learning.worlds import World, WorldPlan
-from swarm_forage_env.scenarios import scenario as preset
+from swarm_forage_env.learning.processes import open_arenas
+from swarm_forage_env.learning.worlds import World, WorldPlan, configured
 from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.wrappers.base import WrapperConfig
-
-
-def _configured(scenario: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
-    if isinstance(scenario, ScenarioConfig):
-        return with_overrides(scenario, **overrides)
-    return preset(scenario, **overrides)
 
 
 class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
@@ -60,7 +53,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
         """
         self._world = World(
             WorldPlan(
-                scenario=_configured(scenario, overrides),
+                scenario=configured(scenario, overrides),
                 wrappers=tuple(wrappers),
                 max_cycles=max_cycles,
                 render_mode=render_mode,
@@ -122,7 +115,9 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
 
     Infos are arrays over rows, with masks under the name with an underscore in front, as Gymnasium does it:
     `active` always; `final_obs` (objects, None elsewhere) and `final_info` ({}) of rows that are done; `episode`
-    (return "r", steps "l", seconds since creation "t") of rows whose episode ended.
+    (return "r", steps "l", seconds since creation "t") of rows whose episode ended. Gymnasium's
+    `RecordEpisodeStatistics` is therefore not needed, refuses to write over it, and under another key would count
+    absent rows as episodes.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - declared like this by Gymnasium
@@ -139,6 +134,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         n_processes: int = 0,
         interface: InterfaceConfig | None = None,
         wrappers: Iterable[WrapperConfig] = (),
+        swarm_wrappers: Iterable[WrapperConfig] = (),
         max_cycles: int | None = None,
         render_mode: str | None = None,
         **overrides: Any,
@@ -153,6 +149,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
             n_processes: Processes that the arenas are spread over; 0 = all in this process.
             interface: What a learner sees and does; default full observations and continuous actions.
             wrappers: What disturbs the swarm (noise, throttle, population ...), in any order.
+            swarm_wrappers: More of them, for `gymnasium.make_vec`, which takes an argument `wrappers` for itself.
             max_cycles: Ticks until truncation; default the scenario's horizon.
             render_mode: None or "rgb_array".
             overrides: Scenario fields by name (`n_robots=20`).
@@ -163,16 +160,14 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         """
         choice = interface or InterfaceConfig()
         plan = WorldPlan(
-            scenario=_configured(scenario, overrides),
-            wrappers=tuple(wrappers),
+            scenario=configured(scenario, overrides),
+            wrappers=(*wrappers, *swarm_wrappers),
             max_cycles=max_cycles,
             render_mode=render_mode,
             reads=choice.reads,
         )
         arenas = _number_of_arenas(num_envs, n_arenas, plan.scenario.robots.n_robots)
-        self._arenas: ArenaBatch | ArenaProcesses = (
-            ArenaProcesses(plan, choice, arenas, n_processes) if n_processes else ArenaBatch(plan, choice, arenas)
-        )
+        self._arenas = open_arenas(plan, choice, arenas, n_processes)
         self.interface = self._arenas.interface
         self.n_arenas, self.n_robots = arenas, self._arenas.n_robots
         self.num_envs = self._arenas.n_rows
@@ -217,7 +212,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         Returns:
             Observations (num_envs, d), rewards, terminations, truncations (num_envs,) and infos, all new.
         """
-        step = self._arenas.step(np.asarray(actions, self.single_action_space.dtype))
+        step = self._arenas.step(np.asarray(actions))
         return step.obs, step.rewards, step.terminated, step.truncated, self._infos(step)
 
     def _infos(self, step: ArenaStep) -> dict[str, Any]:

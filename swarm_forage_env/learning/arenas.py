@@ -13,14 +13,16 @@ Row `a * N + i` is robot i of arena a for ever. The life of a row:
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol, cast
 
 import numpy as np
 
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.learning.worlds import World, WorldPlan
 from swarm_forage_env.state import Counter
 from swarm_forage_env.types import BoolArray, IntArray, ObsArray
+from swarm_forage_env.wrappers.base import SwarmWrapper
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -58,11 +60,35 @@ class ArenaStep:
     is_episode: BoolArray
     """(E,) whether an episode ended, not only an absence."""
     returns: np.ndarray
-    """(E,) float32, sums of rewards."""
+    """(E,) float64, sums of rewards; float32 would lose the small ones of long runs."""
     lengths: IntArray
     """(E,) steps that began with the robot in the world."""
     outcomes: tuple[RunOutcome, ...] = ()
     """Runs that ended."""
+
+
+class Rows(Protocol):
+    """Sizes of a batch."""
+
+    n_arenas: int
+    n_robots: int
+    n_rows: int
+
+
+def check_rows(actions: np.ndarray, batch: Rows) -> None:
+    """Raise ValueError unless there is one action per row of the batch."""
+    if actions.ndim == 0 or len(actions) != batch.n_rows:
+        raise ValueError(
+            f"Expected actions for {batch.n_rows} rows ({batch.n_arenas} arenas of {batch.n_robots} robots), "
+            f"got shape {actions.shape}."
+        )
+
+
+def _owner(env: ForageEnv | SwarmWrapper, name: str) -> ForageEnv | SwarmWrapper:
+    """Return who in a stack has the attribute: wrappers show those of the environment below without owning them."""
+    while isinstance(env, SwarmWrapper) and name not in vars(env) and not hasattr(type(env), name):
+        env = cast("ForageEnv | SwarmWrapper", env.env)  # which it has checked
+    return env
 
 
 @dataclass(slots=True)
@@ -111,7 +137,7 @@ class ArenaBatch:
         self._raw: list[ObsArray] = []
         self._absent = np.zeros((n_arenas, self.n_robots), np.bool_)
         self._present = np.zeros((n_arenas, self.n_robots), np.bool_)
-        self._returns = np.zeros((n_arenas, self.n_robots), np.float32)
+        self._returns = np.zeros((n_arenas, self.n_robots), np.float64)
         self._lengths = np.zeros((n_arenas, self.n_robots), np.int32)
 
     def reset(
@@ -124,24 +150,27 @@ class ArenaBatch:
             options: One per arena; see `World.reset`.
         """
         obs = np.empty((self.n_arenas, self.n_robots, self.interface.layout.size), np.float32)
-        self._raw = [np.empty(0, np.float32)] * self.n_arenas
-        for arena, (seed, option) in enumerate(zip(seeds, options, strict=True)):
+        self._raw = []  # stays so where a seed or an option is refused: half a reset is none
+        self._raw = [
             self._start(arena, obs[arena], seed, option)
+            for arena, (seed, option) in enumerate(zip(seeds, options, strict=True))
+        ]
         return obs.reshape(self.n_rows, -1), self._active()
 
     def _start(
         self, arena: int, out: ObsArray, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> None:
+    ) -> ObsArray:
+        """Start a run in one arena; writes what learners see to `out`, returns the environment's observations."""
         world = self.worlds[arena]
         raw = world.reset(seed, options)
         if world.is_new:
             self._interfaces[arena] = LearnerInterface(self._config, world.base.task)
-        self._raw[arena] = raw
         self._present[arena] = world.base.swarm.present
         self._absent[arena] = False
         self._returns[arena] = 0.0
         self._lengths[arena] = 0
         self._interfaces[arena].observe(raw, out)
+        return raw
 
     def _active(self) -> BoolArray:
         return np.concatenate([world.base.active for world in self.worlds])
@@ -156,13 +185,8 @@ class ArenaBatch:
             RuntimeError: not reset yet.
             ValueError: wrong shape, or actions that the interface or the drive refuses.
         """
-        if not self._raw:
-            raise RuntimeError("Call reset before step.")
-        if len(actions) != self.n_rows:
-            raise ValueError(
-                f"Expected actions for {self.n_rows} rows ({self.n_arenas} arenas of {self.n_robots} robots), "
-                f"got shape {actions.shape}."
-            )
+        self._require_reset("step")
+        check_rows(actions, self)
         shape = (self.n_arenas, self.n_robots)
         obs = np.empty((*shape, self.interface.layout.size), np.float32)
         rewards = np.zeros(shape, np.float32)
@@ -186,7 +210,7 @@ class ArenaBatch:
             ended=_joined(endings.rows, np.zeros(0, np.int32)),
             final_obs=_joined(endings.final_obs, np.zeros((0, columns), np.float32)),
             is_episode=_joined(endings.is_episode, np.zeros(0, np.bool_)),
-            returns=_joined(endings.returns, np.zeros(0, np.float32)),
+            returns=_joined(endings.returns, np.zeros(0, np.float64)),
             lengths=_joined(endings.lengths, np.zeros(0, np.int32)),
             outcomes=tuple(endings.outcomes),
         )
@@ -220,7 +244,7 @@ class ArenaBatch:
             np.logical_not(terminated, out=truncated)
             self._note_endings(arena, np.arange(self.n_robots), obs, endings)
             endings.outcomes.append(self._outcome(arena))
-            self._start(arena, obs)
+            self._raw[arena] = self._start(arena, obs)
         elif terminated.any():
             self._note_endings(arena, np.flatnonzero(terminated), obs, endings)
             absent |= dead
@@ -244,9 +268,19 @@ class ArenaBatch:
         )
 
     def action_masks(self) -> BoolArray:
-        """Return which discrete actions make sense now, (R, number of actions); raises ValueError without any."""
+        """Return which discrete actions make sense now, (R, number of actions).
+
+        Raises:
+            RuntimeError: not reset yet.
+            ValueError: the actions are continuous.
+        """
+        self._require_reset("action_masks")
         masks = [interface.mask(raw) for interface, raw in zip(self._interfaces, self._raw, strict=True)]
         return np.concatenate(masks)
+
+    def _require_reset(self, what: str) -> None:
+        if not self._raw:
+            raise RuntimeError(f"Call reset before {what}.")
 
     def render(self) -> list[np.ndarray | None]:
         """Return one picture per arena."""
@@ -257,9 +291,9 @@ class ArenaBatch:
         return [getattr(self.worlds[arena].env, name) for arena in arenas]
 
     def set_attribute(self, name: str, value: Any, arenas: Sequence[int]) -> None:
-        """Set an attribute of the environments of some arenas."""
+        """Set an attribute of the environments of some arenas, where it is: in a wrapper or at the bottom."""
         for arena in arenas:
-            setattr(self.worlds[arena].env, name, value)
+            setattr(_owner(self.worlds[arena].env, name), name, value)
 
     def call_method(self, name: str, arenas: Sequence[int], *args: Any, **kwargs: Any) -> list[Any]:
         """Call a method of the environments of some arenas, once each; returns what they return.

@@ -7,11 +7,10 @@ import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
-from swarm_forage_env.config import ScenarioConfig, with_overrides
+from swarm_forage_env.config import ScenarioConfig
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.learning.worlds import World, WorldPlan
-from swarm_forage_env.scenarios import scenario as preset
+from swarm_forage_env.learning.worlds import World, WorldPlan, configured
 from swarm_forage_env.types import BoolArray
 from swarm_forage_env.wrappers.base import WrapperConfig
 
@@ -53,10 +52,9 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
             ConfigError: unknown preset or field, or values that describe no world.
         """
         self._config = interface or InterfaceConfig()
-        config = with_overrides(scenario, **overrides) if isinstance(scenario, ScenarioConfig) else None
         self._world = World(
             WorldPlan(
-                scenario=config or preset(str(scenario), **overrides),
+                scenario=configured(scenario, overrides),
                 wrappers=tuple(wrappers),
                 max_cycles=max_cycles,
                 render_mode=render_mode,
@@ -147,10 +145,18 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         return results
 
     def _chosen(self, actions: dict[str, Any]) -> np.ndarray:
+        """Return one row per robot; those of robots that are gone are zeros."""
         space = self.interface.action_space
+        given = {agent: np.asarray(actions[agent]) for agent in self.agents}
+        # Assigning to an array would stretch what is too small and cut what is no whole number.
+        for agent, action in given.items():
+            if action.shape != space.shape or not np.can_cast(action.dtype, space.dtype, casting="same_kind"):
+                raise ValueError(
+                    f"Expected an action of {space} for {agent}, got {action.dtype} with shape {action.shape}."
+                )
         chosen = np.zeros((len(self.possible_agents), *(space.shape or ())), space.dtype)
-        for agent in self.agents:
-            chosen[self._row_of[agent]] = actions[agent]
+        for agent, action in given.items():
+            chosen[self._row_of[agent]] = action
         return chosen
 
     def _per_agent(self, rows: Any) -> dict[str, Any]:

@@ -1,6 +1,9 @@
 """Batches of arenas in processes of their own: the same interface as `ArenaBatch`, for machines with many cores."""
 
+import contextlib
 import multiprocessing
+import pickle
+import signal
 import traceback
 from collections.abc import Mapping, Sequence
 from multiprocessing.connection import Connection
@@ -8,34 +11,49 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.learning.arenas import ArenaBatch, ArenaStep
+from swarm_forage_env.learning.arenas import ArenaBatch, ArenaStep, check_rows
 from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.learning.worlds import World, WorldPlan
 from swarm_forage_env.types import BoolArray, ObsArray
 
 _CLOSE = "close"
+_GOODBYE_S = 10.0
+"""Seconds that a process has to end after it was told to, before it is ended."""
 
 
 class ArenaProcessError(RuntimeError):
-    """A process with arenas failed; the message holds its traceback."""
+    """A process with arenas failed or is gone; the message holds its traceback or exit code."""
 
 
 def _serve(pipe: Connection, plan: WorldPlan, interface: InterfaceConfig, n_arenas: int, first_arena: int) -> None:
-    """Answer calls of `ArenaBatch` methods until told to close; the whole life of a process."""
+    """Answer numbered calls of `ArenaBatch` methods until told to close; the whole life of a process."""
+    # Ctrl-C reaches every process of a terminal. The parent decides what it means and tells by closing.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     batch: ArenaBatch | None = None
     while True:
         try:
-            method, args, kwargs = pipe.recv()
-        except (EOFError, KeyboardInterrupt):  # the parent is gone, or the person at the keyboard wants an end
+            number, method, args, kwargs = pipe.recv()
+        except EOFError:  # the parent is gone
             return
         try:
             if batch is None:
                 batch = ArenaBatch(plan, interface, n_arenas, first_arena=first_arena)
-            pipe.send((getattr(batch, method)(*args, **kwargs), None))
+            pipe.send((number, getattr(batch, method)(*args, **kwargs), None))
+        except BrokenPipeError:  # the parent does not want the answer any more
+            return
         except Exception as error:  # noqa: BLE001 - whatever it is, the parent has to raise it
-            pipe.send((None, (error, traceback.format_exc())))
+            pipe.send((number, None, (_portable(error), traceback.format_exc())))
         if method == _CLOSE:
             return
+
+
+def _portable(error: Exception) -> Exception:
+    """Return the error if it survives the way to another process, else one that says the same."""
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301 - what was pickled right here
+    except Exception:  # noqa: BLE001 - errors of others can fail to pickle in any way
+        return ArenaProcessError(f"{type(error).__name__}: {error}")
+    return error
 
 
 class ArenaProcesses:
@@ -70,6 +88,7 @@ class ArenaProcesses:
         starter = multiprocessing.get_context(context)
         self._pipes: list[Connection] = []
         self._processes = []
+        self._n_asked = [0] * n_processes
         for share in self._shares:
             ours, theirs = starter.Pipe()
             arguments = (theirs, plan, interface, len(share), share[0])
@@ -80,19 +99,33 @@ class ArenaProcesses:
             self._processes.append(process)
 
     def _ask(self, process: int, method: str, *args: Any, **kwargs: Any) -> None:
-        self._pipes[process].send((method, args, kwargs))
+        if not self._pipes:
+            raise ArenaProcessError("Expected open arenas, but they were closed.")
+        self._n_asked[process] += 1
+        try:
+            self._pipes[process].send((self._n_asked[process], method, args, kwargs))
+        except OSError as error:
+            raise self._gone(process) from error
+
+    def _gone(self, process: int) -> ArenaProcessError:
+        self._processes[process].join(_GOODBYE_S)  # the exit code is known a moment after the pipe breaks
+        return ArenaProcessError(
+            f"The process of arenas {self._shares[process]} ended with exit code {self._processes[process].exitcode}."
+        )
+
+    def _answer(self, process: int) -> tuple[Any, tuple[Exception, str] | None]:
+        """Wait for the answer to the last question; those nobody waited for (after Ctrl-C, say) are skipped."""
+        try:
+            while True:
+                number, result, failure = self._pipes[process].recv()
+                if number == self._n_asked[process]:
+                    return result, failure
+        except (EOFError, OSError) as error:
+            raise self._gone(process) from error
 
     def _answers(self, processes: Sequence[int]) -> list[Any]:
         """Wait for one answer of each; every answer is taken before the first failure is raised."""
-        answers = []
-        for process in processes:
-            try:
-                answers.append(self._pipes[process].recv())
-            except EOFError as error:
-                raise ArenaProcessError(
-                    f"The process of arenas {self._shares[process]} ended with exit code "
-                    f"{self._processes[process].exitcode}."
-                ) from error
+        answers = [self._answer(process) for process in processes]
         for _, failure in answers:
             if failure is not None:
                 error, trace = failure
@@ -114,11 +147,7 @@ class ArenaProcesses:
 
     def step(self, actions: np.ndarray) -> ArenaStep:
         """Step every arena by one decision, all processes at once; see `ArenaBatch.step`."""
-        if len(actions) != self.n_rows:
-            raise ValueError(
-                f"Expected actions for {self.n_rows} rows ({self.n_arenas} arenas of {self.n_robots} robots), "
-                f"got shape {actions.shape}."
-            )
+        check_rows(actions, self)
         n_robots = self.n_robots
         parts = [(actions[share[0] * n_robots : (share[-1] + 1) * n_robots],) for share in self._shares]
         steps: list[ArenaStep] = self._ask_all("step", parts)
@@ -165,11 +194,27 @@ class ArenaProcesses:
         return [found[arena] for arena in arenas]
 
     def close(self) -> None:
-        """End all processes."""
-        for process, pipe in enumerate(self._pipes):
-            if self._processes[process].is_alive():
-                pipe.send((_CLOSE, (), {}))
-        for process, pipe in zip(self._processes, self._pipes, strict=True):
-            process.join()
+        """End all processes; whatever they still had to say is dropped. Closed arenas may be closed again."""
+        pipes, self._pipes = self._pipes, []
+        for pipe in pipes:
+            with contextlib.suppress(OSError):  # it ended by itself
+                pipe.send((0, _CLOSE, (), {}))
+        for process, pipe in zip(self._processes, pipes, strict=False):
+            # A process that is still sending cannot end before somebody listens.
+            with contextlib.suppress(EOFError, OSError):
+                while pipe.poll(_GOODBYE_S):
+                    pipe.recv_bytes()
             pipe.close()
-        self._pipes = []
+            process.join(_GOODBYE_S)
+            if process.is_alive():
+                process.kill()
+                process.join()
+
+
+def open_arenas(
+    plan: WorldPlan, interface: InterfaceConfig, n_arenas: int, n_processes: int
+) -> ArenaBatch | ArenaProcesses:
+    """Build arenas in this process (n_processes = 0) or spread over so many others; raises as their classes do."""
+    if n_processes:
+        return ArenaProcesses(plan, interface, n_arenas, n_processes)
+    return ArenaBatch(plan, interface, n_arenas)

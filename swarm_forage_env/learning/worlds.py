@@ -8,12 +8,41 @@ import numpy as np
 
 from swarm_forage_env.config import ConfigError, ScenarioConfig, suggestion, with_overrides
 from swarm_forage_env.env import BatchStep, ForageEnv
+from swarm_forage_env.scenarios import scenario as preset
 from swarm_forage_env.types import ActionArray, ObsArray
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
 SCENARIO_OPTION = "scenario"
 """Key of the options of a reset that is read here. Others are left to those who put them there: both Gymnasium and
 PettingZoo hand options on to everything in the stack."""
+
+
+def configured(scenario: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
+    """Return a preset by name, or a complete configuration, with fields overridden by name.
+
+    Raises:
+        ConfigError: unknown preset or field, or values that describe no world.
+    """
+    if isinstance(scenario, ScenarioConfig):
+        return with_overrides(scenario, **overrides)
+    return preset(scenario, **overrides)
+
+
+def same_robots(scenario: ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
+    """Return the scenario with fields overridden by name, but for the number of robots.
+
+    Raises:
+        ConfigError: unknown fields, values that describe no world, or another number of robots.
+    """
+    changed = with_overrides(scenario, **overrides)
+    n_robots = scenario.robots.n_robots
+    if changed.robots.n_robots != n_robots:
+        raise ConfigError(
+            f"Expected n_robots to stay {n_robots}, the number of rows that spaces promise, got "
+            f"{changed.robots.n_robots}; make another environment, or let robots be born during the run (the "
+            "population wrapper with initial_robots)."
+        )
+    return changed
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -35,14 +64,7 @@ class WorldPlan:
         Raises:
             ConfigError: unknown fields, values that describe no world, or another number of robots.
         """
-        scenario = with_overrides(self.scenario, **overrides)
-        n_robots = self.scenario.robots.n_robots
-        if scenario.robots.n_robots != n_robots:
-            raise ConfigError(
-                f"Expected n_robots to stay {n_robots}, the number of rows that spaces promise, got "
-                f"{scenario.robots.n_robots}; make another environment, or let robots be born during the run (the "
-                "population wrapper with initial_robots)."
-            )
+        scenario = same_robots(self.scenario, overrides)
         env: ForageEnv | SwarmWrapper = ForageEnv(
             scenario, max_cycles=self.max_cycles, render_mode=self.render_mode, reads=self.reads
         )

@@ -12,6 +12,7 @@ import swarm_forage_env
 from swarm_forage_env.adapters import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.config import ConfigError
 from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.learning import lives
 
 IDLE = np.zeros((lives.N_ROBOTS, 3), np.float32)
@@ -51,6 +52,22 @@ def test_the_number_of_sub_environments_is_a_whole_number_of_swarms():
     for wrong in ({"num_envs": 7}, {"num_envs": 2}, {"num_envs": 8, "n_arenas": 3}):
         with pytest.raises(ValueError, match="multiple of n_robots = 4"):
             gymnasium.make_vec(env_id, n_robots=4, **wrong)
+
+
+def test_make_vec_takes_what_disturbs_the_swarm_under_a_name_of_its_own():
+    noise, slip = parse_wrapper("sensor_noise:sigma=0.1"), parse_wrapper("actuator_noise:sigma=0.1")
+    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v0", n_robots=4, swarm_wrappers=[noise])
+    clean = SwarmVectorEnv(n_robots=4)
+    assert not np.array_equal(envs.reset(seed=0)[0], clean.reset(seed=0)[0])
+    both = SwarmVectorEnv(n_robots=4, wrappers=[slip], swarm_wrappers=[noise])
+    np.testing.assert_array_equal(both.reset(seed=0)[0], envs.reset(seed=0)[0])
+
+
+def test_numbers_that_are_not_whole_are_no_actions():
+    envs = SwarmVectorEnv(n_robots=3, interface=INTERFACES[2])
+    envs.reset(seed=0)
+    with pytest.raises(ValueError, match="whole numbers from 0 to 10, got float64"):
+        envs.step(np.array([0.7, 1.0, 2.0]))
 
 
 def test_other_vectorizers_take_the_joint_view():
@@ -163,8 +180,6 @@ def test_a_reset_can_change_the_scenario(view):
 
 
 def test_the_checker_of_gymnasium_passes_with_wrappers_and_options():
-    from swarm_forage_env.wrappers.registry import parse_wrapper
-
     wrappers = [parse_wrapper("sensor_noise:sigma=0.05"), parse_wrapper("population:death_per_tick=0.01")]
     check_env(JointForageEnv("warehouse_small", n_robots=5, wrappers=wrappers, max_cycles=50), skip_render_check=True)
 

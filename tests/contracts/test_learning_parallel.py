@@ -84,6 +84,23 @@ def test_actions_are_asked_of_everybody():
         env.step({"robot_0": np.zeros(3), "robot_2": np.zeros(3)})
 
 
+@pytest.mark.parametrize(
+    ("interface", "action"),
+    [
+        ("full", 0.5),
+        ("full", np.zeros(1)),
+        ("full", np.zeros(2)),
+        ("numbered", 1.9),
+        ("numbered", np.zeros(1, int)),
+    ],
+)
+def test_actions_that_would_have_to_be_stretched_or_cut_are_refused(interface, action):
+    env = ParallelLearnerEnv("warehouse_small", n_robots=2, interface=INTERFACES[interface])
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"Expected an action of .* for robot_0"):
+        env.step(dict.fromkeys(env.agents, action))
+
+
 def test_draws_pictures():
     pytest.importorskip("PIL", reason="needs the render extra: pillow")
     env = ParallelLearnerEnv("warehouse_small", n_robots=3, render_mode="rgb_array")

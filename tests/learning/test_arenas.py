@@ -158,6 +158,8 @@ def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
     batch.reset([0], [None])
     with pytest.raises(ConfigError, match=reason):
         batch.reset([0], [options])
+    with pytest.raises(RuntimeError, match="Call reset before step"):
+        batch.step(np.zeros((3, 3), np.float32))
     batch.reset([0], [None])
     assert batch.step(np.zeros((3, 3), np.float32)).rewards.tolist() == [1.0, 1.0, 1.0]
 
@@ -166,8 +168,44 @@ def test_refuses_too_few_rows_and_steps_before_a_reset():
     batch = ArenaBatch(plan(), InterfaceConfig(), 2)
     with pytest.raises(RuntimeError, match="reset"):
         batch.step(np.zeros((6, 3), np.float32))
+    with pytest.raises(RuntimeError, match="Call reset before action_masks"):
+        batch.action_masks()
     batch.reset([0, 1], [None, None])
+    with pytest.raises(ValueError, match=r"6 rows .* got shape \(\)"):
+        batch.step(np.float32(0.0))
     with pytest.raises(ValueError, match="6 rows"):
         batch.step(np.zeros((3, 3), np.float32))
     with pytest.raises(ValueError, match="n_arenas >= 1"):
         ArenaBatch(plan(), InterfaceConfig(), 0)
+
+
+@pytest.mark.parametrize("interface", [InterfaceConfig(), InterfaceConfig(automatic_gripper=True)])
+def test_actions_that_are_not_finite_are_refused_by_name(interface):
+    batch = ArenaBatch(plan(), interface, 1)
+    batch.reset([0], [None])
+    actions = np.zeros((3, *batch.interface.action_space.shape), np.float32)
+    actions[1, 0] = np.nan
+    with pytest.raises(ValueError, match="robot_1"):
+        batch.step(actions)
+    assert batch.worlds[0].base.tick == 0
+
+
+def test_small_rewards_of_long_runs_add_up():
+    batch = ArenaBatch(plan(max_cycles=3000, tick=0.1), InterfaceConfig(decision_ticks=10), 1)
+    batch.reset([0], [None])
+    for _ in range(300):
+        step = batch.step(np.zeros((3, 3), np.float32))
+    np.testing.assert_allclose(step.returns, [300.0] * 3, rtol=3e-7)
+
+
+def test_attributes_are_set_where_they_are_also_below_wrappers():
+    wrapped = WorldPlan(
+        scenario=scenario("warehouse_small", n_robots=3, n_objects=4),
+        max_cycles=9,
+        wrappers=(parse_wrapper("sensor_noise:sigma=0.01"), parse_wrapper("actuator_noise:sigma=0.01")),
+    )
+    batch = ArenaBatch(wrapped, InterfaceConfig(), 1)
+    batch.reset([0], [None])
+    batch.set_attribute("max_cycles", 1, [0])
+    assert batch.worlds[0].base.max_cycles == 1
+    assert batch.step(np.zeros((3, 3), np.float32)).truncated.all()

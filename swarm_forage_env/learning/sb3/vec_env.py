@@ -9,12 +9,11 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from swarm_forage_env.config import ScenarioConfig, with_overrides
-from swarm_forage_env.learning.arenas import ArenaBatch, ArenaStep
+from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env.learning.arenas import ArenaStep
 from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.processes import ArenaProcesses
-from swarm_forage_env.learning.worlds import WorldPlan
-from swarm_forage_env.scenarios import scenario as preset
+from swarm_forage_env.learning.processes import open_arenas
+from swarm_forage_env.learning.worlds import WorldPlan, configured
 from swarm_forage_env.types import BoolArray
 from swarm_forage_env.wrappers.base import WrapperConfig
 
@@ -68,19 +67,15 @@ class SwarmVecEnv(VecEnv):
             ConfigError: unknown preset or field, or values that describe no world.
             ValueError: n_arenas below 1, or more processes than arenas.
         """
-        config = with_overrides(scenario, **overrides) if isinstance(scenario, ScenarioConfig) else None
         choice = interface or InterfaceConfig()
         plan = WorldPlan(
-            scenario=config or preset(str(scenario), **overrides),
+            scenario=configured(scenario, overrides),
             wrappers=tuple(wrappers),
             max_cycles=max_cycles,
             render_mode=render_mode,
             reads=choice.reads,
         )
-        self.plan = plan
-        self._arenas: ArenaBatch | ArenaProcesses = (
-            ArenaProcesses(plan, choice, n_arenas, n_processes) if n_processes else ArenaBatch(plan, choice, n_arenas)
-        )
+        self._arenas = open_arenas(plan, choice, n_arenas, n_processes)
         self.n_arenas, self.n_robots = n_arenas, self._arenas.n_robots
         self.interface = self._arenas.interface
         self._started = time.perf_counter()
