@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
 from .curves import CurveError, FloatArray
-from .score_table import Score, ScoreTable, aligned, forecast_lines, paragraph, percent, plain, spread
+from .score_table import ROUNDING, Score, ScoreTable, aligned, forecast_lines, paragraph, percent, plain, spread
 from .statistics import Summary, aggregate
 
 FAMILY_ERROR = 0.05
@@ -229,16 +229,17 @@ def paired_p(differences: FloatArray) -> float:
 
     Returns:
         The p value; NaN for fewer than two pairs or a difference that is not finite. Where all differences are equal
-        Student's t does not exist: 1 if they are zero, else that of the sign test, 2^(1 - R).
+        (but for rounding, which would pass for a tiny spread) Student's t does not exist: 1 if they are zero, else that
+        of the sign test, 2^(1 - R).
     """
     n_pairs = differences.size
     if n_pairs < 2 or not np.isfinite(differences).all():
         return math.nan
-    spread = float(differences.std(ddof=1))
+    std = float(differences.std(ddof=1))
     mean = float(differences.mean())
-    if spread == 0.0:
+    if std <= ROUNDING * abs(mean):
         return 1.0 if mean == 0.0 else 2.0 ** (1 - n_pairs)
-    t = abs(mean) * math.sqrt(n_pairs) / spread
+    t = abs(mean) * math.sqrt(n_pairs) / std
     return 2.0 * float(stdtr(n_pairs - 1, -t))
 
 

@@ -12,6 +12,10 @@ from .statistics import Summary, aggregate
 if TYPE_CHECKING:
     import polars as pl
 
+ROUNDING = 1e-9
+"""Runs that spread less than this share of their mean are equal but for rounding."""
+_NO_AMOUNT = 1e-12
+"""Smaller amounts are what rounding leaves of zero."""
 HEADER = ("measure", "at", "robots", "value", "95 % interval", "noise floor", "relative", "runs", "better", "unit")
 
 
@@ -236,7 +240,9 @@ def spread(summary: Summary, *, is_share: bool = False) -> str:
     mean, half = factor * summary.mean, factor * (summary.upper - summary.mean)
     if not (math.isfinite(mean) and math.isfinite(half)):
         return number(mean) + (unit if math.isfinite(mean) else "")
-    decimals = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 2
+    if half <= max(ROUNDING * abs(mean), _NO_AMOUNT):
+        return f"{number(0.0 if abs(mean) <= _NO_AMOUNT else mean)} ± 0{unit}"
+    decimals = max(0, 1 - math.floor(math.log10(half)))
     mean = round(mean, decimals) + 0.0  # no "-0"
     return f"{mean:.{decimals}f} ± {half:.{decimals}f}{unit}"
 
