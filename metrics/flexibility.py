@@ -2,7 +2,7 @@
 
 from numpy.typing import ArrayLike
 
-from .curves import FloatArray, Variant, as_curves, as_waveforms
+from .curves import FloatArray, Variant, as_curves, as_waveforms, check_broadcast
 from .distance import curve_distance
 from .environment import ScalingModel, environment_scaling
 
@@ -39,12 +39,14 @@ def reactivity(
         R >= 0, shape (...,), in the unit of `perf`.
 
     Raises:
-        CurveError: Curves or signals are missing, negative (performance only), infinite or of different length, or the
-            model divides by zero.
+        CurveError: Curves or signals are missing, negative (performance only), infinite, of different length or for
+            different numbers of runs, or the model divides by zero.
         ValueError: Unknown option.
     """
     perf_ideal, perf = as_curves(perf_ideal=perf_ideal, perf=perf)
     v, i_ec = as_waveforms(perf.shape[-1], v=v, i_ec=i_ec)
+    shapes = f"perf_ideal {perf_ideal.shape}, perf {perf.shape}, v {v.shape}, i_ec {i_ec.shape}"
+    check_broadcast((perf_ideal, perf, v, i_ec), shapes)
     perfectly_reactive = environment_scaling(v, i_ec, model=model) * perf_ideal
     return curve_distance(perfectly_reactive, perf, variant, clock)
 

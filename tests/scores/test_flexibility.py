@@ -57,6 +57,11 @@ def test_one_waveform_serves_all_runs():
     assert reactivity(ideal, observed, THROTTLE, 0.0).tolist() == [0.5] * 5
 
 
+def test_waveforms_of_other_runs_are_refused():
+    with pytest.raises(CurveError, match=r"run axes that broadcast, got perf_ideal \(2, 4\), perf \(2, 4\), v \(3, 4\)"):
+        reactivity(np.ones((2, 4)), np.ones((2, 4)), np.ones((3, 4)), 0.0)
+
+
 def test_a_swarm_that_gains_from_noise_scores_as_badly_as_one_that_loses():
     assert noise_robustness(IDEAL, [1.5] * 4) == noise_robustness(IDEAL, [0.5] * 4) == 2.0
     assert mean_signed_difference(IDEAL, [1.5] * 4) == 0.5
