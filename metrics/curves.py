@@ -21,7 +21,7 @@ Variant: TypeAlias = Literal["paper", "corrected", "sierra"]
 Reduction: TypeAlias = Literal["sum", "mean", "last", "total"]
 """How intervals become one number: sum, mean or last value of the measure, or the measure of the summed curves."""
 
-_FRACTION_TOLERANCE = 1e-9
+FRACTION_TOLERANCE = 1e-9
 """Averaging fractions over ticks may exceed 1 by rounding."""
 
 
@@ -77,7 +77,7 @@ def as_interference(**fractions: ArrayLike | None) -> tuple[FloatArray, ...]:
     """
     arrays = as_curves(signed=False, **fractions)
     for name, array in zip(fractions, arrays, strict=True):
-        if (array > 1.0 + _FRACTION_TOLERANCE).any():
+        if (array > 1.0 + FRACTION_TOLERANCE).any():
             raise CurveError(
                 f"Expected {name} as a fraction of the robots in [0, 1], got {np.nanmax(array)}; "
                 "divide numbers of robots by the swarm size with t_lost_fraction."
@@ -114,16 +114,25 @@ def check_broadcast(arrays: Iterable[FloatArray], shapes: str) -> None:
         raise CurveError(f"Expected run axes that broadcast, got {shapes}; pair runs one to one or average.") from error
 
 
+def check_whole(name: str, n_robots: int) -> int:
+    """Return a number of robots as int.
+
+    Raises:
+        CurveError: Not an integer.
+    """
+    try:
+        return index(n_robots)
+    except TypeError as error:
+        raise CurveError(f"Expected {name} as a whole number of robots, got {n_robots!r}.") from error
+
+
 def check_size(name: str, n_robots: int) -> int:
     """Return a swarm size as int.
 
     Raises:
         CurveError: Not a positive integer.
     """
-    try:
-        size = index(n_robots)
-    except TypeError as error:
-        raise CurveError(f"Expected {name} as a whole number of robots, got {n_robots!r}.") from error
+    size = check_whole(name, n_robots)
     if size < 1:
         raise CurveError(f"Expected {name} >= 1 robot, got {size}.")
     return size

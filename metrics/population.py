@@ -12,6 +12,7 @@ from .curves import (
     as_curves,
     check_option,
     check_size,
+    check_whole,
     last_interval_only,
     reduce_intervals,
 )
@@ -144,10 +145,10 @@ def availability(n: int, n_min: int, ratio_out: float) -> float:
         p_v in [0, 1]. Higher is better.
 
     Raises:
-        CurveError: n < 1.
+        CurveError: n < 1, or n_min is no whole number.
         PopulationError: A ratio that is negative or NaN.
     """
-    n = check_size("n", n)
+    n, n_min = check_size("n", n), check_whole("n_min", n_min)
     if not ratio_out >= 0.0:
         raise PopulationError(f"Expected ratio_out = lambda / mu >= 0, got {ratio_out}.")
     if n_min <= 0:
@@ -168,10 +169,10 @@ def ratio_for_availability(n: int, n_min: int, p_v: float) -> float:
         p_v: Wanted availability in [0, 1], strictly falling with q: 1 gives 0, 0 gives inf.
 
     Raises:
-        CurveError: n < 1.
+        CurveError: n < 1, or n_min is no whole number.
         PopulationError: n_min or p_v outside its range.
     """
-    n = check_size("n", n)
+    n, n_min = check_size("n", n), check_whole("n_min", n_min)
     if not 1 <= n_min <= n:
         raise PopulationError(
             f"Expected 1 <= n_min <= n = {n}, got {n_min}; elsewhere availability does not depend on q."

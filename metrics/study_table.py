@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from .curves import CurveError, FloatArray
+from .curves import FRACTION_TOLERANCE, CurveError, FloatArray
 from .queues import PopulationRates
 
 if TYPE_CHECKING:
@@ -25,8 +25,6 @@ Kind: TypeAlias = Literal["text", "whole", "number", "amount", "fraction"]
 SIZE, THROTTLE, NOISE, POPULATION, UNDISTURBED = "population_size", "throttle", "noise", "population_dynamics", "none"
 CRITERIA = (SIZE, THROTTLE, NOISE, POPULATION, UNDISTURBED)
 """What a study varies, in column `criterion`."""
-
-_FRACTION_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,7 +286,7 @@ def _checked_column(frame: "pl.DataFrame", name: str, where: str) -> "pl.Series"
     if column.kind in ("amount", "fraction"):
         _refuse(given, (values < 0).fill_null(False), name, where, "no negative number")
     if column.kind == "fraction":
-        _refuse(given, (values > 1 + _FRACTION_TOLERANCE).fill_null(False), name, where, "a fraction in [0, 1]")
+        _refuse(given, (values > 1 + FRACTION_TOLERANCE).fill_null(False), name, where, "a fraction in [0, 1]")
     return values
 
 

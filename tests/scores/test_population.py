@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from metrics import (
+    CurveError,
     PopulationError,
     PopulationRates,
     availability,
@@ -218,6 +219,14 @@ def test_availability_of_large_swarms():
 def test_ratios_are_not_negative(q):
     with pytest.raises(PopulationError, match="lambda / mu"):
         availability(5, 3, q)
+
+
+def test_robots_needed_are_a_whole_number():
+    for n_min in (4.5, math.nan):
+        with pytest.raises(CurveError, match="n_min as a whole number"):
+            availability(50, n_min, 1.2)
+        with pytest.raises(CurveError, match="n_min as a whole number"):
+            ratio_for_availability(50, n_min, 0.4)
 
 
 @pytest.mark.parametrize(("n", "n_min"), [(1, 1), (50, 5), (200, 200), (16_384, 10_000)])
