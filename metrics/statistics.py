@@ -86,7 +86,9 @@ def aggregate(
     if used.size > 1:
         if method == "bootstrap":
             picks = np.random.default_rng(seed).integers(used.size, size=(_N_RESAMPLES, used.size))
-            lower, upper = _percentile_bounds(used[picks].mean(axis=1), level)
+            with np.errstate(invalid="ignore"):  # infinities of both signs
+                means = used[picks].mean(axis=1)
+            lower, upper = _percentile_bounds(means, level)
         else:
             spread = 2.0 * std
             if method == "t":
@@ -214,8 +216,9 @@ def _mean_and_std(values: FloatArray) -> tuple[float, float]:
 
 
 def _percentile_bounds(values: FloatArray, level: float) -> tuple[float, float]:
-    with np.errstate(invalid="ignore"):
-        lower, upper = np.quantile(values, [0.5 - 0.5 * level, 0.5 + 0.5 * level])
+    # Infinities, for example of scalability, are bounds like others, but nothing lies between them.
+    method = "nearest" if np.isinf(values).any() else "linear"
+    lower, upper = np.quantile(values, [0.5 - 0.5 * level, 0.5 + 0.5 * level], method=method)
     return float(lower), float(upper)
 
 

@@ -89,6 +89,12 @@ def test_infinite_values_stay_visible():
     assert math.isnan(summary.std)
 
 
+def test_infinite_values_are_bounds_of_the_bootstrap():
+    summary = aggregate([1.0, 2.0, -math.inf], method="bootstrap", seed=1)
+    assert (summary.mean, summary.lower, summary.upper) == (-math.inf, -math.inf, 2.0)
+    assert math.isnan(aggregate([1.0, math.inf, -math.inf], method="bootstrap", seed=1).mean)
+
+
 @pytest.mark.parametrize("values", [[], [[1.0, 2.0]], 1.0])
 def test_aggregate_wants_one_value_per_run(values):
     with pytest.raises(CurveError, match="one value per run"):
