@@ -84,8 +84,11 @@ def test_reductions():
     gains = {"sum": 6.0, "mean": 2.0, "last": 4.0, "total": 6.0}
     for reduce, expected in gains.items():
         assert task_emergence(perf1, 1, perf2, 2, reduce=reduce) == pytest.approx(expected, abs=1e-12)
-        lost = [0.0] * 3
-        assert spatial_emergence(perf1, lost, 2, perf2, lost, 4, perf1, lost, reduce=reduce) == 0.0
+    calm, busy = [0.0] * 3, [0.1, 0.2, 0.5]  # losses of the larger swarm 0.3, 1, 5
+    losses = {"sum": -6.3, "mean": -2.1, "last": -5.0, "total": -6.3}
+    for reduce, expected in losses.items():
+        value = spatial_emergence(perf1, calm, 2, perf2, busy, 4, perf1, calm, reduce=reduce)
+        assert value == pytest.approx(expected, abs=1e-12)
 
 
 def test_relative_gain_does_not_depend_on_the_unit():
