@@ -111,7 +111,8 @@ NO_WINDOW = -(2**30)
 
 def new_robots(n_robots: int, more_fields: Sequence[tuple[str, type]] = ()) -> np.ndarray:
     """Return (n_robots,) records of `ROBOT_FIELDS` and `more_fields` that start to acquire and have seen nothing."""
-    fields = np.dtype([*ROBOT_FIELDS, *more_fields], align=True)
+    # Were the common fields the first ones, numba would take a longer record for a kind of the shorter one, and warn.
+    fields = np.dtype([*more_fields, *ROBOT_FIELDS], align=True)
     # np.record makes fields readable as attributes when kernels run uncompiled; compiled they always are.
     robots = np.zeros(n_robots, np.dtype((np.record, fields)))
     robots["explore_ticks"] = NOT_EXPLORING
@@ -250,7 +251,6 @@ def explore_for_object(
     """
     x, y = start_exploring(robot, senses, c, draws)
     if robot.explore_ticks >= c.exploration_lock_ticks and sees_object(row[c.ground : c.ground + 4]):
-        robot.explore_ticks = NOT_EXPLORING
         return True, 0.0, 0.0
     walk_x, walk_y = explore(robot, senses, c, draws)
     return False, x + walk_x, y + walk_y
