@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from .cache_memory import OneTaskMemory, cache_density, covers
+from .cache_memory import OneTaskMemory, covers
 from .compiling import Row, kernel
 from .machines import ACQUIRE, TRANSPORT, Senses
 from .memory import OneMemory, density
@@ -61,7 +61,7 @@ def select_cache(robot: np.record, senses: Senses, c: np.record, draws: Row, mem
             continue
         centre_x = (cache.cell_x + 0.5) * c.cell_m
         centre_y = (cache.cell_y + 0.5) * c.cell_m
-        pheromone = cache_density(robot, memory.caches, entry, c.log_keep)
+        pheromone = density(robot.clock - cache.seen, c.log_keep)
         utility = cache_utility(centre_x, centre_y, cache.count, senses.x, senses.y, pheromone, c)
         if utility > best:
             best = utility
@@ -144,7 +144,7 @@ def select_isolated_object(robot: np.record, senses: Senses, c: np.record, memor
             continue
         x = objects.cell_x[entry] * c.cell_m + half
         y = objects.cell_y[entry] * c.cell_m + half
-        pheromone = density(robot, objects, entry, c.log_keep)
+        pheromone = density(robot.clock - objects.seen[entry], c.log_keep)
         utility = isolated_object_utility(x, y, senses.x, senses.y, pheromone, c)
         if utility > best:
             best = utility

@@ -11,7 +11,6 @@ The rule, for one robot and tick, W being its 5 x 5 window of cells:
 Source: cache memory of the paper's task-allocating controllers.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -79,12 +78,6 @@ def task_memory_of(memory: TaskMemory, robot_index: int) -> OneTaskMemory:
     return OneTaskMemory(
         memory_of(memory.objects, robot_index), memory.caches[robot_index], memory.shunned[robot_index]
     )
-
-
-@kernel
-def cache_density(robot: np.record, caches: Row, entry: int, log_keep: float) -> float:
-    """Pheromone density of a remembered cache, as `memory.density`."""
-    return math.exp(log_keep * (robot.clock - caches[entry].seen + 1))
 
 
 @kernel

@@ -137,4 +137,4 @@ class DPOPolicy:
 
     def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
         """Return what one robot remembers: object row -> (cell x, cell y, pheromone density)."""
-        return remembered_objects(self._memory, self._robots, robot_index, self.parameters.evaporation_per_tick)
+        return remembered_objects(self._memory, self._robots, robot_index, self._constants[0].log_keep)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarm_forage_env.layout import WINDOW_CELLS
-from swarm_forage_env.types import FloatArray, IntArray, ObsArray
+from swarm_forage_env.types import IntArray, ObsArray
 
 from .compiling import Row, kernel
 
@@ -157,24 +157,15 @@ def _forget_what_is_gone(robot: np.record, c: np.record, memory: OneMemory) -> N
 
 
 @kernel
-def density(robot: np.record, memory: OneMemory, entry: int, log_keep: float) -> float:
-    """Pheromone density of a list entry: (1 - rho)^(ticks since last sight + 1), log_keep = log(1 - rho)."""
-    return math.exp(log_keep * (robot.clock - memory.seen[entry] + 1))
-
-
-def densities(ages_ticks: IntArray, evaporation_per_tick: float) -> FloatArray:
-    """Pheromone densities after `ages_ticks` ticks without sight, for inspection."""
-    return np.exp(math.log1p(-evaporation_per_tick) * (ages_ticks + 1.0))
+def density(age_ticks: int, log_keep: float) -> float:
+    """Pheromone density of what was last seen `age_ticks` ago: (1 - rho)^(age + 1), log_keep = log(1 - rho)."""
+    return math.exp(log_keep * (age_ticks + 1))
 
 
 def remembered_objects(
-    memory: ObjectMemory, robots: np.ndarray, robot_index: int, evaporation_per_tick: float
+    memory: ObjectMemory, robots: np.ndarray, robot_index: int, log_keep: float
 ) -> dict[int, tuple[int, int, float]]:
     """Return what one robot remembers, for inspection: object row -> (cell x, cell y, pheromone density)."""
     robot = robots[robot_index]
-    rows, cells_x, cells_y, seen = (part[robot_index, : robot["n_known"]] for part in memory[:4])
-    density = densities(robot["clock"] - seen, evaporation_per_tick)
-    return {
-        int(row): (int(x), int(y), float(value))
-        for row, x, y, value in zip(rows, cells_x, cells_y, density, strict=True)
-    }
+    lists = (part[robot_index, : robot["n_known"]].tolist() for part in memory[:4])
+    return {row: (x, y, density(int(robot["clock"]) - seen, log_keep)) for row, x, y, seen in zip(*lists, strict=True)}

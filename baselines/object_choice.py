@@ -87,7 +87,7 @@ def select_best_object(
         dy = anchor_y + half - senses.y
         if dx * dx + dy * dy <= nearest or is_left_out(robot, whole_memory, memory.row[entry]):
             continue
-        pheromone = density(robot, memory, entry, c.log_keep)
+        pheromone = density(robot.clock - memory.seen[entry], c.log_keep)
         utility = object_utility(anchor_x, anchor_y, senses.x, senses.y, pheromone, c)
         if utility > best:
             best = utility

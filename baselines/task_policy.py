@@ -9,7 +9,7 @@ from swarm_forage_env.policy import SwarmTask
 from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 from .cache_memory import new_task_memory
-from .memory import densities, remembered_objects
+from .memory import density, remembered_objects
 from .parameters import kernel_constants, require_observations, with_overrides
 from .stoch_n1 import new_allocation
 from .task_machines import new_task_robots, step_tasks
@@ -150,14 +150,14 @@ class TaskPolicy:
 
     def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
         """Return the objects that one robot remembers: object row -> (cell x, cell y, pheromone density)."""
-        return remembered_objects(self._memory.objects, self._robots, robot_index, self.parameters.evaporation_per_tick)
+        return remembered_objects(self._memory.objects, self._robots, robot_index, self._constants[0].log_keep)
 
     def remembered_caches(self, robot_index: int) -> dict[int, tuple[int, int, int, float]]:
         """Return the caches that one robot remembers: serial -> (centre cell x, y, objects, pheromone density)."""
         robot = self._robots[robot_index]
         caches = self._memory.caches[robot_index, : robot["n_caches"]]
-        density = densities(robot["clock"] - caches["seen"], self.parameters.evaporation_per_tick)
+        log_keep = self._constants[0].log_keep
         return {
-            int(cache["serial"]): (int(cache["cell_x"]), int(cache["cell_y"]), int(cache["count"]), float(value))
-            for cache, value in zip(caches, density, strict=True)
+            serial: (x, y, count, density(int(robot["clock"]) - seen, log_keep))
+            for x, y, serial, count, seen, *_ in caches.tolist()
         }

@@ -152,6 +152,17 @@ def test_objects_near_each_other_are_no_candidates():
     assert robot.record.goal_tolerance_m == 0.8
 
 
+def test_older_memories_of_isolated_objects_count_less():
+    robot = robot_at(18.1, 12.0)
+    robot.know_object(3, (100, 70))  # utility 0.052
+    robot.know_object(4, (60, 70))  # 0.040
+    assert isolated(robot)
+    assert robot.goal == pytest.approx((20.1, 14.1))
+    robot.memory.objects.seen[0] = robot.record.clock - 50_000
+    assert isolated(robot)
+    assert robot.goal == pytest.approx((12.1, 14.1)), "0.052 has decayed by exp(0.6065 - 1) to 0.035"
+
+
 def test_several_objects_are_compared_with_all_others():
     robot = robot_at(10.1, 8.1)
     for row, cell in enumerate([(80, 40), (130, 40), (131, 41), (30, 70), (82, 40)]):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from baselines.dpo import DPOPolicy
-from baselines.machines import Activity, VectorState
+from baselines.machines import Activity, VectorState, restart_acquiring
+from baselines.memory import OneMemory, remember
 from baselines.object_choice import MemoryParameters, object_utility
 from baselines.parameters import kernel_constants
 from swarm_forage_env.policy import Event, Grip
@@ -90,6 +91,29 @@ def test_goes_to_the_object_of_highest_utility(robot):
     robot.seen.window({(-2, 0): 3, (2, 0): 7, (2, 2): 8})
     robot.act()
     assert robot.record.target == 7  # nearest corner, seen from the robot, for its distance from the nest
+
+
+def test_older_memories_count_less(robot):
+    robot.seen.window({(-2, 0): 3, (2, 0): 7})
+    robot.act()
+    assert robot.record.target == 7
+    robot.policy._memory.seen[0, robot.policy._memory.entry[0, 7] - 1] -= 50_000
+    robot.seen.window({})
+    robot.seen.pose(20.1, 10.1)
+    robot.keep(10.05, 10.1)  # between the two, as it believes, but without seeing them
+    restart_acquiring(robot.record)
+    robot.act()
+    assert robot.record.target == 3
+
+
+def test_the_object_known_first_wins_a_tie(robot):
+    memory = OneMemory(*(part[0] for part in robot.policy._memory))
+    robot.seen.pose(24.1, 14.1)
+    robot.keep(24.0, 8.0)
+    for row, cell_y in ((8, 60), (7, 20)):  # 4 m above and below the line through robot and nest
+        remember(robot.record, memory, row, 100, cell_y)
+    robot.act()
+    assert robot.record.target == 8
 
 
 def test_an_object_within_20_cm_is_not_chosen(robot):

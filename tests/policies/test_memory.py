@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from baselines.dpo import DPOPolicy
-from baselines.memory import densities
+from baselines.memory import density
 from tests.policies.observations import Observations, make_task
 from tests.reference.controllers import ObjectDictionary, visible_objects
 
@@ -25,8 +25,9 @@ def look(policy: DPOPolicy, observations: Observations, x: float, y: float, obje
 
 
 def test_density_of_an_object_seen_now_and_long_ago():
-    assert densities(np.array([0]), 0.00001)[0] == pytest.approx(1.0 - 0.00001)
-    assert densities(np.array([49_999]), 0.00001)[0] == pytest.approx(0.6065, abs=1e-4)
+    log_keep = DPOPolicy().parameters.derived()["log_keep"]
+    assert density(0, log_keep) == pytest.approx(1.0 - 0.00001, abs=1e-12)
+    assert density(49_999, log_keep) == pytest.approx(0.6065, abs=1e-4)
 
 
 def test_objects_are_remembered_with_cell_and_decaying_density():
