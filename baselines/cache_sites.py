@@ -6,9 +6,9 @@ The authors' program maximises a utility that grows without bound towards the mi
 
 under the constraints that s keeps the proximity distance from the nest's centre and from every remembered cache, and
 lies in a box. Its stochastic optimiser thus ends up near the allowed point nearest to m, which is computed here: our
-choice, exact and without iterations. That point is m itself; or m pushed out of one disc or into the box; or a crossing
-of two borders. A random offset, far below the distance at which robots count as arrived, stands for the optimiser's
-scatter.
+choice, exact and without iterations. That point is m itself; or m pushed out of one disc or into the box; or where the
+border of a disc crosses another one or the box. A random offset, far below the distance at which robots count as
+arrived, stands for the optimiser's scatter.
 """
 
 import math
@@ -164,11 +164,7 @@ def nearest_allowed(
         best = _edge_crossings(best, robot, k, middle_x, middle_y, c, memory)
         for other in range(k):
             best = _disc_crossings(best, robot, k, other, middle_x, middle_y, c, memory)
-    for corner in range(4):
-        x = c.site_x_low_m if corner % 2 else c.site_x_high_m
-        y = c.site_y_low_m if corner // 2 else c.site_y_high_m
-        best = _better(best, robot, x, y, middle_x, middle_y, c, memory)
-    return best
+    return best  # a corner of the box is nearest only to a midpoint that was put into the box there
 
 
 @kernel
