@@ -408,6 +408,17 @@ def test_caches_of_a_transfer_are_left_alone_by_the_next_transfer_only(robot, ne
     assert marks == {7: (False, shunned), 8: (shunned, False)}
 
 
+def test_a_transfer_that_moved_nothing_ends_the_shielding_of_caches(robot):
+    wait_for_drop(robot, Task.TRANSFERER)
+    robot.policy._constants["partition_gamma"] = 1e9
+    robot.policy._constants["tab_gamma"] = 0.0
+    drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, (120, 40), 6))
+    assert any(cache.no_drop for cache in robot.memory.caches[:2])
+    give_up(robot)
+    assert robot.task is Task.TRANSFERER
+    assert not any(cache.no_pickup or cache.no_drop for cache in robot.memory.caches[:2])
+
+
 # The policies
 
 

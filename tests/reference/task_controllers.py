@@ -269,7 +269,7 @@ class ReferenceTaskRobot(ReferenceRobot):
 
     @property
     def kind(self) -> str:
-        """What is being acquired."""
+        """What is being acquired, or was and is waited for."""
         return JOBS[self.job][self.state == "transport"]
 
     def approach(self) -> tuple[bool, complex]:
@@ -340,15 +340,12 @@ class ReferenceTaskRobot(ReferenceRobot):
         return True
 
     def valid(self) -> bool:
-        if self.kind_when_waiting() == "object":
+        if self.kind == "object":
             return self.target in self.memory.known
-        if self.kind_when_waiting() == "cache":
+        if self.kind == "cache":
             holding = [cache for cell, cache in self.caches.items() if self.covered(cell, self.goal)]
             return bool(holding) and (self.state == "transport" or holding[0].count >= self.smallest_cache)
         return True
-
-    def kind_when_waiting(self) -> str:
-        return JOBS[self.job][self.state == "transport"]
 
     def reached(self) -> bool:
         if self.kind == "object":
