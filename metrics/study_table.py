@@ -254,9 +254,8 @@ def _checked_frame(frame: "pl.DataFrame", where: str, controller: str) -> "pl.Da
         )
     if frame.is_empty():
         raise CurveError(f"Expected curves in {where}, got column names without a row.")
-    if "criterion" in frame.columns and "criterion_value" not in frame.columns:
-        raise CurveError(f"Expected the column criterion_value beside criterion in {where}.")
     frame = frame.select(_checked_column(frame, name, where) for name in CURVE_COLUMNS if name in frame.columns)
+    has_values = "criterion_value" in frame.columns
     defaults = {"controller": controller, "criterion": SIZE, "criterion_value": 0.0}
     frame = frame.with_columns(
         pl.lit(value).alias(name) for name, value in defaults.items() if name not in frame.columns
@@ -264,7 +263,12 @@ def _checked_frame(frame: "pl.DataFrame", where: str, controller: str) -> "pl.Da
     for name in frame["criterion"].unique().sort().to_list():
         if name not in CRITERIA:
             raise CurveError(f"Expected criterion in {where} to be one of {', '.join(CRITERIA)}, got {name!r}.")
-    return frame
+    is_level = frame["criterion"] != SIZE
+    if is_level.any() and not has_values:
+        raise CurveError(f"Expected the column criterion_value beside criterion in {where}.")
+    values = frame["criterion_value"]
+    _refuse(values, values.is_null() & is_level, "criterion_value", where, "a number")
+    return frame.with_columns(values.fill_null(0.0))
 
 
 def _checked_column(frame: "pl.DataFrame", name: str, where: str) -> "pl.Series":
@@ -276,8 +280,7 @@ def _checked_column(frame: "pl.DataFrame", name: str, where: str) -> "pl.Series"
         _refuse(values, values.is_null(), name, where, "a text")
         return values
     values = given.cast(pl.Float64, strict=False)
-    is_optional = not column.is_required and name != "criterion_value"
-    unread = values.is_null() & (given.is_not_null() if is_optional else pl.repeat(True, len(given), eager=True))
+    unread = values.is_null() & (pl.repeat(True, len(given), eager=True) if column.is_required else given.is_not_null())
     _refuse(given, unread | values.is_nan().fill_null(False), name, where, "a number")
     _refuse(given, values.is_infinite().fill_null(False), name, where, "a finite number")
     if column.kind == "whole":

@@ -104,6 +104,17 @@ def test_population_measures_need_rates_and_a_clock(tmp_path):
     assert 0.98 < scored.scores[0].beside["weight"] < 1.0
 
 
+def test_swarm_sizes_need_no_criterion_value(tmp_path):
+    sizes = CROWDING.drop("criterion_value", strict=False).with_columns(criterion=pl.lit("population_size"))
+    expected = score_curves(written(CROWDING, tmp_path / "curves.csv"))[0].to_frame()
+    assert score_curves(written(sizes, tmp_path / "curves.csv"))[0].to_frame().equals(expected)
+    empty = sizes.with_columns(criterion_value=pl.lit(None, pl.Float64))
+    assert score_curves(written(empty, tmp_path / "curves.csv"))[0].to_frame().equals(expected)
+    undisturbed = empty.with_columns(criterion=pl.lit("none"))
+    with pytest.raises(CurveError, match=r"Expected a number in column criterion_value .*, got nothing in row 1"):
+        score_curves(written(undisturbed, tmp_path / "curves.csv"))
+
+
 def test_a_file_may_hold_several_policies(tmp_path):
     frame = pl.concat([CROWDING.with_columns(controller=pl.lit(name)) for name in ("mine", "theirs")])
     assert [scored.policy for scored in score_curves(written(frame, tmp_path / "both.csv"))] == ["mine", "theirs"]
