@@ -58,7 +58,7 @@ def test_one_waveform_serves_all_runs():
 
 
 def test_waveforms_of_other_runs_are_refused():
-    with pytest.raises(CurveError, match=r"run axes that broadcast, got perf_ideal \(2, 4\), perf \(2, 4\), v \(3, 4\)"):
+    with pytest.raises(CurveError, match=r"axes that broadcast, got perf_ideal \(2, 4\), perf \(2, 4\), v \(3, 4\)"):
         reactivity(np.ones((2, 4)), np.ones((2, 4)), np.ones((3, 4)), 0.0)
 
 
