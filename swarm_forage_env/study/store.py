@@ -18,6 +18,7 @@ from swarm_forage_env.study.spec import RunSpec
 
 FAILURES = "failures"
 """Name of the sub-folder for failed runs."""
+_WAY_OUT = "Move the file away, and its run will be made again."
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -70,9 +71,14 @@ class RunStore:
             RecordError: the file is missing, damaged, foreign, or holds another run than its name says.
         """
         path = self.path(run_id)
-        record = RunRecord.read(path)
+        try:
+            record = RunRecord.read(path)
+        except RecordError as error:
+            raise RecordError(f"{error} {_WAY_OUT}" if path.exists() else str(error)) from error
         if record.run_id != run_id:
-            raise RecordError(f"Expected {path} to hold run {run_id}, got run {record.run_id}; was the file renamed?")
+            raise RecordError(
+                f"Expected {path} to hold run {run_id}, got run {record.run_id}; was the file renamed? {_WAY_OUT}"
+            )
         return record
 
     def write(self, record: RunRecord) -> None:

@@ -65,9 +65,14 @@ def test_a_bad_file_is_named_and_nothing_is_lost(store, records, damage):
     else:
         bad.write_bytes(sound if damage == "renamed" else sound[:-100])
     before = sorted(store.folder.iterdir())
-    with pytest.raises(RecordError, match=r"bad\.parquet"):
+    with pytest.raises(RecordError, match=r"bad\.parquet.* Move the file away"):
         load(store.folder)
     assert sorted(store.folder.iterdir()) == before
+
+
+def test_a_missing_record_is_not_to_be_moved_away(store):
+    with pytest.raises(RecordError, match=r"absent\.parquet: No such file or directory\.$"):
+        store.read("absent")
 
 
 def test_a_failure_is_kept_until_the_run_succeeds(store, records):
