@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+import metrics.plots
+import swarm_forage_env.plots
 from metrics import waveform
 from metrics.score_rows import MEASURE_CRITERIA
 from metrics.study_table import CRITERIA, CURVE_COLUMNS, UNDISTURBED, study_curves
@@ -39,6 +41,10 @@ def test_criteria_have_the_same_names():
     assert {*experiments.CRITERIA, experiments.UNDISTURBED} == set(CRITERIA)
     assert experiments.UNDISTURBED == UNDISTURBED
     assert set(MEASURE_CRITERIA.values()) <= set(experiments.CRITERIA)
+
+
+def test_pictures_have_the_same_colours():
+    assert metrics.plots.COLOURS == swarm_forage_env.plots.COLOURS
 
 
 @pytest.fixture(scope="module")
