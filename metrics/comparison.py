@@ -10,7 +10,18 @@ import numpy as np
 from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
 from .curves import CurveError, FloatArray
-from .score_table import ROUNDING, Score, ScoreTable, aligned, forecast_lines, paragraph, percent, plain, spread
+from .score_table import (
+    ROUNDING,
+    Score,
+    ScoreTable,
+    aligned,
+    forecast_lines,
+    paragraph,
+    percent,
+    plain,
+    spread,
+    title,
+)
 from .statistics import Summary, aggregate
 
 FAMILY_ERROR = 0.05
@@ -157,7 +168,7 @@ class Comparison:
         return (*shared, *own)
 
     def __str__(self) -> str:
-        lines = [*aligned(self.value_rows()), VALUES]
+        lines = [title(self.tables), *aligned(self.value_rows()), VALUES]
         for start in range(0, len(self.pairs), PAIRS_PER_TABLE):
             lines += ["", *aligned(self.difference_rows(self.pairs[start : start + PAIRS_PER_TABLE]))]
         return "\n".join([*lines, TEST, *forecast_lines(self.tables), *paragraph(self.notes())])

@@ -71,6 +71,7 @@ class Score:
         """Return the row as texts under `HEADER`."""
         summary = self.summary
         runs = str(summary.n_used) + (f" of {summary.n_used + summary.n_nan + self.n_lost}" if self.is_partial else "")
+        enters = bool(self.per_seed) or self.is_partial  # no run enters what follows from rates alone
         return (
             self.measure,
             self.at,
@@ -79,7 +80,7 @@ class Score:
             interval(summary),
             "" if self.noise_floor is None else number(self.noise_floor),
             "" if self.relative is None else percent(self.relative.mean),
-            runs,
+            runs if enters else "-",
             "higher" if self.higher_is_better else "lower",
             self.unit,
         )
@@ -148,9 +149,20 @@ class ScoreTable:
 
     def notes(self) -> tuple[str, ...]:
         """Return everything that must not be overlooked: rows with a note, missing measures, failed runs."""
-        rows = [f"{score.measure}, {score.at}: {score.note}" for score in self.scores if score.note]
+        rows = [f"{places}: {note}" for note, places in self._places_of_notes().items()]
         absent = [f"{measure} is not computed: {reason}" for measure, reason in self.missing.items()]
         return (*rows, *absent, *(f"failed: {failure}" for failure in self.failures))
+
+    def _places_of_notes(self) -> dict[str, str]:
+        """Note -> the rows it stands at, in words, so that what holds for many rows is told once."""
+        levels: dict[str, dict[str, list[str]]] = {}
+        for score in self.scores:
+            if score.note:
+                levels.setdefault(score.note, {}).setdefault(score.measure, []).append(score.at)
+        return {
+            note: "; ".join(f"{measure}, {', '.join(places)}" for measure, places in rows.items())
+            for note, rows in levels.items()
+        }
 
     def to_frame(self) -> "pl.DataFrame":
         """Return the rows as a table; what a row holds more than a table can is left to `to_mapping`."""
@@ -180,9 +192,20 @@ class ScoreTable:
         }
 
     def __str__(self) -> str:
-        where = f" in {self.scenario}" if self.scenario else ""
         rows = aligned([HEADER, *(score.cells() for score in self.scores)])
-        return "\n".join([f"{self.policy}{where}", *rows, *forecast_lines([self]), *paragraph(self.notes())])
+        return "\n".join([title([self]), *rows, *forecast_lines([self]), *paragraph(self.notes())])
+
+
+def title(tables: Sequence[ScoreTable]) -> str:
+    """Return who was scored, where, and how much was run: "crw in warehouse_small, budget quick, 4 seeds, 4,000 s"."""
+    words = ", ".join(table.policy for table in tables)
+    scenario, settings = tables[0].scenario, tables[0].settings
+    if scenario:
+        words += f" in {scenario}"
+    if "budget" in settings:
+        seeds = counted(len(settings["seeds"]), "seed")
+        words += f", budget {settings['budget']}, {seeds}, {settings['horizon_s']:,g} s"
+    return words
 
 
 def forecast_lines(tables: Sequence[ScoreTable]) -> list[str]:
@@ -206,6 +229,11 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return rows of texts as lines with columns under each other."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def counted(count: int, noun: str) -> str:
+    """Return a number with its noun, "1 run" or "2,000 runs"."""
+    return f"{count:,} {noun}" + ("" if count == 1 else "s")
 
 
 def number(value: float) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from metrics.score_table import counted
 from metrics.statistics import aggregate
 from swarm_forage_env.plots import Curve, draw_curves
 from swarm_forage_env.recording import RunRecord
@@ -33,7 +34,7 @@ class Estimate:
 
     def __str__(self) -> str:
         half = self.high - self.mean
-        return f"{self.mean:.2f} ± " + ("n/a" if math.isnan(half) else f"{half:.2f}")
+        return f"{self.mean:.2f}" + ("" if math.isnan(half) else f" ± {half:.2f}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +78,11 @@ def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummar
     first = specs[0].scenario
     world = f"{first.name}: {first.robots.n_robots} robots, {first.objects.n_objects} objects, {first.horizon_s:g} s"
     disturbed = ", ".join(config.name for config in specs[0].wrappers)
+    is_spread_known = any(row.n_runs > 1 for row in summaries)
+    interval = f"± {LEVEL:.0%} t interval over seeds" if is_spread_known else "one seed, so no interval"
     table = Table(
         title=f"{world}, with {disturbed}" if disturbed else world,
-        caption=f"± {LEVEL:.0%} t interval over seeds; interference: share of active robot time",
+        caption=f"{interval}; interference: share of active robot time",
     )
     picks = first.performance == "first_picked"
     for name in ("controller", "caches"):
@@ -96,7 +99,7 @@ def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummar
 
 def plan_table(specs: Sequence[RunSpec], store: RunStore) -> Table:
     """Return the table of planned runs."""
-    table = Table(title=f"{len(specs)} planned runs, records go to {store.folder}")
+    table = Table(title=f"{counted(len(specs), 'planned run')}, records go to {store.folder}")
     for name in ("run", "controller", "caches", "robots", "seed", "seconds", "state"):
         table.add_column(name)
     for spec in specs:
@@ -168,9 +171,17 @@ def draw_performance(specs: Sequence[RunSpec], records: Sequence[RunRecord], pat
 def plan_note(specs: Sequence[RunSpec], seconds: float, jobs: int) -> str:
     """Return the estimate in words."""
     simulated = sum(spec.scenario.horizon_s for spec in specs)
+    left = f"{counted(len(specs), 'run')} to do, {simulated:,.0f} simulated seconds"
+    return left + estimate(seconds, jobs, any_left=bool(specs))
+
+
+def estimate(seconds: float, jobs: int, *, any_left: bool) -> str:
+    """Return how long planned runs will take, as the end of a sentence."""
+    if not any_left:
+        return "."
     return (
-        f"{len(specs)} runs to do, {simulated:,.0f} simulated seconds: roughly {duration(seconds)} on {jobs} "
-        f"process{'es' if jobs > 1 else ''}, if each does half a million robot-ticks per second."
+        f": roughly {duration(seconds)} on {jobs} process{'es' if jobs > 1 else ''}, "
+        "if each does half a million robot-ticks per second."
     )
 
 

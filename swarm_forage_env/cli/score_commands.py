@@ -25,12 +25,16 @@ from swarm_forage_env.cli.options import (
     complain,
 )
 
+_OF_CURVES = ("curves", "measures", "as_json")
+"""Options of `score` that go with --curves."""
+
 if TYPE_CHECKING:
     from metrics.score_table import ScoreTable
     from metrics.scoring import ScoringPlan
 
 
 def score(
+    context: typer.Context,
     policy: Annotated[str | None, typer.Option(help="Name of a controller, or file of a trained policy.")] = None,
     curves: Annotated[
         Path | None, typer.Option(help="Score curves from elsewhere instead: a CSV or Parquet file (docs/scoring.md).")
@@ -61,6 +65,7 @@ def score(
     if (policy is None) == (curves is None):
         raise typer.BadParameter("Expected either --policy or --curves.")
     if curves is not None:
+        _refuse_options_of_runs(context)
         _show_scores(tables_of_file(curves, measures), None, as_json=as_json)
         return
     world = WorldOptions(
@@ -69,6 +74,21 @@ def score(
     options = ScoreOptions(policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon)
     folder = out or default_folder(scenario)
     _score(build_plan(world, options), folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run)
+
+
+def _refuse_options_of_runs(context: typer.Context) -> None:
+    """Refuse what curves that exist already would silently ignore."""
+    sources = {option: context.get_parameter_source(str(option.name)) for option in context.command.params}
+    given = [
+        option.opts[0]
+        for option, source in sources.items()
+        if source is not None and source.name == "COMMANDLINE" and option.name not in _OF_CURVES
+    ]
+    if given:
+        raise typer.BadParameter(
+            f"Expected --curves with no other options than --measures and --json, got {', '.join(given)}, which are "
+            "about runs."
+        )
 
 
 def compare(
@@ -110,7 +130,6 @@ def _score(plan: "ScoringPlan", folder: Path, picture: str, jobs: int | None, *,
         show = plan_json if as_json else plan_text
         typer.echo(show(plan, RunStore(folder), jobs or available_cores()))
         return
-    folder.mkdir(parents=True, exist_ok=True)
     try:
         tables = run_scores(plan, out=folder, jobs=jobs, progress=True)
     except StudyInterrupted as interrupt:

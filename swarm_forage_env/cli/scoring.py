@@ -8,11 +8,11 @@ from pathlib import Path
 
 from metrics.comparison import Comparison, compare_tables
 from metrics.plots import draw_scores
-from metrics.score_table import ScoreTable, aligned
+from metrics.score_table import ScoreTable, aligned, counted
 from metrics.scoring import ScoringPlan, plan_scores, score_curves
 from swarm_forage_env.cli.plan import WorldOptions, build_scenario, estimated_seconds, split_names
+from swarm_forage_env.cli.report import estimate
 from swarm_forage_env.config import ConfigError
-from swarm_forage_env.study.progress import duration
 from swarm_forage_env.study.store import RunStore
 
 _OF_THE_BUDGET = ("horizon_s", "interval_s")
@@ -94,10 +94,9 @@ def plan_text(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
     return "\n".join(
         [
             f"{', '.join(contestant.label for contestant in plan.contestants)} in {plan.scenario.name}, budget "
-            f"{plan.budget_name}, {len(plan.seeds)} seeds, records go to {store.folder}",
+            f"{plan.budget_name}, {counted(len(plan.seeds), 'seed')}, records go to {store.folder}",
             *aligned(rows),
-            f"{len(plan.specs)} runs, {len(todo)} to do: roughly {duration(seconds)} on {jobs} "
-            f"process{'es' if jobs > 1 else ''}, if each does half a million robot-ticks per second.",
+            f"{counted(len(plan.specs), 'run')}, {len(todo):,} to do" + estimate(seconds, jobs, any_left=bool(todo)),
         ]
     )
 

@@ -42,7 +42,8 @@ def command(tmp_path, monkeypatch, capsys):
 def test_score_shows_every_measure_keeps_records_and_draws_a_picture(command):
     code, out, err = command(*SCORE)
     assert code == 0
-    for word in ("random in warehouse_small", "95 % interval", "noise floor", "reactivity", "objects in 4 s", "higher"):
+    assert out.splitlines()[0] == "random in warehouse_small, budget tiny, 2 seeds, 4 s"
+    for word in ("95 % interval", "noise floor", "reactivity", "objects in 4 s", "higher"):
         assert word in out
     assert "Population: what the queueing model predicts" in out
     folder = Path("results/warehouse_small")
@@ -54,7 +55,8 @@ def test_score_shows_every_measure_keeps_records_and_draws_a_picture(command):
 def test_compare_shows_values_differences_and_the_test(command):
     code, out, _ = command(*COMPARE, *FEW, "--out", "here")
     assert code == 0
-    assert out.splitlines()[0].split() == ["measure", "at", "better", "random", "crw"]
+    assert out.splitlines()[0] == "random, crw in warehouse_small, budget tiny, 2 seeds, 4 s"
+    assert out.splitlines()[1].split() == ["measure", "at", "better", "random", "crw"]
     for word in ("random - crw", "paired t test", "Holm", "adaptability, relative", "throttle 0.4"):
         assert word in out
     assert Path("here/comparison.png").is_file()
@@ -98,6 +100,16 @@ def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
     assert sum(run["stored"] for run in answer["runs"]) == 8
 
 
+def test_a_plan_counts_in_words(command):
+    one = (*SCORE, "--measures", "availability", "--seeds", "1")
+    _, out, _ = command(*one, "--dry-run")
+    assert "budget tiny, 1 seed, records go to" in out
+    assert "2 runs, 2 to do: roughly 1 s on 1 process, if each does" in out
+    command(*one)
+    _, out, _ = command(*one, "--dry-run")
+    assert out.splitlines()[-1] == "2 runs, 0 to do."
+
+
 def test_seeds_length_and_world_can_be_chosen(command):
     command(*SCORE, *FEW, "--seeds", "1", "--horizon", "2", "--set", "walk_probability=0.1", "--caches", "static")
     records = load("results/warehouse_small")
@@ -110,6 +122,8 @@ def test_seeds_length_and_world_can_be_chosen(command):
     [
         (("score",), "Expected either --policy or --curves"),
         (("score", "--policy", "crw", "--curves", "x.csv"), "Expected either --policy or --curves"),
+        (("score", "--curves", "x.csv", "--seeds", "3", "--dry-run"), "got --seeds, --dry-run, which are about runs"),
+        (("score", "--policy", "crw", "--out", "curves.csv"), "Expected a folder for run records, got the file"),
         (("score", "--policy", "crww"), "Unknown policy 'crww'. Did you mean 'crw'?"),
         (("score", "--policy", "gone.zip"), "Cannot read the policy file"),
         (("score", "--policy", "bad.npz"), "Expected"),

@@ -109,6 +109,17 @@ def test_doing_nothing_is_noted_and_not_praised():
     assert "says nothing in 2 of 2 runs" in score.note
 
 
+def test_a_note_of_many_rows_is_told_once():
+    idle = [[0.0] * 4] * 2
+    sizes = [rows(n, idle, criterion="population_size", criterion_value=n, t_end_s=CLOCK) for n in (2, 4, 9)]
+    found = scored(*throttled(idle, idle), *sizes)
+    notes = ScoreTable(policy="mine", scenario="", scores=found).notes()
+    assert [note.split(": ", 1)[0] for note in notes] == [
+        "task_emergence, N = 2 to 4, N = 4 to 9; reactivity, throttle 0.3; adaptability, throttle 0.3",
+        "scalability, N = 2 to 4, N = 4 to 9",
+    ]
+
+
 def test_undefined_and_infinite_scalability_is_noted():
     found = scored(rows(2, [[0.0], [1.0], [2.0]]), rows(4, [[0.0], [0.0], [3.0]]), measures=["scalability"])
     assert "undefined in 1 of 3 runs" in found[0].note
@@ -136,6 +147,13 @@ def test_population_measures_use_the_rates_of_the_level():
     assert found[0].beside["weight"] == pytest.approx(metrics.population_weight(rates, horizon=400.0, n=9))
     assert found[1].summary.mean == pytest.approx(metrics.availability(9, 1, 0.02 / 0.021), abs=1e-5)
     assert "the same for every policy" in found[1].note
+
+
+def test_what_follows_from_rates_alone_has_no_number_of_runs():
+    reference = rows(9, IDEAL, criterion="none", criterion_value=0.0)
+    level = rows(9, IDEAL, criterion="population_dynamics", criterion_value=1.0, deaths_per_s=0.1)
+    (score,) = scored(reference, level, measures=["availability"])
+    assert dict(zip(HEADER, score.cells(), strict=True))["runs"] == "-"
 
 
 def test_availability_is_told_once_per_ratio_of_rates():
