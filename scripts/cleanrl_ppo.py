@@ -104,9 +104,10 @@ def rollout(envs, agent: Agent, obs: np.ndarray, active: np.ndarray, args: argpa
     next_value, last = agent.value(torch.from_numpy(obs)), torch.zeros(envs.num_envs)
     for step in reversed(range(args.num_steps)):
         target = rewards[step] + args.gamma * next_value * (1 - dones[step])
-        # Away from work, a state is worth what follows from it; the network is not asked.
+        # Away from work, a state is worth what follows from it; the network is not asked, and lambda does not count.
         values[step] = torch.where(at_work[step], values[step], target)
-        last = target - values[step] + args.gamma * args.gae_lambda * (1 - dones[step]) * last
+        decay = args.gamma * torch.where(at_work[step], args.gae_lambda, 1.0)
+        last = target - values[step] + decay * (1 - dones[step]) * last
         advantages[step], next_value = last, values[step]
     batch = {
         "obs": seen,

@@ -158,3 +158,25 @@ def test_dqn_learns_from_it():
     before = model.q_net.q_net[0].weight.detach().clone()
     model.learn(90)
     assert not torch.equal(before, model.q_net.q_net[0].weight)
+
+
+def test_a_wait_is_one_transition_for_lambda_too():
+    # One robot, at work in steps 0 and 3 and away between; values 4, rewards 1 at work, gamma = lambda = 1/2.
+    buffer = ActiveRolloutBuffer(
+        4, spaces.Box(0, 1, (1,)), spaces.Box(-1, 1, (1,)), gamma=0.5, gae_lambda=0.5, active_column=0
+    )
+    for active in (1.0, 0.0, 0.0, 1.0):
+        there, value = np.full(1, active), torch.full((1,), VALUE)
+        buffer.add(there[None], np.zeros((1, 1)), there, np.zeros(1), value, torch.zeros(1))
+    buffer.compute_returns_and_advantage(torch.full((1,), VALUE), np.zeros(1))
+    # Step 3: 1 + 4/2 - 4 = -1. Step 0: 1 + 4/8 - 4 = -2.5, and lambda gamma^3 = 1/16 of the -1 after the wait.
+    np.testing.assert_allclose(buffer.advantages[[0, 3], 0], [-2.5625, -1.0])
+
+
+def test_a_rollout_without_anybody_at_work_says_so():
+    buffer = ActiveRolloutBuffer(1, spaces.Box(0, 1, (1,)), spaces.Box(-1, 1, (1,)), active_column=0)
+    one = torch.ones(1)
+    buffer.add(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(1), np.zeros(1), one, one)
+    buffer.compute_returns_and_advantage(one, np.zeros(1))
+    with pytest.raises(ValueError, match="at work in the rollout"):
+        next(buffer.get())

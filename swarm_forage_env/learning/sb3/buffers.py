@@ -19,7 +19,8 @@ class ActiveRolloutBuffer(RolloutBuffer):
     A step whose observation says that the robot is not at work (dead, unborn, in repair) is in no minibatch. An absence
     between two steps at work is a wait without reward: it is bridged as one long transition, so that the step before
     it is credited with the discounted value of the state the robot comes back to, and the value of the absence itself
-    is never asked of the network. (At the end of a rollout it is asked once, for robots that are away just then.)
+    is never asked of the network. (At the end of a rollout and at a time limit it is asked once, for robots that are
+    away just then.)
 
     Give it to an algorithm by
     `rollout_buffer_class=ActiveRolloutBuffer, rollout_buffer_kwargs={"active_column": env.active_column}`.
@@ -67,7 +68,9 @@ class ActiveRolloutBuffer(RolloutBuffer):
         for step in reversed(range(self.buffer_size)):
             target = self.rewards[step] + self.gamma * next_values * next_continues
             self.values[step] = np.where(is_active[step], self.values[step], target)
-            advantage = target - self.values[step] + self.gamma * self.gae_lambda * next_continues * advantage
+            # One transition, however long the wait: lambda counts for the step before it alone.
+            decay = self.gamma * np.where(is_active[step], self.gae_lambda, 1.0)
+            advantage = target - self.values[step] + decay * next_continues * advantage
             self.advantages[step] = advantage
             next_values = self.values[step]
             next_continues = 1.0 - self.episode_starts[step]
@@ -75,8 +78,14 @@ class ActiveRolloutBuffer(RolloutBuffer):
         self._is_active = is_active
 
     def get(self, batch_size: int | None = None) -> Generator[RolloutBufferSamples, None, None]:
-        """Yield minibatches of the steps at work in random order; none when nobody was at work."""
+        """Yield minibatches of the steps at work in random order.
+
+        Raises:
+            ValueError: nobody was at work in the whole rollout.
+        """
         assert self.full
+        if not self._is_active.any():
+            raise ValueError("Expected a robot at work in the rollout, got none to learn from; take more n_steps.")
         if not self.generator_ready:
             taught = self.swap_and_flatten(self._is_active).ravel()
             for name in _SAMPLES:
@@ -84,8 +93,9 @@ class ActiveRolloutBuffer(RolloutBuffer):
             self.generator_ready = True
         n_samples = len(self.returns)
         order = np.random.permutation(n_samples)  # noqa: NPY002 - the generator that stable-baselines3 seeds
-        for start in range(0, n_samples, batch_size or max(1, n_samples)):
-            yield self._get_samples(order[start : start + (batch_size or n_samples)])
+        size = batch_size or n_samples
+        for start in range(0, n_samples, size):
+            yield self._get_samples(order[start : start + size])
 
 
 class PresentReplayBuffer(ReplayBuffer):
