@@ -71,7 +71,9 @@ def build_plan(world: WorldOptions, options: TrainOptions) -> TrainingPlan:
         ConfigError: whatever is wrong with them.
     """
     fields, wrappers = ({}, ()) if world.config_file is None else read_config(world.config_file)
-    scenario, _ = build_scenario(replace(world, horizon=options.horizon_s or EPISODE_S), fields)
+    scenario, _ = build_scenario(
+        replace(world, horizon=EPISODE_S if options.horizon_s is None else options.horizon_s), fields
+    )
     algorithm = options.algorithm or "ppo"
     interface = InterfaceConfig(
         observation=options.observation or "compact",
@@ -146,19 +148,17 @@ def run_training(plan: TrainingPlan, folder: Path, *, n_processes: int, resume: 
         ImportError: stable-baselines3 is not installed.
         ConfigError: see `training.train`.
     """
-    try:
-        from swarm_forage_env.learning.sb3.training import train
-    except ImportError as error:
-        raise ImportError(
-            f"Training needs stable-baselines3 and torch ({error}): "
-            "pip install 'swarm-forage-env[train]' 'torch==2.13.0'"
-        ) from error
+    from swarm_forage_env.learning.sb3.training import MODEL_FILE, train
 
     console = Console(stderr=True, highlight=False)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        result = train(plan, folder, n_processes=n_processes, resume=resume, report=_reporter(plan, bar))
-    console.print(f"model {folder / 'model.zip'}" + (f", network {result.policy_file}" if result.policy_file else ""))
+        try:
+            result = train(plan, folder, n_processes=n_processes, resume=resume, report=_reporter(plan, bar))
+        except KeyboardInterrupt:
+            bar.console.print("Stopped. The same command with --resume goes on.")
+            raise
+    console.print(f"model {folder / MODEL_FILE}" + (f", network {result.policy_file}" if result.policy_file else ""))
 
 
 def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | Evaluation], None]:

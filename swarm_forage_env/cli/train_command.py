@@ -50,8 +50,8 @@ def train(  # long: one parameter per option
 ) -> None:
     """Train one policy that every robot shares, beside evaluations of it and of a scripted controller.
 
-    Rewards are fields of the scenario: --set nest_progress=0.05 --set first_pickup=1. Ctrl-C loses what came after
-    the last checkpoint; the same command with --resume goes on.
+    Rewards are fields of the scenario: --set nest_progress=0.05 --set first_pickup=1. Ctrl-C keeps a
+    checkpoint; the same command with --resume goes on.
     """
     from swarm_forage_env.cli.plan import WorldOptions
     from swarm_forage_env.cli.train import TrainOptions, build_plan, named_plan, run_training

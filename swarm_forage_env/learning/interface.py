@@ -6,7 +6,7 @@ so that a policy runs exactly as it was trained.
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -196,11 +196,11 @@ class LearnerInterface:
 
     def _check_numbers(self, actions: np.ndarray) -> None:
         most = int(self.action_space.n) - 1  # type: ignore[union-attr]
-        if actions.dtype.kind not in "iu" or actions.min() < 0 or actions.max() > most:
-            raise ValueError(
-                f"Expected actions as whole numbers from 0 to {most}, got {actions.dtype} from {actions.min()} to "
-                f"{actions.max()}."
-            )
+        expected = f"Expected actions as whole numbers from 0 to {most}, got"
+        if actions.dtype.kind not in "iu":
+            raise ValueError(f"{expected} {actions.dtype}.")
+        if actions.min() < 0 or actions.max() > most:
+            raise ValueError(f"{expected} {actions.min()} to {actions.max()}.")
 
     def mask(self, obs: ObsArray) -> BoolArray:
         """Return which discrete actions make sense, (N, number of actions) bool; at least one per row.
@@ -221,7 +221,7 @@ class LearnerInterface:
         return mask
 
 
-@cache
+@lru_cache(maxsize=64)  # a curriculum may ask for a new size in every run
 def compact_layout(half_width_m: float, half_height_m: float) -> ObservationLayout:
     """Build the layout of the compact view (our choice of what a driver needs); directions are forward and left."""
     reach = (1.0, 1.0, 1.0)

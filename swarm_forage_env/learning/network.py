@@ -5,9 +5,11 @@ of `NetworkAbout`. Nothing in it is executed, so that opening a file from a stra
 """
 
 import dataclasses
+import io
 import itertools
 import json
 import zipfile
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,11 +19,14 @@ import numpy as np
 from gymnasium import spaces
 
 from swarm_forage_env.config import ConfigError, suggestion
+from swarm_forage_env.learning.files import replacing
 from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.policy import SwarmTask
 from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
 
 ACTIVATIONS = ("tanh", "relu")
+_BROKEN = (ValueError, LookupError, TypeError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error)
+"""What numpy and zipfile raise over an archive that is none or has been damaged."""
 
 
 class NetworkError(ValueError):
@@ -87,6 +92,8 @@ class Network:
         )
         if not fits or any(left[1] != right[0] for left, right in itertools.pairwise(sizes)):
             raise NetworkError(f"Expected layers that follow on each other, got weights {sizes}.")
+        if not all(layer.dtype.kind == "f" and np.isfinite(layer).all() for layer in (*self.weights, *self.biases)):
+            raise NetworkError("Expected weights and biases that are finite numbers; did the training diverge?")
 
     def outputs(self, rows: ObsArray) -> np.ndarray:
         """Return the last layer's values for observations (N, d), before any choice of actions."""
@@ -112,7 +119,7 @@ class Network:
         """Write the file; an existing one is replaced."""
         layers = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
         layers |= {f"bias_{k}": bias for k, bias in enumerate(self.biases)}
-        with Path(path).open("wb") as file:
+        with replacing(Path(path)) as draft, draft.open("wb") as file:
             np.savez_compressed(file, about=np.array(self.about.to_json()), **layers)  # type: ignore[arg-type]
 
     @classmethod
@@ -123,15 +130,16 @@ class Network:
             OSError: the file cannot be read.
             NetworkError: it holds no network.
         """
+        content = io.BytesIO(Path(path).read_bytes())
         try:
-            with np.load(path, allow_pickle=False) as stored:
+            with np.load(content, allow_pickle=False) as stored:
                 n_layers = sum(name.startswith("weight_") for name in stored.files)
                 weights = tuple(stored[f"weight_{k}"] for k in range(n_layers))
                 biases = tuple(stored[f"bias_{k}"] for k in range(n_layers))
                 about = NetworkAbout.from_json(str(stored["about"]))
-        except (zipfile.BadZipFile, ValueError, KeyError) as error:
-            raise NetworkError(f"Expected {path} to hold a network: {error}") from error
-        return cls(weights, biases, about)
+            return cls(weights, biases, about)
+        except _BROKEN as error:
+            raise NetworkError(f"Expected {path} to hold a network: {error or type(error).__name__}") from error
 
 
 Choose: TypeAlias = Callable[[ObsArray, np.random.Generator], np.ndarray]

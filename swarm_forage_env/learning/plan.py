@@ -10,7 +10,10 @@ from typing import Any
 
 from swarm_forage_env.config import ConfigError, ScenarioConfig, suggestion, with_overrides
 from swarm_forage_env.config import from_mapping as config_from_mapping
+from swarm_forage_env.learning.files import replacing
 from swarm_forage_env.learning.interface import InterfaceConfig, interface_from_mapping
+from swarm_forage_env.learning.worlds import same_robots
+from swarm_forage_env.policy import policy_class
 from swarm_forage_env.scenarios import scenario as preset
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.wrappers.base import WrapperConfig
@@ -21,9 +24,15 @@ ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
 DEFAULT_STEPS = 5_000_000
 
 
-def _require_whole(name: str, value: Any) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise ConfigError(f"Expected {name} to be a whole number >= 1, got {value!r}.")
+def _require_whole(name: str, value: Any, *, least: int = 1) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ConfigError(f"Expected {name} to be a whole number >= {least}, got {value!r}.")
+
+
+def _require_table(name: str, value: Any) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise ConfigError(f"Expected {name} to be a table, got {value!r}.")
+    return value
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -39,6 +48,8 @@ class Stage:
 
     def __post_init__(self) -> None:
         _require_whole("stage.steps", self.steps)
+        _require_table("stage.scenario", self.scenario)
+        _require_table("stage.options", self.options)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -58,6 +69,10 @@ class EvaluationPlan:
     def __post_init__(self) -> None:
         _require_whole("evaluation.every_steps", self.every_steps)
         _require_whole("evaluation.n_runs", self.n_runs)
+        try:
+            policy_class(self.baseline)
+        except ValueError as error:
+            raise ConfigError(f"Expected evaluation.baseline to be a controller: {error}") from error
 
     def specs(self, scenario: ScenarioConfig, wrappers: tuple[WrapperConfig, ...], policy: str) -> tuple[RunSpec, ...]:
         """Return one specification per run, in `scenario` but for its horizon.
@@ -75,8 +90,8 @@ class TrainingPlan:
     """Everything that decides a training run, but for the machine and the installed versions.
 
     Raises:
-        ConfigError: an unknown algorithm, sizes below 1, a stage whose world cannot be, or discrete actions for an
-            algorithm that has none (and the other way round).
+        ConfigError: an unknown algorithm or baseline, sizes below 1, a stage whose world cannot be or has another
+            number of robots, or discrete actions for an algorithm that has none (and the other way round).
     """
 
     scenario: ScenarioConfig
@@ -108,8 +123,10 @@ class TrainingPlan:
             _require_whole("hidden", size)
         if not self.stages:
             raise ConfigError("Expected at least one stage, got none.")
+        _require_whole("seed", self.seed, least=0)
+        _require_table("options", self.options)
         for stage in self.stages:
-            with_overrides(self.scenario, **stage.scenario)
+            same_robots(self.scenario, stage.scenario)
         self.evaluation.specs(self.scenario, self.wrappers, self.evaluation.baseline)
 
     @property
@@ -126,7 +143,9 @@ class TrainingPlan:
 
     def write(self, path: Path) -> None:
         """Write the plan as JSON."""
-        path.write_text(json.dumps(self.to_mapping(), indent=2) + "\n", encoding="utf-8")
+        text = json.dumps(self.to_mapping(), indent=2) + "\n"
+        with replacing(path) as draft:
+            draft.write_text(text, encoding="utf-8")
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "TrainingPlan":
@@ -139,21 +158,24 @@ class TrainingPlan:
             ConfigError: unknown keys, or values that make no plan.
         """
         values = _known(cls, mapping, "")
-        scenario = dict(_table(values, "scenario"))
+        scenario = dict(_require_table("scenario", values.get("scenario")))
         if "preset" in scenario:
             values["scenario"] = preset(scenario.pop("preset"), **_tuples(scenario))
         else:
             values["scenario"] = config_from_mapping(ScenarioConfig, scenario, where="scenario.")
         if "wrappers" in values:
-            values["wrappers"] = wrappers_from_mapping(_table(values, "wrappers"))
+            values["wrappers"] = wrappers_from_mapping(_require_table("wrappers", values["wrappers"]))
         if "interface" in values:
-            values["interface"] = interface_from_mapping(dict(_table(values, "interface")))
+            values["interface"] = interface_from_mapping(dict(_require_table("interface", values["interface"])))
         if "evaluation" in values:
-            values["evaluation"] = EvaluationPlan(**_known(EvaluationPlan, _table(values, "evaluation"), "evaluation."))
+            values["evaluation"] = EvaluationPlan(
+                **_known(EvaluationPlan, _require_table("evaluation", values["evaluation"]), "evaluation.")
+            )
         if "stages" in values:
             tables = [_known(Stage, table, "stages.") for table in values["stages"]]
             values["stages"] = tuple(
-                Stage(**{**table, "scenario": _tuples(table.get("scenario", {}))}) for table in tables
+                Stage(**{**table, "scenario": _tuples(_require_table("stages.scenario", table.get("scenario", {})))})
+                for table in tables
             )
         return cls(**_tuples(values))
 
@@ -202,18 +224,12 @@ def read_plan(path: Path) -> TrainingPlan:
 
 
 def _known(config_class: type, mapping: Mapping[str, Any], where: str) -> dict[str, Any]:
+    _require_table(where.rstrip(".") or "the plan", mapping)
     known = [item.name for item in dataclasses.fields(config_class)]
     for key in mapping:
         if key not in known:
             raise ConfigError(f"Unknown key {where + key!r}.{suggestion(key, known)}")
     return dict(mapping)
-
-
-def _table(values: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-    table = values.get(key)
-    if not isinstance(table, Mapping):
-        raise ConfigError(f"Expected {key} to be a table, got {table!r}.")
-    return table
 
 
 def _tuples(mapping: Mapping[str, Any]) -> dict[str, Any]:

@@ -80,6 +80,8 @@ def test_without_the_training_library_the_message_says_what_to_install(command, 
         (("--algo", "ppp"), "Did you mean 'ppo'"),
         (("--algo", "dqn", "--actions", "continuous"), "dqn can choose"),
         (("--arg", "gamma=much"), "key=number"),
+        (("--arg", "gama=0.9"), "Did you mean 'gamma'"),
+        (("--horizon", "0"), "horizon_s"),
         (("--scenario", "warehouse_smal"), "Did you mean 'warehouse_small'"),
         (("--wrapper", "throtle:amplitude=0.1"), "Did you mean 'throttle'"),
         (("--plan", "nothing.toml"), "Cannot read the plan nothing.toml"),
@@ -92,6 +94,26 @@ def test_wrong_words_are_one_line_of_complaint(command, words, reason):
     assert code == 2
     assert reason in err
     assert len(err.splitlines()) == 1
+
+
+def test_the_message_is_the_same_from_python(monkeypatch):
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    for name in [name for name in sys.modules if name.startswith("swarm_forage_env.learning.sb3")]:
+        monkeypatch.delitem(sys.modules, name)
+    with pytest.raises(ImportError, match=r"pip install 'swarm-forage-env\[train\]'"):
+        import swarm_forage_env.learning.sb3  # noqa: F401
+
+
+def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
+    training = pytest.importorskip("swarm_forage_env.learning.sb3.training", reason="needs the train extra")
+
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(training, "train", stop)
+    code, _, err = command("train", *TINY)
+    assert code == 130
+    assert "--resume goes on" in err
 
 
 def test_defaults_are_what_a_driver_needs():

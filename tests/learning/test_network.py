@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.env import parallel_env
+from swarm_forage_env.learning.files import replacing
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.network import LearnedPolicy, Network, NetworkAbout, NetworkError, NetworkPolicy
 from swarm_forage_env.policy import Policy
@@ -78,6 +79,47 @@ def test_other_files_are_refused(tmp_path, write):
         Network.load(path)
     with pytest.raises(FileNotFoundError):
         Network.load(tmp_path / "nothing.npz")
+
+
+def test_damaged_files_are_refused_whatever_is_damaged(tmp_path):
+    path = tmp_path / "network.npz"
+    compact_network(6, np.random.default_rng(0), interface=InterfaceConfig(actions="discrete")).save(path)
+    whole, rng = path.read_bytes(), np.random.default_rng(0)
+    complaints = []
+    for _ in range(200):
+        damaged = bytearray(whole)
+        for at in rng.integers(len(whole), size=3):
+            damaged[at] = rng.integers(256)
+        path.write_bytes(damaged[: rng.integers(len(whole)) if rng.random() < 0.2 else None])
+        try:
+            Network.load(path)  # damage to a time stamp harms nobody
+        except NetworkError as error:
+            complaints.append(str(error))
+    assert len(complaints) > 100
+    assert all(str(path) in complaint for complaint in complaints)
+    for content in (b"", b"no archive"):
+        path.write_bytes(content)
+        with pytest.raises(NetworkError, match=r"network\.npz"):
+            Network.load(path)
+
+
+def test_weights_that_are_no_numbers_are_refused():
+    network = small_network()
+    for wrong in (np.full((2, 2), np.nan, np.float32), np.full((2, 2), "a")):
+        with pytest.raises(NetworkError, match="finite numbers"):
+            Network((network.weights[0], wrong), network.biases, network.about)
+
+
+def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
+    path = tmp_path / "network.npz"
+    small_network().save(path)
+    before = path.read_bytes()
+    with pytest.raises(TypeError):
+        small_network(card={"not": {"plain"}}).save(path)
+    with pytest.raises(ZeroDivisionError), replacing(path) as draft:
+        draft.write_text(f"half {1 / 0}")
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_layers_that_do_not_follow_on_each_other_are_refused():

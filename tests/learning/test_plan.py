@@ -89,6 +89,12 @@ def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
         ("[interface]", "[[interface]]", "interface to be a table"),
         ("sigma = 0.02", "sigma = -1.0", "sigma"),
         ("[options]", "[options", "plan.toml"),
+        ("[options]", "[[options]]", "options to be a table"),
+        ("n_arenas = 2", "n_arenas = 2\nseed = -1", "seed to be a whole number >= 0"),
+        ("width_m = 20.0", "n_robots = 5", "n_robots to stay 6"),
+        ("scenario = { width_m = 20.0, nest_centre_m = [2.0, 8.0] }", "scenario = 5", "stages.scenario to be a table"),
+        ("options = { learning_rate = 0.1 }", "options = 5", "stage.options to be a table"),
+        ("horizon_s = 400.0", 'horizon_s = 400.0\nbaseline = "crv"', "Did you mean 'crw'"),
     ],
 )
 def test_plans_that_cannot_be_are_refused_with_their_file(tmp_path, old, new, reason):
@@ -104,6 +110,12 @@ def test_a_plan_has_stages_and_a_readable_file(tmp_path):
         TrainingPlan(scenario=warehouse_small(), stages=())
     with pytest.raises(ConfigError, match="Cannot read the plan"):
         read_plan(tmp_path / "nothing.toml")
+
+
+def test_a_file_without_a_table_is_no_plan(tmp_path):
+    (tmp_path / "plan.json").write_text("[1]")
+    with pytest.raises(ConfigError, match=r"the plan to be a table, got \[1\]"):
+        read_plan(tmp_path / "plan.json")
 
 
 def test_the_plan_of_the_shipped_policy_is_a_plan():

@@ -2,6 +2,8 @@
 
 import csv
 import dataclasses
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from swarm_forage_env.config import ConfigError
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.network import Network, NetworkError
 from swarm_forage_env.learning.plan import EvaluationPlan, Stage, TrainingPlan
-from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
+from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
 from swarm_forage_env.learning.sb3.export import export_network
 from swarm_forage_env.learning.sb3.training import train
 from swarm_forage_env.scenarios import warehouse_small
@@ -39,6 +41,17 @@ def tiny_plan(**changes) -> TrainingPlan:
         evaluation=EvaluationPlan(every_steps=256, horizon_s=200.0, n_runs=1, baseline="random"),
     )
     return dataclasses.replace(plan, **changes)
+
+
+SHORT = tiny_plan(stages=(Stage(steps=128),))
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory) -> Path:
+    """Folder of a finished training by SHORT."""
+    folder = tmp_path_factory.mktemp("trained")
+    train(SHORT, folder)
+    return folder
 
 
 def weights(model) -> list[np.ndarray]:
@@ -117,6 +130,87 @@ def test_folders_of_other_trainings_are_left_alone(tmp_path):
         train(tiny_plan(), tmp_path)
     with pytest.raises(ConfigError, match="another plan"):
         train(tiny_plan(), tmp_path, resume=True)
+
+
+def test_the_last_checkpoint_holds_all_that_was_learnt(tmp_path):
+    """Also where an evaluation is due with the last step of a stage."""
+    evaluation = dataclasses.replace(tiny_plan().evaluation, every_steps=128)
+    result = train(tiny_plan(stages=(Stage(steps=256),), evaluation=evaluation), tmp_path)
+    assert [each.steps for each in result.evaluations] == [128, 256]
+    assert same(weights(result.model), weights(PPO.load(tmp_path / "model.zip")))
+
+
+def test_ctrl_c_before_the_first_evaluation_loses_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "_REPORT_EVERY_S", 0.0)
+    plan = tiny_plan(evaluation=EvaluationPlan(every_steps=10_000, horizon_s=200.0, n_runs=1, baseline="random"))
+
+    def stop(news):
+        if news.steps == 256:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(plan, tmp_path, report=stop)
+    assert PPO.load(tmp_path / "model.zip").num_timesteps == 256
+    result = train(plan, tmp_path, resume=True)
+    assert [each.steps for each in result.evaluations] == [384, 768]
+
+
+def test_the_network_is_there_before_the_table_speaks_of_it(tmp_path, monkeypatch):
+    def full_disk(path, evaluations):
+        raise OSError("no space left")
+
+    monkeypatch.setattr(training, "_write_evaluations", full_disk)
+    with pytest.raises(OSError, match="no space"):
+        train(tiny_plan(stages=(Stage(steps=128),)), tmp_path)
+    assert Network.load(tmp_path / "policy.npz").about.card["evaluation"]["steps"] == 128
+    assert not (tmp_path / "evaluations.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("model.zip", b"", "Cannot open the checkpoint .*model.zip"),
+        ("model.zip", None, "Cannot open the checkpoint .*model.zip"),
+        ("evaluations.csv", b"steps,wall_time_s\n12", "Cannot read the evaluations in .*evaluations.csv"),
+        ("evaluations.csv", b"steps\nmany\n", "Cannot read the evaluations in .*evaluations.csv"),
+        ("plan.json", b"{", "Cannot use the plan .*plan.json"),
+    ],
+)
+def test_broken_files_are_named(trained, tmp_path, name, content, reason):
+    folder = tmp_path / "copy"
+    shutil.copytree(trained, folder)
+    path = folder / name
+    path.write_bytes(path.read_bytes()[:3000] if content is None else content)
+    with pytest.raises(ConfigError, match=reason):
+        train(SHORT, folder, resume=True)
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"learning_rat": 1.0}, "Did you mean 'learning_rate'"),
+        ({"seed": 3}, "without 'seed'"),
+        ({"n_steps": 1, "batch_size": 1}, "Cannot prepare ppo with its options: `batch_size`"),
+    ],
+)
+def test_options_that_the_algorithm_refuses_leave_the_folder_unused(tmp_path, options, reason):
+    with pytest.raises(ConfigError, match=reason):
+        train(tiny_plan(options=options), tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_options_of_later_stages_are_checked_before_the_first(tmp_path):
+    stages = (Stage(steps=128), Stage(steps=128, options={"learning_rat": 1.0}))
+    with pytest.raises(ConfigError, match="Did you mean 'learning_rate'"):
+        train(tiny_plan(stages=stages), tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+def test_seeds_of_stages_and_of_resumed_trainings_are_new_and_none_of_the_evaluations():
+    seeds = {training.training_seed(seed, done) for seed in (0, 1) for done in (0, 1_000_000, 1_000_001)}
+    assert len(seeds) == 6
+    evaluated = range(EvaluationPlan().first_seed, EvaluationPlan().first_seed + EvaluationPlan().n_runs)
+    assert not any(seed + arena in evaluated for seed in seeds for arena in range(64))
 
 
 @pytest.mark.parametrize("algorithm", ["a2c", "dqn", "sac"])

@@ -7,8 +7,11 @@ can hold.
 
 import csv
 import importlib.util
+import inspect
+import pickle
 import time
-from collections.abc import Callable
+import zipfile
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -20,7 +23,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import safe_mean
 
-from swarm_forage_env.config import ConfigError
+from swarm_forage_env.config import ConfigError, suggestion
+from swarm_forage_env.learning.files import replacing
 from swarm_forage_env.learning.network import LearnedPolicy
 from swarm_forage_env.learning.plan import Evaluation, Stage, TrainingPlan, TrainingStatus, read_plan
 from swarm_forage_env.learning.sb3.buffers import ActiveRolloutBuffer, PresentReplayBuffer
@@ -38,6 +42,11 @@ PLAN_FILE = "plan.json"
 POLICY_FILE = "policy.npz"
 EVALUATIONS_FILE = "evaluations.csv"
 _REPORT_EVERY_S = 1.0
+_OURS = frozenset(
+    {"policy", "env", "seed", "device", "policy_kwargs", "tensorboard_log", "_init_setup_model"}
+    | {f"{kind}_buffer_{what}" for kind in ("rollout", "replay") for what in ("class", "kwargs")}
+)
+"""Arguments of the algorithms' classes that training gives them."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -66,6 +75,7 @@ def train(
 
     The same plan gives the same weights on the same machine with the same versions. Resumed training is sound, but
     not the same as one that was never interrupted: arenas start anew, and so does the replay memory of dqn and sac.
+    Ctrl-C keeps a checkpoint before it goes on its way; a crash leaves the one of the latest evaluation.
 
     Args:
         plan: What to do.
@@ -75,11 +85,14 @@ def train(
         report: Told the status about once a second, and every evaluation.
 
     Raises:
-        ConfigError: the folder holds a training run and nobody said resume, or that of another plan.
+        ConfigError: the algorithm knows no such option, the folder holds a training run and nobody said resume, or
+            that of another plan, or files that are broken.
     """
+    _check_options(plan)
     folder.mkdir(parents=True, exist_ok=True)
-    _claim(folder, plan, resume=resume)
+    _check_folder(folder, plan, resume=resume)
     torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
+    watch = _Watch(plan, folder, report or _keep_quiet)
     env = SwarmVecEnv(
         plan.scenario,
         n_arenas=plan.n_arenas,
@@ -88,15 +101,15 @@ def train(
         wrappers=plan.wrappers,
     )
     try:
-        watch = _Watch(plan, folder, report or _keep_quiet)
-        model, done = _opened(plan, folder, env)
+        model = _checkpoint(plan, folder, env)
         begins = 0
         for stage in plan.stages:
             ends = begins + stage.steps
+            done = 0 if model is None else model.num_timesteps
             if done < ends:
                 model = _prepared(plan, stage, folder, env, done)
-                model.learn(ends - done, callback=watch, reset_num_timesteps=False, tb_log_name=plan.algorithm)
-                done = model.num_timesteps
+                plan.write(folder / PLAN_FILE)  # not before it is known to be one that can be carried out
+                _learn(model, ends - done, watch, folder)
             begins = ends
         assert model is not None, "a plan has a stage"
     finally:
@@ -105,25 +118,37 @@ def train(
     return TrainingResult(model=model, evaluations=tuple(watch.evaluations), policy_file=policy_file)
 
 
-def _claim(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
-    """Write the plan, unless the folder belongs to another training run."""
+def _check_options(plan: TrainingPlan) -> None:
+    """Refuse options that the algorithm does not know, which a checkpoint would take without a word."""
+    known = set(inspect.signature(ALGORITHM_CLASSES[plan.algorithm]).parameters) - _OURS
+    for options in (plan.options, *(stage.options for stage in plan.stages)):
+        for name in options:
+            if name in _OURS:
+                raise ConfigError(f"Expected options of {plan.algorithm} without {name!r}, which training sets itself.")
+            if name not in known:
+                raise ConfigError(f"Unknown option {name!r} of {plan.algorithm}.{suggestion(name, sorted(known))}")
+
+
+def _check_folder(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
+    """Refuse a folder that belongs to another training run."""
     path = folder / PLAN_FILE
-    if path.exists():
-        if not resume:
-            raise ConfigError(
-                f"Expected an unused folder, got {folder} with a training run; resume it or go elsewhere."
-            )
-        if read_plan(path) != plan:
-            raise ConfigError(f"Expected the plan in {path} to resume its training, got another plan.")
-    plan.write(path)
+    if not path.exists():
+        return
+    if not resume:
+        raise ConfigError(f"Expected an unused folder, got {folder} with a training run; resume it or go elsewhere.")
+    if read_plan(path) != plan:
+        raise ConfigError(f"Expected the plan in {path} to resume its training, got another plan.")
 
 
-def _opened(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> tuple[BaseAlgorithm | None, int]:
-    """Return the checkpoint of the folder and how far it got."""
-    if not (folder / MODEL_FILE).exists():
-        return None, 0
-    model = ALGORITHM_CLASSES[plan.algorithm].load(folder / MODEL_FILE, env=env, device="cpu")
-    return model, model.num_timesteps
+def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgorithm | None:
+    """Return the checkpoint of the folder, None when there is none."""
+    path = folder / MODEL_FILE
+    if not path.exists():
+        return None
+    try:
+        return ALGORITHM_CLASSES[plan.algorithm].load(path, env=env, device="cpu")
+    except (ValueError, LookupError, RuntimeError, EOFError, zipfile.BadZipFile, pickle.UnpicklingError) as error:
+        raise ConfigError(f"Cannot open the checkpoint {path}: {error}; remove it to start anew.") from error
 
 
 def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, done: int) -> BaseAlgorithm:
@@ -131,18 +156,43 @@ def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, 
     env.set_options({"scenario": stage.scenario})
     algorithm = ALGORITHM_CLASSES[plan.algorithm]
     options: dict[str, Any] = {**plan.options, **stage.options}
-    # Runs of a later stage, or of a resumed one, are none that were seen before.
-    options["seed"] = plan.seed + done
+    options["seed"] = training_seed(plan.seed, done)
     options["tensorboard_log"] = str(folder / "tensorboard") if importlib.util.find_spec("tensorboard") else None
-    if (folder / MODEL_FILE).exists():
-        return algorithm.load(folder / MODEL_FILE, env=env, device="cpu", **options)
     buffer: dict[str, Any] = {"replay_buffer_class": PresentReplayBuffer}
     if plan.algorithm in ON_POLICY:
         buffer = {
             "rollout_buffer_class": ActiveRolloutBuffer,
             "rollout_buffer_kwargs": {"active_column": env.active_column},
         }
-    return algorithm("MlpPolicy", env, device="cpu", policy_kwargs={"net_arch": list(plan.hidden)}, **buffer, **options)
+    network = {"net_arch": list(plan.hidden)}
+    try:
+        if (folder / MODEL_FILE).exists():
+            return algorithm.load(folder / MODEL_FILE, env=env, device="cpu", **options)
+        return algorithm("MlpPolicy", env, device="cpu", policy_kwargs=network, **buffer, **options)
+    except (AssertionError, TypeError, ValueError) as error:  # how the library refuses values
+        raise ConfigError(f"Cannot prepare {plan.algorithm} with its options: {error}") from error
+
+
+def training_seed(seed: int, done: int) -> int:
+    """Return the seed for what comes after `done` decisions of a training with `seed`.
+
+    Drawn, so that runs of a later stage or of a resumed training are none that were seen before, and none of the
+    evaluations, whose seeds are counted up from a number of their own.
+    """
+    return int(np.random.default_rng((seed, done)).integers(2**31))
+
+
+def _learn(model: BaseAlgorithm, steps: int, watch: "_Watch", folder: Path) -> None:
+    try:
+        model.learn(steps, callback=watch, reset_num_timesteps=False, tb_log_name=model.__class__.__name__.lower())
+    except KeyboardInterrupt:
+        _keep(model, folder)
+        raise
+
+
+def _keep(model: BaseAlgorithm, folder: Path) -> None:
+    with replacing(folder / MODEL_FILE) as draft:
+        model.save(draft)
 
 
 class _Watch(BaseCallback):
@@ -170,10 +220,13 @@ class _Watch(BaseCallback):
                 self.logger.record_mean("rollout/performance_per_1000_s", 1000.0 * counted / info["run"]["seconds"])
         return True
 
-    def _on_rollout_end(self) -> None:
-        elapsed = time.perf_counter() - self._started
+    def _on_rollout_start(self) -> None:
+        # Not at the end of a rollout, which has not taught anything yet.
         if self.num_timesteps >= self._next_evaluation:
             self._evaluate()
+
+    def _on_rollout_end(self) -> None:
+        elapsed = time.perf_counter() - self._started
         if elapsed - self._last_report >= _REPORT_EVERY_S:
             self._last_report = elapsed
             episodes = self.model.ep_info_buffer or ()
@@ -181,14 +234,13 @@ class _Watch(BaseCallback):
             self._report(TrainingStatus(steps=self.num_timesteps, wall_time_s=elapsed, episode_return=mean))
 
     def _on_training_end(self) -> None:
-        if not self.evaluations or self.evaluations[-1].steps != self.num_timesteps:
-            self._evaluate()
+        self._evaluate()
         self.logger.dump(self.num_timesteps)
 
     def _evaluate(self) -> None:
         """Keep a checkpoint, run the policy, and note how it did."""
         self._next_evaluation = self.num_timesteps + self._plan.evaluation.every_steps
-        self.model.save(self._folder / MODEL_FILE)
+        _keep(self.model, self._folder)
         if self._baseline is None:
             self._baseline, _ = self._judged(lambda: load_policy(self._plan.evaluation.baseline))
         performance, interference = self._judged(lambda: LearnedPolicy(self._plan.interface, _acting(self.model)))
@@ -202,9 +254,10 @@ class _Watch(BaseCallback):
         for name in ("performance", "baseline", "interference_fraction"):
             self.logger.record(f"evaluation/{name}", getattr(evaluation, name))
         self.evaluations.append(evaluation)
-        self._write(evaluation)
+        # The network before the table: a table must not boast of a network that is not there.
         if self._plan.algorithm in EXPORTABLE and performance >= max(past.performance for past in self.evaluations):
             self._export(evaluation)
+        _write_evaluations(self._folder / EVALUATIONS_FILE, self.evaluations)
         self._report(evaluation)
 
     def _export(self, evaluation: Evaluation) -> None:
@@ -225,22 +278,23 @@ class _Watch(BaseCallback):
         performance = np.mean([record.rate_per_1000_s("performance") for record in records])
         return float(performance), float(np.mean([record.interference_fraction.mean() for record in records]))
 
-    def _write(self, evaluation: Evaluation) -> None:
-        path = self._folder / EVALUATIONS_FILE
-        is_new = not path.exists()
-        with path.open("a", newline="", encoding="utf-8") as file:
-            table = csv.DictWriter(file, [item.name for item in fields(Evaluation)])
-            if is_new:
-                table.writeheader()
-            table.writerow(asdict(evaluation))
+
+def _write_evaluations(path: Path, evaluations: Sequence[Evaluation]) -> None:
+    with replacing(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, [item.name for item in fields(Evaluation)])
+        table.writeheader()
+        table.writerows(map(asdict, evaluations))
 
 
 def _read_evaluations(path: Path) -> list[Evaluation]:
     if not path.exists():
         return []
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
-    return [Evaluation(**{**row, "steps": int(row["steps"])}) for row in rows]  # type: ignore[arg-type]
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
+        return [Evaluation(**{**row, "steps": int(row["steps"])}) for row in rows]  # type: ignore[arg-type]
+    except (ValueError, TypeError, KeyError, csv.Error) as error:
+        raise ConfigError(f"Cannot read the evaluations in {path}: {error}; repair or remove the file.") from error
 
 
 def _acting(model: BaseAlgorithm) -> Callable[[np.ndarray, np.random.Generator], np.ndarray]:
