@@ -28,10 +28,12 @@ class RunProgress:
         self._started = time.monotonic()
         self._last_line = self._started
         if self._stored:
-            self._console.print(f"{self._stored} of {self._total} runs are stored already.")
+            be = "is" if self._stored == 1 else "are"
+            self._console.print(f"{self._stored} of {self._total} runs {be} stored already.")
         if self._foreign:
+            be = "was" if self._foreign == 1 else "were"
             self._console.print(
-                f"{self._foreign} of them were made by another version or commit of the packages; "
+                f"{self._foreign} of them {be} made by another version or commit of the packages; "
                 "give another folder to run them afresh."
             )
         if self._done == self._total:

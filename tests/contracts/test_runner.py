@@ -284,7 +284,7 @@ def test_progress_where_stderr_is_no_terminal_is_plain(tmp_path, capsys):
     shown = capsys.readouterr()
     assert shown.out == ""
     assert shown.err.splitlines() == [
-        "1 of 3 runs are stored already.",
+        "1 of 3 runs is stored already.",
         "1/3 runs, no estimate yet (the first run after an installation compiles for up to a minute)",
         "3/3 runs, all done, 1 failed",
     ]
@@ -298,6 +298,8 @@ def test_stored_runs_of_other_versions_are_pointed_out(tmp_path, monkeypatch, ca
     monkeypatch.setattr(runner, "software_versions", lambda: {"numba": "0.0"})
     run_all(SPECS[:2], store=store, jobs=1, progress=True)
     assert "2 of them were made by another version or commit" in capsys.readouterr().err
+    run_all(SPECS[:1], store=store, jobs=1, progress=True)
+    assert "1 of them was made by another version or commit" in capsys.readouterr().err
 
 
 @pytest.mark.compiled
