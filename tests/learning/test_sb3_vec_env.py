@@ -1,15 +1,20 @@
 """The vector environment of stable-baselines3 tells the story of `lives`, and keeps that library's contract."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
 
 from gymnasium import Wrapper
+from stable_baselines3 import PPO
+from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecEnvWrapper, VecFrameStack, VecMonitor
 
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.sb3 import SwarmVecEnv
+from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.learning import lives
 
 IDLE = np.zeros((lives.N_ROBOTS, 3), np.float32)
@@ -85,6 +90,18 @@ def test_attributes_and_methods_reach_the_arenas():
     assert not env.has_attr("no_such_thing")
 
 
+def test_evaluations_of_the_library_count_episodes_and_no_absences():
+    wrappers = [parse_wrapper("population:death_per_tick=0.05")]
+    env = SwarmVecEnv("warehouse_small", n_robots=4, max_cycles=20, delivery=0.0, first_pickup=0.0, tick=1.0,
+                      wrappers=wrappers)  # fmt: skip
+    model = PPO("MlpPolicy", env, n_steps=2, batch_size=8, seed=0, device="cpu")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        returns, lengths = evaluate_policy(model, env, n_eval_episodes=40, return_episode_rewards=True)
+    lost = np.array(lengths) - np.array(returns)
+    assert set(lost) == {0.0, 1.0}, "whoever dies earns nothing in the last step of its episode, and in no other"
+
+
 def test_a_method_is_called_once_per_arena():
     env = SwarmVecEnv(**lives.WORLD, n_arenas=2)
     env.seed(0)
@@ -122,7 +139,9 @@ def test_one_picture_per_arena():
 
 
 def test_works_inside_the_wrappers_of_the_library():
-    env: VecEnvWrapper = VecFrameStack(VecMonitor(SwarmVecEnv(**lives.WORLD)), 2)
+    with pytest.warns(UserWarning, match="already wrapped with a `Monitor`"):  # rows tell their episodes themselves
+        monitored = VecMonitor(SwarmVecEnv(**lives.WORLD))
+    env: VecEnvWrapper = VecFrameStack(monitored, 2)
     env.seed(1)
     obs = env.reset()
     half = obs.shape[1] // 2

@@ -6,6 +6,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
@@ -179,8 +180,12 @@ class SwarmVecEnv(VecEnv):
         )
 
     def env_is_wrapped(self, wrapper_class: type[gymnasium.Wrapper], indices: VecEnvIndices = None) -> list[bool]:
-        """Return False for each row: no Gymnasium wrapper is inside."""
-        return [False] * len(self._rows(indices))
+        """Return False for each row, but True for `Monitor`: rows tell their episodes as it would.
+
+        `evaluate_policy` and `EvalCallback` ask for it, and then count episodes instead of dones, which absent rows
+        have, too.
+        """
+        return [wrapper_class is Monitor] * len(self._rows(indices))
 
     def close(self) -> None:
         """Close all arenas and end their processes."""
