@@ -20,6 +20,18 @@ from swarm_forage_env.policy import SwarmTask
 from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
 
 _DIGEST_DIGITS = 16
+MODEL_FAULTS = (
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    AssertionError,
+    RuntimeError,
+    OSError,
+    EOFError,
+    pickle.UnpicklingError,
+)
+"""What stable-baselines3 and torch raise over a file that is no model or has been damaged."""
 
 
 class ModelError(ValueError):
@@ -164,7 +176,7 @@ def _open_model(path: str, digest: str) -> Any:  # noqa: ARG001 - the digest mak
         network = data["policy_class"](data["observation_space"], data["action_space"], lambda _: 0.0, **settings)
         weights: Any = parameters["policy"]
         network.load_state_dict(weights)
-    except (ValueError, LookupError, TypeError, AssertionError, RuntimeError, pickle.UnpicklingError) as error:
+    except MODEL_FAULTS as error:
         reason = " ".join(str(error).split())
         raise ModelError(
             f"Expected {path} to be a model saved by stable-baselines3, but it cannot be opened: {reason}."

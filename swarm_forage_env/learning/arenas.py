@@ -193,13 +193,13 @@ class ArenaBatch:
         terminated, truncated = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
         endings = _Endings()
         for arena in range(self.n_arenas):
-            first = arena * self.n_robots
-            self._step_arena(
-                arena,
-                actions[first : first + self.n_robots],
-                (obs[arena], rewards[arena], terminated[arena], truncated[arena]),
-                endings,
-            )
+            rows = slice(arena * self.n_robots, (arena + 1) * self.n_robots)
+            out = obs[arena], rewards[arena], terminated[arena], truncated[arena]
+            try:
+                self._step_arena(arena, actions[rows], out, endings)
+            except ValueError as error:
+                error.add_note(f"This was in arena {self._first_arena + arena}; those before it have been stepped.")
+                raise
         columns = obs.shape[-1]
         return ArenaStep(
             obs=obs.reshape(self.n_rows, columns),

@@ -181,13 +181,14 @@ def test_refuses_too_few_rows_and_steps_before_a_reset():
 
 @pytest.mark.parametrize("interface", [InterfaceConfig(), InterfaceConfig(automatic_gripper=True)])
 def test_actions_that_are_not_finite_are_refused_by_name(interface):
-    batch = ArenaBatch(plan(), interface, 1)
-    batch.reset([0], [None])
-    actions = np.zeros((3, *batch.interface.action_space.shape), np.float32)
-    actions[1, 0] = np.nan
-    with pytest.raises(ValueError, match="robot_1"):
+    batch = ArenaBatch(plan(), interface, 2, first_arena=4)
+    batch.reset([0, 1], [None, None])
+    actions = np.zeros((6, *batch.interface.action_space.shape), np.float32)
+    actions[4, 0] = np.nan
+    with pytest.raises(ValueError, match="robot_1") as refusal:
         batch.step(actions)
-    assert batch.worlds[0].base.tick == 0
+    assert refusal.value.__notes__ == ["This was in arena 5; those before it have been stepped."]
+    assert batch.worlds[1].base.tick == 0
 
 
 def test_small_rewards_of_long_runs_add_up():

@@ -1,5 +1,6 @@
 """Training by stable-baselines3: reproducible, resumable, judged beside a baseline, exported without loss."""
 
+import contextlib
 import csv
 import dataclasses
 import shutil
@@ -20,6 +21,7 @@ from swarm_forage_env.learning.plan import EvaluationPlan, Stage, TrainingPlan
 from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
 from swarm_forage_env.learning.sb3.export import export_network
 from swarm_forage_env.learning.sb3.training import train
+from swarm_forage_env.policy_models import ModelError, ModelPolicy
 from swarm_forage_env.scenarios import warehouse_small
 
 NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
@@ -183,6 +185,21 @@ def test_broken_files_are_named(trained, tmp_path, name, content, reason):
     path.write_bytes(path.read_bytes()[:3000] if content is None else content)
     with pytest.raises(ConfigError, match=reason):
         train(SHORT, folder, resume=True)
+
+
+def test_damaged_models_are_refused_as_policies(trained, tmp_path):
+    whole, rng = (trained / "model.zip").read_bytes(), np.random.default_rng(0)
+    path, refused = tmp_path / "model.zip", 0
+    for _ in range(60):
+        damaged = bytearray(whole)
+        for at in (rng.integers(len(whole)), len(whole) - 1 - rng.integers(300)):  # the second in the table of contents
+            damaged[at] = rng.integers(256)
+        path.write_bytes(damaged)
+        with contextlib.suppress(ModelError):  # and nothing else
+            ModelPolicy(path)
+            refused -= 1
+        refused += 1
+    assert refused > 30
 
 
 @pytest.mark.parametrize(

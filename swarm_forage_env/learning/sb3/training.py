@@ -8,9 +8,7 @@ can hold.
 import csv
 import importlib.util
 import inspect
-import pickle
 import time
-import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -31,6 +29,7 @@ from swarm_forage_env.learning.sb3.buffers import ActiveRolloutBuffer, PresentRe
 from swarm_forage_env.learning.sb3.export import export_network
 from swarm_forage_env.learning.sb3.vec_env import SwarmVecEnv
 from swarm_forage_env.policy import Policy, load_policy
+from swarm_forage_env.policy_models import MODEL_FAULTS
 from swarm_forage_env.recording import software_versions
 from swarm_forage_env.study.run import run_policy
 
@@ -147,7 +146,7 @@ def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgor
         return None
     try:
         return ALGORITHM_CLASSES[plan.algorithm].load(path, env=env, device="cpu")
-    except (ValueError, LookupError, RuntimeError, EOFError, zipfile.BadZipFile, pickle.UnpicklingError) as error:
+    except MODEL_FAULTS as error:
         raise ConfigError(f"Cannot open the checkpoint {path}: {error}; remove it to start anew.") from error
 
 
