@@ -34,7 +34,7 @@ from .machines import (
     new_robots,
     sense,
 )
-from .parameters import ControllerParameters, kernel_constants, require_observations, with_overrides
+from .parameters import ControllerParameters, chosen_parameters, kernel_constants, require_inputs
 
 
 @kernel
@@ -77,14 +77,15 @@ class CRWPolicy:
         overrides: Single fields of `ControllerParameters` by name.
 
     Raises:
-        ParameterError: unknown name or a value that makes no sense.
+        ParameterError: parameters of another controller, an unknown name, or a value that makes no sense.
     """
 
     caches: ClassVar[str] = "none"
     reads: ClassVar[tuple[str, ...]] = ("proximity", "light", "ground", "position", "carrying", "event")
 
     def __init__(self, parameters: ControllerParameters | None = None, **overrides: float) -> None:
-        self.parameters = with_overrides(parameters or ControllerParameters(), overrides)
+        self.parameters = chosen_parameters(ControllerParameters(), parameters, overrides)
+        self._task: SwarmTask | None = None
 
     def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
         """Start a run: every robot explores."""
@@ -97,7 +98,7 @@ class CRWPolicy:
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
-        require_observations(obs, self._task)
+        require_inputs(obs, active, self._task)
         self._rng.random(out=self._draws)
         step_crw(obs, active, self._draws, self._constants, self._robots, self._actions)
         return self._actions

@@ -29,7 +29,7 @@ from .machines import (
 )
 from .memory import ObjectMemory, forget, look_around, memory_of, new_memory, object_row_of, remembered_objects
 from .object_choice import MemoryParameters, object_is_known, object_is_reached, select_object
-from .parameters import kernel_constants, require_observations, with_overrides
+from .parameters import chosen_parameters, kernel_constants, require_inputs
 
 
 @kernel
@@ -87,7 +87,7 @@ class DPOPolicy:
         overrides: Single fields of `MemoryParameters` by name.
 
     Raises:
-        ParameterError: unknown name or a value that makes no sense.
+        ParameterError: parameters of another controller, an unknown name, or a value that makes no sense.
     """
 
     caches: ClassVar[str] = "none"
@@ -106,7 +106,8 @@ class DPOPolicy:
     )
 
     def __init__(self, parameters: MemoryParameters | None = None, **overrides: float) -> None:
-        self.parameters = with_overrides(parameters or MemoryParameters(), overrides)
+        self.parameters = chosen_parameters(MemoryParameters(), parameters, overrides)
+        self._task: SwarmTask | None = None
 
     def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
         """Start a run: every robot explores and remembers nothing."""
@@ -120,7 +121,7 @@ class DPOPolicy:
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
-        require_observations(obs, self._task)
+        require_inputs(obs, active, self._task)
         self._rng.random(out=self._draws)
         step_dpo(obs, active, self._draws, self._constants, self._robots, self._memory, self._actions)
         return self._actions

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from swarm_forage_env.policy import SwarmTask
-from swarm_forage_env.types import ObsArray
+from swarm_forage_env.types import BoolArray, ObsArray
 
 COLUMNS = (
     "proximity",
@@ -94,29 +94,48 @@ class ObservationError(ValueError):
     """Observations that are not those of the swarm that the policy was reset for."""
 
 
-def require_observations(obs: ObsArray, task: SwarmTask) -> None:
-    """Refuse observations of another shape; compiled kernels would read beyond them.
+def require_inputs(obs: ObsArray, active: BoolArray, task: SwarmTask | None) -> None:
+    """Refuse what is of another shape than the swarm; compiled kernels would read and write beyond it.
+
+    Args:
+        obs: Observations.
+        active: Which robots act.
+        task: What the policy was reset with, None = it was not.
 
     Raises:
-        ObservationError: `obs` is not (n_robots, layout.size).
+        ObservationError: `obs` is not (n_robots, layout.size), `active` not (n_robots,), or there was no reset.
     """
+    if task is None:
+        raise ObservationError("Expected reset before act; call reset with the task of the environment first.")
     expected = (task.n_robots, task.layout.size)
     if obs.shape != expected:
         raise ObservationError(
             f"Expected observations with shape (n_robots, columns) = {expected}, got {obs.shape}; "
             "call reset with the task of this environment."
         )
+    if active.shape != expected[:1]:
+        raise ObservationError(
+            f"Expected active with shape (n_robots,) = {expected[:1]}, got {active.shape}; pass `active` of the "
+            "environment."
+        )
 
 
 P = TypeVar("P", bound=ControllerParameters)
 
 
-def with_overrides(parameters: P, overrides: Mapping[str, float]) -> P:
-    """Return `parameters` with single numbers replaced by name.
+def chosen_parameters(default: P, parameters: P | None, overrides: Mapping[str, float]) -> P:
+    """Return `parameters`, or `default` without any, with single numbers replaced by name.
 
     Raises:
-        ParameterError: unknown name (with the nearest known one) or a value that makes no sense.
+        ParameterError: parameters of another controller, an unknown name (with the nearest known one), or a value that
+            makes no sense.
     """
+    parameters = default if parameters is None else parameters
+    if not isinstance(parameters, type(default)):
+        raise ParameterError(
+            f"Expected parameters to be {type(default).__name__}, got {type(parameters).__name__}; "
+            "give single numbers by name, as in wander_speed_mps=0.07."
+        )
     known = [field.name for field in dataclasses.fields(parameters)]
     for name in overrides:
         if name not in known:

@@ -10,7 +10,7 @@ from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray
 
 from .cache_memory import new_task_memory
 from .memory import density, remembered_objects
-from .parameters import kernel_constants, require_observations, with_overrides
+from .parameters import chosen_parameters, kernel_constants, require_inputs
 from .stoch_n1 import new_allocation
 from .task_machines import new_task_robots, step_tasks
 from .tasks import N_TASKS, TASK_DRAWS, TaskParameters
@@ -62,7 +62,7 @@ class TaskPolicy:
         overrides: Single fields of `TaskParameters` by name.
 
     Raises:
-        ParameterError: unknown name or a value that makes no sense.
+        ParameterError: parameters of another controller, an unknown name, or a value that makes no sense.
     """
 
     default_parameters: ClassVar[TaskParameters]
@@ -86,7 +86,8 @@ class TaskPolicy:
     )
 
     def __init__(self, parameters: TaskParameters | None = None, **overrides: float) -> None:
-        self.parameters = with_overrides(parameters or self.default_parameters, overrides)
+        self.parameters = chosen_parameters(self.default_parameters, parameters, overrides)
+        self._task: SwarmTask | None = None
 
     def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
         """Start a run: estimates are drawn, nobody has a task, and nothing is remembered."""
@@ -102,7 +103,7 @@ class TaskPolicy:
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
-        require_observations(obs, self._task)
+        require_inputs(obs, active, self._task)
         self._tick += 1
         self._rng.random(out=self._draws)
         step_tasks(

@@ -71,3 +71,24 @@ def test_observations_of_another_swarm_are_refused(policy_class):
     for rows, columns in ((3, policy._task.layout.size), (4, 10)):
         with pytest.raises(ObservationError, match=rf"\(n_robots, columns\) = \(4, .*got \({rows}, {columns}\)"):
             policy.act(np.zeros((rows, columns), np.float32), np.ones(rows, np.bool_))
+    with pytest.raises(ObservationError, match=r"active with shape \(n_robots,\) = \(4,\), got \(5,\)"):
+        policy.act(np.zeros((4, policy._task.layout.size), np.float32), np.ones(5, np.bool_))
+
+
+@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, STOCHMPolicy, STOCHXPolicy])
+def test_acting_without_a_reset_is_refused(policy_class):
+    with pytest.raises(ObservationError, match="Expected reset before act"):
+        policy_class().act(np.zeros((1, 114), np.float32), np.ones(1, np.bool_))
+
+
+@pytest.mark.parametrize(
+    ("policy_class", "parameters", "message"),
+    [
+        (CRWPolicy, {"wander_speed_mps": 0.1}, "to be ControllerParameters, got dict; give single numbers by name"),
+        (DPOPolicy, ControllerParameters(), "to be MemoryParameters, got ControllerParameters"),
+        (STOCHXPolicy, MemoryParameters(), "to be TaskParameters, got MemoryParameters"),
+    ],
+)
+def test_parameters_of_another_controller_are_refused(policy_class, parameters, message):
+    with pytest.raises(ParameterError, match=message):
+        policy_class(parameters)

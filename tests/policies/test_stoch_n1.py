@@ -89,6 +89,7 @@ def test_move_probability_by_ratio_of_imbalances(ratio, expected):
         ((0, 5, 1000, 900), False),
         ((1000, 900, 0, 5), False),
         ((1000, 1999, 1000, 1500), True),
+        ((1000, 2500, 1000, 1500), True),
     ],
 )
 def test_move_probability_of_balanced_or_unknown_blocks(blocks, is_integer):
@@ -277,6 +278,16 @@ def test_quirk_execution_time_counts_from_the_last_completion():
     robot.next(partition=1.0, now=500)
     run_ticks(robot, 501, 510, Activity.ACQUIRE)
     assert robot.a.exec_time[0, Task.HARVESTER] == 410
+
+
+def test_a_task_that_ends_before_its_first_full_tick_took_no_time():
+    robot = Robot()
+    robot.be(Tab.HARVESTER, Task.HARVESTER)
+    robot.a.estimate[0, Task.HARVESTER] = 1500
+    robot.a.exec_time[0, Task.HARVESTER] = 700
+    assert robot.next(partition=1.0, now=500) is Task.HARVESTER
+    stoch_n1.end_task(robot.a, 0, 501, robot.c)
+    assert robot.a.estimate[0, Task.HARVESTER] == 750
 
 
 @pytest.mark.parametrize(
