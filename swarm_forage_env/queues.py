@@ -19,7 +19,9 @@ from typing import TypeAlias
 
 import numpy as np
 
+from swarm_forage_env.config import ConfigError
 from swarm_forage_env.rng import Stream, stream_rng
+from swarm_forage_env.signals import require_number
 from swarm_forage_env.types import BoolArray, IntArray
 
 FindPlace: TypeAlias = Callable[[int, np.random.Generator], bool]
@@ -28,12 +30,20 @@ FindPlace: TypeAlias = Callable[[int, np.random.Generator], bool]
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class EventRates:
-    """Events per tick of the whole swarm; 0 = never."""
+    """Events per tick of the whole swarm; 0 = never.
+
+    Raises:
+        ConfigError: a rate that is negative or no number.
+    """
 
     death: float = 0.0
     birth: float = 0.0
     malfunction: float = 0.0
     repair: float = 0.0
+
+    def __post_init__(self) -> None:
+        for process in ("death", "birth", "malfunction", "repair"):
+            require_number(f"the rate of {process}", getattr(self, process), at_least=0.0)
 
 
 class EventClock:
@@ -131,8 +141,13 @@ class PopulationState:
             n_robots: Rows N, all robots that can ever appear.
             initial_robots: Robots at the start; default all.
             max_robots: Most robots that may be present at once; default N.
+
+        Raises:
+            ConfigError: no robots at the start, or more than there are rows.
         """
         born = n_robots if initial_robots is None else initial_robots
+        if not 1 <= born <= n_robots:
+            raise ConfigError(f"Expected initial_robots from 1 to n_robots = {n_robots}, got {born}.")
         present = np.arange(n_robots) < born
         return cls(
             present=present,
@@ -260,6 +275,9 @@ def simulate_population(
         seed: Seed of the run.
         initial_robots: As in `PopulationState.start`.
         max_robots: As in `PopulationState.start`.
+
+    Raises:
+        ConfigError: as `PopulationState.start`.
     """
     state = PopulationState.start(n_robots, initial_robots=initial_robots, max_robots=max_robots)
     clocks = EventClocks(rates, seed)

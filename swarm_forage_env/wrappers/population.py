@@ -12,7 +12,7 @@ from swarm_forage_env.signals import require_number
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
 BIRTH_MARGIN_M = 2.0
-"""Robots are born at least this far from the border of the arena (study configuration)."""
+"""Robots are born this far from the border of the arena (study configuration), or nearer where they start nearer."""
 BIRTH_TRIALS = 1000
 """Positions that are tried in one tick (study configuration)."""
 DEATHS = ("terminate", "absorbing")

@@ -286,6 +286,26 @@ def test_a_birth_waits_until_there_is_a_place():
     assert env.swarm.present.sum() == 3
 
 
+def test_nobody_is_born_while_enough_are_here():
+    stack = nursery(max_robots=3)
+    stack.reset_batch(0)
+    for _ in range(3):
+        strike(stack, "birth", hold(stack.world))
+    assert stack.world.swarm.present.sum() == 3
+
+
+@pytest.mark.parametrize(("start_margin_m", "nearest_m"), [(1.0, 1.0), (2.5, 2.0)])
+def test_births_are_as_near_to_the_border_as_starts_but_no_farther_than_two_metres(start_margin_m, nearest_m):
+    config = scenario("warehouse_small", n_robots=200, n_objects=9, start_margin_m=start_margin_m)
+    stack = PopulationDynamics(ForageEnv(config), PopulationConfig(initial_robots=1))
+    stack.reset_batch(0)
+    rng = np.random.default_rng(0)
+    assert all(stack._find_place(row, rng) for row in range(1, 200))
+    x, y = stack.world.swarm.position[1:].T
+    for distance in (x.min(), y.min(), 32.0 - x.max(), 16.0 - y.max()):
+        assert nearest_m <= distance < nearest_m + 0.4
+
+
 # Events and record
 
 
@@ -325,6 +345,19 @@ def test_events_queue_and_times_are_recorded():
     assert 0 < record["time_at_work_s"].max() <= 60.0
 
 
+def test_times_at_work_are_means_over_the_stays_that_ended():
+    config = scenario("warehouse_small", n_robots=12, n_objects=20, horizon_s=60.0, interval_s=20.0)
+    population = PopulationConfig(malfunction_per_tick=0.05, repair_per_tick=0.02)
+    recorder = RunRecorder(population.wrap(ForageEnv(config)))
+    recorder.reset_batch(2)
+    while not recorder.complete:
+        recorder.step_batch(hold(recorder.world))
+    record = recorder.contributed()
+    tally = simulate_population(population.rates, 12, 300, 2).tally
+    assert tally.stays == record["malfunctions"].sum() > record["repairs"].sum() > 0
+    assert record["time_at_work_s"] @ record["malfunctions"] == pytest.approx(tally.stay_ticks * 0.2)
+
+
 def test_an_interval_in_which_nothing_ended_has_times_of_zero():
     recorder = RunRecorder(
         at_hand(ForageEnv(scenario("warehouse_small", n_robots=2, n_objects=9, horizon_s=2.0, interval_s=1.0)))
@@ -333,6 +366,22 @@ def test_an_interval_in_which_nothing_ended_has_times_of_zero():
     while not recorder.complete:
         recorder.step_batch(hold(recorder.world))
     assert all(not values.any() for values in recorder.contributed().values())
+
+
+def test_a_run_that_was_broken_off_leaves_no_trace_in_the_next_record():
+    config = scenario("warehouse_small", n_robots=5, n_objects=9, horizon_s=4.0, interval_s=2.0)
+    recorder = RunRecorder(PopulationConfig(malfunction_per_tick=0.3, repair_per_tick=0.1).wrap(ForageEnv(config)))
+    records = []
+    for broken_off in (0, 7):
+        recorder.reset_batch(8)
+        for _ in range(broken_off):
+            recorder.step_batch(hold(recorder.world))
+        recorder.reset_batch(1)
+        while not recorder.complete:
+            recorder.step_batch(hold(recorder.world))
+        records.append(recorder.contributed())
+    assert records[0]["n_in_repair"].any()
+    assert_same_world(*records)
 
 
 def test_malfunctions_do_not_end_an_episode():

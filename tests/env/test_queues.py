@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from metrics.queues import PopulationRates, mean_away
+from swarm_forage_env.config import ConfigError
 from swarm_forage_env.queues import (
     EventClock,
     EventClocks,
@@ -274,6 +275,20 @@ def test_idle_ticks_may_be_skipped():
     tally = history.tally
     assert history.n_present[-1] == 10 + tally.births - tally.deaths
     assert min(tally.deaths, tally.births, tally.malfunctions, tally.repairs) > 5
+
+
+@pytest.mark.parametrize(
+    ("rate", "message"), [(-0.1, "death >= 0, got -0.1"), ("often", "a finite number, got 'often'")]
+)
+def test_rates_that_make_no_sense_are_refused(rate, message):
+    with pytest.raises(ConfigError, match=f"Expected the rate of .*{message}"):
+        EventRates(death=rate)
+
+
+@pytest.mark.parametrize("initial_robots", [0, 6])
+def test_more_robots_than_rows_or_none_are_refused(initial_robots):
+    with pytest.raises(ConfigError, match=f"initial_robots from 1 to n_robots = 5, got {initial_robots}"):
+        simulate_population(EventRates(), 5, 10, seed=0, initial_robots=initial_robots)
 
 
 # The study

@@ -119,6 +119,14 @@ def test_a_reset_starts_anew():
         np.testing.assert_array_equal(again[name], column)
 
 
+def test_a_reset_forgets_the_tasks_of_a_run_that_was_broken_off():
+    tasks = np.array([1, 1, 2, 3], np.int8)
+    recorder = drive(RunRecorder(FakeWorld()), ticks=7, tasks=tasks)
+    shares = drive(recorder, tasks=tasks).contributed()
+    assert shares["task_share_generalist"].tolist() == [0.5, 0.5, 0.5]
+    assert drive(recorder).contributed() == {}
+
+
 def test_other_wrappers_contribute_columns():
     recorder = drive(RunRecorder(Contributor(FakeWorld())))
     assert recorder.contributed()["throttle"].tolist() == [5.0, 10.0, 15.0]
