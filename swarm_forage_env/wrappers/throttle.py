@@ -81,7 +81,10 @@ class ThrottleConfig(WrapperConfig):
 
     def __post_init__(self) -> None:
         if not isinstance(self.waveform, Waveform):
-            raise ConfigError(f"Expected throttle.waveform to be a Waveform, got {self.waveform!r}.")
+            raise ConfigError(
+                "Expected throttle.waveform to be a Waveform, such as one of kind constant with an amplitude, "
+                f"got {self.waveform!r}."
+            )
         if self.waveform.peak > 1.0:
             raise ConfigError(
                 f"Expected a throttle of at most 1 (robots stand still), got a waveform that reaches "

@@ -386,6 +386,10 @@ def test_without_actuator_noise_gains_pass_untouched():
     assert env.calls[1]["wheel_gain"] is None
 
 
+def test_there_is_no_wheel_noise_where_its_waveform_is_negative():
+    np.testing.assert_array_equal(actuator_gains(3, sigma=Waveform(kind="constant", amplitude=-0.1)), 1.0)
+
+
 def test_wheel_noise_may_follow_a_waveform():
     late = Waveform(kind="step", amplitude=0.1, start_s=1.0)
     gains, steady = actuator_gains(8, sigma=late), actuator_gains(8, sigma=0.1)
@@ -399,6 +403,13 @@ def test_wheel_noise_belongs_to_the_seed():
 
 
 # Configuration
+
+
+def test_a_configuration_keeps_its_own_table_of_sigmas():
+    sigmas = {"light": 0.1}
+    config = SensorNoiseConfig(sigmas=sigmas)
+    sigmas["light"] = 0.2
+    assert config.sigmas == {"light": 0.1}
 
 
 def test_groups_are_kept_in_the_order_of_their_columns():

@@ -186,6 +186,17 @@ def test_last_value_and_mean_are_recorded_per_interval(carriers):
         assert recorder.columns()["adversity"].tolist() == recorded["throttle_mean"].tolist()
 
 
+def test_a_run_that_was_broken_off_leaves_no_trace_in_the_next_mean():
+    recorder = RunRecorder(ramp(50).wrap(FakeWorld()))
+    recorder.reset_batch(0)
+    for _ in range(3):
+        recorder.step_batch(np.zeros((4, 3), np.float32))
+    recorder.reset_batch(1)
+    while not recorder.complete:
+        recorder.step_batch(np.zeros((4, 3), np.float32))
+    assert recorder.contributed()["throttle_mean"].tolist() == pytest.approx([0.03, 0.08, 0.13])
+
+
 def test_the_waveform_itself_is_recorded_where_it_is_negative():
     waveform = Waveform(kind="square", amplitude=0.5, period_s=2.0)
     recorder = RunRecorder(ThrottleConfig(waveform=waveform).wrap(FakeWorld()))
@@ -222,7 +233,7 @@ def test_levels_of_the_study():
             {"waveform": Waveform(kind="sine", amplitude=0.6, offset=0.6, period_s=1.0)},
             "reaches 1.2; lower its amplitude",
         ),
-        ({"waveform": 0.3}, "throttle.waveform to be a Waveform, got 0.3"),
+        ({"waveform": 0.3}, "throttle.waveform to be a Waveform, such as one of kind constant.*got 0.3"),
         (
             {"waveform": Waveform(kind="constant"), "carriers": "yes"},
             "throttle.carriers to be True or False, got 'yes'",
