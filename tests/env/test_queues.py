@@ -225,6 +225,14 @@ def test_a_birth_without_a_place_waits_for_one():
     assert asked == [1, 1, 1]
 
 
+def test_the_first_stay_begins_at_birth():
+    state = PopulationState.start(2, initial_robots=1)
+    advance_population(state, due({"birth": 10}), 10)
+    state.active[0] = False  # so that the one just born must be the victim
+    advance_population(state, due({"malfunction": 15}), 15)
+    assert (state.tally.stays, state.tally.stay_ticks) == (1, 5), "at work in the ticks 10 to 14"
+
+
 def test_stays_and_absences_are_measured_in_ticks():
     state, clocks = PopulationState.start(1), due({"malfunction": 11})
     advance_population(state, clocks, 11)
