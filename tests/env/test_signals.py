@@ -94,7 +94,7 @@ def test_phase_shifts_waves_and_raises_sawteeth():
     assert sampled(raised, [0]) == [0.25]
 
 
-@pytest.mark.parametrize("start_s", [0.0, 0.6, 1.4, 200.0])
+@pytest.mark.parametrize("start_s", [0.0, 0.6, 3 * DT_S, 1.4, 200.0])  # 3 * 0.2 / 0.2 is more than 3
 def test_a_step_happens_at_the_tick_of_its_time(start_s):
     signal = Waveform(kind="step", amplitude=1.0, start_s=start_s).signal(DT_S)
     tick = round(start_s / DT_S)
@@ -155,6 +155,16 @@ def test_the_peak_is_the_least_upper_bound(kind):
     waveform = EXAMPLES[kind]
     highest = max(sampled(waveform, range(1, 7 * 35 + 1)))
     assert waveform.peak - 0.02 < highest <= waveform.peak + 1e-12
+
+
+def test_the_peak_of_a_step_down_is_where_it_comes_from():
+    assert Waveform(kind="step", amplitude=-0.4, offset=0.5, start_s=3.0).peak == 0.5
+
+
+@pytest.mark.parametrize("until_s", [0.6, 0.7])
+def test_a_table_ends_at_the_last_whole_multiple(until_s):
+    waveform = Waveform.sampled(lambda time_s: time_s, until_s=until_s, every_s=0.2)  # 0.6 / 0.2 is less than 3
+    assert waveform.times_s == pytest.approx((0.0, 0.2, 0.4, 0.6))
 
 
 def test_any_function_of_time_can_be_tabulated():
