@@ -2,6 +2,7 @@
 
 import builtins
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -96,12 +97,11 @@ def test_wrong_words_are_one_line_of_complaint(command, words, reason):
     assert len(err.splitlines()) == 1
 
 
-def test_the_message_is_the_same_from_python(monkeypatch):
-    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
-    for name in [name for name in sys.modules if name.startswith("swarm_forage_env.learning.sb3")]:
-        monkeypatch.delitem(sys.modules, name)
-    with pytest.raises(ImportError, match=r"pip install 'swarm-forage-env\[train\]'"):
-        import swarm_forage_env.learning.sb3  # noqa: F401
+@pytest.mark.parametrize("missing", ["stable_baselines3", "torch"])
+def test_the_message_is_the_same_from_python(missing):
+    code = f"import sys; sys.modules[{missing!r}] = None; import swarm_forage_env.learning.sb3"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "pip install 'swarm-forage-env[train]' 'torch==2.13.0'" in result.stderr.splitlines()[-1]
 
 
 def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
