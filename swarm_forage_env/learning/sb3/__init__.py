@@ -7,7 +7,7 @@ try:
     from swarm_forage_env.learning.sb3.buffers import ActiveRolloutBuffer, PresentReplayBuffer
     from swarm_forage_env.learning.sb3.vec_env import SwarmVecEnv
 except ModuleNotFoundError as error:
-    if error.name not in ("stable_baselines3", "torch"):
+    if (error.name or "").partition(".")[0] not in ("stable_baselines3", "torch"):
         raise
     raise ImportError(
         f"Training needs stable-baselines3 and torch ({error}): pip install 'swarm-forage-env[train]' 'torch==2.13.0'"
