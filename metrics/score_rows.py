@@ -161,7 +161,7 @@ def _note(per_run: FloatArray, n_lost: int, relative: FloatArray | None) -> str:
         notes.append(f"undefined in {n_nan} of {len(per_run)} runs, in which neither swarm achieved anything")
     if n_infinite:
         notes.append(f"infinite in {n_infinite} of {len(per_run)} runs, in which one swarm achieved nothing")
-    if relative is not None and (n_idle := int(np.isnan(relative).sum()) - n_nan):
+    if relative is not None and (n_idle := int(np.isnan(relative).sum())):
         notes.append(f"says nothing in {n_idle} of {len(per_run)} runs: the performance it compares with is zero")
     return "; ".join(notes)
 

@@ -132,6 +132,17 @@ def test_the_correction_is_over_levels_and_pairs_of_a_measure_and_nothing_else()
     np.testing.assert_allclose([d.p_holm for d in other], holm(np.array([d.p for d in other])))
 
 
+def test_nobody_is_better_by_a_difference_that_the_correction_takes_away():
+    clear, nothing = [1.0, 1.6, 0.4, 1.2], [0.1, -0.1, 0.2, -0.2]
+    zero = [0.0] * 4
+    found = compared(
+        a=[score(clear), *(score(nothing, at=f"N = {n}") for n in range(5, 9))],
+        b=[score(zero), *(score(zero, at=f"N = {n}") for n in range(5, 9))],
+    ).differences
+    assert found[0].p <= 0.05 < found[0].p_holm
+    assert (found[0].better, found[0].is_significant) == ("", False)
+
+
 def test_relative_values_are_tested_on_their_own():
     high, low = [10.0, 11.0, 12.0], [1.0, 2.2, 2.9]
     comparison = compared(

@@ -102,6 +102,17 @@ def test_values_are_told_relative_to_the_performance_they_compare_with():
     assert score.relative.mean == pytest.approx(expected.mean())
 
 
+def test_gains_are_relative_to_the_performance_of_the_larger_swarm():
+    (score,) = scored(rows(2, SLOWED), rows(4, IDEAL), measures=["task_emergence"])
+    expected = metrics.task_emergence(SLOWED, 2, IDEAL, 4, relative=True)
+    np.testing.assert_allclose(list(score.relative_per_seed.values()), expected)
+
+
+def test_interference_is_averaged_over_the_run():
+    (score,) = scored(rows(2, [[1.0, 1.0]], interference_fraction=[0.1, 0.4]), measures=["t_lost_fraction"])
+    assert score.summary.mean == pytest.approx(0.25)
+
+
 def test_doing_nothing_is_noted_and_not_praised():
     (score,) = scored(*throttled([[0.0] * 4] * 2, [[0.0] * 4] * 2), measures=["adaptability"])
     assert score.summary.mean == 0.0
@@ -149,6 +160,19 @@ def test_population_measures_use_the_rates_of_the_level():
     assert "the same for every policy" in found[1].note
 
 
+def test_a_reference_whose_robots_fail_as_well_has_its_own_rates():
+    levels = [
+        rows(9, runs, criterion="population_dynamics", criterion_value=x, t_end_s=CLOCK, deaths_per_s=rate)
+        for x, runs, rate in ((0.0, IDEAL, 0.01), (1.0, SLOWED, 0.02))
+    ]
+    (score,) = scored(*levels, measures=["population_robustness"])
+    often, rarely = PopulationRates(lambda_d=0.02), PopulationRates(lambda_d=0.01)
+    expected = metrics.population_robustness(SLOWED, IDEAL, often, horizon=400.0, n=9, ideal_rates=rarely)
+    np.testing.assert_allclose(list(score.per_seed.values()), expected)
+    weight = metrics.population_weight(often, horizon=400.0, n=9, ideal_rates=rarely)
+    assert score.beside["weight"] == pytest.approx(weight)
+
+
 def test_what_follows_from_rates_alone_has_no_number_of_runs():
     reference = rows(9, IDEAL, criterion="none", criterion_value=0.0)
     level = rows(9, IDEAL, criterion="population_dynamics", criterion_value=1.0, deaths_per_s=0.1)
@@ -166,7 +190,7 @@ def test_availability_is_told_once_per_ratio_of_rates():
     assert [score.summary.mean for score in found] == [0.0, pytest.approx(metrics.availability(9, 1, 0.5))]
 
 
-def lossy(n_planned: int, seeds: tuple[int, ...]) -> StudyCurves:
+def lossy(n_planned: int | None, seeds: tuple[int, ...]) -> StudyCurves:
     """A study of two sizes, of which the larger has lost runs."""
     whole = RunCurves(
         criterion="population_size",
@@ -189,6 +213,11 @@ def test_lost_runs_are_counted_and_noted():
     assert (score.n_lost, score.is_partial) == (1, True)
     assert score.note.startswith("1 of 3 runs failed")
     assert dict(zip(HEADER, score.cells(), strict=True))["runs"] == "2 of 3"
+
+
+def test_runs_without_a_partner_are_counted_where_nobody_planned_them():
+    (score,), _ = score_study(lossy(None, (0, 2)), ["task_emergence"])
+    assert (score.n_lost, score.note.split(" runs")[0]) == (1, "1 of 3")
 
 
 def test_an_experiment_without_a_run_keeps_its_row():

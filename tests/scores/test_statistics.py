@@ -178,6 +178,22 @@ def test_bootstrap_leaves_out_runs_that_cannot_be_scored():
     assert math.isnan(bootstrap_measure(adaptability, ideal, observed, order="mean_curve", n_resamples=5).mean)
 
 
+def test_bootstrap_works_where_hardly_a_resample_is_without_such_runs():
+    ideal, observed = noisy_runs(1), noisy_runs(2)
+    observed[::2, 0] = math.nan
+    summary = bootstrap_measure(adaptability, ideal, observed, seed=1, n_resamples=50)
+    assert summary.n_nan == 12
+    assert summary.lower < summary.mean < summary.upper
+
+
+def test_bootstrap_resamples_experiments_on_their_own():
+    """Runs of equal number would cancel, which is chance where experiments have nothing to do with each other."""
+    runs = noisy_runs(1)
+    summary = bootstrap_measure(lambda few, many: many.mean(axis=-1) - few.mean(axis=-1), runs, runs, seed=1)
+    assert summary.mean == 0.0
+    assert summary.upper - summary.lower > 0.1
+
+
 @pytest.mark.parametrize("order", ["per_run", "mean_curve"])
 def test_bootstrap_of_one_run_has_no_bounds(order):
     summary = bootstrap_measure(adaptability, noisy_runs(1, n_runs=1), noisy_runs(2, n_runs=1), order=order)
