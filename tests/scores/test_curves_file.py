@@ -178,6 +178,10 @@ BAD_TABLES = {
         edited(CROWDING, criterion="noise"),
         "Expected the column criterion_value beside criterion",
     ),
+    "clock that goes back": (
+        table(rows(2, [[1.0, 1.0]], t_end_s=[20.0, 10.0])),
+        "Expected the same rising t_end_s in all runs",
+    ),
     "unknown criterion": (
         edited(CROWDING, criterion="weather", criterion_value=1.0),
         "Expected criterion in .* to be one of population_size, .* got 'weather'",

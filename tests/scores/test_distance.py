@@ -103,6 +103,7 @@ def test_a_nan_spoils_its_own_pair_only():
 def test_per_interval():
     assert dtw(np.zeros(40), np.full(40, 0.25), per_interval=True) == 0.25
     assert dtw([0.0, 0.0, 0.0, 0.0], [1.0], per_interval=True) == 1.0
+    assert dtw([1.0], [0.0, 0.0, 0.0, 0.0], per_interval=True) == 1.0
 
 
 @pytest.mark.parametrize("clock", [[0.0, 1.0], np.zeros((2, 3)), [0.0, np.nan, 2.0], np.nan])

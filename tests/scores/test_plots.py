@@ -52,6 +52,9 @@ def test_one_panel_per_measure_and_one_line_per_policy(tmp_path, monkeypatch):
     panel = next(axes for axes in figure.axes if axes.get_title().startswith("noise_robustness"))
     assert len(panel.containers) == 2
     assert panel.get_ylabel() == "objects (DTW)"
+    summary = given[0]["noise_robustness"][0].summary
+    (bar,) = panel.containers[0][2][0].get_segments()
+    assert bar[:, 1].tolist() == pytest.approx([summary.lower, summary.upper])
     dotted = [line for line in panel.get_lines() if line.get_linestyle() == ":"]
     assert [line.get_ydata()[0] for line in dotted] == [given[0]["noise_robustness"][0].noise_floor] * 2
 
