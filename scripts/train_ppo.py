@@ -17,8 +17,6 @@ from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, SwarmVecEnv
 from swarm_forage_env.learning.sb3.export import export_network
 
-NARROW = {"width_m": 12.0, "nest_centre_m": (1.2, 8.0), "nest_size_m": (1.2, 12.8)}
-
 
 def main() -> None:
     """Train in a narrow warehouse, where ways are short, then in the real one; save the network."""
@@ -49,7 +47,7 @@ def main() -> None:
         verbose=1,
         device="cpu",
     )
-    for changes in (NARROW, {}):
+    for changes in ({"width_m": 12.0, "nest_centre_m": (1.2, 8.0), "nest_size_m": (1.2, 12.8)}, {}):
         env.set_options({"scenario": changes})
         model.set_env(env)  # makes the next call of learn reset the arenas
         model.learn(arguments.steps // 2, reset_num_timesteps=False)

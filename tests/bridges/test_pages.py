@@ -59,6 +59,10 @@ def test_the_example_of_stable_baselines3_trains_and_exports(tmp_path):
     assert (tmp_path / "policy.npz").exists()
 
 
+def test_train_ppo_is_as_short_as_promised():
+    assert len((ROOT / "scripts" / "train_ppo.py").read_text().splitlines()) < 60
+
+
 @pytest.mark.slow
 def test_train_ppo_trains_and_exports(tmp_path):
     require("stable_baselines3", "sb3")
