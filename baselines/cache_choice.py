@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 
+from swarm_forage_env.compiling import kernel
+from swarm_forage_env.types import Row
+
 from .cache_memory import OneTaskMemory, covers
-from .compiling import Row, kernel
 from .machines import ACQUIRE, TRANSPORT, Senses
 from .memory import OneMemory, density
 from .tasks import DRAW_POINT_X, DRAW_POINT_Y

@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
 from swarm_forage_env.policy import SwarmTask
-from swarm_forage_env.types import IntArray
+from swarm_forage_env.types import IntArray, Row
 
-from .compiling import Row, kernel
 from .memory import ObjectMemory, OneMemory, forget, memory_of, new_memory, object_row_of
 
 CACHE = np.dtype(

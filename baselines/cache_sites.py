@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarm_forage_env.compiling import kernel
+
 from .cache_memory import OneTaskMemory
-from .compiling import kernel
 from .machines import Senses
 from .tasks import DRAW_POINT_X, DRAW_POINT_Y
 

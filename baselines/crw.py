@@ -16,10 +16,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.policy import SwarmTask
 from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 
-from .compiling import kernel
 from .machines import (
     ACQUIRE,
     DELIVER,

@@ -17,10 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.layout import WINDOW_CELLS
-from swarm_forage_env.types import IntArray, ObsArray
-
-from .compiling import Row, kernel
+from swarm_forage_env.types import IntArray, ObsArray, Row
 
 _WINDOW = WINDOW_CELLS * WINDOW_CELLS
 _REACH = WINDOW_CELLS // 2

@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.detection import ring_sum
-
-from .compiling import Row, kernel
+from swarm_forage_env.types import Row
 
 
 @kernel

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from swarm_forage_env.compiling import inline_kernel, kernel
 from swarm_forage_env.detection import sees_object
+from swarm_forage_env.types import Row
 
-from .compiling import Row, inline_kernel, kernel
 from .machines import Senses
 from .memory import OneMemory, density
 from .parameters import ControllerParameters, ParameterError

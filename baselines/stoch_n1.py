@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.policy import Task
 from swarm_forage_env.quirks import Quirks
-from swarm_forage_env.types import BoolArray, CodeArray, FloatArray, IntArray
+from swarm_forage_env.types import BoolArray, CodeArray, FloatArray, IntArray, Row
 
-from .compiling import Row, kernel
 from .machines import ACQUIRE, TRANSPORT, WAIT_DROP, WAIT_PICKUP
 from .tasks import N_TABS, N_TASKS, ROOTED_TAB, SOURCE, TAB_CHILDREN, TAB_ROOT, Goal, Tab, TaskParameters
 

@@ -15,10 +15,11 @@ Source: STOCHM and STOCHX of the paper, section "Candidate Algorithms".
 
 import numpy as np
 
+from swarm_forage_env.compiling import inline_kernel, kernel
 from swarm_forage_env.detection import sees_cache
 from swarm_forage_env.layout import CACHE_FIELDS
 from swarm_forage_env.policy import Event, Task
-from swarm_forage_env.types import ActionArray, BoolArray, FloatArray, ObsArray
+from swarm_forage_env.types import ActionArray, BoolArray, FloatArray, ObsArray, Row
 
 from .cache_choice import cache_is_known, object_is_near, select_cache, select_isolated_object
 from .cache_memory import (
@@ -34,7 +35,6 @@ from .cache_memory import (
     task_memory_of,
 )
 from .cache_sites import select_site
-from .compiling import Row, inline_kernel, kernel
 from .machines import (
     ACQUIRE,
     DRAW_RESTART,

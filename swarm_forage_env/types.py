@@ -5,7 +5,7 @@ Units are SI (metres, seconds, radians) unless a docstring says otherwise; a *ti
 step of `dt_s`, a *cell* is one square of the floor grid (`config.CELL_M` wide).
 """
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,3 +18,5 @@ ObsArray: TypeAlias = NDArray[np.float32]
 """Observations, (N, D) float32 in [-1, 1]."""
 ActionArray: TypeAlias = NDArray[np.float32]
 """Actions, (N, 3) float32 in [-1, 1]: left wheel, right wheel, gripper."""
+Row: TypeAlias = Any
+"""One row of an array inside a compiled function, such as the observation of one robot, (D,) float32."""

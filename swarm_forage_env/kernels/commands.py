@@ -1,8 +1,7 @@
 """From a learner's actions to commands of the contract: motions by number, automatic gripper, masks."""
 
-from numba import njit
-
 from swarm_forage_env.codes import Grip
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.detection import sees_cache, sees_nest
 from swarm_forage_env.kernels.compact import is_over_object
 from swarm_forage_env.types import ActionArray, BoolArray, IntArray, ObsArray
@@ -17,13 +16,13 @@ ACT_GRASP, ACT_RELEASE, ACT_DELIVER, ACT_SITE, ACT_FOUND = 6, 7, 8, 9, 10
 N_GRIPS = 5
 
 
-@njit(cache=True)
+@kernel
 def idle_grip(row: ObsArray, carrying: int) -> float:
     """Gripper command that asks for nothing: hold when carrying, release when empty."""
     return GRASP if row[carrying] > 0.5 else RELEASE
 
 
-@njit(cache=True)
+@kernel
 def automatic_grip(obs: ObsArray, starts: tuple[int, int, int], actions: ActionArray) -> None:
     """Write the gripper column: grasp when empty and over an object or a cache, deliver when carrying in the nest.
 
@@ -42,7 +41,7 @@ def automatic_grip(obs: ObsArray, starts: tuple[int, int, int], actions: ActionA
         actions[i, 2] = grip
 
 
-@njit(cache=True)
+@kernel
 def numbered_actions(
     chosen: IntArray, wheels: ActionArray, grips: ActionArray, obs: ObsArray, carrying: int, actions: ActionArray
 ) -> None:
@@ -62,7 +61,7 @@ def numbered_actions(
             actions[i, 2] = grips[number - N_MOTIONS]
 
 
-@njit(cache=True)
+@kernel
 def mask_actions(obs: ObsArray, starts: tuple[int, int, int, int, int], dynamic_caches: bool, mask: BoolArray) -> None:
     """Write which actions make sense, (N, N_MOTIONS) or (N, N_MOTIONS + N_GRIPS); at least one per row.
 

@@ -2,8 +2,7 @@
 
 import math
 
-from numba import njit
-
+from swarm_forage_env.compiling import kernel
 from swarm_forage_env.detection import is_obstacle_vector, ring_sum, sees_cache, sees_nest
 from swarm_forage_env.kernels.floor import CELLS_PER_M
 from swarm_forage_env.layout import WINDOW_CELLS
@@ -19,13 +18,13 @@ _WINDOW = WINDOW_CELLS * WINDOW_CELLS
 _OWN_CELL = _WINDOW // 2
 
 
-@njit(cache=True)
+@kernel
 def is_over_object(row: ObsArray, object_start: int) -> bool:
     """Return whether a free object lies in the robot's own cell, the centre of its line-of-sight window."""
     return row[object_start + _OWN_CELL] > 0.0
 
 
-@njit(cache=True)
+@kernel
 def nearest_object(row: ObsArray, starts: tuple[int, int, int], half_x: float, half_y: float) -> tuple[float, float]:
     """Vector in m, along the axes of the arena, to the nearest object in view; (inf, inf) when there is none.
 
@@ -51,7 +50,7 @@ def nearest_object(row: ObsArray, starts: tuple[int, int, int], half_x: float, h
     return best_x, best_y
 
 
-@njit(cache=True)
+@kernel
 def nearest_cache(row: ObsArray, starts: tuple[int, int], half_x: float, half_y: float) -> tuple[float, float]:
     """Vector in m, along the axes of the arena, to the centre of the nearest visible cache; (inf, inf) without one.
 
@@ -63,7 +62,7 @@ def nearest_cache(row: ObsArray, starts: tuple[int, int], half_x: float, half_y:
     return (row[caches + 1] - row[position]) * half_x, (row[caches + 2] - row[position + 1]) * half_y
 
 
-@njit(cache=True)
+@kernel
 def write_direction(out: ObsArray, at: int, x: float, y: float, cos: float, sin: float) -> None:
     """Write a vector into three columns: forward and left over VIEW_REACH_M, cut to length 1; whether there is one."""
     if x == math.inf:
@@ -77,7 +76,7 @@ def write_direction(out: ObsArray, at: int, x: float, y: float, cos: float, sin:
     out[at + 2] = 1.0
 
 
-@njit(cache=True)
+@kernel
 def compact_view(obs: ObsArray, starts: tuple[int, ...], half_x: float, half_y: float, out: ObsArray) -> None:
     """Write the compact view (N, COMPACT_COLUMNS) of observations (N, D); rows of zeros stay zeros.
 
