@@ -3,7 +3,7 @@
 
 pip install 'swarm-forage-env[train]' 'torch==2.13.0'
 python scripts/train_ppo.py --steps 3000000 --out ppo_example.npz
-swarm-forage run --controller crw,ppo_example.npz
+swarm-forage run --policy crw,ppo_example.npz
 """
 # pyright: reportMissingImports=false
 

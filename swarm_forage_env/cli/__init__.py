@@ -41,7 +41,7 @@ _USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
 _WIDTH_WITHOUT_TERMINAL = 140
 
 app = typer.Typer(
-    help="Swarm foraging: run controllers, inspect scenarios, film runs, train policies.",
+    help="Swarm foraging: run, film, train and score policies, inspect scenarios.",
     add_completion=False,
     invoke_without_command=True,
     rich_markup_mode=None,
@@ -87,9 +87,14 @@ def _options(
 @app.command()
 def run(
     scenario: Scenario = "warehouse_small",
-    controller: Annotated[str, typer.Option(help="One or more names, separated by commas.")] = "crw",
+    policy: Annotated[
+        str,
+        typer.Option(
+            "--policy", "--controller", help="One or more, separated by commas: names, or files of trained ones."
+        ),
+    ] = "crw",
     robots: Robots = None,
-    seeds: Annotated[int, typer.Option(min=1, help="Runs per controller.")] = 1,
+    seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,
     first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first of them.")] = 0,
     horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
     objects: Objects = None,
@@ -103,7 +108,7 @@ def run(
     as_json: AsJson = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Run controllers in a scenario and compare them.
+    """Run policies in a scenario and compare how they perform.
 
     Runs in parallel, shows a table, stores one record per run and draws performance over time. Runs that the folder
     holds already are not repeated, so an interrupted command can simply be given again.
@@ -122,7 +127,7 @@ def run(
         wrappers=tuple(wrappers or ()),
         config_file=config,
     )
-    specs = plan_runs(options, split_names(controller), n_seeds=seeds, first_seed=first_seed)
+    specs = plan_runs(options, split_names(policy), n_seeds=seeds, first_seed=first_seed)
     store = RunStore(out or default_folder(scenario))
     if dry_run:
         _show_plan(specs, store, jobs, as_json=as_json)
@@ -159,6 +164,7 @@ def _run_specs(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None
 
 
 def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "RunStore", *, as_json: bool) -> None:
+    from metrics.score_table import counted
     from swarm_forage_env.cli.report import draw_performance, results_json, results_table, summarize
 
     notes = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -174,7 +180,9 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
         typer.echo(results_json(specs, result, store, plot))
     elif result.records:
         _console().print(results_table(specs, summarize(specs, result.records)))
-        notes.print(f"{len(result.records)} records in {store.folder}" + (f", picture {plot}" if plot else ""))
+        notes.print(
+            f"{counted(len(result.records), 'record')} in {store.folder}" + (f", picture {plot}" if plot else "")
+        )
     for failure in result.failures:
         notes.print(f"failed: {failure.spec.describe()}: {failure.error}", markup=False)
         notes.print(f"  again, alone: swarm-forage rerun {store.failure_path(failure.run_id)}", markup=False)
@@ -189,7 +197,7 @@ app.command()(train)
 
 @app.command("list")
 def list_everything() -> None:
-    """List scenarios and controllers."""
+    """List scenarios and policies."""
     from swarm_forage_env.cli.show import overview
 
     for table in overview():
@@ -197,8 +205,8 @@ def list_everything() -> None:
 
 
 @app.command()
-def info(name: Annotated[str, typer.Argument(help="A scenario, an environment id or a controller.")]) -> None:
-    """Show all fields and spaces of a scenario, or what a controller is."""
+def info(name: Annotated[str, typer.Argument(help="A scenario, an environment id or a policy.")]) -> None:
+    """Show all fields and spaces of a scenario, or what a policy is."""
     from swarm_forage_env.cli.show import information
 
     typer.echo(information(name))
@@ -235,7 +243,7 @@ def rerun(file: Annotated[Path, typer.Argument(help="A record (.parquet) or a fa
 def record(
     out: Annotated[Path, typer.Option(help="File to write, .gif or .mp4.")],
     scenario: Scenario = "warehouse_small",
-    controller: Annotated[str, typer.Option(help="Name of a controller.")] = "crw",
+    policy: Annotated[str, typer.Option("--policy", "--controller", help="Name, or file of a trained policy.")] = "crw",
     robots: Robots = None,
     seconds: Annotated[float, typer.Option(help="Simulated seconds to film.")] = 300.0,
     speedup: Annotated[float, typer.Option(help="Simulated seconds per second of film.")] = 20.0,
@@ -266,7 +274,7 @@ def record(
         wrappers=tuple(wrappers or ()),
         config_file=config,
     )
-    spec = plan_runs(options, (controller,), n_seeds=1, first_seed=seed)[0]
+    spec = plan_runs(options, (policy,), n_seeds=1, first_seed=seed)[0]
     try:
         screen = Console(stderr=True)
         with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:

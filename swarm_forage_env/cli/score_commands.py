@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 def score(
     context: typer.Context,
-    policy: Annotated[str | None, typer.Option(help="Name of a controller, or file of a trained policy.")] = None,
+    policy: Annotated[str | None, typer.Option(help="Name, or file of a trained policy.")] = None,
     curves: Annotated[
         Path | None, typer.Option(help="Score curves from elsewhere instead: a CSV or Parquet file (docs/scoring.md).")
     ] = None,
@@ -73,7 +73,7 @@ def score(
     )
     options = ScoreOptions(policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon)
     folder = out or default_folder(scenario)
-    _score(build_plan(world, options), folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run)
+    _score(build_plan(world, options, at_most=1), folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run)
 
 
 def _refuse_options_of_runs(context: typer.Context) -> None:
@@ -92,7 +92,12 @@ def _refuse_options_of_runs(context: typer.Context) -> None:
 
 
 def compare(
-    policies: Annotated[str, typer.Option(help="Names or files of two or more policies, separated by commas.")],
+    policies: Annotated[
+        str,
+        typer.Option(
+            "--policy", "--policies", help="Two or more, separated by commas: names, or files of trained ones."
+        ),
+    ],
     scenario: Scenario = "warehouse_small",
     measures: Measures = None,
     budget: Budget = "standard",

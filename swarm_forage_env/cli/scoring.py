@@ -30,13 +30,16 @@ class ScoreOptions:
     horizon: float | None = None
 
 
-def build_plan(world: WorldOptions, options: ScoreOptions, *, at_least: int = 1) -> ScoringPlan:
+def build_plan(
+    world: WorldOptions, options: ScoreOptions, *, at_least: int = 1, at_most: int | None = None
+) -> ScoringPlan:
     """Return what the words ask for.
 
     Args:
         world: Of which the horizon is left out.
         options: The rest.
         at_least: How many policies there must be.
+        at_most: How many there may be, None = any number.
 
     Raises:
         ConfigError: whatever is wrong with the words.
@@ -48,6 +51,8 @@ def build_plan(world: WorldOptions, options: ScoreOptions, *, at_least: int = 1)
     names = split_names(options.policies)
     if len(names) < at_least:
         raise ConfigError(f"Expected {at_least} or more policies to compare, separated by commas, got {names[0]!r}.")
+    if at_most is not None and len(names) > at_most:
+        raise ConfigError(f"Expected one policy to score, got {', '.join(names)}; compare scores more than one.")
     scenario, caches = build_scenario(world)
     try:
         return plan_scores(

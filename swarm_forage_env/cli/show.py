@@ -15,25 +15,25 @@ from swarm_forage_env.policy import policy_class, policy_names
 
 
 def overview() -> tuple[Table, Table]:
-    """Return the tables of scenarios and of controllers."""
+    """Return the tables of scenarios and of policies."""
     worlds = Table("scenario", "robots", "objects", "arena", "what it is", title="scenarios")
     for name in scenarios.SCENARIO_NAMES:
         config = scenarios.scenario(name)
         size = f"{config.arena.width_m:g} x {config.arena.height_m:g} m"
         counts = (str(config.robots.n_robots), str(config.objects.n_objects))
         worlds.add_row(name, *counts, size, _first_line(getattr(scenarios, name)))
-    controllers = Table("controller", "caches", "what it is", title="controllers")
+    policies = Table("policy", "caches", "what it is", title="policies")
     for name in policy_names():
         policy = policy_class(name)
-        controllers.add_row(name, getattr(policy, "caches", "none"), _first_line(policy))
-    return worlds, controllers
+        policies.add_row(name, getattr(policy, "caches", "none"), _first_line(policy))
+    return worlds, policies
 
 
 def information(name: str) -> str:
-    """Return everything about a scenario (by name or environment id) or a controller as text.
+    """Return everything about a scenario (by name or environment id) or a policy as text.
 
     Raises:
-        ConfigError: neither a scenario nor a controller has that name.
+        ConfigError: neither a scenario nor a policy has that name.
     """
     name = re.sub(r"^swarm_forage/(\w+)-v\d+$", r"\1", name)
     if name in scenarios.SCENARIO_NAMES:
@@ -41,7 +41,7 @@ def information(name: str) -> str:
     if name in policy_names():
         return "\n".join(_policy_lines(name))
     known = (*scenarios.SCENARIO_NAMES, *policy_names())
-    raise ConfigError(f"Unknown scenario or controller {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
+    raise ConfigError(f"Unknown scenario or policy {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
 
 
 def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:

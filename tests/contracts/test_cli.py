@@ -18,7 +18,7 @@ from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
 from swarm_forage_env.study.store import load
 
 SHORT = ("--robots", "3", "--objects", "20", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
-RUN = ("run", "--controller", "random", *SHORT)
+RUN = ("run", "--policy", "random", *SHORT)
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_a_single_seed_has_no_interval(command):
 
 
 def test_first_pickups_are_shown_where_they_are_the_performance(command):
-    words = ("run", "--controller", "random", "--scenario", "search_and_rescue", "--side", "16", "--jobs", "1")
+    words = ("run", "--policy", "random", "--scenario", "search_and_rescue", "--side", "16", "--jobs", "1")
     code, out, _ = command(*words, "--horizon", "4", "--set", "interval_s=2")
     assert code == 0
     assert "first pick-ups" in out
@@ -88,14 +88,21 @@ def test_json_has_null_where_there_is_no_interval(command):
 
 
 def test_several_controllers_and_their_worlds(command):
-    code, out, _ = command("run", "--controller", "random, crw,random", *SHORT, "--caches", "static", "--dry-run")
+    code, out, _ = command("run", "--policy", "random, crw,random", *SHORT, "--caches", "static", "--dry-run")
     assert code == 0
     rows = [line.split("│")[2:4] for line in out.splitlines() if "│ to do" in line]
     assert [[cell.strip() for cell in row] for row in rows] == [["random", "static"], ["crw", "static"]]
 
 
+@pytest.mark.parametrize("words", [("run", "--controller", "crw,dpo"), ("compare", "--policies", "crw,dpo")])
+def test_policies_are_found_under_the_other_names_of_the_option_too(command, words):
+    code, out, _ = command(*words, "--dry-run")
+    assert code == 0
+    assert "to do" in out
+
+
 def test_a_dry_run_plans_estimates_and_touches_nothing(command):
-    code, out, _ = command("run", "--controller", "random", "--seeds", "3", "--jobs", "2", "--dry-run")
+    code, out, _ = command("run", "--policy", "random", "--seeds", "3", "--jobs", "2", "--dry-run")
     assert code == 0
     assert out.count("│ to do") == 3
     assert "3 runs to do, 30,000 simulated seconds: roughly 8 s on 2 processes" in out
@@ -206,7 +213,7 @@ def test_ctrl_c_in_this_process(command, monkeypatch):
 def test_ctrl_c_with_worker_processes(tmp_path):
     words = [
         "run",
-        "--controller",
+        "--policy",
         "random",
         "--jobs",
         "2",
@@ -288,7 +295,7 @@ def test_help_loads_neither_physics_nor_tables():
 
 def test_record_films_a_run(command):
     pytest.importorskip("PIL")
-    words = ("--controller", "random", "--robots", "3", "--seconds", "8", "--size", "240", "--fps", "5")
+    words = ("--policy", "random", "--robots", "3", "--seconds", "8", "--size", "240", "--fps", "5")
     code, out, _ = command("record", "--out", "film.gif", *words)
     assert (code, out) == (0, "wrote film.gif\n")
     assert Path("film.gif").read_bytes().startswith(b"GIF8")
@@ -298,8 +305,8 @@ def test_record_films_a_run(command):
     ("words", "complaint"),
     [
         (("run", "--scenario", "warehouse_smal"), "Unknown scenario 'warehouse_smal'. Did you mean 'warehouse_small'?"),
-        (("run", "--controller", "crw,crv"), "Unknown policy 'crv'. Did you mean 'crw'?"),
-        (("run", "--controller", ","), "Expected one or more names separated by commas"),
+        (("run", "--policy", "crw,crv"), "Unknown policy 'crv'. Did you mean 'crw'?"),
+        (("run", "--policy", ","), "Expected one or more names separated by commas"),
         (("run", "--bogus"), "No such option: --bogus"),
         (("run", "extra"), "unexpected extra argument"),
         (("run", "--seeds", "0"), "'--seeds'"),

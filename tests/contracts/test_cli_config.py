@@ -33,7 +33,7 @@ def command(tmp_path, monkeypatch, capsys):
 
     def call(text, *words):
         Path("world.toml").write_text(text)
-        monkeypatch.setattr(sys, "argv", ["swarm-forage", "run", "--controller", "random", "--jobs", "1", *words])
+        monkeypatch.setattr(sys, "argv", ["swarm-forage", "run", "--policy", "random", "--jobs", "1", *words])
         with pytest.raises(SystemExit) as end:
             cli.main()
         shown = capsys.readouterr()

@@ -17,7 +17,7 @@ from swarm_forage_env.study.store import RunStore, load
 
 WORLD = ("--robots", "3", "--objects", "20", "--jobs", "1", "--budget", "tiny")
 SCORE = ("score", "--policy", "random", *WORLD)
-COMPARE = ("compare", "--policies", "random,crw", *WORLD)
+COMPARE = ("compare", "--policy", "random,crw", *WORLD)
 FEW = ("--measures", "t_lost_fraction,adaptability")
 CURVES = "n_robots,seed,interval,performance\n2,0,0,3\n4,0,0,5\n"
 
@@ -135,8 +135,9 @@ def test_seeds_length_and_world_can_be_chosen(command):
         (("score", "--policy", "crw", "--horizon", "150"), "whole number of intervals"),
         (("score", "--policy", "crw", "--robots", "1"), "at least 2 robots"),
         (("score", "--policy", "crw", "--set", "interval_s=2"), "which the budget sets"),
-        (("compare", "--policies", "crw"), "Expected 2 or more policies"),
-        (("compare", "--policies", "crw,dpoo"), "Unknown policy 'dpoo'"),
+        (("score", "--policy", "crw,dpo"), "Expected one policy to score, got crw, dpo; compare scores more than one."),
+        (("compare", "--policy", "crw"), "Expected 2 or more policies"),
+        (("compare", "--policy", "crw,dpoo"), "Unknown policy 'dpoo'"),
         (("compare",), "policies"),
         (("score", "--curves", "gone.csv"), "Cannot read gone.csv: No such file"),
         (("score", "--curves", "curves.csv", "--measures", "scalability"), "Expected the columns seed, interval"),

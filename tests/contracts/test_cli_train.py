@@ -53,7 +53,7 @@ def test_trains_shows_evaluations_and_goes_on(command):
     assert "resume it or go elsewhere" in err
     assert command(*words, "--resume")[0] == 0
 
-    code, out, _ = command("run", "--controller", str(folder / "policy.npz"), "--robots", "3", "--objects", "20",
+    code, out, _ = command("run", "--policy", str(folder / "policy.npz"), "--robots", "3", "--objects", "20",
                            "--horizon", "4", "--set", "interval_s=2", "--jobs", "1", "--json")  # fmt: skip
     assert code == 0
     assert json.loads(out)
