@@ -5,7 +5,6 @@ steering forces: the velocity that a force alone would make the robot drive with
 """
 
 import dataclasses
-import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from swarm_forage_env.policy import SwarmTask
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.types import BoolArray, ObsArray
 
 COLUMNS = (
@@ -139,9 +139,9 @@ def chosen_parameters(default: P, parameters: P | None, overrides: Mapping[str, 
     known = [field.name for field in dataclasses.fields(parameters)]
     for name in overrides:
         if name not in known:
-            close = difflib.get_close_matches(name, known, n=1)
-            hint = f" Did you mean {close[0]!r}?" if close else ""
-            raise ParameterError(f"Unknown controller parameter {name!r}.{hint} Known: {', '.join(known)}.")
+            raise ParameterError(
+                f"Unknown controller parameter {name!r}.{suggestion(name, known)} Known: {', '.join(known)}."
+            )
     return dataclasses.replace(parameters, **overrides)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from swarm_forage_env.actuators import Drive
 from swarm_forage_env.caches import create_static_caches, found_caches, n_cache_slots, restore_static_caches
-from swarm_forage_env.config import ConfigError, ScenarioConfig, suggestion
+from swarm_forage_env.config import ConfigError, ScenarioConfig
 from swarm_forage_env.interactions import Interactions
 from swarm_forage_env.interference import mark_interference
 from swarm_forage_env.kernels.floor import CELLS_PER_M
@@ -16,6 +16,7 @@ from swarm_forage_env.physics import Physics
 from swarm_forage_env.placement import draw_source, place_all, place_objects, static_cache_centres
 from swarm_forage_env.rng import Stream, stream_rng
 from swarm_forage_env.sensors import SensorSuite, sense, sense_proximity
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.start_poses import draw_start_poses
 from swarm_forage_env.state import CacheState, Counter, ObjectState, ObjectStatus, StepEvents, SwarmState
 from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray

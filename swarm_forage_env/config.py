@@ -4,9 +4,8 @@ A warehouse and a disaster zone are two configurations, never two environments. 
 """
 
 import dataclasses
-import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, TypeVar, cast
@@ -14,6 +13,7 @@ from typing import Any, TypeVar, cast
 from swarm_forage_env.layout import WHEEL_SCALE_MPS
 from swarm_forage_env.quirks import Quirks
 from swarm_forage_env.regions import PLACEMENTS, Box, capacity, distributable_box
+from swarm_forage_env.spelling import suggestion
 
 CELL_M = 0.2
 """Side of a floor cell and of an object."""
@@ -81,12 +81,6 @@ def _require_shares(section: str, **values: Any) -> None:
             are_positive and abs(sum(shares) - 1.0) < 1e-9,
             f"Expected {section}.{name} to be positive shares of a tick that sum to 1, got {value!r}.",
         )
-
-
-def suggestion(name: str, known: Iterable[str]) -> str:
-    """Return " Did you mean ...?" with the nearest known name, or an empty string."""
-    close = difflib.get_close_matches(name, list(known), n=1)
-    return f" Did you mean {close[0]!r}?" if close else ""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -4,7 +4,6 @@ A policy, scripted or trained, sees observations and never the world. `baselines
 here, `layout`, `detection`, `quirks` and `types`, and from nothing else of the environment.
 """
 
-import difflib
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from swarm_forage_env.codes import Grip as Grip
 from swarm_forage_env.codes import Task as Task
 from swarm_forage_env.layout import ObservationLayout
 from swarm_forage_env.quirks import Quirks
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
 
 POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
@@ -168,9 +168,9 @@ def policy_class(name: str) -> Callable[..., Policy]:
         if point.name == name:
             return point.load()
     known = policy_names()
-    close = difflib.get_close_matches(name, known, n=1)
-    hint = f" Did you mean {close[0]!r}?" if close else ""
-    raise ValueError(f"Unknown policy {name!r}.{hint} Installed policies: {', '.join(known) or 'none'}.")
+    raise ValueError(
+        f"Unknown policy {name!r}.{suggestion(name, known)} Installed policies: {', '.join(known) or 'none'}."
+    )
 
 
 @contextmanager
@@ -193,6 +193,13 @@ def local_policy(name: str, factory: Callable[..., Policy]) -> Generator[None]:
         del _LOCAL_POLICIES[name]
 
 
-def load_policy(name: str, parameters: Mapping[str, Any] | None = None) -> Policy:
-    """Return a fresh policy by registered name or from a policy file, built with keyword `parameters`."""
-    return policy_class(name)(**dict(parameters or {}))
+def load_policy(name: str | PurePath, parameters: Mapping[str, Any] | None = None) -> Policy:
+    """Return a fresh policy by registered name or from a policy file, built with keyword `parameters`.
+
+    Raises:
+        TypeError: `name` is neither text nor a path.
+        ValueError: no installed policy has that name; the message lists the known ones.
+    """
+    if not isinstance(name, str | PurePath):  # pyright: ignore[reportUnnecessaryIsInstance] - people pass None
+        raise TypeError(f"Expected the name of a policy or of a policy file, got {name!r}.")
+    return policy_class(str(name))(**dict(parameters or {}))

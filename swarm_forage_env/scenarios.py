@@ -14,9 +14,9 @@ from swarm_forage_env.config import (
     RewardConfig,
     RobotConfig,
     ScenarioConfig,
-    suggestion,
     with_overrides,
 )
+from swarm_forage_env.spelling import suggestion
 
 SCENARIO_NAMES = ("warehouse_small", "warehouse_medium", "search_and_rescue")
 

@@ -19,7 +19,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, TypeAlias
 
-from swarm_forage_env.config import ConfigError, from_mapping, suggestion
+from swarm_forage_env.config import ConfigError, from_mapping
+from swarm_forage_env.spelling import suggestion
 
 Signal: TypeAlias = Callable[[int], float]
 """Value at a tick; the first tick of a run is 1."""

@@ -9,9 +9,10 @@ from typing import Any
 from rich.table import Table
 
 from swarm_forage_env import scenarios
-from swarm_forage_env.config import ConfigError, ScenarioConfig, suggestion
+from swarm_forage_env.config import ConfigError, ScenarioConfig
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policy import policy_class, policy_names
+from swarm_forage_env.spelling import suggestion
 
 
 def overview() -> tuple[Table, Table]:

@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium import spaces
 
 from swarm_forage_env.codes import Grip
-from swarm_forage_env.config import ConfigError, suggestion
+from swarm_forage_env.config import ConfigError
 from swarm_forage_env.kernels.commands import (
     N_GRIPS,
     N_MOTIONS,
@@ -24,6 +24,7 @@ from swarm_forage_env.kernels.commands import (
 from swarm_forage_env.kernels.compact import COMPACT_COLUMNS, compact_view
 from swarm_forage_env.layout import ObservationLayout, ObservationSlice
 from swarm_forage_env.policy import SwarmTask
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
 
 OBSERVATIONS = ("full", "compact")

@@ -18,10 +18,11 @@ from typing import Any, TypeAlias
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env.config import ConfigError, suggestion
+from swarm_forage_env.config import ConfigError
 from swarm_forage_env.learning.files import replacing
 from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.policy import SwarmTask
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
 
 ACTIVATIONS = ("tanh", "relu")

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from swarm_forage_env.config import ConfigError, ScenarioConfig, suggestion, with_overrides
+from swarm_forage_env.config import ConfigError, ScenarioConfig, with_overrides
 from swarm_forage_env.config import from_mapping as config_from_mapping
 from swarm_forage_env.learning.files import replacing
 from swarm_forage_env.learning.interface import InterfaceConfig, interface_from_mapping
 from swarm_forage_env.learning.worlds import same_robots
 from swarm_forage_env.policy import policy_class
 from swarm_forage_env.scenarios import scenario as preset
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.config import ConfigError, ScenarioConfig, suggestion, with_overrides
+from swarm_forage_env.config import ConfigError, ScenarioConfig, with_overrides
 from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.scenarios import scenario as preset
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.types import ActionArray, ObsArray
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 

@@ -14,7 +14,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from swarm_forage_env.config import ConfigError, ScenarioConfig, suggestion
+from swarm_forage_env.config import ConfigError, ScenarioConfig
 from swarm_forage_env.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.scenarios import (
     SEARCH_AND_RESCUE_OBJECTS,
@@ -22,6 +22,7 @@ from swarm_forage_env.scenarios import (
     scenario,
     search_and_rescue,
 )
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, noise_levels

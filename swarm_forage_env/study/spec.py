@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env.config import ConfigError, ScenarioConfig, from_mapping, suggestion, to_mapping
+from swarm_forage_env.config import ConfigError, ScenarioConfig, from_mapping, to_mapping
 from swarm_forage_env.policy import policy_class
 from swarm_forage_env.recording import whole_intervals
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.wrappers.registry import wrapper_config_class
 
 if TYPE_CHECKING:

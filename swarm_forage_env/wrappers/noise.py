@@ -7,12 +7,13 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env.config import ConfigError, from_mapping, suggestion
+from swarm_forage_env.config import ConfigError, from_mapping
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.kernels.gaussian import to_normal
 from swarm_forage_env.kernels.noise import noisy_gain, perturb_readings, turn_heading
 from swarm_forage_env.rng import Stream, stream_rng
 from swarm_forage_env.signals import Signal, Waveform, gather_waveform, require_number
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.types import ActionArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 

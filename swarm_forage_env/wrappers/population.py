@@ -5,10 +5,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env.config import ConfigError, suggestion
+from swarm_forage_env.config import ConfigError
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.queues import EventClocks, EventRates, EventTally, PopulationState, advance_population
 from swarm_forage_env.signals import require_number
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
 BIRTH_MARGIN_M = 2.0

@@ -9,7 +9,7 @@ from swarm_forage_env.env import parallel_env
 from swarm_forage_env.learning.files import replacing
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.network import LearnedPolicy, Network, NetworkAbout, NetworkError, NetworkPolicy
-from swarm_forage_env.policy import Policy
+from swarm_forage_env.policy import Policy, load_policy
 
 
 def small_network(**about) -> Network:
@@ -165,3 +165,11 @@ def test_any_function_becomes_a_policy_by_naming_its_interface():
     assert policy.act(env.reset_batch(0), env.active)[:, :2].tolist() == [[0.5, 0.5]] * 3
     assert policy.caches == "static"
     assert "los_object" in policy.reads
+
+
+def test_a_path_opens_as_well_as_its_text(tmp_path):
+    compact_network(6, np.random.default_rng(0), interface=InterfaceConfig(observation="compact")).save(
+        tmp_path / "net.npz"
+    )
+    assert isinstance(load_policy(tmp_path / "net.npz"), NetworkPolicy)
+    assert isinstance(load_policy(str(tmp_path / "net.npz")), NetworkPolicy)

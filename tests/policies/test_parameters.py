@@ -92,3 +92,8 @@ def test_acting_without_a_reset_is_refused(policy_class):
 def test_parameters_of_another_controller_are_refused(policy_class, parameters, message):
     with pytest.raises(ParameterError, match=message):
         policy_class(parameters)
+
+
+def test_something_else_than_a_name_is_refused():
+    with pytest.raises(TypeError, match="Expected the name of a policy or of a policy file, got None"):
+        load_policy(None)

@@ -21,7 +21,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import safe_mean
 
-from swarm_forage_env.config import ConfigError, suggestion
+from swarm_forage_env.config import ConfigError
 from swarm_forage_env.learning.files import replacing
 from swarm_forage_env.learning.network import LearnedPolicy
 from swarm_forage_env.learning.plan import Evaluation, Stage, TrainingPlan, TrainingStatus, read_plan
@@ -31,6 +31,7 @@ from swarm_forage_env.learning.sb3.vec_env import SwarmVecEnv
 from swarm_forage_env.policy import Policy, load_policy
 from swarm_forage_env.policy_models import MODEL_FAULTS
 from swarm_forage_env.recording import software_versions
+from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.study.run import run_policy
 
 ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
