@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import stable_baselines3
 import torch
 from stable_baselines3 import A2C, DQN, PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -265,7 +266,11 @@ class _Watch(BaseCallback):
         card = {
             "plan": plan.to_mapping(),
             "evaluation": asdict(evaluation),
-            "versions": {**software_versions(), "torch": str(torch.__version__)},
+            "versions": {
+                **software_versions(),
+                "stable-baselines3": stable_baselines3.__version__,
+                "torch": str(torch.__version__),
+            },
         }
         network = export_network(self.model, plan.interface, caches=plan.scenario.caches, card=card)
         network.save(self._folder / POLICY_FILE)
