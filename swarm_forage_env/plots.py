@@ -56,3 +56,48 @@ def draw_curves(
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)
     figure.savefig(path, dpi=150)
+
+
+def draw_training(
+    path: str | Path,
+    steps: Sequence[int],
+    performance: Sequence[float],
+    interference: Sequence[float],
+    *,
+    baseline: tuple[str, float],
+    stage_ends: Sequence[int],
+    title: str,
+    ylabel: str,
+) -> None:
+    """Draw how a policy did in the evaluations of its training into a picture file.
+
+    Args:
+        path: File to write; its suffix chooses the format (.png, .svg, .pdf).
+        steps: (E,) decisions before each evaluation.
+        performance: (E,) what the scenario counts.
+        interference: (E,) mean fraction of active robots in interference.
+        baseline: Name of the controller to compare with, and its performance.
+        stage_ends: Decisions at which the stages of the training end.
+        title: Headline.
+        ylabel: What is counted, with its unit.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    from matplotlib.figure import Figure
+
+    millions = np.asarray(steps) / 1e6
+    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+    upper.plot(millions, performance, color=COLOURS[0], marker="o", label="trained policy")
+    upper.axhline(baseline[1], color=COLOURS[1], linestyle="--", label=baseline[0])
+    lower.plot(millions, interference, color=COLOURS[0], marker="o")
+    upper.set(title=title, ylabel=ylabel, ylim=(0, None))
+    lower.set(xlabel="million decisions of single robots (dotted: a new stage)", ylabel="interference", ylim=(0, 1))
+    for axes in (upper, lower):
+        axes.set_xlim(0, None)
+        axes.grid(alpha=0.3)
+        for end in stage_ends[:-1]:
+            axes.axvline(end / 1e6, color="black", linestyle=":", linewidth=1)
+    upper.legend(frameon=False)
+    figure.savefig(path, dpi=150)

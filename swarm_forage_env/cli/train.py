@@ -1,15 +1,17 @@
 """The command `swarm-forage train`: from its options to a plan, and what it shows meanwhile."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.cli.plan import WorldOptions, build_scenario
+from swarm_forage_env.cli.report import PERFORMANCE_WORDS
 from swarm_forage_env.config import CELL_M, ConfigError, ScenarioConfig
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.plan import (
@@ -22,6 +24,7 @@ from swarm_forage_env.learning.plan import (
     read_plan,
 )
 from swarm_forage_env.learning.pretrained import plan_file
+from swarm_forage_env.plots import draw_training
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
 DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
@@ -41,6 +44,7 @@ DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
 """Arguments that suit hundreds of robots at once; our choice, the rest is the library's."""
 EPISODE_S = 1000.0
 """Length of an episode, s; our choice: a start puts robots all over the arena, which teaches more than a long run."""
+PICTURE_FILE = "training.png"
 SMALL_START = 0.4
 """Share of its size that an arena has in a small start; our choice."""
 
@@ -158,7 +162,28 @@ def run_training(plan: TrainingPlan, folder: Path, *, n_processes: int, resume: 
         except KeyboardInterrupt:
             bar.console.print("Stopped. The same command with --resume goes on.")
             raise
-    console.print(f"model {folder / MODEL_FILE}" + (f", network {result.policy_file}" if result.policy_file else ""))
+    drawn = _draw(plan, result.evaluations, folder / PICTURE_FILE, console)
+    files = {"model": folder / MODEL_FILE, "network": result.policy_file, "picture": drawn}
+    console.print(", ".join(f"{what} {file}" for what, file in files.items() if file is not None))
+
+
+def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, console: Console) -> Path | None:
+    """Draw the evaluations; returns `path`, None without matplotlib."""
+    try:
+        draw_training(
+            path,
+            [evaluation.steps for evaluation in evaluations],
+            [evaluation.performance for evaluation in evaluations],
+            [evaluation.interference_fraction for evaluation in evaluations],
+            baseline=(plan.evaluation.baseline, evaluations[-1].baseline),
+            stage_ends=np.cumsum([stage.steps for stage in plan.stages]).tolist(),
+            title=f"{plan.algorithm} in {plan.scenario.name}, {plan.scenario.robots.n_robots} robots",
+            ylabel=f"{PERFORMANCE_WORDS[plan.scenario.performance]} per 1,000 s",
+        )
+    except ImportError:
+        console.print("No picture without matplotlib: pip install 'swarm-forage-env[plots]'", markup=False)
+        return None
+    return path
 
 
 def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | Evaluation], None]:

@@ -4,6 +4,7 @@ import builtins
 import json
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,8 @@ def test_trains_shows_evaluations_and_goes_on(command):
     folder = Path("results/training/warehouse_small_ppo")
     assert "decisions  per 1,000 s" in err
     assert str(folder / "policy.npz") in err
+    if find_spec("matplotlib"):
+        assert (folder / "training.png").read_bytes().startswith(b"\x89PNG")
     plan = read_plan(folder / "plan.json")
     assert plan.scenario.reward.nest_progress == 0.05
     assert [stage.steps for stage in plan.stages] == [42, 86]
