@@ -9,8 +9,7 @@ from swarm_forage_env.caches import create_static_caches, found_caches, n_cache_
 from swarm_forage_env.config import ConfigError, ScenarioConfig
 from swarm_forage_env.interactions import Interactions
 from swarm_forage_env.interference import mark_interference
-from swarm_forage_env.kernels.floor import CELLS_PER_M
-from swarm_forage_env.layout import observation_layout
+from swarm_forage_env.layout import CELLS_PER_M, observation_layout
 from swarm_forage_env.object_motion import walk_objects
 from swarm_forage_env.physics import Physics
 from swarm_forage_env.placement import draw_source, place_all, place_objects, static_cache_centres

@@ -6,7 +6,8 @@ What robots do with caches (adding, taking, the last pair dissolving) is in `ker
 import numpy as np
 
 from swarm_forage_env.codes import Task
-from swarm_forage_env.config import CELL_M, ScenarioConfig
+from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env.layout import CELL_M
 from swarm_forage_env.placement import Source, static_cache_centres
 from swarm_forage_env.regions import Box, overlap_cells
 from swarm_forage_env.state import (

@@ -10,13 +10,11 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, TypeVar, cast
 
-from swarm_forage_env.layout import WHEEL_SCALE_MPS
+from swarm_forage_env.layout import CELL_M, WHEEL_SCALE_MPS
 from swarm_forage_env.quirks import Quirks
 from swarm_forage_env.regions import PLACEMENTS, Box, capacity, distributable_box
 from swarm_forage_env.spelling import suggestion
 
-CELL_M = 0.2
-"""Side of a floor cell and of an object."""
 CACHE_KINDS = ("none", "static", "dynamic")
 PERFORMANCE_MEASURES = ("collected", "first_picked")
 MAX_DISC_SHARE = 0.4

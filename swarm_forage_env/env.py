@@ -11,8 +11,8 @@ from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_forage_env.actuators import ActionError
 from swarm_forage_env.arena import ForagingArena
-from swarm_forage_env.config import CELL_M, ConfigError, ScenarioConfig, with_overrides
-from swarm_forage_env.layout import WHEEL_SCALE_MPS, ObservationLayout
+from swarm_forage_env.config import ConfigError, ScenarioConfig, with_overrides
+from swarm_forage_env.layout import CELL_M, WHEEL_SCALE_MPS, ObservationLayout
 from swarm_forage_env.policy import SwarmTask
 from swarm_forage_env.rewards import RewardModel
 from swarm_forage_env.scenarios import scenario as preset

@@ -4,6 +4,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
+CELL_M = 0.2
+"""Side of a floor cell and of an object."""
+CELLS_PER_M = 5.0
+"""Cell index = floor(coordinate * 5); dividing by 0.2 would truncate 0.6 m to cell 2."""
 PROXIMITY_BEAMS = 24
 LIGHT_SENSORS = 24
 GROUND_SENSORS = 4

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarm_forage_env.clusters import draw_clusters
-from swarm_forage_env.config import CELL_M, ConfigError, ScenarioConfig
+from swarm_forage_env.config import ConfigError, ScenarioConfig
 from swarm_forage_env.kernels.scatter import DRAWS, UNLIMITED, scatter
+from swarm_forage_env.layout import CELL_M
 from swarm_forage_env.regions import Box, overlap_cells, source_boxes
 from swarm_forage_env.state import ObjectState, ObjectStatus
 from swarm_forage_env.types import IntArray

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from swarm_forage_env.config import CELL_M, ScenarioConfig
+from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env.layout import CELL_M
 from swarm_forage_env.regions import source_boxes
 from swarm_forage_env.rendering_paint import (
     Canvas,

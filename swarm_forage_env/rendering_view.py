@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swarm_forage_env.config import CELL_M, ScenarioConfig
+from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env.layout import CELL_M
 from swarm_forage_env.rendering_paint import Colour
 from swarm_forage_env.types import FloatArray
 

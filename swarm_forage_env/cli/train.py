@@ -12,7 +12,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.cli.plan import WorldOptions, build_scenario
 from swarm_forage_env.cli.report import PERFORMANCE_WORDS
-from swarm_forage_env.config import CELL_M, ConfigError, ScenarioConfig
+from swarm_forage_env.config import ConfigError, ScenarioConfig
+from swarm_forage_env.layout import CELL_M
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.plan import (
     DEFAULT_STEPS,

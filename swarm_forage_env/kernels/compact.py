@@ -4,8 +4,7 @@ import math
 
 from swarm_forage_env.compiling import kernel
 from swarm_forage_env.detection import is_obstacle_vector, ring_sum, sees_cache, sees_nest
-from swarm_forage_env.kernels.floor import CELLS_PER_M
-from swarm_forage_env.layout import WINDOW_CELLS
+from swarm_forage_env.layout import CELLS_PER_M, WINDOW_CELLS
 from swarm_forage_env.types import ObsArray
 
 COMPACT_COLUMNS = 23

@@ -6,11 +6,9 @@ import numpy as np
 
 from swarm_forage_env.compiling import kernel
 from swarm_forage_env.detection import BEAM_ANGLES_RAD
-from swarm_forage_env.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
+from swarm_forage_env.layout import CACHE_FIELDS, CELLS_PER_M, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
 from swarm_forage_env.types import BoolArray, FloatArray, IntArray, ObsArray
 
-CELLS_PER_M = 5.0
-"""Cell index = floor(coordinate * 5); dividing by 0.2 would truncate 0.6 m to cell 2."""
 _GROUND_X = np.array([0.063, 0.063, -0.063, -0.063])
 _GROUND_Y = np.array([0.0116, -0.0116, 0.0116, -0.0116])
 _GREY_OBJECT = 0.0

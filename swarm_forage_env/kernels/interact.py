@@ -10,6 +10,7 @@ import numpy as np
 
 from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, Counter, Event, ObjectStatus
 from swarm_forage_env.compiling import kernel
+from swarm_forage_env.layout import CELLS_PER_M
 from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray
 
 NO_REQUEST = 0
@@ -123,8 +124,8 @@ def clear_events(
 def _cell(world: World, i: int) -> tuple[int, int]:
     ny, nx = world.floor.shape
     return (
-        min(nx - 1, max(0, int(world.position[i, 0] * 5.0))),
-        min(ny - 1, max(0, int(world.position[i, 1] * 5.0))),
+        min(nx - 1, max(0, int(world.position[i, 0] * CELLS_PER_M))),
+        min(ny - 1, max(0, int(world.position[i, 1] * CELLS_PER_M))),
     )
 
 

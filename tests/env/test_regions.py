@@ -2,7 +2,7 @@
 
 import pytest
 
-from swarm_forage_env.config import CELL_M
+from swarm_forage_env.layout import CELL_M
 from swarm_forage_env.regions import PLACEMENTS, capacity, distributable_box, overlap_cells, source_boxes
 from swarm_forage_env.scenarios import SEARCH_AND_RESCUE_OBJECTS, scenario
 

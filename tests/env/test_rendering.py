@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from swarm_forage_env import rendering_paint, rendering_view
-from swarm_forage_env.config import CELL_M, ScenarioConfig
+from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env.layout import CELL_M
 from swarm_forage_env.rendering import Trails, render_frame
 from swarm_forage_env.rendering_paint import paint_box, paint_discs, paint_needles, paint_rings, paint_squares
 from swarm_forage_env.rendering_view import (
