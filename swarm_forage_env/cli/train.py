@@ -165,7 +165,7 @@ def run_training(plan: TrainingPlan, folder: Path, *, n_processes: int, resume: 
             raise
     drawn = _draw(plan, result.evaluations, folder / PICTURE_FILE, console)
     files = {"model": folder / MODEL_FILE, "network": result.policy_file, "picture": drawn}
-    console.print(", ".join(f"{what} {file}" for what, file in files.items() if file is not None))
+    console.print(", ".join(f"{what} {file}" for what, file in files.items() if file is not None), soft_wrap=True)
 
 
 def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, console: Console) -> Path | None:
