@@ -155,6 +155,7 @@ def learning_rows(ticks: int, repeats: int) -> Iterator[Row]:
             "VecEnv, N = 50, random actions", math.nan, "k robot-steps/s", ">= 400", None, "needs the train extra"
         )
         return
+    import torch  # pyright: ignore[reportMissingImports]
     from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
 
     from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, SwarmVecEnv
@@ -173,6 +174,7 @@ def learning_rows(ticks: int, repeats: int) -> Iterator[Row]:
     rate = statistics.median(rates)
     yield Row("VecEnv, N = 50, random actions", rate / 1e3, "k robot-steps/s", ">= 400", rate >= 400_000)
 
+    torch.set_num_threads(1)  # processor time of two threads would count twice
     n_steps = max(128, ticks // 10)
     model = PPO(
         "MlpPolicy",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_forage_env.extras import install_command
 from swarm_forage_env.rendering_view import CACHE_OPACITY, NEST_OPACITY, PALETTE, SOURCE_OPACITY, RenderError
 
 if TYPE_CHECKING:
@@ -154,6 +155,6 @@ def _import_imageio() -> Any:
     except ImportError as error:
         raise ImportError(
             "Writing .mp4 needs imageio and imageio-ffmpeg, which are not installed; "
-            "run: pip install 'swarm-forage-env[render]', or write a .gif."
+            f"run {install_command('render')}, or write a .gif."
         ) from error
     return imageio.v2

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env.extras import install_command
 from swarm_forage_env.layout import CELL_M
 from swarm_forage_env.rendering_paint import Colour
 from swarm_forage_env.types import FloatArray
@@ -169,6 +170,6 @@ def text_font(text_px: float) -> "ImageFont.FreeTypeFont":
         from PIL import ImageFont
     except ImportError as error:
         raise ImportError(
-            "Rendering needs Pillow, which is not installed; run: pip install 'swarm-forage-env[render]'"
+            f"Rendering needs Pillow, which is not installed; run {install_command('render')}."
         ) from error
     return ImageFont.load_default(round(text_px))  # type: ignore[return-value]

@@ -14,6 +14,7 @@ from swarm_forage_env.cli.options import (
     EXIT_FAILURE,
     EXIT_INTERRUPTED,
     EXIT_USAGE,
+    NO_PICTURE,
     AsJson,
     Caches,
     ConfigFile,
@@ -175,7 +176,7 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
             draw_performance(specs, result.records, plot)
         except ImportError:
             plot = None
-            notes.print("No picture without matplotlib: pip install 'swarm-forage-env[plots]'", markup=False)
+            notes.print(NO_PICTURE, markup=False)
     if as_json:
         typer.echo(results_json(specs, result, store, plot))
     elif result.records:

@@ -5,10 +5,14 @@ from typing import Annotated
 
 import typer
 
+from swarm_forage_env.extras import install_command
+
 EXIT_FAILURE = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
 """What shells report for a program that Ctrl-C ended."""
+
+NO_PICTURE = f"No picture without matplotlib: {install_command('plots')}."
 
 Scenario = Annotated[str, typer.Option("--scenario", help="Preset; see 'swarm-forage list'.")]
 Robots = Annotated[int | None, typer.Option("--robots", min=1, help="Swarm size.")]

@@ -8,6 +8,7 @@ import typer
 from swarm_forage_env.cli.options import (
     EXIT_FAILURE,
     EXIT_INTERRUPTED,
+    NO_PICTURE,
     AsJson,
     Budget,
     Caches,
@@ -154,7 +155,7 @@ def _show_scores(tables: "tuple[ScoreTable, ...]", picture: Path | None, *, as_j
         try:
             drawn = draw(tables, picture)
         except ImportError:
-            typer.echo("No picture without matplotlib: pip install 'swarm-forage-env[plots]'", err=True)
+            typer.echo(NO_PICTURE, err=True)
     if as_json:
         typer.echo(json_text(tables, comparison, drawn))
     else:

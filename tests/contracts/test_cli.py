@@ -243,7 +243,7 @@ def test_without_matplotlib_it_says_how_to_get_the_picture(command, monkeypatch)
     code, out, err = command(*RUN)
     assert code == 0
     assert "random" in out
-    assert "pip install 'swarm-forage-env[plots]'" in err
+    assert 'pip install ".[plots]"' in err
     assert not Path("results/warehouse_small/performance.png").exists()
 
 

@@ -206,7 +206,7 @@ def test_without_matplotlib_it_says_how_to_get_the_picture(command, monkeypatch)
     code, out, err = command(*SCORE, *FEW)
     assert code == 0
     assert "adaptability" in out
-    assert "pip install 'swarm-forage-env[plots]'" in err
+    assert 'pip install ".[plots]"' in err
     assert not Path("results/warehouse_small/scores.png").exists()
 
 

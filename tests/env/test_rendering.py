@@ -319,7 +319,7 @@ def test_without_pillow_the_message_tells_what_to_install(world, monkeypatch):
     monkeypatch.setitem(sys.modules, "PIL", None)
     rendering_view.text_font.cache_clear()
     arena_view.cache_clear()
-    with pytest.raises(ImportError, match=r"pip install 'swarm-forage-env\[render\]'"):
+    with pytest.raises(ImportError, match=r'pip install ".\[render\]"'):
         world.draw()
 
 

@@ -109,7 +109,7 @@ def test_impossible_films_are_refused(tmp_path, name, fps, n_frames, expected):
 
 def test_without_ffmpeg_the_message_tells_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(ImportError, match=r"pip install 'swarm-forage-env\[render\]'"):
+    with pytest.raises(ImportError, match=r'pip install ".\[render\]"'):
         check_film(tmp_path / "film.mp4", 20, 10)
     assert check_film(tmp_path / "film.gif", 20, 10) == tmp_path / "film.gif"
 

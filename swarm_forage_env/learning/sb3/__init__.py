@@ -3,14 +3,14 @@
 Only this package imports stable_baselines3 and torch; install them with the `train` extra.
 """
 
+from swarm_forage_env.extras import install_command
+
 try:
     from swarm_forage_env.learning.sb3.buffers import ActiveRolloutBuffer, PresentReplayBuffer
     from swarm_forage_env.learning.sb3.vec_env import SwarmVecEnv
 except ModuleNotFoundError as error:
     if (error.name or "").partition(".")[0] not in ("stable_baselines3", "torch"):
         raise
-    raise ImportError(
-        f"Training needs stable-baselines3 and torch ({error}): pip install 'swarm-forage-env[train]' 'torch==2.13.0'"
-    ) from error
+    raise ImportError(f"Training needs stable-baselines3 and torch ({error}): {install_command('train')}.") from error
 
 __all__ = ["ActiveRolloutBuffer", "PresentReplayBuffer", "SwarmVecEnv"]
