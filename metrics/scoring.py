@@ -261,12 +261,19 @@ def run_scores(
 
 
 def _told_apart(contestants: tuple[Contestant, ...]) -> tuple[Contestant, ...]:
-    """Name files of equal names by their whole paths; raises CurveError if policies still have equal names."""
-    counts = Counter(contestant.label for contestant in contestants)
-    contestants = tuple(
-        replace(contestant, label=contestant.policy) if counts[contestant.label] > 1 else contestant
-        for contestant in contestants
-    )
+    """Name files of equal names by their folders, too, or by whole paths.
+
+    Raises:
+        CurveError: policies still have equal names.
+    """
+    for n_parts in (2, 0):  # folder and file, all
+        counts = Counter(contestant.label for contestant in contestants)
+        contestants = tuple(
+            replace(contestant, label=str(Path(*Path(contestant.policy).parts[-n_parts:])))
+            if counts[contestant.label] > 1
+            else contestant
+            for contestant in contestants
+        )
     labels = [contestant.label for contestant in contestants]
     if len(set(labels)) < len(labels):
         raise CurveError(f"Expected policies of different names, got {', '.join(labels)}; give a mapping from names.")
@@ -289,10 +296,12 @@ def _contestant(
 ) -> Contestant:
     """Find out what was given as a policy."""
     from swarm_forage_env.policy import from_callable, is_policy_file, policy_class
+    from swarm_forage_env.study.spec import pin_policy_file
 
     if isinstance(policy, (str, Path)):
         if is_policy_file(str(policy)):
-            return _policy_file(Path(policy), name, parameters)
+            file, checked, caches = pin_policy_file(policy, parameters)
+            return Contestant(label=name or Path(policy).stem, policy=file, parameters=checked, caches=caches)
         policy_class(str(policy))
         return Contestant(label=name or str(policy), policy=str(policy), parameters=parameters)
     if not callable(policy) and not _is_policy(policy):
@@ -314,17 +323,6 @@ def _contestant(
     return Contestant(
         label=label, policy=label, parameters=parameters, factory=factory, is_named=name is not None, caches=caches
     )
-
-
-def _policy_file(path: Path, name: str | None, parameters: Mapping[str, Any]) -> Contestant:
-    """A policy in a file: its content is part of its runs' identity, and it is opened once before anything is run."""
-    from swarm_forage_env.policy import load_policy
-    from swarm_forage_env.policy_models import file_digest
-
-    file = str(path.resolve())
-    checked = {**parameters, "digest": file_digest(file)}
-    caches = getattr(load_policy(file, checked), "caches", None)
-    return Contestant(label=name or path.stem, policy=file, parameters=checked, caches=caches)
 
 
 def _is_policy(policy: Any) -> bool:

@@ -7,7 +7,6 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.config import SECTIONS, ConfigError, ScenarioConfig, field_sections
-from swarm_forage_env.policy import policy_class
 from swarm_forage_env.scenarios import scenario
 from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.study.spec import RunSpec, plan_run
@@ -118,29 +117,26 @@ def _parse_value(name: str, text: str, kind: Any) -> Any:
         raise ConfigError(f"Expected {name} to be {wanted}, got {text!r}.") from error
 
 
-def plan_runs(
-    options: WorldOptions, controllers: Sequence[str], *, n_seeds: int, first_seed: int
-) -> tuple[RunSpec, ...]:
-    """Return one specification per controller and seed.
+def plan_runs(options: WorldOptions, policies: Sequence[str], *, n_seeds: int, first_seed: int) -> tuple[RunSpec, ...]:
+    """Return one specification per policy and seed.
 
     Raises:
-        ConfigError: see `build_scenario` and `read_config`; or an unknown controller or wrapper.
+        ConfigError: see `build_scenario` and `read_config`; an unknown policy or wrapper, or a policy file that
+            cannot be opened.
     """
     file_fields, file_wrappers = ({}, ()) if options.config_file is None else read_config(options.config_file)
     config, caches = build_scenario(options, file_fields)
     wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
     named = {wrapper.name for wrapper in wrappers}
     wrappers += tuple(wrapper for wrapper in file_wrappers if wrapper.name not in named)
-    for name in controllers:
-        try:
-            policy_class(name)
-        except ValueError as error:
-            raise ConfigError(str(error)) from error
-    return tuple(
-        plan_run(config, name, caches=caches, wrappers=wrappers, seed=seed)
-        for name in controllers
-        for seed in range(first_seed, first_seed + n_seeds)
-    )
+    try:
+        return tuple(
+            plan_run(config, name, caches=caches, wrappers=wrappers, seed=seed)
+            for name in policies
+            for seed in range(first_seed, first_seed + n_seeds)
+        )
+    except ValueError as error:  # of a policy or its file
+        raise ConfigError(str(error)) from error
 
 
 def default_folder(scenario_name: str) -> Path:

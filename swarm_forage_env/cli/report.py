@@ -93,8 +93,14 @@ def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummar
     for row in summaries:
         rates = [*([str(row.first_pickups_per_1000_s)] if picks else []), str(row.deliveries_per_1000_s)]
         tail = [f"{row.interference_fraction:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
-        table.add_row(row.controller, row.caches, str(row.n_runs), *rates, *tail)
+        table.add_row(shown(row.controller), row.caches, str(row.n_runs), *rates, *tail)
     return table
+
+
+def shown(policy: str) -> str:
+    """Return the name of a policy for people: a file below the current folder without the way there."""
+    path = Path(policy)
+    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else policy
 
 
 def plan_table(specs: Sequence[RunSpec], store: RunStore) -> Table:
@@ -106,7 +112,7 @@ def plan_table(specs: Sequence[RunSpec], store: RunStore) -> Table:
         world = spec.scenario
         state = "stored" if spec.run_id in store else "to do"
         numbers = (str(world.robots.n_robots), str(spec.seed), f"{world.horizon_s:g}")
-        table.add_row(spec.run_id, spec.policy, world.caches, *numbers, state)
+        table.add_row(spec.run_id, shown(spec.policy), world.caches, *numbers, state)
     return table
 
 
@@ -156,7 +162,7 @@ def draw_performance(specs: Sequence[RunSpec], records: Sequence[RunRecord], pat
         runs = np.array([record.performance for record in records if record.controller == controller])
         per_interval = [aggregate(column, level=LEVEL) for column in runs.T]
         mean, low, high = np.array([(point.mean, point.lower, point.upper) for point in per_interval]).T
-        curves.append(Curve(controller, mean, low, high))
+        curves.append(Curve(shown(controller), mean, low, high))
     words = PERFORMANCE_WORDS[scenario.performance]
     draw_curves(
         path,

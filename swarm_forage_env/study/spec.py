@@ -4,10 +4,11 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env.config import ConfigError, ScenarioConfig, from_mapping, to_mapping
-from swarm_forage_env.policy import policy_class
+from swarm_forage_env.policy import is_policy_file, load_policy, policy_class
 from swarm_forage_env.recording import whole_intervals
 from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.wrappers.registry import wrapper_config_class
@@ -32,7 +33,7 @@ class RunSpec:
 
     scenario: ScenarioConfig
     policy: str
-    """Registered name, or the name under which the runs of a policy object are stored."""
+    """Registered name, path of a policy file, or the name under which the runs of a policy object are stored."""
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Keyword arguments of the policy, plain JSON values; tuples become lists."""
     wrappers: "tuple[WrapperConfig, ...]" = ()
@@ -126,23 +127,53 @@ class RunSpec:
         return cls.from_mapping(mapping)
 
 
-def plan_run(scenario: ScenarioConfig, policy: str, *, caches: str | None = None, **fields: Any) -> RunSpec:
-    """Plan a run of a registered policy in the world that the policy is made for.
+def plan_run(
+    scenario: ScenarioConfig,
+    policy: str,
+    *,
+    parameters: Mapping[str, Any] | None = None,
+    caches: str | None = None,
+    **fields: Any,
+) -> RunSpec:
+    """Plan a run of a policy in the world that the policy is made for.
 
     Args:
         scenario: The world, but for its caches.
-        policy: Registered name.
-        caches: Which caches the world has; default what the policy's class states in `caches`, or what the
-            scenario has where the class states nothing.
+        policy: Registered name, or path of a policy file.
+        parameters: Keyword arguments of the policy, plain values.
+        caches: Which caches the world has; default what the policy states in `caches`, or what the scenario has where
+            the policy states nothing.
         fields: Further fields of `RunSpec`.
 
     Raises:
         ConfigError: see `RunSpec`.
-        ValueError: no installed policy has that name.
+        ValueError: no installed policy has that name, or a file that cannot be opened.
     """
-    if caches is None:
-        caches = getattr(policy_class(policy), "caches", scenario.caches)
-    return RunSpec(scenario=replace(scenario, caches=caches), policy=policy, **fields)
+    chosen = dict(parameters or {})
+    if is_policy_file(policy):
+        policy, chosen, stated = pin_policy_file(policy, chosen)
+        caches = caches or stated
+    elif caches is None:
+        caches = getattr(policy_class(policy), "caches", None)
+    return RunSpec(
+        scenario=replace(scenario, caches=caches or scenario.caches), policy=policy, parameters=chosen, **fields
+    )
+
+
+def pin_policy_file(path: str | Path, parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any], str | None]:
+    """Make the content of a policy file part of its runs' identity; opens it once, before anything is run.
+
+    Returns:
+        The whole path; the parameters and the file's digest; the caches it was made for, None where it does not tell.
+
+    Raises:
+        ValueError: the file cannot be opened.
+    """
+    from swarm_forage_env.policy_models import file_digest  # late: most runs open no model
+
+    file = str(Path(path).resolve())
+    checked = {**parameters, "digest": file_digest(file)}
+    return file, checked, getattr(load_policy(file, checked), "caches", None)
 
 
 def _wrapper_from_mapping(entry: Mapping[str, Any]) -> "WrapperConfig":

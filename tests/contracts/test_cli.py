@@ -306,6 +306,7 @@ def test_record_films_a_run(command):
     [
         (("run", "--scenario", "warehouse_smal"), "Unknown scenario 'warehouse_smal'. Did you mean 'warehouse_small'?"),
         (("run", "--policy", "crw,crv"), "Unknown policy 'crv'. Did you mean 'crw'?"),
+        (("run", "--policy", "crw,gone.npz"), "gone.npz"),
         (("run", "--policy", ","), "Expected one or more names separated by commas"),
         (("run", "--bogus"), "No such option: --bogus"),
         (("run", "extra"), "unexpected extra argument"),

@@ -4,9 +4,12 @@ import json
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
 import pytest
 
 from swarm_forage_env.config import ConfigError
+from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.network import Network, NetworkAbout
 from swarm_forage_env.policy import policy_class, policy_names
 from swarm_forage_env.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
@@ -168,3 +171,33 @@ def test_planning_an_unknown_policy_suggests_the_nearest():
 def test_describe_is_one_line():
     text = replace(BASE, seed=7, criterion="noise", criterion_value=0.03).describe()
     assert text == f"{text[:16]}: crw in warehouse_small, 50 robots, seed 7, noise = 0.03"
+
+
+def network_file(path, *, caches="none", seed=0):
+    """A network from compact observations to motions, with random weights."""
+    weights = np.random.default_rng(seed).normal(size=(23, 6)).astype(np.float32)
+    interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
+    network = Network((weights,), (np.zeros(6, np.float32),), NetworkAbout(interface=interface, caches=caches))
+    network.save(path)
+    return path
+
+
+def test_the_content_of_a_policy_file_is_part_of_the_runs_identity(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    world = scenario("warehouse_small")
+    network_file(tmp_path / "net.npz")
+    first = plan_run(world, "net.npz")
+    assert first == plan_run(world, str(tmp_path / "net.npz"))
+    network_file(tmp_path / "net.npz", seed=1)
+    assert plan_run(world, "net.npz").run_id != first.run_id
+
+
+def test_a_policy_file_runs_in_the_world_it_was_made_for(tmp_path):
+    path = str(network_file(tmp_path / "net.npz", caches="static"))
+    assert plan_run(scenario("warehouse_small"), path).scenario.caches == "static"
+    assert plan_run(scenario("warehouse_small"), path, caches="dynamic").scenario.caches == "dynamic"
+
+
+def test_a_missing_policy_file_is_found_before_anything_is_run(tmp_path):
+    with pytest.raises(ValueError, match=r"gone\.npz"):
+        plan_run(scenario("warehouse_small"), str(tmp_path / "gone.npz"))

@@ -183,12 +183,15 @@ def test_files_are_scored_under_the_name_of_the_file_in_the_world_they_are_made_
     assert (found.policy, found.failures) == ("straight", ())
 
 
-def test_files_of_equal_names_go_by_their_paths(network_file, tmp_path):
-    twin = tmp_path / "twin" / network_file.name
-    twin.parent.mkdir()
-    twin.write_bytes(network_file.read_bytes())
-    plan = plan_scores([network_file, twin], scenario("warehouse_small", n_robots=3), budget=TINY)
-    assert [contestant.label for contestant in plan.contestants] == [str(network_file), str(twin)]
+@pytest.mark.parametrize(("folders", "labels"), [(("a", "b"), "short"), (("a/same", "b/same"), "whole")])
+def test_files_of_equal_names_go_by_their_folders_or_paths(network_file, tmp_path, folders, labels):
+    files = [tmp_path / folder / network_file.name for folder in folders]
+    for file in files:
+        file.parent.mkdir(parents=True)
+        file.write_bytes(network_file.read_bytes())
+    plan = plan_scores(files, scenario("warehouse_small", n_robots=3), budget=TINY)
+    expected = {"short": ["a/straight.npz", "b/straight.npz"], "whole": [str(file) for file in files]}
+    assert [contestant.label for contestant in plan.contestants] == expected[labels]
 
 
 def test_names_are_no_files():
