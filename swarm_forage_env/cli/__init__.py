@@ -206,7 +206,7 @@ def list_everything() -> None:
 
 
 @app.command()
-def info(name: Annotated[str, typer.Argument(help="A scenario, an environment id or a policy.")]) -> None:
+def info(name: Annotated[str, typer.Argument(help="A scenario, an environment id, a policy or its file.")]) -> None:
     """Show all fields and spaces of a scenario, or what a policy is."""
     from swarm_forage_env.cli.show import information
 

@@ -4,6 +4,7 @@ import dataclasses
 import inspect
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from rich.table import Table
@@ -11,7 +12,8 @@ from rich.table import Table
 from swarm_forage_env import scenarios
 from swarm_forage_env.config import ConfigError, ScenarioConfig
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import policy_class, policy_names
+from swarm_forage_env.learning.network import Network
+from swarm_forage_env.policy import is_policy_file, policy_class, policy_names
 from swarm_forage_env.spelling import suggestion
 
 
@@ -31,16 +33,18 @@ def overview() -> tuple[Table, Table]:
 
 
 def information(name: str) -> str:
-    """Return everything about a scenario (by name or environment id) or a policy as text.
+    """Return everything about a scenario (by name or environment id) or a policy (by name or file) as text.
 
     Raises:
-        ConfigError: neither a scenario nor a policy has that name.
+        ConfigError: neither a scenario nor a policy has that name, or the file holds none.
     """
     name = re.sub(r"^swarm_forage/(\w+)-v\d+$", r"\1", name)
     if name in scenarios.SCENARIO_NAMES:
         return "\n".join(_scenario_lines(scenarios.scenario(name), _first_line(getattr(scenarios, name))))
     if name in policy_names():
         return "\n".join(_policy_lines(name))
+    if is_policy_file(name):
+        return "\n".join(_file_lines(Path(name)))
     known = (*scenarios.SCENARIO_NAMES, *policy_names())
     raise ConfigError(f"Unknown scenario or policy {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
 
@@ -78,6 +82,32 @@ def _policy_lines(name: str) -> Iterator[str]:
     yield f"  parameters  {inspect.signature(policy)}"
     yield f"  caches      {getattr(policy, 'caches', 'none')} (the world it is made for)"
     yield f"  reads       {'all slices' if reads is None else ', '.join(reads) or 'nothing'}"
+
+
+def _file_lines(file: Path) -> Iterator[str]:
+    if file.suffix.lower() != ".npz":
+        yield f"{file}: a model of stable-baselines3. Opening it runs code that it contains, so it is not opened here."
+        return
+    try:
+        network = Network.load(file)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    about = network.about
+    sizes = [network.weights[0].shape[0], *(weight.shape[1] for weight in network.weights)]
+    yield f"{file}: a network of {' x '.join(map(str, sizes))} units ({about.activation})"
+    yield ""
+    for name, value in dataclasses.asdict(about.interface).items():
+        yield f"  {name:<20}{_plain(value)}"
+    yield f"  {'caches':<20}{about.caches} (the world it is made for)"
+    for part, values in about.card.items():
+        if part != "plan":  # a page of its own
+            yield ""
+            yield f"  [{part}]"
+            if isinstance(values, dict):
+                for name, value in values.items():
+                    yield f"    {name:<24}{_plain(value)}"
+            else:
+                yield f"    {_plain(values)}"
 
 
 def _first_line(documented: Any) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 
 from swarm_forage_env import cli
 from swarm_forage_env.config import ConfigError, field_sections
+from swarm_forage_env.learning import pretrained
 from swarm_forage_env.policy import RandomPolicy, policy_names
 from swarm_forage_env.recording import RunRecord
 from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
@@ -245,6 +247,29 @@ def test_without_matplotlib_it_says_how_to_get_the_picture(command, monkeypatch)
     assert "random" in out
     assert 'pip install ".[plots]"' in err
     assert not Path("results/warehouse_small/performance.png").exists()
+
+
+def test_info_describes_a_network_file(command):
+    code, out, _ = command("info", pretrained.__file__.replace("__init__.py", "ppo_warehouse_small.npz"))
+    assert code == 0
+    assert "a network of 23 x 64 x 64 x 6 units (tanh)" in out
+    assert re.search(r"decision_ticks +5\n", out)
+    assert re.search(r"stable-baselines3 +\d", out)
+
+
+@pytest.mark.parametrize(("file", "said"), [("gone.npz", "gone.npz"), ("bad.npz", "bad.npz")])
+def test_info_says_what_is_wrong_with_a_file(command, file, said):
+    Path("bad.npz").write_bytes(b"no network")
+    code, _, err = command("info", file)
+    assert code in (1, 2)
+    assert said in err
+    assert "Traceback" not in err
+
+
+def test_info_opens_no_model_that_could_run_code(command):
+    code, out, _ = command("info", "gone.zip")
+    assert code == 0
+    assert "not opened here" in out
 
 
 def test_list_names_everything(command):
