@@ -242,7 +242,9 @@ def rerun(file: Annotated[Path, typer.Argument(help="A record (.parquet) or a fa
 
 @app.command()
 def record(
-    out: Annotated[Path, typer.Option(help="File to write, .gif or .mp4.")],
+    out: Annotated[
+        Path | None, typer.Option(help="File to write, .gif or .mp4; default results/SCENARIO_POLICY.gif.")
+    ] = None,
     scenario: Scenario = "warehouse_small",
     policy: Annotated[str, typer.Option("--policy", "--controller", help="Name, or file of a trained policy.")] = "crw",
     robots: Robots = None,
@@ -276,6 +278,7 @@ def record(
         config_file=config,
     )
     spec = plan_runs(options, (policy,), n_seeds=1, first_seed=seed)[0]
+    film = out or _film_in_results(f"{scenario}_{Path(policy).stem}.gif")
     try:
         screen = Console(stderr=True)
         with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
@@ -283,7 +286,7 @@ def record(
             written = record_run(
                 spec.scenario,
                 spec.policy,
-                out,
+                film,
                 seconds=seconds,
                 seed=seed,
                 speedup=speedup,
@@ -295,6 +298,12 @@ def record(
     except RenderError as error:
         raise typer.BadParameter(str(error)) from error
     typer.echo(f"wrote {written}")
+
+
+def _film_in_results(name: str) -> Path:
+    folder = Path("results")
+    folder.mkdir(exist_ok=True)
+    return folder / name
 
 
 def _console() -> Console:

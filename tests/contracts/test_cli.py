@@ -324,6 +324,8 @@ def test_record_films_a_run(command):
     code, out, _ = command("record", "--out", "film.gif", *words)
     assert (code, out) == (0, "wrote film.gif\n")
     assert Path("film.gif").read_bytes().startswith(b"GIF8")
+    assert command("record", *words)[1] == "wrote results/warehouse_small_random.gif\n"
+    assert Path("results/warehouse_small_random.gif").read_bytes() == Path("film.gif").read_bytes()
 
 
 @pytest.mark.parametrize(
