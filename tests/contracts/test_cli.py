@@ -362,7 +362,6 @@ def test_record_films_a_run(command):
         (("run", "--wrapper", "actuator_noise:sigma"), "Expected the settings of wrapper actuator_noise as key=value"),
         (("run", "--out", "file"), "Expected a folder for run records, got the file file"),
         (("record", "--out", "x.avi"), "ending in .gif or .mp4"),
-        (("record",), "Missing option '--out'"),
         (("info", "crv"), "Did you mean 'crw'?"),
         (("rerun", "missing.parquet"), "Cannot read missing.parquet: No such file or directory"),
         (("rerun", "file"), "Cannot read file: it is no Parquet file or a damaged one"),
