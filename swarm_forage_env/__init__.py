@@ -145,8 +145,8 @@ def _register_environments() -> None:
     for name in SCENARIO_NAMES:
         env_id = f"swarm_forage/{name}-v0"
         kwargs = {"scenario": name}
-        pettingzoo.register("parallel", env_id, "swarm_forage_env.env:parallel_env", kwargs=kwargs)
-        pettingzoo.register("aec", env_id, "swarm_forage_env.env:env", kwargs=kwargs)
+        pettingzoo.register("parallel", env_id, "swarm_forage_env.learning.parallel:parallel_env", kwargs=kwargs)
+        pettingzoo.register("aec", env_id, "swarm_forage_env.learning.parallel:env", kwargs=kwargs)
         gymnasium.register(
             env_id,
             "swarm_forage_env.adapters:JointForageEnv",

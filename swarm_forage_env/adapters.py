@@ -6,26 +6,30 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from swarm_forage_env.config import ScenarioConfig
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.learning.arenas import ArenaStep
-from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.interface import GivenInterface, LearnerInterface
 from swarm_forage_env.learning.processes import open_arenas
-from swarm_forage_env.learning.worlds import World, WorldPlan, configured
-from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.learning.worlds import World, plan_world
+from swarm_forage_env.types import BoolArray, ObsArray
 from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.registry import wrapper_configs
 
 
-class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
+class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
     """One agent that sees and steers every robot: the view of single-agent algorithms and of central control.
 
-    Observations are (N, D) float32 and actions (N, 3) float32, both in [-1, 1], row i = robot i; the columns are
-    those of the parallel environment (`world.layout`). The reward is the sum over robots. An episode terminates when
-    every robot is dead and is truncated at the horizon. `info["active"]` is (N,) bool, the tasked swarm.
+    Observations are (N, d) float32 in [-1, 1], row i = robot i; the columns are those of the parallel environment
+    (`world.layout`), or of the interface (`interface.layout`). Actions are (N, 3) or (N, 2) float32 in [-1, 1], or
+    (N,) whole numbers where the interface has discrete ones. The reward is the sum over robots and over the ticks of
+    a decision. An episode terminates when every robot is dead and is truncated at the horizon.
+
+    `info["active"]` is (N,) bool, the tasked swarm. With discrete actions, `info["action_mask"]` is (N, number of
+    actions) int8, 1 = makes sense; `action_space.sample(mask=tuple(info["action_mask"]))` draws from these.
     """
 
     metadata = ForageEnv.metadata
@@ -34,7 +38,8 @@ class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
         self,
         scenario: str | ScenarioConfig = "warehouse_small",
         *,
-        wrappers: Iterable[WrapperConfig] = (),
+        interface: GivenInterface = None,
+        wrappers: Iterable[WrapperConfig | str] = (),
         max_cycles: int | None = None,
         render_mode: str | None = None,
         **overrides: Any,
@@ -43,26 +48,31 @@ class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
 
         Args:
             scenario: Name of a preset, or a complete configuration.
-            wrappers: What stands between agent and world (throttle, noise, ...), in any order.
-            max_cycles: Steps until truncation; default the scenario's horizon.
+            interface: What is seen and done of each robot, an `InterfaceConfig` or its fields by name; default full
+                observations and continuous actions.
+            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+                ("population:death_per_tick=0.01").
+            max_cycles: Ticks until truncation; default the scenario's horizon.
             render_mode: None or "rgb_array".
             overrides: Scenario fields by name (`n_robots=20`).
 
         Raises:
-            ConfigError: unknown preset or field, or values that describe no world.
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
         """
-        self._world = World(
-            WorldPlan(
-                scenario=configured(scenario, overrides),
-                wrappers=tuple(wrappers),
-                max_cycles=max_cycles,
-                render_mode=render_mode,
-            )
+        plan = plan_world(
+            scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
         )
+        self._world = World(plan)
+        self._is_discrete = plan.interface.actions == "discrete"
         self.render_mode = render_mode
-        n_robots = self.world.scenario.robots.n_robots
-        self.observation_space = spaces.Box(-1.0, 1.0, (n_robots, self.world.layout.size), np.float32)
-        self.action_space = spaces.Box(-1.0, 1.0, (n_robots, 3), np.float32)
+        n_robots = plan.scenario.robots.n_robots
+        self.observation_space = batch_space(self.interface.observation_space, n_robots)
+        self.action_space = batch_space(self.interface.action_space, n_robots)
+
+    @property
+    def interface(self) -> LearnerInterface:
+        """Spaces and layout of one robot's row; another one after a reset that changed the scenario."""
+        return self._world.interface
 
     @property
     def world(self) -> ForageEnv:
@@ -72,27 +82,28 @@ class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[ObsArray, dict[str, Any]]:
-        """Start an episode; returns observations (N, D) and info.
+        """Start an episode; returns observations (N, d) and info.
 
         Args:
             seed: Seed of this episode and of the sequence of those after it.
             options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `World.reset`.
         """
         super().reset(seed=seed)
-        return self._world.reset(seed, options).copy(), self._info()
+        self._world.reset(seed, options)
+        return self._world.observe(), self._info()
 
-    def step(self, action: ActionArray) -> tuple[ObsArray, float, bool, bool, dict[str, Any]]:
-        """Advance one tick.
+    def step(self, action: np.ndarray) -> tuple[ObsArray, float, bool, bool, dict[str, Any]]:
+        """Advance by one decision.
 
         Args:
-            action: (N, 3), rows of robots that are away included (and ignored).
+            action: (N,) or (N, k), rows of robots that are away included (and ignored).
 
         Raises:
-            ActionError: wrong shape or an active robot's action that is not finite.
+            ActionError: wrong shape, numbers that are no actions, or an active robot's action that is not finite.
         """
-        obs, reward, terminated, truncated = self._world.step(np.asarray(action, np.float32))
-        # float64 before the sum: the total of a large swarm should not depend on the order of rows.
-        return obs.copy(), float(reward.sum(dtype=np.float64)), bool(terminated.all()), truncated, self._info()
+        rewards = np.zeros(self.world.scenario.robots.n_robots)  # float64: the sum shall not depend on the order
+        _, terminated, truncated = self._world.step(np.asarray(action), rewards)
+        return self._world.observe(), float(rewards.sum()), terminated, truncated, self._info()
 
     def render(self) -> np.ndarray | None:
         """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
@@ -103,7 +114,10 @@ class JointForageEnv(gymnasium.Env[ObsArray, ActionArray]):
         self._world.env.close()
 
     def _info(self) -> dict[str, Any]:
-        return {"active": self.world.active.copy()}
+        info: dict[str, Any] = {"active": self.world.active.copy()}
+        if self._is_discrete:
+            info["action_mask"] = self._world.mask().astype(np.int8)
+        return info
 
 
 class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
@@ -132,9 +146,9 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         num_envs: int = 1,
         n_arenas: int | None = None,
         n_processes: int = 0,
-        interface: InterfaceConfig | None = None,
-        wrappers: Iterable[WrapperConfig] = (),
-        swarm_wrappers: Iterable[WrapperConfig] = (),
+        interface: GivenInterface = None,
+        wrappers: Iterable[WrapperConfig | str] = (),
+        swarm_wrappers: Iterable[WrapperConfig | str] = (),
         max_cycles: int | None = None,
         render_mode: str | None = None,
         **overrides: Any,
@@ -147,27 +161,29 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
                 `gymnasium.make_vec` says when nobody asked for a number, leaves the choice to `n_arenas`.
             n_arenas: Arenas that run side by side; default as many as `num_envs` needs, at least one.
             n_processes: Processes that the arenas are spread over; 0 = all in this process.
-            interface: What a learner sees and does; default full observations and continuous actions.
-            wrappers: What disturbs the swarm (noise, throttle, population ...), in any order.
+            interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
+                observations and continuous actions.
+            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+                ("population:death_per_tick=0.01").
             swarm_wrappers: More of them, for `gymnasium.make_vec`, which takes an argument `wrappers` for itself.
             max_cycles: Ticks until truncation; default the scenario's horizon.
             render_mode: None or "rgb_array".
             overrides: Scenario fields by name (`n_robots=20`).
 
         Raises:
-            ConfigError: unknown preset or field, or values that describe no world.
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
             ValueError: num_envs and n_arenas that do not fit together, or more processes than arenas.
         """
-        choice = interface or InterfaceConfig()
-        plan = WorldPlan(
-            scenario=configured(scenario, overrides),
-            wrappers=(*wrappers, *swarm_wrappers),
+        plan = plan_world(
+            scenario,
+            overrides,
+            interface=interface,
+            wrappers=(*wrapper_configs(wrappers), *wrapper_configs(swarm_wrappers)),
             max_cycles=max_cycles,
             render_mode=render_mode,
-            reads=choice.reads,
         )
         arenas = _number_of_arenas(num_envs, n_arenas, plan.scenario.robots.n_robots)
-        self._arenas = open_arenas(plan, choice, arenas, n_processes)
+        self._arenas = open_arenas(plan, arenas, n_processes)
         self.interface = self._arenas.interface
         self.n_arenas, self.n_robots = arenas, self._arenas.n_robots
         self.num_envs = self._arenas.n_rows
@@ -212,7 +228,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         Returns:
             Observations (num_envs, d), rewards, terminations, truncations (num_envs,) and infos, all new.
         """
-        step = self._arenas.step(np.asarray(actions))
+        step = self._arenas.step(actions)
         return step.obs, step.rewards, step.terminated, step.truncated, self._infos(step)
 
     def _infos(self, step: ArenaStep) -> dict[str, Any]:
@@ -270,11 +286,18 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
 
 
 def _number_of_arenas(num_envs: int, n_arenas: int | None, n_robots: int) -> int:
-    if n_arenas is None:
-        n_arenas = 1 if num_envs == 1 else num_envs // n_robots
-    if num_envs not in (1, n_arenas * n_robots):
+    if n_arenas is not None and num_envs not in (1, n_arenas * n_robots):
         raise ValueError(
-            f"Expected num_envs to be a multiple of n_robots = {n_robots} (one sub-environment per robot), "
-            f"and n_arenas times that where both are given; got num_envs = {num_envs}, n_arenas = {n_arenas}."
+            f"Expected num_envs = {n_arenas * n_robots} for n_arenas = {n_arenas} of n_robots = {n_robots} (one "
+            f"sub-environment per robot), got {num_envs}; leave num_envs or n_arenas away."
         )
-    return n_arenas
+    if n_arenas is not None:
+        return n_arenas
+    if num_envs == 1:
+        return 1
+    if num_envs < 1 or num_envs % n_robots:
+        raise ValueError(
+            f"Expected num_envs to be a multiple of n_robots = {n_robots} (one sub-environment per robot), got "
+            f"{num_envs}; choose another n_robots, or give n_arenas instead."
+        )
+    return num_envs // n_robots

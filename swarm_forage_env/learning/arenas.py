@@ -18,7 +18,6 @@ from typing import Any, Protocol, cast
 import numpy as np
 
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.learning.worlds import World, WorldPlan
 from swarm_forage_env.state import Counter
 from swarm_forage_env.types import BoolArray, IntArray, ObsArray
@@ -39,9 +38,9 @@ class RunOutcome:
     """Objects picked up for the first time."""
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
+@dataclass(kw_only=True, slots=True)
 class ArenaStep:
-    """Result of one step of R rows. All arrays are new in every step and belong to the caller."""
+    """Result of one step of R rows. All arrays with something in them are new and belong to the caller."""
 
     obs: ObsArray
     """(R, d) what to act on next; rows of arenas that ended show their new run already."""
@@ -75,13 +74,20 @@ class Rows(Protocol):
     n_rows: int
 
 
-def check_rows(actions: np.ndarray, batch: Rows) -> None:
-    """Raise ValueError unless there is one action per row of the batch."""
+def checked_rows(actions: Any, batch: Rows) -> np.ndarray:
+    """Return actions as an array; raises ValueError unless there is one per row of the batch."""
+    actions = np.asarray(actions)
     if actions.ndim == 0 or len(actions) != batch.n_rows:
         raise ValueError(
             f"Expected actions for {batch.n_rows} rows ({batch.n_arenas} arenas of {batch.n_robots} robots), "
             f"got shape {actions.shape}."
         )
+    return actions
+
+
+def closed_error() -> RuntimeError:
+    """Return what is raised where closed arenas are asked for something."""
+    return RuntimeError("Expected open arenas, but they were closed.")
 
 
 def _owner(env: ForageEnv | SwarmWrapper, name: str) -> ForageEnv | SwarmWrapper:
@@ -102,6 +108,17 @@ class _Endings:
     lengths: list[IntArray] = field(default_factory=list)
     outcomes: list[RunOutcome] = field(default_factory=list)
 
+    def joined(self, columns: int) -> dict[str, Any]:
+        """Return the fields of an `ArenaStep` of that name; `columns` are those of an observation."""
+        return {
+            "ended": _joined(self.rows, np.zeros(0, np.int32)),
+            "final_obs": _joined(self.final_obs, np.zeros((0, columns), np.float32)),
+            "is_episode": _joined(self.is_episode, np.zeros(0, np.bool_)),
+            "returns": _joined(self.returns, np.zeros(0, np.float64)),
+            "lengths": _joined(self.lengths, np.zeros(0, np.int32)),
+            "outcomes": tuple(self.outcomes),
+        }
+
 
 class ArenaBatch:
     """Arenas of one kind in this process, stepped together.
@@ -112,12 +129,11 @@ class ArenaBatch:
         interface: Spaces and layout of what learners see and do.
     """
 
-    def __init__(self, plan: WorldPlan, interface: InterfaceConfig, n_arenas: int, *, first_arena: int = 0) -> None:
+    def __init__(self, plan: WorldPlan, n_arenas: int, *, first_arena: int = 0) -> None:
         """Build the arenas; `reset` must be called before `step`.
 
         Args:
-            plan: What every arena is made from; its `reads` are those of the interface.
-            interface: What learners see and do.
+            plan: What every arena is made from.
             n_arenas: How many.
             first_arena: Number of the first of them, where this is part of a larger batch.
 
@@ -126,19 +142,18 @@ class ArenaBatch:
         """
         if n_arenas < 1:
             raise ValueError(f"Expected n_arenas >= 1, got {n_arenas}.")
-        self._config = interface
         self._first_arena = first_arena
         self.worlds = [World(plan) for _ in range(n_arenas)]
-        self._interfaces = [LearnerInterface(interface, world.base.task) for world in self.worlds]
-        self.interface = self._interfaces[0]
+        self.interface = self.worlds[0].interface
         self.n_arenas = n_arenas
         self.n_robots = plan.scenario.robots.n_robots
         self.n_rows = n_arenas * self.n_robots
-        self._raw: list[ObsArray] = []
+        self._is_reset = self._is_closed = False
         self._absent = np.zeros((n_arenas, self.n_robots), np.bool_)
         self._present = np.zeros((n_arenas, self.n_robots), np.bool_)
         self._returns = np.zeros((n_arenas, self.n_robots), np.float64)
         self._lengths = np.zeros((n_arenas, self.n_robots), np.int32)
+        self._no_endings = _Endings().joined(self.interface.layout.size)
 
     def reset(
         self, seeds: Sequence[int | None], options: Sequence[Mapping[str, Any] | None]
@@ -148,29 +163,30 @@ class ArenaBatch:
         Args:
             seeds: One per arena; see `World.reset`.
             options: One per arena; see `World.reset`.
+
+        Raises:
+            RuntimeError: closed.
         """
+        if self._is_closed:
+            raise closed_error()
         obs = np.empty((self.n_arenas, self.n_robots, self.interface.layout.size), np.float32)
-        self._raw = []  # stays so where a seed or an option is refused: half a reset is none
-        self._raw = [
+        self._is_reset = False  # stays so where a seed or an option is refused: half a reset is none
+        for arena, (seed, option) in enumerate(zip(seeds, options, strict=True)):
             self._start(arena, obs[arena], seed, option)
-            for arena, (seed, option) in enumerate(zip(seeds, options, strict=True))
-        ]
+        self._is_reset = True
         return obs.reshape(self.n_rows, -1), self._active()
 
     def _start(
         self, arena: int, out: ObsArray, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> ObsArray:
-        """Start a run in one arena; writes what learners see to `out`, returns the environment's observations."""
+    ) -> None:
+        """Start a run in one arena; writes what learners see to `out`."""
         world = self.worlds[arena]
-        raw = world.reset(seed, options)
-        if world.is_new:
-            self._interfaces[arena] = LearnerInterface(self._config, world.base.task)
+        world.reset(seed, options)
         self._present[arena] = world.base.swarm.present
         self._absent[arena] = False
         self._returns[arena] = 0.0
         self._lengths[arena] = 0
-        self._interfaces[arena].observe(raw, out)
-        return raw
+        world.observe(out)
 
     def _active(self) -> BoolArray:
         return np.concatenate([world.base.active for world in self.worlds])
@@ -182,13 +198,13 @@ class ArenaBatch:
             actions: (R,) or (R, k), one action of the interface per row; those of absent rows are ignored.
 
         Raises:
-            RuntimeError: not reset yet.
-            ValueError: wrong shape, or actions that the interface or the drive refuses.
+            RuntimeError: not reset yet, or closed.
+            ValueError: wrong shape, or actions that the interface or the drive refuses. A note names the arena.
         """
         self._require_reset("step")
-        check_rows(actions, self)
-        shape = (self.n_arenas, self.n_robots)
-        obs = np.empty((*shape, self.interface.layout.size), np.float32)
+        actions = checked_rows(actions, self)
+        shape, columns = (self.n_arenas, self.n_robots), self.interface.layout.size
+        obs = np.empty((*shape, columns), np.float32)
         rewards = np.zeros(shape, np.float32)
         terminated, truncated = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
         endings = _Endings()
@@ -198,21 +214,18 @@ class ArenaBatch:
             try:
                 self._step_arena(arena, actions[rows], out, endings)
             except ValueError as error:
-                error.add_note(f"This was in arena {self._first_arena + arena}; those before it have been stepped.")
+                error.add_note(
+                    f"This was in arena {self._first_arena + arena}: its world was not stepped. Worlds of other arenas "
+                    "may have been; where there are others, reset before going on."
+                )
                 raise
-        columns = obs.shape[-1]
         return ArenaStep(
             obs=obs.reshape(self.n_rows, columns),
             rewards=rewards.ravel(),
             terminated=terminated.ravel(),
             truncated=truncated.ravel(),
             active=self._active(),
-            ended=_joined(endings.rows, np.zeros(0, np.int32)),
-            final_obs=_joined(endings.final_obs, np.zeros((0, columns), np.float32)),
-            is_episode=_joined(endings.is_episode, np.zeros(0, np.bool_)),
-            returns=_joined(endings.returns, np.zeros(0, np.float64)),
-            lengths=_joined(endings.lengths, np.zeros(0, np.int32)),
-            outcomes=tuple(endings.outcomes),
+            **(endings.joined(columns) if endings.rows else self._no_endings),
         )
 
     def _step_arena(
@@ -224,27 +237,19 @@ class ArenaBatch:
     ) -> None:
         """Step one arena; writes its rows of obs, rewards, terminated, truncated and appends to `endings`."""
         obs, rewards, terminated, truncated = out
-        interface, world = self._interfaces[arena], self.worlds[arena]
-        absent = self._absent[arena]
+        world, absent = self.worlds[arena], self._absent[arena]
         self._lengths[arena] += self._present[arena]  # as last seen: who dies in this step has begun it
-        raw, dead, is_over = self._raw[arena], absent, False
-        for _ in range(self._config.decision_ticks):
-            raw, reward, dead, at_horizon = world.step(interface.command(actions, raw))
-            rewards += reward
-            is_over = at_horizon or bool(dead[0] and dead.all())
-            if is_over:
-                break
-        self._raw[arena] = raw
+        dead, all_dead, at_horizon = world.step(actions, rewards)
         self._present[arena] = world.base.swarm.present
         self._returns[arena] += rewards
-        interface.observe(raw, obs)
+        world.observe(obs)
         np.greater(dead, absent, out=terminated)
-        if is_over:
+        if all_dead or at_horizon:
             terminated |= absent
             np.logical_not(terminated, out=truncated)
             self._note_endings(arena, np.arange(self.n_robots), obs, endings)
             endings.outcomes.append(self._outcome(arena))
-            self._raw[arena] = self._start(arena, obs)
+            self._start(arena, obs)
         elif terminated.any():
             self._note_endings(arena, np.flatnonzero(terminated), obs, endings)
             absent |= dead
@@ -271,15 +276,16 @@ class ArenaBatch:
         """Return which discrete actions make sense now, (R, number of actions).
 
         Raises:
-            RuntimeError: not reset yet.
+            RuntimeError: not reset yet, or closed.
             ValueError: the actions are continuous.
         """
         self._require_reset("action_masks")
-        masks = [interface.mask(raw) for interface, raw in zip(self._interfaces, self._raw, strict=True)]
-        return np.concatenate(masks)
+        return np.concatenate([world.mask() for world in self.worlds])
 
     def _require_reset(self, what: str) -> None:
-        if not self._raw:
+        if self._is_closed:
+            raise closed_error()
+        if not self._is_reset:
             raise RuntimeError(f"Call reset before {what}.")
 
     def render(self) -> list[np.ndarray | None]:
@@ -304,7 +310,8 @@ class ArenaBatch:
         return [member(*args, **kwargs) if callable(member) else member for member in found]
 
     def close(self) -> None:
-        """Close all environments."""
+        """Close all environments; they take no reset or step any more."""
+        self._is_closed = True
         for world in self.worlds:
             world.env.close()
 

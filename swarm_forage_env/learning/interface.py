@@ -5,13 +5,15 @@ actions or a gripper that works by itself; training environments and trained pol
 so that a policy runs exactly as it was trained.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
 
+from swarm_forage_env.actuators import ActionError
 from swarm_forage_env.codes import Grip
 from swarm_forage_env.config import ConfigError
 from swarm_forage_env.kernels.commands import (
@@ -133,6 +135,7 @@ class LearnerInterface:
         self.layout = compact_layout(self._half_x, self._half_y) if self._is_compact else source
         self.observation_space = self.new_observation_space()
         self.action_space = self.new_action_space()
+        self._actions_shape = (task.n_robots, *(self.action_space.shape or ()))
 
     def new_observation_space(self) -> spaces.Box:
         """Return a space of its own, with a random state of its own, for one robot's row."""
@@ -173,13 +176,12 @@ class LearnerInterface:
             obs: (N, D) observations of the environment that the learner's choice is carried out in.
 
         Raises:
-            ValueError: another shape, or a number that is no action.
+            ActionError: another shape, or a number that is no action.
         """
         commands = self._commands
-        expected = (len(commands), *(self.action_space.shape or ()))
-        if actions.shape != expected:
-            raise ValueError(
-                f"Expected actions with shape {expected}, one row per robot as in {self.action_space}, "
+        if actions.shape != self._actions_shape:
+            raise ActionError(
+                f"Expected actions with shape {self._actions_shape}, one row per robot as in {self.action_space}, "
                 f"got {actions.shape}."
             )
         if self._is_discrete:
@@ -199,9 +201,9 @@ class LearnerInterface:
         most = int(self.action_space.n) - 1  # type: ignore[union-attr]
         expected = f"Expected actions as whole numbers from 0 to {most}, got"
         if actions.dtype.kind not in "iu":
-            raise ValueError(f"{expected} {actions.dtype}.")
+            raise ActionError(f"{expected} {actions.dtype}.")
         if actions.min() < 0 or actions.max() > most:
-            raise ValueError(f"{expected} {actions.min()} to {actions.max()}.")
+            raise ActionError(f"{expected} {actions.min()} to {actions.max()}.")
 
     def mask(self, obs: ObsArray) -> BoolArray:
         """Return which discrete actions make sense, (N, number of actions) bool; at least one per row.
@@ -251,8 +253,30 @@ def compact_layout(half_width_m: float, half_height_m: float) -> ObservationLayo
     return ObservationLayout(tuple(slices))
 
 
-def interface_from_mapping(mapping: dict[str, Any]) -> InterfaceConfig:
-    """Build a configuration from plain values, as trained policies store it.
+GivenInterface: TypeAlias = InterfaceConfig | Mapping[str, Any] | None
+"""What environments take as their argument `interface`; see `chosen_interface`."""
+
+
+def chosen_interface(given: GivenInterface) -> InterfaceConfig:
+    """Return the choices that were given: as they are, as fields by name, or None for the defaults.
+
+    Raises:
+        ConfigError: none of these, an unknown field or value.
+    """
+    if given is None:
+        return InterfaceConfig()
+    if isinstance(given, InterfaceConfig):
+        return given
+    if isinstance(given, Mapping):
+        return interface_from_mapping(given)
+    raise ConfigError(
+        f"Expected interface as an InterfaceConfig or its fields by name, such as {{'actions': 'discrete'}}, "
+        f"got {given!r}."
+    )
+
+
+def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
+    """Build a configuration from fields by name, as trained policies store it.
 
     Raises:
         ConfigError: an unknown key or value.

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
+from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_forage_env.config import ScenarioConfig
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.learning.worlds import World, WorldPlan, configured
-from swarm_forage_env.types import BoolArray
-from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.learning.interface import GivenInterface, LearnerInterface
+from swarm_forage_env.learning.worlds import World, plan_world
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
 Infos = dict[str, dict[str, Any]]
 
@@ -31,8 +31,8 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         self,
         scenario: str | ScenarioConfig = "warehouse_small",
         *,
-        interface: InterfaceConfig | None = None,
-        wrappers: Iterable[WrapperConfig] = (),
+        interface: GivenInterface = None,
+        wrappers: Iterable[WrapperConfig | str] = (),
         max_cycles: int | None = None,
         render_mode: str | None = None,
         **overrides: Any,
@@ -41,37 +41,35 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
 
         Args:
             scenario: Name of a preset, or a complete configuration.
-            interface: What a learner sees and does; default full observations and continuous actions.
-            wrappers: What disturbs the swarm (noise, throttle, population ...), in any order. Trainers that need a
+            interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
+                observations and continuous actions.
+            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+                ("population:death_per_tick=0.01"). Trainers that need a
                 fixed number of agents take `deaths="absorbing"`.
             max_cycles: Ticks until truncation; default the scenario's horizon.
             render_mode: None or "rgb_array".
             overrides: Scenario fields by name (`n_robots=20`).
 
         Raises:
-            ConfigError: unknown preset or field, or values that describe no world.
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
         """
-        self._config = interface or InterfaceConfig()
-        self._world = World(
-            WorldPlan(
-                scenario=configured(scenario, overrides),
-                wrappers=tuple(wrappers),
-                max_cycles=max_cycles,
-                render_mode=render_mode,
-                reads=self._config.reads,
-            )
+        plan = plan_world(
+            scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
         )
+        self._is_discrete = plan.interface.actions == "discrete"
+        self._world = World(plan)
         self.render_mode = render_mode
         self.possible_agents = list(self._world.base.possible_agents)
         self.agents: list[str] = []
         self._row_of = {agent: row for row, agent in enumerate(self.possible_agents)}
-        self._bind()
         # One space object per agent: each has a random state of its own.
         self._observation_space = {agent: self.interface.new_observation_space() for agent in self.possible_agents}
         self._action_space = {agent: self.interface.new_action_space() for agent in self.possible_agents}
 
-    def _bind(self) -> None:
-        self.interface = LearnerInterface(self._config, self._world.base.task)
+    @property
+    def interface(self) -> LearnerInterface:
+        """Spaces and layout of what learners see and do; another one after a reset that changed the scenario."""
+        return self._world.interface
 
     @property
     def world(self) -> ForageEnv:
@@ -104,11 +102,9 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
             seed: Seed of this run and of the sequence of those after it.
             options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `World.reset`.
         """
-        self._raw = self._world.reset(seed, options)
-        if self._world.is_new:
-            self._bind()
+        self._world.reset(seed, options)
         self.agents = list(self.possible_agents)
-        return self._per_agent(self.interface.observe(self._raw)), self._infos()
+        return self._per_agent(self._world.observe()), self._infos()
 
     def step(
         self, actions: dict[str, Any]
@@ -126,16 +122,9 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
             raise ValueError(f"Expected an action for each of the {len(self.agents)} agents, missing {missing[:3]}.")
         chosen = self._chosen(actions)
         rewards = np.zeros(len(self.possible_agents))
-        raw, truncated = self._raw, False
-        dead: BoolArray = np.zeros(len(rewards), np.bool_)
-        for _ in range(self._config.decision_ticks):
-            raw, reward, dead, truncated = self._world.step(self.interface.command(chosen, raw))
-            rewards += reward
-            if truncated or dead.all():
-                break
-        self._raw = raw
+        dead, _, truncated = self._world.step(chosen, rewards)
         results = (
-            self._per_agent(self.interface.observe(raw)),
+            self._per_agent(self._world.observe()),
             self._per_agent(rewards.tolist()),
             self._per_agent(dead.tolist()),
             dict.fromkeys(self.agents, truncated),
@@ -165,8 +154,8 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
     def _infos(self) -> Infos:
         active = self.world.active
         infos: Infos = {agent: {"active": bool(active[self._row_of[agent]])} for agent in self.agents}
-        if self._config.actions == "discrete":
-            mask = self.interface.mask(self._raw).astype(np.int8)
+        if self._is_discrete:
+            mask = self._world.mask().astype(np.int8)
             for agent, info in infos.items():
                 info["action_mask"] = mask[self._row_of[agent]]
         return infos
@@ -178,3 +167,35 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
     def close(self) -> None:
         """Close the stack."""
         self._world.env.close()
+
+
+def parallel_env(
+    scenario: str | ScenarioConfig = "warehouse_small",
+    *,
+    interface: GivenInterface = None,
+    wrappers: Iterable[WrapperConfig | str] = (),
+    max_cycles: int | None = None,
+    render_mode: str | None = None,
+    **overrides: Any,
+) -> ForageEnv | SwarmWrapper | ParallelLearnerEnv:
+    """Create what `pettingzoo.make("parallel", id, ...)` gives: with an interface a `ParallelLearnerEnv`.
+
+    Without one it is the environment in its wrappers, whose resets take no options. Arguments and errors as there.
+    """
+    if interface is not None:
+        return ParallelLearnerEnv(
+            scenario,
+            interface=interface,
+            wrappers=wrappers,
+            max_cycles=max_cycles,
+            render_mode=render_mode,
+            **overrides,
+        )
+    plan = plan_world(scenario, overrides, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode)
+    return plan.build({})
+
+
+def env(scenario: str | ScenarioConfig = "warehouse_small", **options: Any) -> Any:
+    """Create the agent-by-agent (AEC) form by PettingZoo's own conversion; arguments as `parallel_env`."""
+    parallel = parallel_env(scenario, **options)
+    return parallel_to_aec(parallel)  # pyright: ignore[reportArgumentType] - it wants an action type that may be None

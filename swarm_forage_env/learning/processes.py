@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.learning.arenas import ArenaBatch, ArenaStep, check_rows
-from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.learning.arenas import ArenaBatch, ArenaStep, checked_rows, closed_error
 from swarm_forage_env.learning.worlds import World, WorldPlan
 from swarm_forage_env.types import BoolArray, ObsArray
 
@@ -25,7 +24,7 @@ class ArenaProcessError(RuntimeError):
     """A process with arenas failed or is gone; the message holds its traceback or exit code."""
 
 
-def _serve(pipe: Connection, plan: WorldPlan, interface: InterfaceConfig, n_arenas: int, first_arena: int) -> None:
+def _serve(pipe: Connection, plan: WorldPlan, n_arenas: int, first_arena: int) -> None:
     """Answer numbered calls of `ArenaBatch` methods until told to close; the whole life of a process."""
     # Ctrl-C reaches every process of a terminal. The parent decides what it means and tells by closing.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -37,7 +36,7 @@ def _serve(pipe: Connection, plan: WorldPlan, interface: InterfaceConfig, n_aren
             return
         try:
             if batch is None:
-                batch = ArenaBatch(plan, interface, n_arenas, first_arena=first_arena)
+                batch = ArenaBatch(plan, n_arenas, first_arena=first_arena)
             pipe.send((number, getattr(batch, method)(*args, **kwargs), None))
         except BrokenPipeError:  # the parent does not want the answer any more
             return
@@ -62,14 +61,11 @@ class ArenaProcesses:
     Results are those of one `ArenaBatch` bit for bit: arenas know nothing of each other. Attributes as there.
     """
 
-    def __init__(
-        self, plan: WorldPlan, interface: InterfaceConfig, n_arenas: int, n_processes: int, *, context: str = "spawn"
-    ) -> None:
+    def __init__(self, plan: WorldPlan, n_arenas: int, n_processes: int, *, context: str = "spawn") -> None:
         """Start the processes.
 
         Args:
             plan: What every arena is made from.
-            interface: What learners see and do.
             n_arenas: How many, at least one per process.
             n_processes: How many processes.
             context: How processes start, see `multiprocessing.get_context`; "spawn" works beside threads and
@@ -83,15 +79,16 @@ class ArenaProcesses:
         self.n_arenas = n_arenas
         self.n_robots = plan.scenario.robots.n_robots
         self.n_rows = n_arenas * self.n_robots
-        self.interface = LearnerInterface(interface, World(plan).base.task)
+        self.interface = World(plan).interface
         self._shares = [part.tolist() for part in np.array_split(np.arange(n_arenas), n_processes)]
         starter = multiprocessing.get_context(context)
         self._pipes: list[Connection] = []
         self._processes = []
         self._n_asked = [0] * n_processes
+        self._has_answered = [False] * n_processes
         for share in self._shares:
             ours, theirs = starter.Pipe()
-            arguments = (theirs, plan, interface, len(share), share[0])
+            arguments = (theirs, plan, len(share), share[0])
             process = starter.Process(target=_serve, args=arguments, daemon=True)  # type: ignore[attr-defined]
             process.start()
             theirs.close()
@@ -100,28 +97,34 @@ class ArenaProcesses:
 
     def _ask(self, process: int, method: str, *args: Any, **kwargs: Any) -> None:
         if not self._pipes:
-            raise ArenaProcessError("Expected open arenas, but they were closed.")
+            raise closed_error()
         self._n_asked[process] += 1
         try:
             self._pipes[process].send((self._n_asked[process], method, args, kwargs))
-        except OSError as error:
-            raise self._gone(process) from error
+        except OSError:
+            raise self._gone(process) from None
 
     def _gone(self, process: int) -> ArenaProcessError:
         self._processes[process].join(_GOODBYE_S)  # the exit code is known a moment after the pipe breaks
-        return ArenaProcessError(
-            f"The process of arenas {self._shares[process]} ended with exit code {self._processes[process].exitcode}."
-        )
+        exit_code = self._processes[process].exitcode
+        told = f"The process of arenas {self._shares[process]} ended with exit code {exit_code}"
+        if exit_code == 1 and not self._has_answered[process]:  # an exception while it started
+            return ArenaProcessError(
+                f"{told} while it started. A script that uses n_processes must do its work under "
+                "`if __name__ == '__main__':`, because each process imports it; n_processes=0 needs no other process."
+            )
+        return ArenaProcessError(f"{told}.")
 
     def _answer(self, process: int) -> tuple[Any, tuple[Exception, str] | None]:
         """Wait for the answer to the last question; those nobody waited for (after Ctrl-C, say) are skipped."""
         try:
             while True:
                 number, result, failure = self._pipes[process].recv()
+                self._has_answered[process] = True
                 if number == self._n_asked[process]:
                     return result, failure
-        except (EOFError, OSError) as error:
-            raise self._gone(process) from error
+        except (EOFError, OSError):
+            raise self._gone(process) from None
 
     def _answers(self, processes: Sequence[int]) -> list[Any]:
         """Wait for one answer of each; every answer is taken before the first failure is raised."""
@@ -147,7 +150,7 @@ class ArenaProcesses:
 
     def step(self, actions: np.ndarray) -> ArenaStep:
         """Step every arena by one decision, all processes at once; see `ArenaBatch.step`."""
-        check_rows(actions, self)
+        actions = checked_rows(actions, self)
         n_robots = self.n_robots
         parts = [(actions[share[0] * n_robots : (share[-1] + 1) * n_robots],) for share in self._shares]
         steps: list[ArenaStep] = self._ask_all("step", parts)
@@ -211,10 +214,8 @@ class ArenaProcesses:
                 process.join()
 
 
-def open_arenas(
-    plan: WorldPlan, interface: InterfaceConfig, n_arenas: int, n_processes: int
-) -> ArenaBatch | ArenaProcesses:
+def open_arenas(plan: WorldPlan, n_arenas: int, n_processes: int) -> ArenaBatch | ArenaProcesses:
     """Build arenas in this process (n_processes = 0) or spread over so many others; raises as their classes do."""
     if n_processes:
-        return ArenaProcesses(plan, interface, n_arenas, n_processes)
-    return ArenaBatch(plan, interface, n_arenas)
+        return ArenaProcesses(plan, n_arenas, n_processes)
+    return ArenaBatch(plan, n_arenas)

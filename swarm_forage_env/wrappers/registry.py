@@ -1,6 +1,6 @@
 """Wrapper configurations by the name that stored specifications, the command line and TOML files use."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -62,6 +62,26 @@ def parse_wrapper(text: str) -> "WrapperConfig":
             raise ConfigError(f"Expected {key} of wrapper {name} once, got it twice in {text!r}.")
         target[last] = _plain_value(value)
     return config_class.from_mapping(mapping)
+
+
+def wrapper_configs(given: "Iterable[WrapperConfig | str]") -> "tuple[WrapperConfig, ...]":
+    """Return wrapper configurations, words read as on the command line; see `parse_wrapper`.
+
+    Raises:
+        ConfigError: no list, something in it that is neither, or a word that is no wrapper.
+    """
+    from swarm_forage_env.wrappers.base import WrapperConfig  # with it comes the whole environment
+
+    expected = "Expected wrappers as a list of configurations or words such as 'sensor_noise:sigma=0.1', got"
+    if isinstance(given, str | Mapping) or not isinstance(given, Iterable):
+        raise ConfigError(f"{expected} {given!r}.")
+    configs = []
+    for one in given:
+        config = parse_wrapper(one) if isinstance(one, str) else one
+        if not isinstance(config, WrapperConfig):
+            raise ConfigError(f"{expected} {one!r} in it.")
+        configs.append(config)
+    return tuple(configs)
 
 
 def wrappers_from_mapping(tables: Mapping[str, Any]) -> "tuple[WrapperConfig, ...]":

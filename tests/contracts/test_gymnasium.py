@@ -3,12 +3,15 @@
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium import spaces
 from gymnasium.utils.env_checker import check_env
 
 from swarm_forage_env import SCENARIO_NAMES
-from swarm_forage_env.adapters import JointForageEnv
+from swarm_forage_env.actuators import ActionError
+from swarm_forage_env.adapters import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.config import ConfigError
 from swarm_forage_env.env import parallel_env
+from swarm_forage_env.learning.interface import InterfaceConfig
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
@@ -61,6 +64,74 @@ def test_terminates_only_when_every_robot_is_dead():
     nobody = np.zeros(3, np.bool_)
     env.world.set_population(active=nobody, present=nobody, terminated=~nobody)
     assert env.step(idle)[2]
+
+
+INTERFACES = {
+    "driven": InterfaceConfig(observation="compact", automatic_gripper=True),
+    "numbered": InterfaceConfig(observation="compact", actions="discrete", decision_ticks=3),
+}
+
+
+@pytest.mark.parametrize("interface", INTERFACES.values(), ids=INTERFACES)
+def test_passes_the_checker_with_an_interface(interface):
+    env = gymnasium.make("swarm_forage/warehouse_small-v0", interface=interface, n_robots=4)
+    check_env(env.unwrapped, skip_render_check=True)
+
+
+def test_an_interface_decides_what_is_seen_and_done():
+    driven = JointForageEnv(n_robots=4, interface=INTERFACES["driven"])
+    assert driven.observation_space.shape == (4, driven.interface.layout.size)
+    assert driven.action_space == spaces.Box(-1.0, 1.0, (4, 2), np.float32)
+    assert "action_mask" not in driven.reset(seed=0)[1]
+    numbered = JointForageEnv(n_robots=4, interface=INTERFACES["numbered"])
+    assert numbered.action_space == spaces.MultiDiscrete([11] * 4)
+    numbered.reset(seed=0)
+    with pytest.raises(ActionError, match="whole numbers from 0 to 10, got float64"):
+        numbered.step(np.full(4, 0.7))
+
+
+def test_without_an_interface_the_spaces_are_those_of_the_parallel_environment():
+    env = JointForageEnv(n_robots=4)
+    assert env.observation_space == spaces.Box(-1.0, 1.0, (4, env.world.layout.size), np.float32)
+    assert env.action_space == spaces.Box(-1.0, 1.0, (4, 3), np.float32)
+    assert env.reset(seed=0)[1].keys() == {"active"}
+
+
+@pytest.mark.parametrize("interface", INTERFACES.values(), ids=INTERFACES)
+def test_an_interface_shows_the_rows_of_the_vector_view_and_sums_their_rewards(interface):
+    options = {"n_robots": 4, "interface": interface, "max_cycles": 20, "tick": 0.01}
+    joint, rows = JointForageEnv(**options), SwarmVectorEnv(**options)
+    obs, info = joint.reset(seed=5)
+    expected, _ = rows.reset(seed=5)
+    joint.action_space.seed(0)
+    truncated, total = False, 0.0
+    while not truncated:
+        np.testing.assert_array_equal(obs, expected)
+        mask = None
+        if interface.actions == "discrete":
+            np.testing.assert_array_equal(info["action_mask"], rows.action_masks())
+            assert info["action_mask"].dtype == np.int8
+            mask = tuple(info["action_mask"])
+        action = joint.action_space.sample(mask)
+        expected, rewards, *_ = rows.step(action)
+        obs, reward, _, truncated, info = joint.step(action)
+        assert reward == pytest.approx(rewards.sum())
+        total += reward
+    assert joint.world.tick == 20
+    assert total >= 20 * 4 * 0.01 * (1 - 1e-6), "0.01 per robot and tick, also of the decision cut short"
+
+
+def test_a_curriculum_keeps_the_interface():
+    env = JointForageEnv(n_robots=4, interface={"observation": "compact"})
+    obs, _ = env.reset(seed=0, options={"scenario": {"width_m": 24.0}})
+    assert env.world.scenario.arena.width_m == 24.0
+    assert env.interface.layout.part("position").scale[0] == 12.0
+    assert env.observation_space.contains(obs)
+
+
+def test_there_is_nothing_to_step_before_a_reset():
+    with pytest.raises(RuntimeError, match="Call reset first"):
+        JointForageEnv(n_robots=4).step(np.zeros((4, 3), np.float32))
 
 
 def test_unknown_scenario_names_the_nearest():

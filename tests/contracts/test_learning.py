@@ -12,6 +12,8 @@ import swarm_forage_env
 from swarm_forage_env.adapters import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.config import ConfigError
 from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.parallel import ParallelLearnerEnv
+from swarm_forage_env.wrappers.noise import SensorNoise
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.learning import lives
 
@@ -49,9 +51,13 @@ def test_the_number_of_sub_environments_is_a_whole_number_of_swarms():
     assert gymnasium.make_vec(env_id).num_envs == 50
     assert gymnasium.make_vec(env_id, n_arenas=2, n_robots=4).num_envs == 8
     assert gymnasium.make_vec(env_id, num_envs=8, n_arenas=2, n_robots=4).n_arenas == 2
-    for wrong in ({"num_envs": 7}, {"num_envs": 2}, {"num_envs": 8, "n_arenas": 3}):
-        with pytest.raises(ValueError, match="multiple of n_robots = 4"):
-            gymnasium.make_vec(env_id, n_robots=4, **wrong)
+    for wrong in (7, 2, -4):
+        with pytest.raises(ValueError, match=f"multiple of n_robots = 4 .* got {wrong}; choose"):
+            gymnasium.make_vec(env_id, n_robots=4, num_envs=wrong)
+    with pytest.raises(ValueError, match=r"num_envs = 12 for n_arenas = 3 .* got 8"):
+        gymnasium.make_vec(env_id, n_robots=4, num_envs=8, n_arenas=3)
+    with pytest.raises(ValueError, match="n_arenas >= 1"):
+        gymnasium.make_vec(env_id, n_robots=4, n_arenas=0)
 
 
 def test_make_vec_takes_what_disturbs_the_swarm_under_a_name_of_its_own():
@@ -61,6 +67,55 @@ def test_make_vec_takes_what_disturbs_the_swarm_under_a_name_of_its_own():
     assert not np.array_equal(envs.reset(seed=0)[0], clean.reset(seed=0)[0])
     both = SwarmVectorEnv(n_robots=4, wrappers=[slip], swarm_wrappers=[noise])
     np.testing.assert_array_equal(both.reset(seed=0)[0], envs.reset(seed=0)[0])
+
+
+def test_words_of_the_command_line_and_plain_values_are_taken_everywhere():
+    words, fields = ["sensor_noise:sigma=0.1"], {"actions": "discrete"}
+    seen = []
+    for wrappers, interface in (
+        (words, fields),
+        ([parse_wrapper(word) for word in words], InterfaceConfig(actions="discrete")),
+    ):
+        choices = {"n_robots": 4, "interface": interface}
+        envs = SwarmVectorEnv(**choices, wrappers=wrappers)
+        joint = JointForageEnv(**choices, wrappers=iter(wrappers))
+        parallel = ParallelLearnerEnv(**choices, wrappers=wrappers)
+        made = gymnasium.make_vec("swarm_forage/warehouse_small-v0", **choices, swarm_wrappers=wrappers)
+        assert envs.single_action_space == parallel.action_space("robot_0") == made.single_action_space
+        rows, _ = parallel.reset(seed=0)
+        seen += [envs.reset(seed=0)[0], joint.reset(seed=0)[0], np.stack(list(rows.values())), made.reset(seed=0)[0]]
+    assert not np.array_equal(seen[0], SwarmVectorEnv(n_robots=4).reset(seed=0)[0])
+    for other in seen[1:]:
+        np.testing.assert_array_equal(other, seen[0])
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        ({"wrappers": "throttle"}, "wrappers as a list of .* got 'throttle'"),
+        ({"wrappers": {"throttle": {}}}, "wrappers as a list"),
+        ({"wrappers": 3}, "wrappers as a list .* got 3"),
+        ({"wrappers": [SensorNoise]}, "got <class .*SensorNoise'> in it"),
+        ({"wrappers": ["trottle"]}, "Did you mean 'throttle'"),
+        ({"interface": "discrete"}, "InterfaceConfig or its fields by name.* got 'discrete'"),
+        ({"interface": {"action": "discrete"}}, "Did you mean 'actions'"),
+    ],
+)
+@pytest.mark.parametrize("view", [JointForageEnv, SwarmVectorEnv, ParallelLearnerEnv])
+def test_other_wrappers_and_interfaces_are_refused(view, given, reason):
+    with pytest.raises(ConfigError, match=reason):
+        view(n_robots=3, **given)
+
+
+@pytest.mark.parametrize("n_processes", [0, 1])
+def test_actions_may_be_lists_and_closed_environments_take_none(n_processes):
+    envs = SwarmVectorEnv(n_robots=3, interface={"actions": "discrete"}, n_processes=n_processes)
+    envs.reset(seed=0)
+    assert envs.step([0, 1, 2])[1].shape == (3,)
+    envs.close()
+    for call in (lambda: envs.step([0, 1, 2]), envs.reset):
+        with pytest.raises(RuntimeError, match="Expected open arenas, but they were closed"):
+            call()
 
 
 def test_numbers_that_are_not_whole_are_no_actions():
@@ -177,6 +232,8 @@ def test_a_reset_can_change_the_scenario(view):
     assert env.observation_space == space
     with pytest.raises(ConfigError, match="n_robots to stay 3"):
         env.reset(options={"scenario": {"n_robots": 4}})
+    with pytest.raises(ConfigError, match="'width_m' inside of the reset option 'scenario'"):
+        env.reset(options={"width_m": 24.0})
 
 
 def test_the_checker_of_gymnasium_passes_with_wrappers_and_options():

@@ -1,14 +1,17 @@
 """The learner's interface under the PettingZoo API: its contract, and the same world as the rows of arenas."""
 
 import numpy as np
+import pettingzoo
 import pytest
-from pettingzoo.test import parallel_api_test, parallel_seed_test
+from gymnasium import spaces
+from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
 
 from swarm_forage_env.learning.arenas import ArenaBatch
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.parallel import ParallelLearnerEnv
 from swarm_forage_env.learning.worlds import WorldPlan
 from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+from swarm_forage_env.wrappers.noise import SensorNoise
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
 INTERFACES = {
@@ -38,9 +41,7 @@ def test_shows_the_same_as_the_rows_of_an_arena(interface):
     world = scenario("warehouse_small", n_robots=6, n_objects=40, width_m=12.0, nest_centre_m=(1.2, 8.0),
                      nest_size_m=(1.2, 12.8), tick=0.01)  # fmt: skip
     env = ParallelLearnerEnv(world, interface=interface, wrappers=wrappers, max_cycles=100)
-    batch = ArenaBatch(
-        WorldPlan(scenario=world, wrappers=wrappers, max_cycles=100, reads=interface.reads), interface, 1
-    )
+    batch = ArenaBatch(WorldPlan(scenario=world, wrappers=wrappers, max_cycles=100, interface=interface), 1)
     observations, infos = env.reset(seed=2)
     rows, _ = batch.reset([2], [None])
     n_deaths = 0
@@ -99,6 +100,24 @@ def test_actions_that_would_have_to_be_stretched_or_cut_are_refused(interface, a
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"Expected an action of .* for robot_0"):
         env.step(dict.fromkeys(env.agents, action))
+
+
+def test_an_interface_is_asked_for_by_id():
+    env_id, options = "swarm_forage/warehouse_small-v0", {"n_robots": 3, "max_cycles": 9}
+    parallel = pettingzoo.make("parallel", env_id, interface=INTERFACES["numbered"], **options)
+    assert isinstance(parallel.unwrapped, ParallelLearnerEnv)
+    assert parallel.action_space("robot_0") == spaces.Discrete(11)
+    turns = pettingzoo.make("aec", env_id, interface={"actions": "discrete", "automatic_gripper": True}, **options)
+    assert turns.action_space("robot_0") == spaces.Discrete(6)
+    api_test(turns, num_cycles=20)
+
+
+def test_what_disturbs_the_swarm_is_asked_for_by_id_with_or_without_an_interface():
+    env_id, words = "swarm_forage/warehouse_small-v0", ["sensor_noise:sigma=0.1"]
+    plain = pettingzoo.make("parallel", env_id, n_robots=3, wrappers=words)
+    assert isinstance(plain, SensorNoise)
+    learner = pettingzoo.make("parallel", env_id, n_robots=3, wrappers=words, interface={})
+    np.testing.assert_equal(plain.reset(seed=1)[0], learner.reset(seed=1)[0])
 
 
 def test_draws_pictures():

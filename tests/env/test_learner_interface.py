@@ -11,6 +11,7 @@ from swarm_forage_env.learning.interface import (
     MOTIONS,
     InterfaceConfig,
     LearnerInterface,
+    chosen_interface,
     interface_from_mapping,
 )
 from swarm_forage_env.policy import Event, Grip, load_policy
@@ -244,3 +245,12 @@ def test_choices_are_read_back_from_plain_values():
     )
     with pytest.raises(ConfigError, match="Did you mean 'actions'"):
         interface_from_mapping({"action": "discrete"})
+
+
+def test_an_interface_is_given_as_it_is_by_fields_or_not_at_all():
+    numbered = InterfaceConfig(actions="discrete")
+    assert chosen_interface(numbered) is numbered
+    assert chosen_interface({"actions": "discrete"}) == numbered
+    assert chosen_interface(None) == chosen_interface({}) == InterfaceConfig()
+    with pytest.raises(ConfigError, match=r"InterfaceConfig or its fields by name, .* got 'discrete'\."):
+        chosen_interface("discrete")

@@ -6,16 +6,15 @@ import pytest
 from swarm_forage_env.config import ConfigError
 from swarm_forage_env.learning.arenas import ArenaBatch, ArenaStep
 from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.worlds import WorldPlan
+from swarm_forage_env.learning.worlds import WorldPlan, plan_world
 from swarm_forage_env.scenarios import scenario
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.learning import lives
 
 
-def plan(**overrides) -> WorldPlan:
+def plan(interface: InterfaceConfig | None = None, **overrides) -> WorldPlan:
     options = {**lives.WORLD, **overrides}
-    name, max_cycles = options.pop("scenario"), options.pop("max_cycles")
-    return WorldPlan(scenario=scenario(name, **options), max_cycles=max_cycles)
+    return plan_world(options.pop("scenario"), options, interface=interface, max_cycles=options.pop("max_cycles"))
 
 
 def told_story(batch: ArenaBatch, arena: int) -> list[ArenaStep]:
@@ -28,7 +27,7 @@ def told_story(batch: ArenaBatch, arena: int) -> list[ArenaStep]:
 
 @pytest.mark.parametrize("arena", [0, 1])
 def test_the_story_by_hand(arena):
-    batch = ArenaBatch(plan(), InterfaceConfig(), 2)
+    batch = ArenaBatch(plan(), 2)
     rows = slice(arena * lives.N_ROBOTS, (arena + 1) * lives.N_ROBOTS)
     steps = told_story(batch, arena)
     np.testing.assert_array_equal([step.rewards[rows] for step in steps], lives.REWARDS)
@@ -44,7 +43,7 @@ def test_the_story_by_hand(arena):
 
 
 def test_active_rows_follow_the_story():
-    batch = ArenaBatch(plan(), InterfaceConfig(), 1)
+    batch = ArenaBatch(plan(), 1)
     steps = told_story(batch, 0)
     column = batch.interface.active_column
     np.testing.assert_array_equal([step.active for step in steps[:-1]], lives.ACTIVE_BEFORE[1:])
@@ -52,7 +51,7 @@ def test_active_rows_follow_the_story():
 
 
 def test_final_observations_are_the_last_of_the_old_run_and_the_returned_ones_the_first_of_the_new():
-    batch = ArenaBatch(plan(), InterfaceConfig(), 1)
+    batch = ArenaBatch(plan(), 1)
     steps = told_story(batch, 0)
     death, end = steps[2], steps[4]
     assert death.ended.tolist() == [1]
@@ -68,7 +67,7 @@ def test_final_observations_are_the_last_of_the_old_run_and_the_returned_ones_th
 
 
 def test_the_arena_ends_with_its_last_robot():
-    batch = ArenaBatch(plan(), InterfaceConfig(), 1)
+    batch = ArenaBatch(plan(), 1)
     batch.reset([0], [None])
     actions, nobody = np.zeros((3, 3), np.float32), np.zeros(3, bool)
     batch.call_method("set_population", [0], active=~nobody, present=~nobody)
@@ -89,8 +88,9 @@ def test_deaths_of_the_population_wrapper_end_rows_once_per_run():
         scenario=scenario("warehouse_small", n_robots=6, n_objects=4),
         max_cycles=60,
         wrappers=(parse_wrapper("population:death_per_tick=0.05"),),
+        interface=InterfaceConfig(observation="compact"),
     )
-    batch = ArenaBatch(wrapped, InterfaceConfig(observation="compact"), 1)
+    batch = ArenaBatch(wrapped, 1)
     batch.reset([3], [None])
     actions = np.zeros((6, 3), np.float32)
     episodes = np.zeros(6, int)
@@ -108,7 +108,7 @@ def test_deaths_of_the_population_wrapper_end_rows_once_per_run():
 
 
 def test_an_action_is_kept_for_the_ticks_of_a_decision_and_rewards_add_up():
-    batch = ArenaBatch(plan(), InterfaceConfig(decision_ticks=3), 1)
+    batch = ArenaBatch(plan(InterfaceConfig(decision_ticks=3)), 1)
     batch.reset([0], [None])
     actions = np.zeros((3, 3), np.float32)
     step = batch.step(actions)
@@ -121,7 +121,7 @@ def test_an_action_is_kept_for_the_ticks_of_a_decision_and_rewards_add_up():
 
 
 def test_seeds_decide_everything_and_runs_continue_their_sequence():
-    first, second = (ArenaBatch(plan(), InterfaceConfig(), 2) for _ in range(2))
+    first, second = (ArenaBatch(plan(), 2) for _ in range(2))
     rng = np.random.default_rng(0)
     actions = rng.uniform(-1, 1, (12, 6, 3)).astype(np.float32)
     seen = []
@@ -134,7 +134,7 @@ def test_seeds_decide_everything_and_runs_continue_their_sequence():
 
 
 def test_a_reset_changes_the_scenario_for_all_later_runs_until_told_otherwise():
-    batch = ArenaBatch(plan(), InterfaceConfig(observation="compact"), 2)
+    batch = ArenaBatch(plan(InterfaceConfig(observation="compact")), 2)
     batch.reset([0, 1], [{"scenario": {"n_objects": 9, "width_m": 24.0}}, None])
     assert [world.base.scenario.objects.n_objects for world in batch.worlds] == [9, 4]
     for _ in range(lives.HORIZON_TICKS):
@@ -151,10 +151,15 @@ def test_a_reset_changes_the_scenario_for_all_later_runs_until_told_otherwise():
         ({"scenario": {"n_objekts": 4}}, "n_objects"),
         ({"scenario": 4}, "fields by name"),
         ({"scenery": {}}, "scenario"),
+        ({"width_m": 12.0}, r"inside of .* options=\{'scenario': \{'width_m': 12.0\}\}"),
+        ({"scenario": {}, "width_m": 12.0}, "'width_m' inside of the reset option 'scenario'"),
+        ({"objects": 3}, "'objects' inside of"),
+        ({"width": 12.0}, "Unknown reset option 'width'. If the scenario field 'width_m'"),
+        ({"num_robots": 12}, "'n_robots'"),
     ],
 )
 def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
-    batch = ArenaBatch(plan(), InterfaceConfig(), 1)
+    batch = ArenaBatch(plan(), 1)
     batch.reset([0], [None])
     with pytest.raises(ConfigError, match=reason):
         batch.reset([0], [options])
@@ -164,8 +169,34 @@ def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
     assert batch.step(np.zeros((3, 3), np.float32)).rewards.tolist() == [1.0, 1.0, 1.0]
 
 
+def test_options_of_others_are_left_to_them():
+    batch = ArenaBatch(plan(), 1)
+    batch.reset([0], [{"reset_mask": np.ones(1, bool), "low": -1, "high": 1, 3: "three", "record": True}])
+    assert batch.worlds[0].base.scenario.objects.n_objects == 4
+
+
+def test_closed_arenas_take_no_reset_and_no_step():
+    batch = ArenaBatch(plan(), 1)
+    batch.reset([0], [None])
+    batch.close()
+    for call in (lambda: batch.step(np.zeros((3, 3))), batch.action_masks, lambda: batch.reset([0], [None])):
+        with pytest.raises(RuntimeError, match="were closed"):
+            call()
+
+
+def test_steps_in_which_nothing_ends_share_what_is_empty_and_nothing_else():
+    batch = ArenaBatch(plan(), 1)
+    batch.reset([0], [None])
+    first, second = (batch.step(np.zeros((3, 3), np.float32)) for _ in range(2))
+    assert first.ended.shape == first.returns.shape == first.lengths.shape == first.is_episode.shape == (0,)
+    assert first.final_obs.shape == (0, batch.interface.layout.size)
+    assert first.outcomes == ()
+    for name in ("obs", "rewards", "terminated", "truncated", "active"):
+        assert not np.shares_memory(getattr(first, name), getattr(second, name))
+
+
 def test_refuses_too_few_rows_and_steps_before_a_reset():
-    batch = ArenaBatch(plan(), InterfaceConfig(), 2)
+    batch = ArenaBatch(plan(), 2)
     with pytest.raises(RuntimeError, match="reset"):
         batch.step(np.zeros((6, 3), np.float32))
     with pytest.raises(RuntimeError, match="Call reset before action_masks"):
@@ -176,23 +207,27 @@ def test_refuses_too_few_rows_and_steps_before_a_reset():
     with pytest.raises(ValueError, match="6 rows"):
         batch.step(np.zeros((3, 3), np.float32))
     with pytest.raises(ValueError, match="n_arenas >= 1"):
-        ArenaBatch(plan(), InterfaceConfig(), 0)
+        ArenaBatch(plan(), 0)
 
 
 @pytest.mark.parametrize("interface", [InterfaceConfig(), InterfaceConfig(automatic_gripper=True)])
 def test_actions_that_are_not_finite_are_refused_by_name(interface):
-    batch = ArenaBatch(plan(), interface, 2, first_arena=4)
+    batch = ArenaBatch(plan(interface), 2, first_arena=4)
     batch.reset([0, 1], [None, None])
     actions = np.zeros((6, *batch.interface.action_space.shape), np.float32)
     actions[4, 0] = np.nan
     with pytest.raises(ValueError, match="robot_1") as refusal:
         batch.step(actions)
-    assert refusal.value.__notes__ == ["This was in arena 5; those before it have been stepped."]
-    assert batch.worlds[1].base.tick == 0
+    assert "the world was not stepped" in str(refusal.value)
+    (note,) = refusal.value.__notes__
+    assert "in arena 5: its world was not stepped" in note
+    assert [world.base.tick for world in batch.worlds] == [1, 0], "worlds of other arenas may have been"
+    batch.reset([0, 1], [None, None])
+    assert batch.step(np.zeros_like(actions)).obs.shape[0] == 6
 
 
 def test_small_rewards_of_long_runs_add_up():
-    batch = ArenaBatch(plan(max_cycles=3000, tick=0.1), InterfaceConfig(decision_ticks=10), 1)
+    batch = ArenaBatch(plan(InterfaceConfig(decision_ticks=10), max_cycles=3000, tick=0.1), 1)
     batch.reset([0], [None])
     for _ in range(300):
         step = batch.step(np.zeros((3, 3), np.float32))
@@ -205,7 +240,7 @@ def test_attributes_are_set_where_they_are_also_below_wrappers():
         max_cycles=9,
         wrappers=(parse_wrapper("sensor_noise:sigma=0.01"), parse_wrapper("actuator_noise:sigma=0.01")),
     )
-    batch = ArenaBatch(wrapped, InterfaceConfig(), 1)
+    batch = ArenaBatch(wrapped, 1)
     batch.reset([0], [None])
     batch.set_attribute("max_cycles", 1, [0])
     assert batch.worlds[0].base.max_cycles == 1

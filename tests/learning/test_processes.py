@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 
@@ -10,7 +12,6 @@ import pytest
 
 from swarm_forage_env.learning import processes
 from swarm_forage_env.learning.arenas import ArenaBatch
-from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.processes import ArenaProcessError, ArenaProcesses, open_arenas
 from swarm_forage_env.learning.worlds import WorldPlan
 from swarm_forage_env.scenarios import scenario
@@ -22,7 +23,7 @@ IDLE = np.zeros((6, 3), np.float32)
 @pytest.fixture
 def arenas() -> Iterator[ArenaProcesses]:
     """Two arenas in two processes, reset."""
-    opened = ArenaProcesses(PLAN, InterfaceConfig(), 2, 2)
+    opened = ArenaProcesses(PLAN, 2, 2)
     opened.reset([0, 1], [None, None])
     yield opened
     opened.close()
@@ -32,7 +33,7 @@ def test_closed_arenas_may_be_closed_again_and_say_so(arenas):
     arenas.close()
     arenas.close()
     assert not any(process.is_alive() for process in arenas._processes)
-    with pytest.raises(ArenaProcessError, match="were closed"):
+    with pytest.raises(RuntimeError, match="were closed"):
         arenas.step(IDLE)
 
 
@@ -41,6 +42,30 @@ def test_a_process_that_died_is_reported_with_its_exit_code(arenas):
     for _ in range(2):
         with pytest.raises(ArenaProcessError, match=r"arenas \[1\] ended with exit code -9"):
             arenas.step(IDLE)
+
+
+UNGUARDED = """
+from swarm_forage_env.adapters import SwarmVectorEnv
+SwarmVectorEnv(n_robots=3, n_processes=1).reset(seed=0)
+"""
+
+
+def test_a_script_without_a_guard_is_told_so(tmp_path):
+    script = tmp_path / "train.py"
+    script.write_text(UNGUARDED)
+    run = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False, timeout=120)
+    assert run.returncode == 1
+    last = run.stderr.strip().splitlines()[-1]
+    assert "ArenaProcessError: The process of arenas [0] ended with exit code 1 while it started" in last
+    assert "under `if __name__ == '__main__':`" in last
+
+
+def test_a_process_that_was_killed_before_its_first_answer_is_not_blamed_on_the_script():
+    arenas = ArenaProcesses(PLAN, 1, 1)
+    arenas._processes[0].kill()
+    with pytest.raises(ArenaProcessError, match=r"exit code -9\.$"):
+        arenas.reset([0], [None])
+    arenas.close()
 
 
 def test_ctrl_c_is_left_to_the_parent(arenas):
@@ -79,8 +104,8 @@ def test_errors_that_cannot_travel_are_told_in_words():
 
 
 def test_arenas_are_opened_here_or_elsewhere():
-    assert isinstance(open_arenas(PLAN, InterfaceConfig(), 1, 0), ArenaBatch)
-    elsewhere = open_arenas(PLAN, InterfaceConfig(), 1, 1)
+    assert isinstance(open_arenas(PLAN, 1, 0), ArenaBatch)
+    elsewhere = open_arenas(PLAN, 1, 1)
     assert isinstance(elsewhere, ArenaProcesses)
     with pytest.raises(RuntimeError, match="Call reset before step"):
         elsewhere.step(IDLE[:3])

@@ -12,6 +12,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecEnvWrapper, VecFrameStack, VecMonitor
 
+from swarm_forage_env.config import ConfigError
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.sb3 import SwarmVecEnv
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -187,3 +188,35 @@ def test_arenas_in_processes_give_the_same_bits():
 def test_refuses_more_processes_than_arenas():
     with pytest.raises(ValueError, match="n_processes from 1 to n_arenas = 2"):
         SwarmVecEnv(**lives.WORLD, n_arenas=2, n_processes=3)
+
+
+def test_the_number_of_rows_is_asked_for_by_arenas():
+    with pytest.raises(ConfigError, match="Expected n_arenas, not num_envs"):
+        SwarmVecEnv(num_envs=12)
+
+
+def test_takes_words_plain_values_and_lists_of_actions():
+    env = SwarmVecEnv(n_robots=3, wrappers=["sensor_noise:sigma=0.1"], interface={"actions": "discrete"})
+    env.seed(0)
+    obs = env.reset()
+    assert env.step([0, 1, 2])[1].shape == (3,)
+    clean = SwarmVecEnv(n_robots=3)
+    clean.seed(0)
+    assert not np.array_equal(clean.reset(), obs)
+    with pytest.raises(ConfigError, match="wrappers as a list"):
+        SwarmVecEnv(wrappers="sensor_noise:sigma=0.1")
+
+
+def test_options_beside_the_scenario_are_refused():
+    env = SwarmVecEnv(**lives.WORLD)
+    env.set_options({"n_objects": 9})
+    with pytest.raises(ConfigError, match="'n_objects' inside of the reset option 'scenario'"):
+        env.reset()
+
+
+def test_closed_environments_take_no_step():
+    env = SwarmVecEnv(**lives.WORLD)
+    env.reset()
+    env.close()
+    with pytest.raises(RuntimeError, match="were closed"):
+        env.step(IDLE)

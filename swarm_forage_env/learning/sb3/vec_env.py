@@ -10,11 +10,11 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env.config import ConfigError, ScenarioConfig
 from swarm_forage_env.learning.arenas import ArenaStep
-from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.interface import GivenInterface
 from swarm_forage_env.learning.processes import open_arenas
-from swarm_forage_env.learning.worlds import WorldPlan, configured
+from swarm_forage_env.learning.worlds import plan_world
 from swarm_forage_env.types import BoolArray
 from swarm_forage_env.wrappers.base import WrapperConfig
 
@@ -46,8 +46,8 @@ class SwarmVecEnv(VecEnv):
         *,
         n_arenas: int = 1,
         n_processes: int = 0,
-        interface: InterfaceConfig | None = None,
-        wrappers: Iterable[WrapperConfig] = (),
+        interface: GivenInterface = None,
+        wrappers: Iterable[WrapperConfig | str] = (),
         max_cycles: int | None = None,
         render_mode: str | None = None,
         **overrides: Any,
@@ -58,25 +58,24 @@ class SwarmVecEnv(VecEnv):
             scenario: Name of a preset, or a complete configuration.
             n_arenas: Arenas that run side by side.
             n_processes: Processes that the arenas are spread over; 0 = all in this process.
-            interface: What a learner sees and does; default full observations and continuous actions.
-            wrappers: What disturbs the swarm (noise, throttle, population ...), in any order.
+            interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
+                observations and continuous actions.
+            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+                ("population:death_per_tick=0.01").
             max_cycles: Ticks until truncation; default the scenario's horizon.
             render_mode: None or "rgb_array".
             overrides: Scenario fields by name (`n_robots=20`, `nest_progress=0.1`).
 
         Raises:
-            ConfigError: unknown preset or field, or values that describe no world.
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
             ValueError: n_arenas below 1, or more processes than arenas.
         """
-        choice = interface or InterfaceConfig()
-        plan = WorldPlan(
-            scenario=configured(scenario, overrides),
-            wrappers=tuple(wrappers),
-            max_cycles=max_cycles,
-            render_mode=render_mode,
-            reads=choice.reads,
+        if "num_envs" in overrides:
+            raise ConfigError("Expected n_arenas, not num_envs: each arena gives one sub-environment per robot.")
+        plan = plan_world(
+            scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
         )
-        self._arenas = open_arenas(plan, choice, n_arenas, n_processes)
+        self._arenas = open_arenas(plan, n_arenas, n_processes)
         self.n_arenas, self.n_robots = n_arenas, self._arenas.n_robots
         self.interface = self._arenas.interface
         self._started = time.perf_counter()
