@@ -1,8 +1,9 @@
 #!/usr/bin/env python
 """PPO in one file, in the manner of CleanRL: plain torch on `gymnasium.make_vec`, nothing hidden.
 
-    pip install 'swarm-forage-env' 'torch==2.13.0'
-    python scripts/cleanrl_ppo.py --total-timesteps 1000000
+    pip install . "torch==2.13.0"  # in a checkout
+    python scripts/cleanrl_ppo.py --total-timesteps 3000000 --out cleanrl_ppo.npz
+    swarm-forage run --policy crw,cleanrl_ppo.npz
 
 Differs from the textbook in two places, both because robots are sub-environments: arenas start anew within the step
 that ends them, so that the value of the last observation is added where an episode was cut off by time; and steps of
@@ -12,6 +13,7 @@ robots that are not at work (`infos["active"]`) are in no minibatch.
 
 import argparse
 import time
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -20,6 +22,11 @@ from torch import nn
 
 import swarm_forage_env  # noqa: F401 - registers the environments
 from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.network import Network, NetworkAbout
+
+INTERFACE = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
+NARROW = {"width_m": 12.0, "nest_centre_m": (1.2, 8.0), "nest_size_m": (1.2, 12.8)}
+"""A first stage in which the way home is a third as long."""
 
 
 class Agent(nn.Module):
@@ -41,11 +48,17 @@ class Agent(nn.Module):
         """Return the distribution of actions."""
         return torch.distributions.Categorical(logits=self.actor(obs))
 
+    def network(self) -> Network:
+        """Return the actor as a network that runs without torch, and draws its actions as in training."""
+        state = self.actor.state_dict()
+        weights = tuple(value.numpy().T for name, value in state.items() if name.endswith("weight"))
+        biases = tuple(value.numpy() for name, value in state.items() if name.endswith("bias"))
+        return Network(weights, biases, NetworkAbout(interface=INTERFACE, activation="tanh", samples=True))
+
 
 def parse() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--env-id", default="swarm_forage/warehouse_small-v0")
     parser.add_argument("--n-arenas", type=int, default=8)
     parser.add_argument("--n-robots", type=int, default=50)
     parser.add_argument("--total-timesteps", type=int, default=1_000_000, help="decisions of single robots")
@@ -58,6 +71,7 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--clip-coef", type=float, default=0.2)
     parser.add_argument("--ent-coef", type=float, default=0.003)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, default=Path("cleanrl_ppo.npz"), help="where the trained network goes")
     return parser.parse_args()
 
 
@@ -120,30 +134,32 @@ def rollout(envs, agent: Agent, obs: np.ndarray, active: np.ndarray, args: argpa
 
 
 def main() -> None:
-    """Train, and print what a robot earns per decision."""
+    """Train, half in the narrow arena and half in the real one, print what a robot earns per decision, and save."""
     args = parse()
     torch.manual_seed(args.seed)
     torch.set_num_threads(1)
     envs = gymnasium.make_vec(
-        args.env_id,
+        "swarm_forage/warehouse_small-v0",
         n_arenas=args.n_arenas,
         n_robots=args.n_robots,
-        interface=InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5),
+        interface=INTERFACE,
         horizon_s=600.0,
         first_pickup=1.0,
         nest_progress=0.05,
     )
-    narrow = {"width_m": 12.0, "nest_centre_m": (1.2, 8.0), "nest_size_m": (1.2, 12.8)}
-    obs, infos = envs.reset(seed=args.seed, options={"scenario": narrow})
-    agent = Agent(obs.shape[1], int(envs.single_action_space.n))  # type: ignore[attr-defined]
+    agent = Agent(envs.single_observation_space.shape[0], int(envs.single_action_space.n))  # type: ignore[attr-defined]
     optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
-    active, started, steps = infos["active"], time.perf_counter(), 0
-    while steps < args.total_timesteps:
-        batch, obs, active, reward = rollout(envs, agent, obs, active, args)
-        update(agent, optimizer, batch, args)
-        steps += args.num_steps * envs.num_envs
-        print(f"{steps:>10,} decisions, {steps / (time.perf_counter() - started):,.0f} per s, reward {reward:.4f}")
+    started, steps = time.perf_counter(), 0
+    for until, changes in ((args.total_timesteps // 2, NARROW), (args.total_timesteps, {})):
+        obs, infos = envs.reset(seed=args.seed, options={"scenario": changes})
+        active = infos["active"]
+        while steps < until:
+            batch, obs, active, reward = rollout(envs, agent, obs, active, args)
+            update(agent, optimizer, batch, args)
+            steps += args.num_steps * envs.num_envs
+            print(f"{steps:>10,} decisions, {steps / (time.perf_counter() - started):,.0f} per s, reward {reward:.4f}")
     envs.close()
+    agent.network().save(args.out)
 
 
 if __name__ == "__main__":

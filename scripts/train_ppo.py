@@ -1,7 +1,7 @@
 #!/usr/bin/env python
 """Train PPO of stable-baselines3 on a swarm, plainly: one shared policy, every robot a sub-environment.
 
-pip install 'swarm-forage-env[train]' 'torch==2.13.0'
+pip install ".[train]" "torch==2.13.0"  # in a checkout
 python scripts/train_ppo.py --steps 3000000 --out ppo_example.npz
 swarm-forage run --policy crw,ppo_example.npz
 """
