@@ -6,6 +6,7 @@ name is one.
 
 import hashlib
 import pickle
+from collections.abc import Mapping
 from functools import lru_cache
 from itertools import product
 from pathlib import Path
@@ -14,11 +15,21 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env.learning.interface import ACTIONS, OBSERVATIONS, InterfaceConfig, LearnerInterface
+from swarm_forage_env.config import CACHE_KINDS, ConfigError
+from swarm_forage_env.extras import install_command
+from swarm_forage_env.learning.interface import (
+    ACTIONS,
+    OBSERVATIONS,
+    InterfaceConfig,
+    LearnerInterface,
+    interface_from_mapping,
+)
 from swarm_forage_env.learning.network import Network, NetworkPolicy
 from swarm_forage_env.policy import SwarmTask
 from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
 
+MODEL_NOTE = "swarm_forage_note"
+"""Attribute of a model, saved with it, that says what its spaces do not: {"interface": fields, "caches": kind}."""
 _DIGEST_DIGITS = 16
 MODEL_FAULTS = (
     ValueError,
@@ -41,20 +52,27 @@ class ModelError(ValueError):
 class ModelPolicy:
     """A model saved by stable-baselines3 (PPO, A2C, DQN, SAC, TD3, DDPG), acting without exploration.
 
-    A model of one robot is applied to every robot, whatever the swarm size; what it sees and does, of the choices in
-    `learning.interface`, is told from its spaces. A model of the whole swarm, (N, D) to (N, 3), works for its own N
-    only. Nothing is normalised: a model trained behind `VecNormalize` sees other numbers than it was trained on.
+    A model of one robot is applied to every robot, whatever the swarm size. What it sees and does, of the choices in
+    `learning.interface`, is read from the note that our training leaves in the file (`sb3.export.note_interface`);
+    without one it is told from the spaces, and a decision lasts one tick. A model of the whole swarm, (N, D) to (N, 3),
+    works for its own N only. Nothing is normalised: a model trained behind `VecNormalize` sees other numbers than it
+    was trained on.
 
     Opening a model runs code that the file contains. Open only what you trust.
+
+    Attributes:
+        caches: World that the model was trained in; there only when the file tells.
     """
 
-    def __init__(self, path: str | Path, *, digest: str | None = None, decision_ticks: int = 1) -> None:
+    caches: str
+
+    def __init__(self, path: str | Path, *, digest: str | None = None, decision_ticks: int | None = None) -> None:
         """Open the model.
 
         Args:
             path: The saved file.
             digest: What `file_digest` returned when the run was planned; a file that has changed since is refused.
-            decision_ticks: Ticks for which an action is kept, as in training; the file does not tell.
+            decision_ticks: Ticks for which an action is kept; default as in training where the file tells, else 1.
 
         Raises:
             ImportError: stable-baselines3 is not installed.
@@ -62,7 +80,12 @@ class ModelPolicy:
             ConfigError: decision_ticks below 1.
         """
         self._path = Path(path)
-        self._network = _open_model(str(path), _checked_digest(path, digest))
+        self._network, note = _open_model(str(path), _checked_digest(path, digest))
+        self._noted = None
+        if note is not None:
+            self._noted, self.caches = _read_note(note, self._path)
+        if decision_ticks is None:
+            decision_ticks = self._noted.decision_ticks if self._noted else 1
         self._decision_ticks = InterfaceConfig(decision_ticks=decision_ticks).decision_ticks
 
     def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
@@ -89,14 +112,16 @@ class ModelPolicy:
         """Return the interface whose spaces are those of the model; None for a model of the whole swarm."""
         n_robots, size = task.n_robots, task.layout.size
         spaces_of_model = (self._network.observation_space, self._network.action_space)
-        found = tuple(_describe(space) for space in spaces_of_model)
+        found = tuple(describe_space(space) for space in spaces_of_model)
+        if self._noted is not None:
+            return self._noted_interface(self._noted, task, found)
         if found == (f"Box({n_robots}, {size})", f"Box({n_robots}, 3)"):
             return None
         seen: list[str] = []
         for observation, actions, automatic in product(OBSERVATIONS, ACTIONS, (False, True)):
             config = InterfaceConfig(observation=observation, actions=actions, automatic_gripper=automatic)
             interface = LearnerInterface(config, task)
-            fitting = (_describe(interface.observation_space), _describe(interface.action_space))
+            fitting = (describe_space(interface.observation_space), describe_space(interface.action_space))
             if found == fitting:
                 return interface
             seen.append(" to ".join(fitting))
@@ -105,6 +130,35 @@ class ModelPolicy:
             f"robots together, Box({n_robots}, {size}) to Box({n_robots}, 3); {self._path.name} goes from "
             f"{' to '.join(found)}."
         )
+
+    def _noted_interface(self, noted: InterfaceConfig, task: SwarmTask, found: tuple[str, ...]) -> LearnerInterface:
+        interface = LearnerInterface(noted, task)
+        fitting = (describe_space(interface.observation_space), describe_space(interface.action_space))
+        if found != fitting:
+            raise ModelError(
+                f"Expected a model from {' to '.join(fitting)}, as the note in {self._path.name} says, got one from "
+                f"{' to '.join(found)}."
+            )
+        return interface
+
+
+def _read_note(note: Any, path: Path) -> tuple[InterfaceConfig, str]:
+    """Return interface and caches that a note tells.
+
+    Raises:
+        ModelError: it tells something else.
+    """
+    if not isinstance(note, Mapping) or not isinstance(note.get("interface"), Mapping):
+        raise ModelError(f"Expected the note in {path} to be a table with interface and caches, got {note!r}.")
+    try:
+        interface = interface_from_mapping(dict(note["interface"]))
+    except ConfigError as error:
+        raise ModelError(f"Cannot use the note in {path}: {error}") from error
+    if note.get("caches") not in CACHE_KINDS:
+        raise ModelError(
+            f"Expected caches in the note in {path} to be one of {', '.join(CACHE_KINDS)}, got {note.get('caches')!r}."
+        )
+    return interface, note["caches"]
 
 
 def open_network(path: str | Path, *, digest: str | None = None) -> NetworkPolicy:
@@ -145,15 +199,15 @@ def _checked_digest(path: str | Path, planned: str | None) -> str:
     return found
 
 
-def _describe(space: spaces.Space[Any]) -> str:
+def describe_space(space: spaces.Space[Any]) -> str:
     """Return kind and size of a space, which is what has to agree."""
     size = space.n if isinstance(space, spaces.Discrete) else ", ".join(map(str, space.shape or ()))
     return f"{type(space).__name__}({size})"
 
 
 @lru_cache(maxsize=2)
-def _open_model(path: str, digest: str) -> Any:  # noqa: ARG001 - the digest makes a changed file a new entry
-    """Return the policy network of a saved model, in evaluation mode, on the CPU.
+def _open_model(path: str, digest: str) -> tuple[Any, Any]:  # noqa: ARG001 - with the digest a changed file is new
+    """Return the policy network of a saved model, in evaluation mode, on the CPU; and its note, None without one.
 
     The network alone, not the algorithm around it, which for off-policy methods would allocate its replay buffer.
     """
@@ -161,9 +215,7 @@ def _open_model(path: str, digest: str) -> Any:  # noqa: ARG001 - the digest mak
         from stable_baselines3.common.policies import ActorCriticPolicy  # pyright: ignore[reportMissingImports]
         from stable_baselines3.common.save_util import load_from_zip_file  # pyright: ignore[reportMissingImports]
     except ImportError as error:
-        raise ImportError(
-            f"The model {path} needs stable-baselines3: pip install 'swarm-forage-env[train]' 'torch==2.13.0'"
-        ) from error
+        raise ImportError(f"The model {path} needs stable-baselines3: {install_command('train')}.") from error
 
     try:
         data, parameters, _ = load_from_zip_file(path, device="cpu")
@@ -182,4 +234,4 @@ def _open_model(path: str, digest: str) -> Any:  # noqa: ARG001 - the digest mak
             f"Expected {path} to be a model saved by stable-baselines3, but it cannot be opened: {reason}."
         ) from error
     network.set_training_mode(False)
-    return network
+    return network, data.get(MODEL_NOTE)

@@ -16,7 +16,7 @@ from swarm_forage_env.env import parallel_env
 from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.learning.network import Network, NetworkAbout
 from swarm_forage_env.policy import is_policy_file, load_policy, local_policy, policy_class
-from swarm_forage_env.policy_models import ModelError, ModelPolicy, file_digest
+from swarm_forage_env.policy_models import MODEL_NOTE, ModelError, ModelPolicy, file_digest
 from swarm_forage_env.scenarios import scenario
 from swarm_forage_env.study.experiments import Budget
 from swarm_forage_env.study.spec import RunSpec
@@ -109,6 +109,59 @@ def test_actions_are_kept_for_the_ticks_of_a_decision(tmp_path):
         load_policy(str(path), {"decision_ticks": 0})
 
 
+NOTED = {
+    "interface": {"observation": "compact", "actions": "discrete", "automatic_gripper": True, "decision_ticks": 3},
+    "caches": "static",
+}
+
+
+def noted_model(folder: Path, note):
+    """Save an untrained model that carries a note; returns it, its file, and the interface of NOTED."""
+    interface = LearnerInterface(InterfaceConfig(**NOTED["interface"]), ENV.task)
+    made, path = model("A2C", folder, seen=interface.observation_space, done=interface.action_space)
+    setattr(made, MODEL_NOTE, note)
+    made.save(path)
+    return made, path, interface
+
+
+def test_a_model_with_a_note_runs_as_it_was_trained(tmp_path):
+    made, path, interface = noted_model(tmp_path, NOTED)
+    policy = started(path)
+    assert policy.caches == "static"
+    wheels = [policy.act(sign * OBS, ACTIVE)[:, :2].copy() for sign in (1.0, -1.0, -1.0, -1.0)]
+    expected, _ = made.predict(interface.observe(OBS), deterministic=True)
+    np.testing.assert_array_equal(wheels[0], interface.command(expected, OBS)[:, :2])
+    np.testing.assert_array_equal(wheels[:3], [wheels[0]] * 3)
+    assert np.any(wheels[3] != wheels[2])
+    policy = started(path, decision_ticks=1)
+    first, second = (policy.act(sign * OBS, ACTIVE)[:, :2].copy() for sign in (1.0, -1.0))
+    assert np.any(first != second)
+
+
+def test_a_model_without_a_note_says_nothing_of_its_world(tmp_path):
+    _, path = model("A2C", tmp_path)
+    assert not hasattr(load_policy(str(path)), "caches")
+
+
+@pytest.mark.parametrize(
+    ("note", "reason"),
+    [
+        ([1], r"note in .*model\.zip to be a table with interface and caches, got \[1\]"),
+        (NOTED | {"interface": {"observation": "compct"}}, r"note in .*model\.zip: .*Did you mean 'compact'"),
+        (NOTED | {"interface": {"decision_tick": 2}}, "Did you mean 'decision_ticks'"),
+        ({"interface": NOTED["interface"]}, "to be one of none, static, dynamic, got None"),
+        (
+            NOTED | {"interface": {"observation": "full"}},
+            r"from Box\(\d+\) to Box\(3\), as the note in model\.zip says",
+        ),
+    ],
+)
+def test_notes_that_cannot_be_are_refused(tmp_path, note, reason):
+    _, path, _ = noted_model(tmp_path, note)
+    with pytest.raises(ModelError, match=reason):
+        started(path)
+
+
 def test_a_model_that_sees_something_else_is_refused(tmp_path):
     _, path = model("A2C", tmp_path, seen=box(7))
     with pytest.raises(ModelError, match=r"model\.zip goes from Box\(7\) to Box\(3\)"):
@@ -128,7 +181,7 @@ def test_without_the_library_it_says_what_to_install(tmp_path, monkeypatch):
     path = tmp_path / "unopened.zip"
     path.write_bytes(b"x")
     monkeypatch.setitem(sys.modules, "stable_baselines3.common.policies", None)
-    with pytest.raises(ImportError, match=r"pip install 'swarm-forage-env\[train\]' 'torch==2\.13\.0'"):
+    with pytest.raises(ImportError, match=r"needs stable-baselines3: pip install .*train"):
         load_policy(str(path))
 
 

@@ -1,5 +1,6 @@
-"""From a trained stable-baselines3 model to a network file that runs without torch."""
+"""From a trained stable-baselines3 model to a network file that runs without torch, or a zip file that tells more."""
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,11 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.dqn.policies import DQNPolicy
 from torch import nn
 
-from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.learning.network import Network, NetworkAbout, NetworkError
+from swarm_forage_env.policy_models import MODEL_NOTE, describe_space
+from swarm_forage_env.scenarios import scenario
 
 _ACTIVATIONS: dict[type[nn.Module], str] = {nn.Tanh: "tanh", nn.ReLU: "relu"}
 
@@ -33,8 +37,10 @@ def export_network(
         card: How it came about, plain values.
 
     Raises:
-        NetworkError: a model of another kind (SAC and TD3 among them), or layers that a network file cannot hold.
+        NetworkError: a model of another kind (SAC and TD3 among them), layers that a network file cannot hold, or an
+            interface that is not the model's.
     """
+    _check_interface(model, interface)
     layers = _acting_layers(model)
     linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
     between = {type(layer) for layer in layers if not isinstance(layer, nn.Linear)}
@@ -54,6 +60,43 @@ def export_network(
         card=card or {},
     )
     return Network(weights, biases, about)
+
+
+def note_interface(model: BaseAlgorithm, interface: InterfaceConfig, *, caches: str = "none") -> None:
+    """Note on a model what its spaces do not tell; saved with it, so that its zip file runs as it was trained.
+
+    Args:
+        model: Any model of one robot, before it is saved.
+        interface: What it sees and does in training, `SwarmVecEnv.interface.config`.
+        caches: World that it is trained in.
+
+    Raises:
+        NetworkError: an interface that is not the model's.
+    """
+    _check_spaces(model, interface)
+    setattr(model, MODEL_NOTE, {"interface": asdict(interface), "caches": caches})
+
+
+def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
+    _check_spaces(model, interface)
+    note = getattr(model, MODEL_NOTE, None)
+    if note is not None and note["interface"] != asdict(interface):
+        raise NetworkError(
+            f"Expected the interface that the model was trained with, {note['interface']}, got {interface}."
+        )
+
+
+def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
+    """Refuse an interface with other observations or actions than the model has."""
+    # Any world will do: all have the same columns and actions.
+    bound = LearnerInterface(interface, ForageEnv(scenario("warehouse_small", n_robots=1, n_objects=1)).task)
+    wanted = [describe_space(space) for space in (bound.observation_space, bound.action_space)]
+    found = [describe_space(space) for space in (model.observation_space, model.action_space)]
+    if wanted != found:
+        raise NetworkError(
+            f"Expected a model from {' to '.join(wanted)} for this interface, got one from {' to '.join(found)}; give "
+            f"the interface that it was trained with (env.interface.config), not {interface}."
+        )
 
 
 def _acting_layers(model: BaseAlgorithm) -> list[nn.Module]:
