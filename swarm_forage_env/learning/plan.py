@@ -2,8 +2,9 @@
 
 import dataclasses
 import json
+import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,11 +24,31 @@ from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
 """Algorithms of stable-baselines3 that train; the first two on rollouts, the others from replay."""
 DEFAULT_STEPS = 5_000_000
+_COUNTS = ("n_steps", "batch_size", "n_epochs", "buffer_size")
+_RANGES: dict[str, tuple[str, Callable[[float], bool]]] = {
+    "gamma": ("a number in (0, 1]", lambda value: 0.0 < value <= 1.0),
+    "gae_lambda": ("a number in [0, 1]", lambda value: 0.0 <= value <= 1.0),
+    "tau": ("a number in (0, 1]", lambda value: 0.0 < value <= 1.0),
+    "learning_rate": ("a number > 0", lambda value: 0.0 < value < math.inf),
+    "clip_range": ("a number > 0", lambda value: 0.0 < value < math.inf),
+}
+"""Options of the algorithms that mean the same in all of them, and what they may be."""
 
 
 def _require_whole(name: str, value: Any, *, least: int = 1) -> None:
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         raise ConfigError(f"Expected {name} to be a whole number >= {least}, got {value!r}.")
+
+
+def _require_options(name: str, options: Any) -> None:
+    """Refuse values that stable-baselines3 takes without a word and that no training survives."""
+    for key, value in _require_table(name, options).items():
+        if key in _COUNTS:
+            _require_whole(f"{name}.{key}", value)
+        wanted, fits = _RANGES.get(key, ("", None))
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if fits is not None and not (is_number and fits(value)):
+            raise ConfigError(f"Expected {name}.{key} to be {wanted}, got {value!r}.")
 
 
 def _require_table(name: str, value: Any) -> Mapping[str, Any]:
@@ -50,7 +71,7 @@ class Stage:
     def __post_init__(self) -> None:
         _require_whole("stage.steps", self.steps)
         _require_table("stage.scenario", self.scenario)
-        _require_table("stage.options", self.options)
+        _require_options("stage.options", self.options)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -114,18 +135,20 @@ class TrainingPlan:
         if self.algorithm not in ALGORITHMS:
             raise ConfigError(
                 f"Expected algorithm to be one of {', '.join(ALGORITHMS)}, got {self.algorithm!r}."
-                + suggestion(str(self.algorithm), ALGORITHMS)
+                + suggestion(str(self.algorithm).lower(), ALGORITHMS)
             )
         unfit = {"dqn": "continuous", "sac": "discrete"}.get(self.algorithm)
         if self.interface.actions == unfit:
             raise ConfigError(f"Expected actions that {self.algorithm} can choose, got {unfit} ones.")
         _require_whole("n_arenas", self.n_arenas)
+        if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything
+            raise ConfigError(f"Expected hidden to be sizes of layers, for example [64, 64], got {self.hidden!r}.")
         for size in self.hidden:
             _require_whole("hidden", size)
         if not self.stages:
             raise ConfigError("Expected at least one stage, got none.")
         _require_whole("seed", self.seed, least=0)
-        _require_table("options", self.options)
+        _require_options("options", self.options)
         for stage in self.stages:
             same_robots(self.scenario, stage.scenario)
         self.evaluation.specs(self.scenario, self.wrappers, self.evaluation.baseline)
@@ -141,6 +164,38 @@ class TrainingPlan:
         nested = {name: dataclasses.asdict(plain[name]) for name in ("scenario", "interface", "evaluation")}
         wrappers = {config.name: config.to_mapping() for config in self.wrappers}
         return {**plain, **nested, "wrappers": wrappers, "stages": [dataclasses.asdict(item) for item in self.stages]}
+
+    def differences(self, earlier: "TrainingPlan") -> tuple[str, ...]:
+        """Return what keeps this plan from going on with a training by an earlier one, field by field.
+
+        More steps in the last stage of the earlier plan, and further stages, do not.
+        """
+        last = len(earlier.stages) - 1
+        stages = list(earlier.stages)
+        if last < len(self.stages):
+            stages[last] = dataclasses.replace(stages[last], steps=max(stages[last].steps, self.stages[last].steps))
+        begun = dataclasses.replace(self, stages=self.stages[: last + 1])
+        before, now = (
+            dict(_leaves(plan.to_mapping())) for plan in (dataclasses.replace(earlier, stages=tuple(stages)), begun)
+        )
+        missing = "nothing"
+        return tuple(
+            f"{name}: {before.get(name, missing)} before, {now.get(name, missing)} now"
+            for name in {**before, **now}
+            if before.get(name, missing) != now.get(name, missing)
+        )
+
+    def longer(self, steps: int) -> "TrainingPlan":
+        """Return the plan with a last stage that makes `steps` in all.
+
+        Raises:
+            ConfigError: fewer steps than it has.
+        """
+        if steps < self.total_steps:
+            raise ConfigError(f"Expected at least the {self.total_steps:,} steps of the plan, got {steps:,}.")
+        last = self.stages[-1]
+        last = dataclasses.replace(last, steps=last.steps + steps - self.total_steps)
+        return dataclasses.replace(self, stages=(*self.stages[:-1], last))
 
     def write(self, path: Path) -> None:
         """Write the plan as JSON."""
@@ -173,6 +228,8 @@ class TrainingPlan:
                 **_known(EvaluationPlan, _require_table("evaluation", values["evaluation"]), "evaluation.")
             )
         if "stages" in values:
+            if not isinstance(values["stages"], list):
+                raise ConfigError(f"Expected stages to be a list of tables, [[stages]], got {values['stages']!r}.")
             tables = [_known(Stage, table, "stages.") for table in values["stages"]]
             values["stages"] = tuple(
                 Stage(**{**table, "scenario": _tuples(_require_table("stages.scenario", table.get("scenario", {})))})
@@ -188,7 +245,7 @@ class Evaluation:
     steps: int
     """Decisions of single robots so far."""
     wall_time_s: float
-    """Since the training was started or resumed, s."""
+    """Time spent on the training, s; a resumed one counts on from its latest evaluation."""
     performance: float
     """What the scenario counts, per 1,000 simulated s."""
     baseline: float
@@ -204,7 +261,7 @@ class TrainingStatus:
     steps: int
     """Decisions of single robots so far."""
     wall_time_s: float
-    """Since the training was started or resumed, s."""
+    """Time spent on the training, s; a resumed one counts on from its latest evaluation."""
     episode_return: float
     """Mean return of the latest episodes, nan before the first."""
 
@@ -222,6 +279,18 @@ def read_plan(path: Path) -> TrainingPlan:
         raise ConfigError(f"Cannot read the plan {path}: {error.strerror or error}.") from error
     except (ValueError, TypeError) as error:  # ConfigError, and what the two parsers raise
         raise ConfigError(f"Cannot use the plan {path}: {error}") from error
+
+
+def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the plain values of nested tables and lists of tables, by their names with dots."""
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _leaves(item, f"{name}.{key}" if name else str(key))
+    elif isinstance(value, list):
+        for k, item in enumerate(value):
+            yield from _leaves(item, f"{name}[{k}]")
+    else:
+        yield name, value
 
 
 def _known(config_class: type, mapping: Mapping[str, Any], where: str) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 """Training plans: from TOML, to JSON and back, and what is refused."""
 
+from dataclasses import replace
+
 import pytest
 
 from swarm_forage_env.config import ConfigError
@@ -86,6 +88,19 @@ def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
         ("width_m = 20.0", "widht_m = 20.0", "Did you mean 'width_m'"),
         ("horizon_s = 400.0", "horizon_s = 300.0", "interval"),
         ("hidden = [16]", "hidden = [0]", "hidden to be a whole number"),
+        ("hidden = [16]", "hidden = 64", r"hidden to be sizes of layers, for example \[64, 64\], got 64"),
+        ('algorithm = "dqn"', 'algorithm = "DQN"', "Did you mean 'dqn'"),
+        ("gamma = 0.9", "gamma = 5", r"options.gamma to be a number in \(0, 1\], got 5"),
+        ("gamma = 0.9", "gamma = nan", "options.gamma"),
+        ("gamma = 0.9", 'gamma = "high"', "options.gamma .* got 'high'"),
+        ("gamma = 0.9", "gamma = true", "options.gamma .* got True"),
+        ("gamma = 0.9", "gae_lambda = 1.01", "options.gae_lambda"),
+        ("gamma = 0.9", "tau = 0", "options.tau"),
+        ("gamma = 0.9", "clip_range = 0", "options.clip_range"),
+        ("gamma = 0.9", "batch_size = 0", "options.batch_size to be a whole number >= 1, got 0"),
+        ("gamma = 0.9", "n_steps = 1.5", "options.n_steps to be a whole number"),
+        ("learning_rate = 0.1", "learning_rate = 0", "stage.options.learning_rate to be a number > 0, got 0"),
+        ("learning_rate = 0.1", "learning_rate = inf", "stage.options.learning_rate"),
         ("[interface]", "[[interface]]", "interface to be a table"),
         ("sigma = 0.02", "sigma = -1.0", "sigma"),
         ("[options]", "[options", "plan.toml"),
@@ -116,6 +131,49 @@ def test_a_file_without_a_table_is_no_plan(tmp_path):
     (tmp_path / "plan.json").write_text("[1]")
     with pytest.raises(ConfigError, match=r"the plan to be a table, got \[1\]"):
         read_plan(tmp_path / "plan.json")
+
+
+def test_stages_are_a_list(tmp_path):
+    path = tmp_path / "plan.toml"
+    path.write_text(TOML.partition("[[stages]]")[0] + "[stages]\nsteps = 100\n")
+    with pytest.raises(ConfigError, match=r"stages to be a list of tables, \[\[stages\]\]"):
+        read_plan(path)
+
+
+def test_plans_that_go_on_with_a_training_differ_in_steps_to_come_alone(plan):
+    assert plan.differences(plan) == ()
+    assert plan.longer(300) == plan
+    assert [stage.steps for stage in plan.longer(1000).stages] == [100, 900]
+    assert plan.longer(1000).differences(plan) == ()
+    assert replace(plan, stages=(*plan.stages, Stage(steps=5))).differences(plan) == ()
+    with pytest.raises(ConfigError, match="at least the 300 steps of the plan, got 299"):
+        plan.longer(299)
+
+
+@pytest.mark.parametrize(
+    ("changes", "difference"),
+    [
+        ({"seed": 4}, "seed: 0 before, 4 now"),
+        ({"scenario": warehouse_small(n_robots=6)}, "scenario.arena.nest_centre_m: (4.0, 8.0) before, (3.2, 8.0) now"),
+        ({"wrappers": ()}, "wrappers.sensor_noise.sigma: 0.02 before, nothing now"),
+        ({"options": {"gamma": 0.9, "tau": 0.5}}, "options.tau: nothing before, 0.5 now"),
+        ({"hidden": (16, 16)}, "hidden: (16,) before, (16, 16) now"),
+    ],
+)
+def test_differences_are_named_field_by_field(plan, changes, difference):
+    assert difference in replace(plan, **changes).differences(plan)
+
+
+def test_stages_that_began_do_not_change(plan):
+    first, last = plan.stages
+    assert replace(plan, stages=(replace(first, steps=101), last)).differences(plan) == (
+        "stages[0].steps: 100 before, 101 now",
+    )
+    assert replace(plan, stages=(first, replace(last, steps=199))).differences(plan) == (
+        "stages[1].steps: 200 before, 199 now",
+    )
+    (fewer,) = replace(plan, stages=(first,)).differences(plan)[:1]
+    assert fewer == "stages[1].steps: 200 before, nothing now"
 
 
 def test_the_plan_of_the_shipped_policy_is_a_plan():

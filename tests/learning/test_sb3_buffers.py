@@ -9,6 +9,7 @@ import torch
 from gymnasium import spaces
 from stable_baselines3 import DQN, PPO
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecFrameStack
 
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
@@ -180,3 +181,30 @@ def test_a_rollout_without_anybody_at_work_says_so():
     buffer.compute_returns_and_advantage(one, np.zeros(1))
     with pytest.raises(ValueError, match="at work in the rollout"):
         next(buffer.get())
+
+
+def test_behind_stacked_frames_the_newest_one_counts():
+    """Robot 1 is in repair in the ticks 2 and 3; an older frame would show it at work, or not, too late."""
+    env = SwarmVecEnv(**lives.WORLD, interface=InterfaceConfig(observation="compact"))
+    stacked = VecFrameStack(env, 3)
+    model = PPO(
+        "MlpPolicy",
+        stacked,
+        n_steps=lives.N_TICKS,
+        batch_size=6,
+        rollout_buffer_class=ActiveRolloutBuffer,
+        rollout_buffer_kwargs={"active_column": env.active_column, "n_columns": env.interface.layout.size},
+        device="cpu",
+    )
+    _, callback = model._setup_learn(lives.N_TICKS * lives.N_ROBOTS, _Story())
+    model.collect_rollouts(stacked, callback, model.rollout_buffer, lives.N_TICKS)
+    assert len(next(model.rollout_buffer.get()).returns) == lives.ACTIVE_BEFORE.sum()
+    np.testing.assert_array_equal(model.rollout_buffer._is_active, lives.ACTIVE_BEFORE)
+
+
+@pytest.mark.parametrize(("active_column", "n_columns"), [(1, 3), (2, 2), (-1, None), (4, None), (0, 0)])
+def test_a_column_that_observations_do_not_have_is_refused(active_column, n_columns):
+    with pytest.raises(ValueError, match=r"column .* got \(4,\)"):
+        ActiveRolloutBuffer(
+            1, spaces.Box(0, 1, (4,)), spaces.Box(-1, 1, (1,)), active_column=active_column, n_columns=n_columns
+        )

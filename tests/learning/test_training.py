@@ -15,14 +15,16 @@ import torch
 from stable_baselines3 import DQN, PPO, SAC
 
 from swarm_forage_env.config import ConfigError
-from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.env import parallel_env
+from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.learning.network import Network, NetworkError
-from swarm_forage_env.learning.plan import EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.learning.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
 from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
-from swarm_forage_env.learning.sb3.export import export_network
+from swarm_forage_env.learning.sb3.export import export_network, note_interface
 from swarm_forage_env.learning.sb3.training import train
+from swarm_forage_env.policy import load_policy
 from swarm_forage_env.policy_models import ModelError, ModelPolicy
-from swarm_forage_env.scenarios import warehouse_small
+from swarm_forage_env.scenarios import search_and_rescue, warehouse_small
 
 NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
 DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True)
@@ -45,6 +47,8 @@ def tiny_plan(**changes) -> TrainingPlan:
     return dataclasses.replace(plan, **changes)
 
 
+ROOMLESS = {"width_m": 19.2, "height_m": 19.2, "nest_centre_m": (9.6, 9.6), "nest_size_m": (3.84, 3.84)}
+"""A world too small for the clusters of search and rescue."""
 SHORT = tiny_plan(stages=(Stage(steps=128),))
 
 
@@ -130,8 +134,102 @@ def test_folders_of_other_trainings_are_left_alone(tmp_path):
     train(tiny_plan(stages=(Stage(steps=128),)), tmp_path)
     with pytest.raises(ConfigError, match="resume it or go elsewhere"):
         train(tiny_plan(), tmp_path)
-    with pytest.raises(ConfigError, match="another plan"):
-        train(tiny_plan(), tmp_path, resume=True)
+    other = dataclasses.replace(tiny_plan().evaluation, n_runs=2)
+    with pytest.raises(ConfigError, match=r"another plan: evaluation\.n_runs: 1 before, 2 now; seed: 0 before, 5 now"):
+        train(tiny_plan(stages=(Stage(steps=128),), evaluation=other, seed=5), tmp_path, resume=True)
+
+
+def test_a_finished_training_goes_on_by_a_longer_plan(trained, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(trained, folder)
+    assert train(SHORT, folder, resume=True).steps == 0
+    longer = dataclasses.replace(SHORT, stages=(Stage(steps=256), Stage(steps=128, options={"gamma": 0.8})))
+    result = train(longer, folder, resume=True)
+    assert result.steps == 256
+    assert result.model.num_timesteps == 384
+    assert result.model.gamma == 0.8
+    assert read_plan(folder / "plan.json") == longer
+    with pytest.raises(ConfigError, match=r"stages\[0\].steps: 256 before, 128 now"):
+        train(SHORT, folder, resume=True)
+
+
+def test_time_spent_counts_on(trained, tmp_path):
+    folder = tmp_path / "copy"
+    shutil.copytree(trained, folder)
+    path = folder / "evaluations.csv"
+    before = training._read_evaluations(path)
+    training._write_evaluations(path, [dataclasses.replace(each, wall_time_s=1000.0) for each in before])
+    told = []
+    result = train(dataclasses.replace(SHORT, stages=(Stage(steps=256),)), folder, resume=True, report=told.append)
+    assert 1000.0 < result.evaluations[-1].wall_time_s < 2000.0
+    assert all(1000.0 < news.wall_time_s < 2000.0 for news in told)
+
+
+@pytest.mark.parametrize("missing", ["plan.json", "model.zip"])
+def test_only_a_training_is_resumed(trained, tmp_path, missing):
+    folder = tmp_path / "copy"
+    with pytest.raises(ConfigError, match=r"to hold a training to resume, .* found no plan\.json"):
+        train(SHORT, folder, resume=True)
+    assert not folder.exists()
+    shutil.copytree(trained, folder)
+    (folder / missing).unlink()
+    with pytest.raises(ConfigError, match=f"found no {missing}"):
+        train(SHORT, folder, resume=True)
+    with pytest.raises(ConfigError, match="unused folder"):
+        train(SHORT, folder)
+
+
+def test_a_training_that_kept_nothing_is_started_again(tmp_path):
+    SHORT.write(tmp_path / "plan.json")
+    assert train(SHORT, tmp_path).steps == 128
+
+
+@pytest.mark.parametrize(
+    ("changes", "n_processes", "reason"),
+    [
+        ({}, 3, "processes from 0 to n_arenas = 2, got 3"),
+        ({}, -1, "processes from 0 to n_arenas = 2, got -1"),
+        # Clusters are drawn by the first reset.
+        (
+            {"scenario": search_and_rescue(side_m=48.0, n_robots=4, horizon_s=200.0),
+             "stages": (Stage(steps=64, scenario=ROOMLESS),)},
+            0,
+            r"Cannot train in stage 1, a world with width_m = 19.2, .*: Expected at most \d+ objects",
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_begin_leaves_nothing_behind(tmp_path, changes, n_processes, reason):
+    with pytest.raises(ConfigError, match=reason):
+        train(tiny_plan(**changes), tmp_path / "new" / "folder", n_processes=n_processes)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_training_that_diverges_says_so(tmp_path):
+    plan = tiny_plan(options={"n_steps": 16, "batch_size": 64, "learning_rate": 1e30})
+    with pytest.raises(ConfigError, match=r"diverged in stage 1, .*lower the learning_rate") as refusal:
+        train(plan, tmp_path)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("algorithm", ["ppo", "sac"])
+def test_checkpoints_run_as_they_were_trained(tmp_path, algorithm):
+    driven = dataclasses.replace(DRIVEN, decision_ticks=3)
+    replay = {"buffer_size": 400, "learning_starts": 64, "batch_size": 16}
+    scenario = warehouse_small(n_robots=4, n_objects=60, horizon_s=200.0, caches="static")
+    changes = {"algorithm": "sac", "interface": driven, "options": replay} if algorithm == "sac" else {}
+    result = train(tiny_plan(stages=(Stage(steps=128),), scenario=scenario, **changes), tmp_path)
+    policy = load_policy(tmp_path / "model.zip")
+    assert policy.caches == "static"
+    env = parallel_env("warehouse_small", n_robots=4, n_objects=20)
+    interface = LearnerInterface(driven if algorithm == "sac" else NUMBERED, env.task)
+    policy.reset(env.task, np.random.default_rng(0))
+    obs = env.reset_batch(0)
+    for tick in range(12):
+        if tick % interface.config.decision_ticks == 0:
+            choice, _ = result.model.predict(interface.observe(obs), deterministic=True)
+        actions = policy.act(obs, env.active)
+        np.testing.assert_array_equal(actions, interface.command(choice, obs))
+        obs, *_ = env.step_batch(actions)
 
 
 def test_the_last_checkpoint_holds_all_that_was_learnt(tmp_path):
@@ -206,7 +304,11 @@ def test_damaged_models_are_refused_as_policies(trained, tmp_path):
     ("options", "reason"),
     [
         ({"learning_rat": 1.0}, "Did you mean 'learning_rate'"),
-        ({"seed": 3}, "without 'seed'"),
+        ({"seed": 3}, "the plan says it in 'seed'"),
+        ({"hidden": 128}, "the plan says it in 'hidden'"),
+        ({"net_arch": 128}, "the plan says it in 'hidden'"),
+        ({"policy_kwargs": {}}, "the plan says it in 'hidden'"),
+        ({"device": "cpu"}, "without 'device', which training sets itself"),
         ({"n_steps": 1, "batch_size": 1}, "Cannot prepare ppo with its options: `batch_size`"),
     ],
 )
@@ -261,6 +363,30 @@ def test_exported_networks_choose_as_the_model_does(algorithm, interface, tmp_pa
         chosen = network.choose(obs, np.random.default_rng(0))
         np.testing.assert_allclose(chosen, expected, atol=1e-5)
         obs, *_ = env.step(expected)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "reason"),
+    [
+        (
+            {"observation": "full"},
+            r"Expected a model from Box\(\d+\) to Box\(2\) .*, got one from Box\(23\) to Box\(2\)",
+        ),
+        ({"actions": "discrete"}, r"to Discrete\(6\) .* to Box\(2\)"),
+        ({"automatic_gripper": False}, r"to Box\(3\) .* to Box\(2\)"),
+    ],
+)
+def test_the_interface_of_an_export_is_that_of_the_model(wrong, reason):
+    env = SwarmVecEnv("warehouse_small", n_robots=2, n_objects=20, interface=DRIVEN)
+    model = PPO("MlpPolicy", env, n_steps=8, batch_size=16, device="cpu")
+    other = dataclasses.replace(DRIVEN, **wrong)
+    with pytest.raises(NetworkError, match=reason):
+        export_network(model, other)
+    with pytest.raises(NetworkError, match=reason):
+        note_interface(model, other)
+    note_interface(model, DRIVEN)
+    with pytest.raises(NetworkError, match=r"Expected the interface that the model was trained with, .*decision_ticks"):
+        export_network(model, dataclasses.replace(DRIVEN, decision_ticks=4))
 
 
 def test_models_that_a_network_file_cannot_hold_are_refused():

@@ -24,7 +24,9 @@ class ActiveRolloutBuffer(RolloutBuffer):
 
     Give it to an algorithm by
     `rollout_buffer_class=ActiveRolloutBuffer, rollout_buffer_kwargs={"active_column": env.active_column}`.
-    Observations must reach it as the environment gave them: `VecNormalize(norm_obs=True)` is refused.
+    Behind `VecFrameStack`, whose newest frame comes last, add `"n_columns": env.interface.layout.size`: without it the
+    column of the oldest frame is read. Numbers must reach it as the environment gave them:
+    `VecNormalize(norm_obs=True)` is refused.
     """
 
     def __init__(
@@ -38,9 +40,33 @@ class ActiveRolloutBuffer(RolloutBuffer):
         n_envs: int = 1,
         *,
         active_column: int,
+        n_columns: int | None = None,
     ) -> None:
-        """Create the buffer; `active_column` of an observation is 1 for robots at work, else 0."""
-        self._active_column = active_column
+        """Create the buffer.
+
+        Args:
+            buffer_size: As in `RolloutBuffer`, like all that is not told here.
+            observation_space: Observations of one row.
+            action_space: Actions of one row.
+            device: Where minibatches go.
+            gae_lambda: lambda of the advantages.
+            gamma: Discount.
+            n_envs: Rows.
+            active_column: Column of what the environment gives that is 1 for robots at work, else 0.
+            n_columns: Columns of what the environment gives; observations may be several such frames, the newest last.
+                None: observations are single frames.
+
+        Raises:
+            ValueError: observations that are no whole number of frames, or no such column in a frame.
+        """
+        width = (observation_space.shape or (0,))[-1]
+        frame = width if n_columns is None else n_columns
+        if frame < 1 or width % frame or not 0 <= active_column < frame:
+            raise ValueError(
+                f"Expected observations of whole frames of {frame} columns with column {active_column} among them, got "
+                f"{observation_space.shape}; take both numbers from the environment (env.interface)."
+            )
+        self._active_column = width - frame + active_column
         super().__init__(buffer_size, observation_space, action_space, device, gae_lambda, gamma, n_envs)
 
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:

@@ -8,6 +8,7 @@ can hold.
 import csv
 import importlib.util
 import inspect
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -27,7 +28,7 @@ from swarm_forage_env.learning.files import replacing
 from swarm_forage_env.learning.network import LearnedPolicy
 from swarm_forage_env.learning.plan import Evaluation, Stage, TrainingPlan, TrainingStatus, read_plan
 from swarm_forage_env.learning.sb3.buffers import ActiveRolloutBuffer, PresentReplayBuffer
-from swarm_forage_env.learning.sb3.export import export_network
+from swarm_forage_env.learning.sb3.export import export_network, note_interface
 from swarm_forage_env.learning.sb3.vec_env import SwarmVecEnv
 from swarm_forage_env.policy import Policy, load_policy
 from swarm_forage_env.policy_models import MODEL_FAULTS
@@ -43,11 +44,15 @@ PLAN_FILE = "plan.json"
 POLICY_FILE = "policy.npz"
 EVALUATIONS_FILE = "evaluations.csv"
 _REPORT_EVERY_S = 1.0
+_MOST_WEIGHT = 1e6
+"""Where torch fails over the outputs of a network, weights this large tell that the training diverged; our choice."""
 _OURS = frozenset(
     {"policy", "env", "seed", "device", "policy_kwargs", "tensorboard_log", "_init_setup_model"}
     | {f"{kind}_buffer_{what}" for kind in ("rollout", "replay") for what in ("class", "kwargs")}
 )
 """Arguments of the algorithms' classes that training gives them."""
+_ELSEWHERE = {"seed": "seed", "policy_kwargs": "hidden", "net_arch": "hidden", "hidden": "hidden"}
+"""What people look for among the options -> the field of a plan that says it."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -59,6 +64,8 @@ class TrainingResult:
     """All of the folder, oldest first."""
     policy_file: Path | None
     """The best network so far; None for an algorithm whose network a file cannot hold."""
+    steps: int
+    """Decisions of single robots that this call added; 0 when the training was finished before."""
 
 
 Report = Callable[[TrainingStatus | Evaluation], None]
@@ -79,18 +86,20 @@ def train(
     Ctrl-C keeps a checkpoint before it goes on its way; a crash leaves the one of the latest evaluation.
 
     Args:
-        plan: What to do.
+        plan: What to do. A training goes on by its own plan, or by one with a longer last stage or further stages.
         folder: Where results go; created.
         n_processes: Processes that the arenas are spread over; 0 = all in this process.
-        resume: Go on where the checkpoint in `folder` stopped; without a checkpoint, start.
+        resume: Go on where the checkpoint in `folder` stopped.
         report: Told the status about once a second, and every evaluation.
 
     Raises:
-        ConfigError: the algorithm knows no such option, the folder holds a training run and nobody said resume, or
-            that of another plan, or files that are broken.
+        ConfigError: the algorithm knows no such option, more processes than arenas, the folder holds a training run and
+            nobody said resume, or none to resume, or that of another plan, or files that are broken; a stage whose
+            world cannot be; or a training that diverged.
     """
     _check_options(plan)
-    folder.mkdir(parents=True, exist_ok=True)
+    if not 0 <= n_processes <= plan.n_arenas:
+        raise ConfigError(f"Expected processes from 0 to n_arenas = {plan.n_arenas}, got {n_processes}.")
     _check_folder(folder, plan, resume=resume)
     torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
     watch = _Watch(plan, folder, report or _keep_quiet)
@@ -102,21 +111,25 @@ def train(
         wrappers=plan.wrappers,
     )
     try:
-        model = _checkpoint(plan, folder, env)
-        begins = 0
-        for stage in plan.stages:
-            ends = begins + stage.steps
+        model = _checkpoint(plan, folder, env) if resume else None
+        begun = 0 if model is None else model.num_timesteps
+        ends = 0
+        for number, stage in enumerate(plan.stages, 1):
+            ends += stage.steps
             done = 0 if model is None else model.num_timesteps
             if done < ends:
                 model = _prepared(plan, stage, folder, env, done)
-                plan.write(folder / PLAN_FILE)  # not before it is known to be one that can be carried out
-                _learn(model, ends - done, watch, folder)
-            begins = ends
+                _learn(model, ends - done, watch, f"stage {number}{_changes(stage)}")
         assert model is not None, "a plan has a stage"
     finally:
         env.close()
     policy_file = folder / POLICY_FILE if plan.algorithm in EXPORTABLE else None
-    return TrainingResult(model=model, evaluations=tuple(watch.evaluations), policy_file=policy_file)
+    return TrainingResult(
+        model=model,
+        evaluations=tuple(watch.evaluations),
+        policy_file=policy_file,
+        steps=model.num_timesteps - begun,
+    )
 
 
 def _check_options(plan: TrainingPlan) -> None:
@@ -124,32 +137,52 @@ def _check_options(plan: TrainingPlan) -> None:
     known = set(inspect.signature(ALGORITHM_CLASSES[plan.algorithm]).parameters) - _OURS
     for options in (plan.options, *(stage.options for stage in plan.stages)):
         for name in options:
+            if name in known:
+                continue
+            if name in _ELSEWHERE:
+                raise ConfigError(
+                    f"Expected options of {plan.algorithm} without {name!r}: the plan says it in {_ELSEWHERE[name]!r}."
+                )
             if name in _OURS:
                 raise ConfigError(f"Expected options of {plan.algorithm} without {name!r}, which training sets itself.")
-            if name not in known:
-                raise ConfigError(f"Unknown option {name!r} of {plan.algorithm}.{suggestion(name, sorted(known))}")
+            raise ConfigError(f"Unknown option {name!r} of {plan.algorithm}.{suggestion(name, sorted(known))}")
 
 
 def _check_folder(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
-    """Refuse a folder that belongs to another training run."""
-    path = folder / PLAN_FILE
-    if not path.exists():
-        return
-    if not resume:
+    """Refuse a folder that belongs to another training run, or to none where one is to be resumed."""
+    if resume:
+        differences = plan.differences(kept_plan(folder))
+        if differences:
+            raise ConfigError(
+                f"Expected the plan in {folder / PLAN_FILE} to resume its training, got another plan: "
+                f"{'; '.join(differences)}."
+            )
+    elif any((folder / name).exists() for name in (MODEL_FILE, EVALUATIONS_FILE, POLICY_FILE)):
         raise ConfigError(f"Expected an unused folder, got {folder} with a training run; resume it or go elsewhere.")
-    if read_plan(path) != plan:
-        raise ConfigError(f"Expected the plan in {path} to resume its training, got another plan.")
 
 
-def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgorithm | None:
-    """Return the checkpoint of the folder, None when there is none."""
+def kept_plan(folder: Path) -> TrainingPlan:
+    """Return the plan of the training that a folder holds.
+
+    Raises:
+        ConfigError: it holds none that can be resumed.
+    """
+    for name in (PLAN_FILE, MODEL_FILE):
+        if not (folder / name).exists():
+            raise ConfigError(
+                f"Expected {folder} to hold a training to resume, {PLAN_FILE} and the checkpoint {MODEL_FILE}, found "
+                f"no {name}; without resume a new one starts."
+            )
+    return read_plan(folder / PLAN_FILE)
+
+
+def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgorithm:
     path = folder / MODEL_FILE
-    if not path.exists():
-        return None
     try:
         return ALGORITHM_CLASSES[plan.algorithm].load(path, env=env, device="cpu")
     except MODEL_FAULTS as error:
-        raise ConfigError(f"Cannot open the checkpoint {path}: {error}; remove it to start anew.") from error
+        reason = " ".join(str(error).split())
+        raise ConfigError(f"Cannot open the checkpoint {path}: {reason}; train anew in another folder.") from error
 
 
 def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, done: int) -> BaseAlgorithm:
@@ -163,15 +196,18 @@ def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, 
     if plan.algorithm in ON_POLICY:
         buffer = {
             "rollout_buffer_class": ActiveRolloutBuffer,
-            "rollout_buffer_kwargs": {"active_column": env.active_column},
+            "rollout_buffer_kwargs": {"active_column": env.active_column, "n_columns": env.interface.layout.size},
         }
     network = {"net_arch": list(plan.hidden)}
     try:
         if (folder / MODEL_FILE).exists():
-            return algorithm.load(folder / MODEL_FILE, env=env, device="cpu", **options)
-        return algorithm("MlpPolicy", env, device="cpu", policy_kwargs=network, **buffer, **options)
+            model = algorithm.load(folder / MODEL_FILE, env=env, device="cpu", **options)
+        else:
+            model = algorithm("MlpPolicy", env, device="cpu", policy_kwargs=network, **buffer, **options)
     except (AssertionError, TypeError, ValueError) as error:  # how the library refuses values
         raise ConfigError(f"Cannot prepare {plan.algorithm} with its options: {error}") from error
+    note_interface(model, plan.interface, caches=plan.scenario.caches)
+    return model
 
 
 def training_seed(seed: int, done: int) -> int:
@@ -183,17 +219,26 @@ def training_seed(seed: int, done: int) -> int:
     return int(np.random.default_rng((seed, done)).integers(2**31))
 
 
-def _learn(model: BaseAlgorithm, steps: int, watch: "_Watch", folder: Path) -> None:
+def _changes(stage: Stage) -> str:
+    fields = ", ".join(f"{name} = {value}" for name, value in stage.scenario.items())
+    return f", a world with {fields}" if fields else ""
+
+
+def _learn(model: BaseAlgorithm, steps: int, watch: "_Watch", where: str) -> None:
     try:
         model.learn(steps, callback=watch, reset_num_timesteps=False, tb_log_name=model.__class__.__name__.lower())
     except KeyboardInterrupt:
-        _keep(model, folder)
+        watch.keep(model)
         raise
-
-
-def _keep(model: BaseAlgorithm, folder: Path) -> None:
-    with replacing(folder / MODEL_FILE) as draft:
-        model.save(draft)
+    except ConfigError as error:  # worlds that only their first reset shows to be impossible
+        raise ConfigError(f"Cannot train in {where}: {error}") from error
+    except ValueError as error:
+        if all(bool((weights.abs() < _MOST_WEIGHT).all()) for weights in model.policy.parameters()):  # not so for nan
+            raise
+        raise ConfigError(
+            f"The training diverged in {where}, after {model.num_timesteps:,} decisions: weights became nan or huge; "
+            "lower the learning_rate, or look for a reward or another option out of proportion."
+        ) from error
 
 
 class _Watch(BaseCallback):
@@ -205,12 +250,27 @@ class _Watch(BaseCallback):
         self._folder = folder
         self._report = report
         self._started = time.perf_counter()
-        self._last_report = 0.0
+        self._last_report = -math.inf
         self._next_evaluation = 0
         self._baseline: float | None = None
         self.evaluations = _read_evaluations(folder / EVALUATIONS_FILE)
+        self._spent_s = self.evaluations[-1].wall_time_s if self.evaluations else 0.0
+
+    def _wall_time_s(self) -> float:
+        return self._spent_s + time.perf_counter() - self._started
+
+    def keep(self, model: BaseAlgorithm) -> None:
+        """Write a checkpoint, beside the plan that it is one of."""
+        self._write_plan()
+        with replacing(self._folder / MODEL_FILE) as draft:
+            model.save(draft)
+
+    def _write_plan(self) -> None:
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._plan.write(self._folder / PLAN_FILE)
 
     def _on_training_start(self) -> None:
+        self._write_plan()  # not before arenas and model are known to be possible
         if self._next_evaluation == 0:
             self._next_evaluation = self.num_timesteps + self._plan.evaluation.every_steps
 
@@ -227,7 +287,7 @@ class _Watch(BaseCallback):
             self._evaluate()
 
     def _on_rollout_end(self) -> None:
-        elapsed = time.perf_counter() - self._started
+        elapsed = self._wall_time_s()
         if elapsed - self._last_report >= _REPORT_EVERY_S:
             self._last_report = elapsed
             episodes = self.model.ep_info_buffer or ()
@@ -241,13 +301,13 @@ class _Watch(BaseCallback):
     def _evaluate(self) -> None:
         """Keep a checkpoint, run the policy, and note how it did."""
         self._next_evaluation = self.num_timesteps + self._plan.evaluation.every_steps
-        _keep(self.model, self._folder)
+        self.keep(self.model)
         if self._baseline is None:
             self._baseline, _ = self._judged(lambda: load_policy(self._plan.evaluation.baseline))
         performance, interference = self._judged(lambda: LearnedPolicy(self._plan.interface, _acting(self.model)))
         evaluation = Evaluation(
             steps=self.num_timesteps,
-            wall_time_s=round(time.perf_counter() - self._started, 1),
+            wall_time_s=round(self._wall_time_s(), 1),
             performance=performance,
             baseline=self._baseline,
             interference_fraction=interference,
