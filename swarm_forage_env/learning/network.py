@@ -10,7 +10,7 @@ import itertools
 import json
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -26,6 +26,8 @@ from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
 
 ACTIVATIONS = ("tanh", "relu")
+_ARCHIVE = b"PK\x03\x04"
+"""How a zip file begins, and so an `.npz`."""
 _BROKEN = (ValueError, LookupError, TypeError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error)
 """What numpy and zipfile raise over an archive that is none or has been damaged."""
 
@@ -66,13 +68,18 @@ class NetworkAbout:
         """
         try:
             mapping = json.loads(text)
-            known = cls.__dataclass_fields__
-            for key in mapping:
-                if key not in known:
-                    raise NetworkError(f"Unknown key {key!r} about a network.{suggestion(key, known)}")
+        except json.JSONDecodeError as error:
+            raise NetworkError(f"Expected a description of a network as JSON, got {text[:80]!r}.") from error
+        if not isinstance(mapping, dict) or not isinstance(mapping.get("interface"), dict):
+            raise NetworkError(f"Expected a description of a network with its interface, got {text[:80]!r}.")
+        known = cls.__dataclass_fields__
+        for key in mapping:
+            if key not in known:
+                raise NetworkError(f"Unknown key {key!r} about a network.{suggestion(key, known)}")
+        try:
             return cls(**{**mapping, "interface": interface_from_mapping(mapping["interface"])})
-        except (json.JSONDecodeError, TypeError, KeyError, ConfigError) as error:
-            raise NetworkError(f"Expected a description of a network as JSON, got {text[:80]!r}: {error}.") from error
+        except ConfigError as error:
+            raise NetworkError(f"Expected a description of a network that can be used: {error}") from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,16 +138,36 @@ class Network:
             OSError: the file cannot be read.
             NetworkError: it holds no network.
         """
-        content = io.BytesIO(Path(path).read_bytes())
+        content = Path(path).read_bytes()
         try:
-            with np.load(content, allow_pickle=False) as stored:
-                n_layers = sum(name.startswith("weight_") for name in stored.files)
-                weights = tuple(stored[f"weight_{k}"] for k in range(n_layers))
-                biases = tuple(stored[f"bias_{k}"] for k in range(n_layers))
-                about = NetworkAbout.from_json(str(stored["about"]))
-            return cls(weights, biases, about)
-        except _BROKEN as error:
-            raise NetworkError(f"Expected {path} to hold a network: {error or type(error).__name__}") from error
+            stored = _parts(content)
+            n_layers = sum(name.startswith("weight_") for name in stored)
+            weights = tuple(_part(stored, f"weight_{k}") for k in range(n_layers))
+            biases = tuple(_part(stored, f"bias_{k}") for k in range(n_layers))
+            return cls(weights, biases, NetworkAbout.from_json(str(_part(stored, "about"))))
+        except NetworkError as error:
+            raise NetworkError(f"Expected {path} to hold a network: {error}") from error
+
+
+def _parts(content: bytes) -> Mapping[str, np.ndarray]:
+    """Return what an archive holds by name, unread. Like `_part` it tells in our words what numpy has others for."""
+    if not content:
+        raise NetworkError("The file is empty.")
+    if not content.startswith(_ARCHIVE):
+        raise NetworkError("The file is no .npz archive.")
+    try:
+        return np.load(io.BytesIO(content), allow_pickle=False)
+    except _BROKEN as error:
+        raise NetworkError("The file is a damaged .npz archive; its table of contents cannot be read.") from error
+
+
+def _part(stored: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+    if name not in stored:
+        raise NetworkError(f"The archive has no part {name!r}; it is damaged, or one of something else.")
+    try:
+        return stored[name]
+    except _BROKEN as error:
+        raise NetworkError(f"Its part {name!r} is damaged, or no plain array of numbers or text.") from error
 
 
 Choose: TypeAlias = Callable[[ObsArray, np.random.Generator], np.ndarray]

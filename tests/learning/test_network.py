@@ -63,20 +63,38 @@ def test_files_give_back_what_was_written(tmp_path):
         np.testing.assert_array_equal(one, other, strict=True)
 
 
-@pytest.mark.parametrize("write", ["text", "no_network", "pickle", "foreign_key", "no_json"])
-def test_other_files_are_refused(tmp_path, write):
+ABOUT = json.loads(small_network().about.to_json())
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"", "The file is empty"),
+        (b"no archive", "is no .npz archive"),
+        (b"PK\x03\x04 and no more", "damaged .npz archive"),
+        ({"numbers": np.zeros(3)}, "has no part 'about'"),
+        ({"weight_0": np.zeros((2, 2)), "about": np.array("{}")}, "has no part 'bias_0'"),
+        (
+            {"weight_0": np.array([{}], object), "about": np.array("{}")},
+            "part 'weight_0' is damaged, or no plain array",
+        ),
+        ({"about": np.array("{")}, "description of a network as JSON, got '{'"),
+        ({"about": np.array("[1]")}, r"with its interface, got '\[1\]'"),
+        ({"about": np.array("{}")}, "with its interface, got '{}'"),
+        ({"about": np.array(json.dumps(ABOUT | {"activaton": "red"}))}, "Did you mean 'activation'"),
+        ({"about": np.array(json.dumps(ABOUT | {"interface": {"actions": "diskrete"}}))}, "Did you mean 'discrete'"),
+        ({"about": np.array(json.dumps(ABOUT))}, r"layers that follow on each other, got weights \[\]"),
+    ],
+)
+def test_other_files_are_refused_in_our_words(tmp_path, content, reason):
     path = tmp_path / "network.npz"
-    if write == "text":
-        path.write_text("no archive")
-    elif write == "no_network":
-        np.savez(path, numbers=np.zeros(3))
-    elif write == "pickle":
-        np.savez(path, weight_0=np.array([{}], object), about=np.array("{}"))
+    if isinstance(content, bytes):
+        path.write_bytes(content)
     else:
-        about = json.loads(small_network().about.to_json()) | {"colour": "red"}
-        np.savez(path, about=np.array("{" if write == "no_json" else json.dumps(about)))
-    with pytest.raises(NetworkError):
+        np.savez(path, **content)
+    with pytest.raises(NetworkError, match=reason) as refusal:
         Network.load(path)
+    assert str(path) in str(refusal.value)
     with pytest.raises(FileNotFoundError):
         Network.load(tmp_path / "nothing.npz")
 
@@ -97,10 +115,8 @@ def test_damaged_files_are_refused_whatever_is_damaged(tmp_path):
             complaints.append(str(error))
     assert len(complaints) > 100
     assert all(str(path) in complaint for complaint in complaints)
-    for content in (b"", b"no archive"):
-        path.write_bytes(content)
-        with pytest.raises(NetworkError, match=r"network\.npz"):
-            Network.load(path)
+    foreign = ("pickle", "in the archive", "No data left", "Error", "CRC", "zip")  # how numpy and zipfile speak
+    assert not [complaint for complaint in complaints if any(word in complaint for word in foreign)]
 
 
 def test_weights_that_are_no_numbers_are_refused():
