@@ -31,8 +31,13 @@ def train(  # long: one parameter per option
         int | None, typer.Option(min=1, help="Decisions between evaluations and checkpoints; default 1,000,000.")
     ] = None,
     small_start: Annotated[
-        bool, typer.Option("--small-start", help="Spend the first third in a smaller arena, where ways are short.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--small-start/--no-small-start",
+            help="Spend the first third in a smaller arena, where ways are short; default where deliveries count.",
+        ),
+    ] = None,
+    hidden: Annotated[str | None, typer.Option(help="Sizes of the hidden layers; default 64,64.")] = None,
     arguments: Annotated[
         list[str] | None,
         typer.Option("--arg", metavar="KEY=NUMBER", help="Argument of the algorithm; may be repeated."),
@@ -46,15 +51,19 @@ def train(  # long: one parameter per option
     wrappers: Wrappers = None,
     config: ConfigFile = None,
     processes: Annotated[int, typer.Option(min=0, help="Processes for the arenas; 0 = none of their own.")] = 0,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Go on from the checkpoint in --out, by its plan; with --steps, a longer one."),
+    ] = False,
 ) -> None:
     """Train one policy that every robot shares, beside evaluations of it and of a scripted controller.
 
-    Rewards are fields of the scenario: --set nest_progress=0.05 --set first_pickup=1. Ctrl-C keeps a
-    checkpoint; the same command with --resume goes on.
+    Rewards are fields of the scenario. Where deliveries count, training sets nest_progress=0.05 and first_pickup=1
+    unless --set or --config do, and begins in a smaller arena: deliveries alone are too rare to learn from. plan.json
+    holds all that was chosen. Ctrl-C keeps a checkpoint; --out FOLDER --resume goes on.
     """
     from swarm_forage_env.cli.plan import WorldOptions
-    from swarm_forage_env.cli.train import TrainOptions, build_plan, named_plan, run_training
+    from swarm_forage_env.cli.train import TrainOptions, build_plan, named_plan, resumed_plan, run_training
 
     options = TrainOptions(
         algorithm=algorithm,
@@ -67,6 +76,7 @@ def train(  # long: one parameter per option
         decision_ticks=decision_ticks,
         evaluate_every=evaluate_every,
         small_start=small_start,
+        hidden=hidden,
         horizon_s=horizon,
         arguments=tuple(arguments or ()),
     )
@@ -80,9 +90,12 @@ def train(  # long: one parameter per option
         wrappers=tuple(wrappers or ()),
         config_file=config,
     )
-    given = (scenario, options, world) != (None, TrainOptions(), WorldOptions(scenario=world.scenario))
-    if plan is not None and given:
+    says_more = (scenario, options, world) != (None, TrainOptions(steps=steps), WorldOptions(scenario=world.scenario))
+    if plan is not None and (says_more or steps is not None):
         raise typer.BadParameter("Expected --plan without options that the plan decides; write them into its file.")
     chosen = build_plan(world, options) if plan is None else named_plan(plan)
     name = Path(plan).stem if plan is not None else f"{chosen.scenario.name}_{chosen.algorithm}"
-    run_training(chosen, out or Path("results/training") / name, n_processes=processes, resume=resume)
+    folder = out or Path("results/training") / name
+    if resume and plan is None:
+        chosen = resumed_plan(folder, chosen if says_more else None, steps)
+    run_training(chosen, folder, n_processes=processes, resume=resume)

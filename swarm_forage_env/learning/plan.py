@@ -24,6 +24,7 @@ from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
 """Algorithms of stable-baselines3 that train; the first two on rollouts, the others from replay."""
 DEFAULT_STEPS = 5_000_000
+DEFAULT_HIDDEN = (64, 64)
 _COUNTS = ("n_steps", "batch_size", "n_epochs", "buffer_size")
 _RANGES: dict[str, tuple[str, Callable[[float], bool]]] = {
     "gamma": ("a number in (0, 1]", lambda value: 0.0 < value <= 1.0),
@@ -123,7 +124,7 @@ class TrainingPlan:
     algorithm: str = "ppo"
     interface: InterfaceConfig = field(default_factory=InterfaceConfig)
     n_arenas: int = 8
-    hidden: tuple[int, ...] = (64, 64)
+    hidden: tuple[int, ...] = DEFAULT_HIDDEN
     """Sizes of the hidden layers of actor and critic."""
     options: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Arguments of the algorithm's class; what is not here keeps the library's default."""

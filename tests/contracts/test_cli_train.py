@@ -13,12 +13,16 @@ from swarm_forage_env import cli
 from swarm_forage_env.cli.plan import WorldOptions
 from swarm_forage_env.cli.train import TrainOptions, build_plan, small_arena
 from swarm_forage_env.config import ConfigError, with_overrides
+from swarm_forage_env.extras import install_command
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.plan import read_plan
 from swarm_forage_env.scenarios import scenario
 
 TINY = ("--robots", "4", "--objects", "20", "--steps", "128", "--arenas", "2", "--arg", "n_steps=16", "--arg",
         "batch_size=64", "--evaluate-every", "128")  # fmt: skip
+
+
+NARROW = ("--set", "width_m=12", "--set", "nest_centre_m=1.2,8", "--set", "nest_size_m=1.2,12.8")
 
 
 @pytest.fixture
@@ -38,7 +42,8 @@ def command(tmp_path, monkeypatch, capsys):
 
 def test_trains_shows_evaluations_and_goes_on(command):
     pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
-    code, _, err = command("train", *TINY, "--small-start", "--set", "nest_progress=0.05")
+    words = ("train", *TINY, "--set", "nest_progress=0.07")
+    code, _, err = command(*words)
     assert code == 0, err
     folder = Path("results/training/warehouse_small_ppo")
     assert "decisions  per 1,000 s" in err
@@ -46,20 +51,46 @@ def test_trains_shows_evaluations_and_goes_on(command):
     if find_spec("matplotlib"):
         assert (folder / "training.png").read_bytes().startswith(b"\x89PNG")
     plan = read_plan(folder / "plan.json")
-    assert plan.scenario.reward.nest_progress == 0.05
+    assert plan.scenario.reward.nest_progress == 0.07
     assert [stage.steps for stage in plan.stages] == [42, 86]
     assert plan.options["n_steps"] == 16
 
-    words = ("train", *TINY, "--small-start", "--set", "nest_progress=0.05")
     code, _, err = command(*words)
     assert code == 2
     assert "resume it or go elsewhere" in err
-    assert command(*words, "--resume")[0] == 0
+    code, _, err = command(*words, "--resume")
+    assert code == 0
+    assert "This training was finished: 128 of 128 decisions" in err
 
     code, out, _ = command("run", "--policy", str(folder / "policy.npz"), "--robots", "3", "--objects", "20",
                            "--horizon", "4", "--set", "interval_s=2", "--jobs", "1", "--json")  # fmt: skip
     assert code == 0
     assert json.loads(out)
+
+
+def test_a_training_is_resumed_by_its_folder_alone(command):
+    pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
+    code, _, err = command("train", "--resume", "--out", "a")
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert "Expected a to hold a training to resume" in err
+    assert not Path("a").exists()
+    assert command("train", *TINY, "--out", "a")[0] == 0
+    begun = read_plan(Path("a/plan.json"))
+
+    assert command("train", "--out", "a", "--resume", "--steps", "256")[0] == 0
+    assert read_plan(Path("a/plan.json")) == begun.longer(256)
+    assert "256," in Path("a/evaluations.csv").read_text()
+    code, _, err = command("train", "--out", "a", "--resume")
+    assert (code, "finished: 256 of 256" in err) == (0, True)
+    code, _, err = command("train", "--out", "a", "--resume", "--steps", "255")
+    assert (code, "at least the 256 steps" in err) == (2, True)
+
+    # The same options divide 384 steps into other stages; those that began stay.
+    assert command("train", *TINY, "--steps", "384", "--out", "a", "--resume")[0] == 0
+    assert read_plan(Path("a/plan.json")) == begun.longer(384)
+    code, _, err = command("train", *TINY, "--steps", "400", "--seed", "3", "--out", "a", "--resume")
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert "got others: seed: 0 before, 3 now. Without options" in err
 
 
 def test_without_the_training_library_the_message_says_what_to_install(command, monkeypatch):
@@ -75,13 +106,23 @@ def test_without_the_training_library_the_message_says_what_to_install(command, 
     monkeypatch.setattr(builtins, "__import__", without)
     code, _, err = command("train", *TINY)
     assert code == 1
-    assert "'swarm-forage-env[train]' 'torch==2.13.0'" in err
+    assert install_command("train") in err
 
 
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
         (("--algo", "ppp"), "Did you mean 'ppo'"),
+        (("--algo", "PPO"), "Did you mean 'ppo'"),
+        (("--arg", "gamma=5"), "options.gamma to be a number in (0, 1], got 5"),
+        (("--arg", "hidden=128"), "Expected the network as --hidden 128,128"),
+        (("--arg", "net_arch=64,64"), "Expected the network as --hidden 128,128"),
+        (("--arg", "policy_kwargs=1"), "Expected the network as --hidden 128,128"),
+        (("--hidden", "big"), "sizes of layers, such as 128,128, got 'big'"),
+        (("--hidden", "0"), "hidden to be a whole number >= 1, got 0"),
+        (("--arenas", "2", "--processes", "9"), "processes from 0 to n_arenas = 2, got 9"),
+        (("--objects", "800"), "(--small-start) of 12.8 x 16.0 m: Expected at most 392 objects"),
+        (NARROW, "(--small-start) of 4.8 x 16.0 m: Expected an arena larger than"),
         (("--algo", "dqn", "--actions", "continuous"), "dqn can choose"),
         (("--arg", "gamma=much"), "key=number"),
         (("--arg", "gama=0.9"), "Did you mean 'gamma'"),
@@ -98,13 +139,14 @@ def test_wrong_words_are_one_line_of_complaint(command, words, reason):
     assert code == 2
     assert reason in err
     assert len(err.splitlines()) == 1
+    assert not list(Path().iterdir())
 
 
 @pytest.mark.parametrize("missing", ["stable_baselines3", "torch"])
 def test_the_message_is_the_same_from_python(missing):
     code = f"import sys; sys.modules[{missing!r}] = None; import swarm_forage_env.learning.sb3"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "pip install 'swarm-forage-env[train]' 'torch==2.13.0'" in result.stderr.splitlines()[-1]
+    assert install_command("train") in result.stderr.splitlines()[-1]
 
 
 def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
@@ -116,7 +158,12 @@ def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
     monkeypatch.setattr(training, "train", stop)
     code, _, err = command("train", *TINY)
     assert code == 130
-    assert "--resume goes on" in err
+    assert "Stopped before there was anything to keep; the same command starts again." in err
+
+    folder = Path("results/training/warehouse_small_ppo")
+    folder.mkdir(parents=True)
+    (folder / "model.zip").touch()
+    assert f"To go on: swarm-forage train --out {folder} --resume" in command("train", *TINY)[2]
 
 
 def test_defaults_are_what_a_driver_needs():
@@ -125,12 +172,65 @@ def test_defaults_are_what_a_driver_needs():
         observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5
     )
     assert plan.options["gamma"] == 0.99
-    assert len(plan.stages) == 1
+    assert plan.options["batch_size"] == 3200
+    assert plan.hidden == (64, 64)
     sac = build_plan(
         WorldOptions(scenario="warehouse_small"), TrainOptions(algorithm="sac", automatic_gripper=False)
     ).interface
     assert sac.actions == "continuous"
     assert not sac.automatic_gripper
+
+
+def test_defaults_are_the_recipe_that_learns():
+    plan = build_plan(WorldOptions(scenario="warehouse_small"), TrainOptions())
+    assert plan == build_plan(
+        WorldOptions(scenario="warehouse_small", settings=("nest_progress=0.05", "first_pickup=1")),
+        TrainOptions(small_start=True),
+    )
+    assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.05, 1.0)
+    assert [stage.steps for stage in plan.stages] == [1_666_666, 3_333_334]
+    assert [stage.scenario for stage in plan.stages] == [small_arena(plan.scenario), {}]
+
+
+def test_what_people_set_goes_before_the_recipe(tmp_path):
+    path = tmp_path / "world.toml"
+    path.write_text("[scenario]\nnest_progress = 0.0\n")
+    world = WorldOptions(scenario="warehouse_small", settings=("first_pickup=0.5",), config_file=path)
+    plan = build_plan(world, TrainOptions(small_start=False, hidden="128,32"))
+    assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.0, 0.5)
+    assert len(plan.stages) == 1
+    assert plan.hidden == (128, 32)
+
+
+def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
+    plan = build_plan(WorldOptions(scenario="search_and_rescue"), TrainOptions())
+    assert plan.scenario.reward == scenario("search_and_rescue").reward
+    assert len(plan.stages) == 1
+
+
+@pytest.mark.parametrize(
+    ("robots", "arenas", "words", "expected"),
+    [
+        (4, 2, (), 1024),  # all of 128 * 8
+        (50, 1, (), 3200),
+        (7, 5, (), 2240),  # half of 128 * 35
+        (1, 1, ("n_steps=9739",), 3200),  # a prime
+        (1, 1, ("n_steps=1",), 3200),
+        (7, 5, ("batch_size=1000",), 1000),
+    ],
+)
+def test_the_default_minibatch_fits_the_rollout(robots, arenas, words, expected):
+    world = WorldOptions(scenario="warehouse_small", robots=robots)
+    plan = build_plan(world, TrainOptions(n_arenas=arenas, arguments=words))
+    assert plan.options["batch_size"] == expected
+
+
+def test_small_runs_come_without_warnings(command, recwarn):
+    pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
+    code, _, err = command("train", "--robots", "3", "--objects", "20", "--arenas", "1", "--steps", "6", "--arg",
+                           "n_steps=2", "--evaluate-every", "6")  # fmt: skip
+    assert code == 0, err
+    assert not [warning for warning in recwarn if "mini-batch" in str(warning.message)]
 
 
 def test_the_files_of_a_world_reach_the_plan(tmp_path):
