@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from swarm_forage_env import RunSpec, run_one, scenario
+
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PAGES = {"benchmarl": "benchmarl", "rllib": "ray", "torchrl": "torchrl"}
@@ -31,6 +33,13 @@ def run(arguments: list[str], folder: Path) -> str:
     return result.stdout
 
 
+def check_runs(file: Path) -> None:
+    """What was saved is a policy that runs, with numpy alone, in a swarm of another size than it was trained in."""
+    small = scenario("warehouse_small", n_robots=8, horizon_s=200.0)
+    record = run_one(RunSpec(scenario=small, policy=str(file), seed=1))
+    assert record.performance.shape == (1,)
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_the_example_of_a_page_trains(page, tmp_path):
     require(PAGES[page], page)
@@ -40,23 +49,26 @@ def test_the_example_of_a_page_trains(page, tmp_path):
     assert last[0] == "losses"
     assert len(last) > 1
     assert all(math.isfinite(float(loss)) for loss in last[1:])
+    check_runs(tmp_path / f"{page}.npz")
 
 
 def test_cleanrl_trains(tmp_path):
     require("torch", "cleanrl")
     sizes = {"total-timesteps": 2000, "n-robots": 4, "n-arenas": 2, "num-steps": 64, "minibatch-size": 128}
-    words = [f"--{name}={size}" for name, size in sizes.items()]
+    words = [*(f"--{name}={size}" for name, size in sizes.items()), "--out=cleanrl.npz"]
     lines = run([str(ROOT / "scripts" / "cleanrl_ppo.py"), *words], tmp_path).splitlines()
     assert [int(line.split()[0].replace(",", "")) for line in lines] == [512, 1024, 1536, 2048]
+    check_runs(tmp_path / "cleanrl.npz")
 
 
 def test_the_example_of_stable_baselines3_trains_and_exports(tmp_path):
     require("stable_baselines3", "sb3")
     page = (ROOT / "docs" / "learning.md").read_text()
-    (example,) = [block for block in EXAMPLE.findall(page) if "stable_baselines3" in block]
-    (tmp_path / "example.py").write_text(example)
+    on_policy, off_policy = [block for block in EXAMPLE.findall(page) if "stable_baselines3" in block]
+    (tmp_path / "example.py").write_text(f"{on_policy}\n{off_policy}")
     run(["example.py"], tmp_path)
-    assert (tmp_path / "policy.npz").exists()
+    check_runs(tmp_path / "policy.npz")
+    check_runs(tmp_path / "sac.zip")
 
 
 def test_train_ppo_is_as_short_as_promised():
@@ -67,4 +79,4 @@ def test_train_ppo_is_as_short_as_promised():
 def test_train_ppo_trains_and_exports(tmp_path):
     require("stable_baselines3", "sb3")
     run([str(ROOT / "scripts" / "train_ppo.py"), "--steps", "2000", "--out", "example.npz"], tmp_path)
-    assert (tmp_path / "example.npz").exists()
+    check_runs(tmp_path / "example.npz")
