@@ -118,7 +118,7 @@ def _algorithm_options(algorithm: str, n_rows: int, words: Sequence[str]) -> dic
     chosen = DEFAULT_OPTIONS.get(algorithm, {}) | given
     n_steps = chosen.get("n_steps")
     if algorithm == "ppo" and "batch_size" not in given and isinstance(n_steps, int):
-        chosen["batch_size"] = _fitting_batch(n_steps * n_rows, chosen["batch_size"])
+        chosen["batch_size"] = _fitting_batch(n_steps * n_rows, DEFAULT_OPTIONS["ppo"]["batch_size"])
     return chosen
 
 
