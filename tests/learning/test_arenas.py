@@ -226,6 +226,18 @@ def test_actions_that_are_not_finite_are_refused_by_name(interface):
     assert batch.step(np.zeros_like(actions)).obs.shape[0] == 6
 
 
+def test_a_step_that_was_refused_does_not_count():
+    batch = ArenaBatch(plan(), 1)
+    batch.reset([0], [None])
+    idle = np.zeros((3, 3), np.float32)
+    with pytest.raises(ValueError, match="robot_0"):
+        batch.step(np.full_like(idle, np.nan))
+    for _ in range(lives.HORIZON_TICKS):
+        step = batch.step(idle)
+    assert step.lengths.tolist() == [lives.HORIZON_TICKS] * 3
+    assert step.returns.tolist() == [5.0] * 3
+
+
 def test_small_rewards_of_long_runs_add_up():
     batch = ArenaBatch(plan(InterfaceConfig(decision_ticks=10), max_cycles=3000, tick=0.1), 1)
     batch.reset([0], [None])
