@@ -400,6 +400,12 @@ def parallel_env(
     Raises:
         ConfigError: unknown preset or field, or values that describe no world.
     """
+    for word in ("interface", "wrappers"):
+        if word in overrides:
+            raise ConfigError(
+                f"Expected scenario fields, got {word}=, which pettingzoo.make('parallel', id, {word}=...) and "
+                "swarm_forage_env.learning.parallel.parallel_env take."
+            )
     if isinstance(scenario, ScenarioConfig):
         config = with_overrides(scenario, **overrides)
     else:

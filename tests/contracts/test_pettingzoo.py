@@ -342,3 +342,9 @@ def test_constructor_errors():
         parallel_env("warehouse_smal")
     with pytest.raises(ConfigError, match="n_robots"):
         parallel_env(n_robot=3)
+
+
+@pytest.mark.parametrize("word", ["interface", "wrappers"])
+def test_the_plain_environment_names_the_door_for_learners(word):
+    with pytest.raises(ConfigError, match=rf"pettingzoo\.make\('parallel', id, {word}="):
+        parallel_env("warehouse_small", **{word: None})
