@@ -61,9 +61,11 @@ class ModelPolicy:
     Opening a model runs code that the file contains. Open only what you trust.
 
     Attributes:
+        reads: Observation slices that are looked at, None = all.
         caches: World that the model was trained in; there only when the file tells.
     """
 
+    reads: tuple[str, ...] | None = None
     caches: str
 
     def __init__(self, path: str | Path, *, digest: str | None = None, decision_ticks: int | None = None) -> None:
@@ -84,6 +86,7 @@ class ModelPolicy:
         self._noted = None
         if note is not None:
             self._noted, self.caches = _read_note(note, self._path)
+            self.reads = self._noted.reads
         if decision_ticks is None:
             decision_ticks = self._noted.decision_ticks if self._noted else 1
         self._decision_ticks = InterfaceConfig(decision_ticks=decision_ticks).decision_ticks

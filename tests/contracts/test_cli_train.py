@@ -62,10 +62,11 @@ def test_trains_shows_evaluations_and_goes_on(command):
     assert code == 0
     assert "This training was finished: 128 of 128 decisions" in err
 
-    code, out, _ = command("run", "--policy", str(folder / "policy.npz"), "--robots", "3", "--objects", "20",
-                           "--horizon", "4", "--set", "interval_s=2", "--jobs", "1", "--json")  # fmt: skip
+    both = f"{folder / 'policy.npz'},{folder / 'model.zip'}"
+    code, out, _ = command("run", "--policy", both, "--robots", "3", "--objects", "20", "--horizon", "4", "--set",
+                           "interval_s=2", "--jobs", "1", "--json")  # fmt: skip
     assert code == 0
-    assert json.loads(out)
+    assert len(json.loads(out)["runs"]) == 2
 
 
 def test_a_training_is_resumed_by_its_folder_alone(command):

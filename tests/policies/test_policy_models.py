@@ -128,6 +128,8 @@ def test_a_model_with_a_note_runs_as_it_was_trained(tmp_path):
     made, path, interface = noted_model(tmp_path, NOTED)
     policy = started(path)
     assert policy.caches == "static"
+    assert policy.reads == interface.config.reads
+    assert policy.reads
     wheels = [policy.act(sign * OBS, ACTIVE)[:, :2].copy() for sign in (1.0, -1.0, -1.0, -1.0)]
     expected, _ = made.predict(interface.observe(OBS), deterministic=True)
     np.testing.assert_array_equal(wheels[0], interface.command(expected, OBS)[:, :2])
@@ -140,7 +142,9 @@ def test_a_model_with_a_note_runs_as_it_was_trained(tmp_path):
 
 def test_a_model_without_a_note_says_nothing_of_its_world(tmp_path):
     _, path = model("A2C", tmp_path)
-    assert not hasattr(load_policy(str(path)), "caches")
+    policy = load_policy(str(path))
+    assert not hasattr(policy, "caches")
+    assert policy.reads is None
 
 
 @pytest.mark.parametrize(
