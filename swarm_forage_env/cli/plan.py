@@ -10,6 +10,7 @@ from swarm_forage_env.config import SECTIONS, ConfigError, ScenarioConfig, field
 from swarm_forage_env.scenarios import scenario
 from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
 ASSUMED_ROBOT_TICKS_PER_S = 0.5e6
@@ -117,6 +118,17 @@ def _parse_value(name: str, text: str, kind: Any) -> Any:
         raise ConfigError(f"Expected {name} to be {wanted}, got {text!r}.") from error
 
 
+def build_wrappers(options: WorldOptions, file_wrappers: Sequence[WrapperConfig] = ()) -> tuple[WrapperConfig, ...]:
+    """Return the wrappers of the options and those of the file that no option names.
+
+    Raises:
+        ConfigError: an unknown wrapper, or values that it refuses.
+    """
+    wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
+    named = {wrapper.name for wrapper in wrappers}
+    return (*wrappers, *(wrapper for wrapper in file_wrappers if wrapper.name not in named))
+
+
 def plan_runs(options: WorldOptions, policies: Sequence[str], *, n_seeds: int, first_seed: int) -> tuple[RunSpec, ...]:
     """Return one specification per policy and seed.
 
@@ -126,9 +138,7 @@ def plan_runs(options: WorldOptions, policies: Sequence[str], *, n_seeds: int, f
     """
     file_fields, file_wrappers = ({}, ()) if options.config_file is None else read_config(options.config_file)
     config, caches = build_scenario(options, file_fields)
-    wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
-    named = {wrapper.name for wrapper in wrappers}
-    wrappers += tuple(wrapper for wrapper in file_wrappers if wrapper.name not in named)
+    wrappers = build_wrappers(options, file_wrappers)
     try:
         return tuple(
             plan_run(config, name, caches=caches, wrappers=wrappers, seed=seed)

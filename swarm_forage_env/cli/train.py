@@ -11,7 +11,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.cli.options import NO_PICTURE
-from swarm_forage_env.cli.plan import WorldOptions, build_scenario
+from swarm_forage_env.cli.plan import WorldOptions, build_scenario, build_wrappers
 from swarm_forage_env.cli.report import PERFORMANCE_WORDS
 from swarm_forage_env.config import ConfigError, ScenarioConfig, with_overrides
 from swarm_forage_env.layout import CELLS_PER_M
@@ -28,7 +28,6 @@ from swarm_forage_env.learning.plan import (
 )
 from swarm_forage_env.learning.pretrained import plan_file
 from swarm_forage_env.plots import draw_training
-from swarm_forage_env.wrappers.registry import parse_wrapper
 
 DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
     "ppo": {
@@ -82,7 +81,7 @@ def build_plan(world: WorldOptions, options: TrainOptions) -> TrainingPlan:
     Raises:
         ConfigError: whatever is wrong with them.
     """
-    fields, wrappers = ({}, ()) if world.config_file is None else read_config(world.config_file)
+    fields, file_wrappers = ({}, ()) if world.config_file is None else read_config(world.config_file)
     world = replace(world, horizon=EPISODE_S if options.horizon_s is None else options.horizon_s)
     scenario, _ = build_scenario(world, fields)
     if _counts_deliveries(scenario):
@@ -97,7 +96,7 @@ def build_plan(world: WorldOptions, options: TrainOptions) -> TrainingPlan:
     )
     return TrainingPlan(
         scenario=scenario,
-        wrappers=(*wrappers, *map(parse_wrapper, world.wrappers)),
+        wrappers=build_wrappers(world, file_wrappers),
         algorithm=algorithm,
         interface=interface,
         n_arenas=n_arenas,

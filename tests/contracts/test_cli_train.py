@@ -241,6 +241,14 @@ def test_the_files_of_a_world_reach_the_plan(tmp_path):
     plan = build_plan(world, TrainOptions(seed=3))
     assert plan.scenario.robots.n_robots == 7
     assert sorted(config.name for config in plan.wrappers) == ["actuator_noise", "sensor_noise"]
+
+
+def test_a_wrapper_option_goes_before_the_same_wrapper_in_the_file(tmp_path):
+    path = tmp_path / "world.toml"
+    path.write_text("[sensor_noise]\nsigma = 0.01\n")
+    world = WorldOptions(scenario="warehouse_small", config_file=path, wrappers=("sensor_noise:sigma=0.02",))
+    (config,) = build_plan(world, TrainOptions()).wrappers
+    assert config.to_mapping()["sigma"] == 0.02
     assert plan.seed == 3
 
 
