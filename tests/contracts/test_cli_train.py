@@ -241,6 +241,7 @@ def test_the_files_of_a_world_reach_the_plan(tmp_path):
     plan = build_plan(world, TrainOptions(seed=3))
     assert plan.scenario.robots.n_robots == 7
     assert sorted(config.name for config in plan.wrappers) == ["actuator_noise", "sensor_noise"]
+    assert plan.seed == 3
 
 
 def test_a_wrapper_option_goes_before_the_same_wrapper_in_the_file(tmp_path):
@@ -249,7 +250,6 @@ def test_a_wrapper_option_goes_before_the_same_wrapper_in_the_file(tmp_path):
     world = WorldOptions(scenario="warehouse_small", config_file=path, wrappers=("sensor_noise:sigma=0.02",))
     (config,) = build_plan(world, TrainOptions()).wrappers
     assert config.to_mapping()["sigma"] == 0.02
-    assert plan.seed == 3
 
 
 @pytest.mark.parametrize(
