@@ -50,10 +50,7 @@ class Agent(nn.Module):
 
     def network(self) -> Network:
         """Return the actor as a network that runs without torch, and draws its actions as in training."""
-        state = self.actor.state_dict()
-        weights = tuple(value.numpy().T for name, value in state.items() if name.endswith("weight"))
-        biases = tuple(value.numpy() for name, value in state.items() if name.endswith("bias"))
-        return Network(weights, biases, NetworkAbout(interface=INTERFACE, activation="tanh", samples=True))
+        return Network.from_state_dict(self.actor.state_dict(), NetworkAbout(interface=INTERFACE, samples=True))
 
 
 def parse() -> argparse.Namespace:

@@ -32,6 +32,9 @@ _BROKEN = (ValueError, LookupError, TypeError, EOFError, OSError, RuntimeError, 
 """What numpy and zipfile raise over an archive that is none or has been damaged."""
 
 
+_LAYER_PARTS = ("weight", "bias")
+
+
 class NetworkError(ValueError):
     """A file that holds no network, or a network that does not fit its interface."""
 
@@ -123,6 +126,27 @@ class Network:
             outputs = outputs + rng.gumbel(size=outputs.shape)
         return np.argmax(outputs, axis=1)
 
+    @classmethod
+    def from_state_dict(
+        cls, state: Mapping[str, Any], about: NetworkAbout, *, n_outputs: int | None = None
+    ) -> "Network":
+        """Take the layers of a perceptron from the state dict of a torch module.
+
+        Args:
+            state: Tensors by name, in the order of the layers: (out, in) under names that end in "weight", (out,) under
+                names that end in "bias". Others are left out.
+            about: What the weights alone do not say.
+            n_outputs: How many outputs are actions; default all. Some libraries let the deviations follow the means.
+
+        Raises:
+            NetworkError: these are no layers that follow on each other.
+        """
+        parts = {end: [_array(tensor) for name, tensor in state.items() if name.endswith(end)] for end in _LAYER_PARTS}
+        weights, biases = ([array.T for array in parts["weight"]], parts["bias"])
+        if n_outputs is not None and weights and biases:
+            weights[-1], biases[-1] = weights[-1][:, :n_outputs], biases[-1][:n_outputs]
+        return cls(tuple(map(np.ascontiguousarray, weights)), tuple(biases), about)
+
     def save(self, path: str | Path) -> None:
         """Write the file; an existing one is replaced."""
         layers = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
@@ -168,6 +192,11 @@ def _part(stored: Mapping[str, np.ndarray], name: str) -> np.ndarray:
         return stored[name]
     except _BROKEN as error:
         raise NetworkError(f"Its part {name!r} is damaged, or no plain array of numbers or text.") from error
+
+
+def _array(tensor: Any) -> np.ndarray:
+    on_host = tensor.detach().cpu() if hasattr(tensor, "detach") else tensor
+    return np.asarray(on_host, np.float32)
 
 
 Choose: TypeAlias = Callable[[ObsArray, np.random.Generator], np.ndarray]

@@ -189,3 +189,41 @@ def test_a_path_opens_as_well_as_its_text(tmp_path):
     )
     assert isinstance(load_policy(tmp_path / "net.npz"), NetworkPolicy)
     assert isinstance(load_policy(str(tmp_path / "net.npz")), NetworkPolicy)
+
+
+def state_dict() -> dict[str, np.ndarray]:
+    """As torch names and lays out two linear layers, with something beside them."""
+    network = small_network()
+    return {
+        "mlp.0.weight": network.weights[0].T,
+        "mlp.0.bias": network.biases[0],
+        "mlp.2.weight": network.weights[1].T,
+        "mlp.2.bias": network.biases[1],
+        "steps": np.array(3.0),
+    }
+
+
+def test_layers_of_a_state_dict_make_the_same_network():
+    network = small_network()
+    taken = Network.from_state_dict(state_dict(), network.about)
+    rows = np.random.default_rng(0).normal(size=(5, 2)).astype(np.float32)
+    np.testing.assert_array_equal(taken.outputs(rows), network.outputs(rows))
+    first = Network.from_state_dict(state_dict(), network.about, n_outputs=1)
+    np.testing.assert_array_equal(first.outputs(rows), network.outputs(rows)[:, :1])
+
+
+def test_tensors_make_the_same_network_as_arrays():
+    torch = pytest.importorskip("torch")
+    tensors = {name: torch.nn.Parameter(torch.tensor(array)) for name, array in state_dict().items()}
+    taken = Network.from_state_dict(tensors, small_network().about)
+    for layer, expected in zip(
+        taken.weights + taken.biases, small_network().weights + small_network().biases, strict=True
+    ):
+        np.testing.assert_array_equal(layer, expected)
+
+
+@pytest.mark.parametrize("lost", ["mlp.2.bias", "mlp.0.weight"])
+def test_a_state_dict_without_all_of_its_layers_is_refused(lost):
+    state = {name: array for name, array in state_dict().items() if name != lost}
+    with pytest.raises(NetworkError, match="layers that follow on each other"):
+        Network.from_state_dict(state, small_network().about)

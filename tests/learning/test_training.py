@@ -25,6 +25,7 @@ from swarm_forage_env.learning.sb3.training import train
 from swarm_forage_env.policy import load_policy
 from swarm_forage_env.policy_models import ModelError, ModelPolicy
 from swarm_forage_env.scenarios import search_and_rescue, warehouse_small
+from swarm_forage_env.wrappers.registry import parse_wrapper
 
 NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
 DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True)
@@ -209,6 +210,12 @@ def test_a_training_that_diverges_says_so(tmp_path):
     with pytest.raises(ConfigError, match=r"diverged in stage 1, .*lower the learning_rate") as refusal:
         train(plan, tmp_path)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_training_in_which_everybody_is_dead_says_so(tmp_path):
+    plan = tiny_plan(wrappers=(parse_wrapper("population:death_per_tick=0.5,deaths=absorbing"),))
+    with pytest.raises(ConfigError, match=r"Cannot train in stage 1.*: Expected a robot at work"):
+        train(plan, tmp_path)
 
 
 @pytest.mark.parametrize("algorithm", ["ppo", "sac"])

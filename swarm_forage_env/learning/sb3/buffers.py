@@ -13,6 +13,10 @@ from stable_baselines3.common.vec_env import VecNormalize
 _SAMPLES = ("observations", "actions", "values", "log_probs", "advantages", "returns")
 
 
+class EmptyRolloutError(ValueError):
+    """A rollout with nothing to learn from."""
+
+
 class ActiveRolloutBuffer(RolloutBuffer):
     """Rollouts (PPO, A2C) from which only robots at work teach.
 
@@ -107,11 +111,13 @@ class ActiveRolloutBuffer(RolloutBuffer):
         """Yield minibatches of the steps at work in random order.
 
         Raises:
-            ValueError: nobody was at work in the whole rollout.
+            EmptyRolloutError: nobody was at work in the whole rollout.
         """
         assert self.full
         if not self._is_active.any():
-            raise ValueError("Expected a robot at work in the rollout, got none to learn from; take more n_steps.")
+            raise EmptyRolloutError(
+                "Expected a robot at work in the rollout, got none to learn from; take more n_steps."
+            )
         if not self.generator_ready:
             taught = self.swap_and_flatten(self._is_active).ravel()
             for name in _SAMPLES:

@@ -27,7 +27,7 @@ from swarm_forage_env.config import ConfigError
 from swarm_forage_env.learning.files import replacing
 from swarm_forage_env.learning.network import LearnedPolicy
 from swarm_forage_env.learning.plan import Evaluation, Stage, TrainingPlan, TrainingStatus, read_plan
-from swarm_forage_env.learning.sb3.buffers import ActiveRolloutBuffer, PresentReplayBuffer
+from swarm_forage_env.learning.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
 from swarm_forage_env.learning.sb3.export import export_network, note_interface
 from swarm_forage_env.learning.sb3.vec_env import SwarmVecEnv
 from swarm_forage_env.policy import Policy, load_policy
@@ -230,7 +230,7 @@ def _learn(model: BaseAlgorithm, steps: int, watch: "_Watch", where: str) -> Non
     except KeyboardInterrupt:
         watch.keep(model)
         raise
-    except ConfigError as error:  # worlds that only their first reset shows to be impossible
+    except (ConfigError, EmptyRolloutError) as error:  # worlds that only a reset or a run shows to be impossible
         raise ConfigError(f"Cannot train in {where}: {error}") from error
     except ValueError as error:
         if all(bool((weights.abs() < _MOST_WEIGHT).all()) for weights in model.policy.parameters()):  # not so for nan
