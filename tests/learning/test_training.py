@@ -212,8 +212,13 @@ def test_a_training_that_diverges_says_so(tmp_path):
     assert "\n" not in str(refusal.value)
 
 
-def test_a_training_in_which_everybody_is_dead_says_so(tmp_path):
-    plan = tiny_plan(wrappers=(parse_wrapper("population:death_per_tick=0.5,deaths=absorbing"),))
+def test_a_rollout_with_nobody_at_work_says_so(tmp_path):
+    plan = tiny_plan(
+        scenario=warehouse_small(n_robots=1, n_objects=20, horizon_s=200.0),
+        wrappers=(parse_wrapper("population:malfunction_per_tick=0.2,repair_per_tick=0.201"),),
+        n_arenas=1,
+        options={"n_steps": 2, "batch_size": 2},
+    )
     with pytest.raises(ConfigError, match=r"Cannot train in stage 1.*: Expected a robot at work"):
         train(plan, tmp_path)
 
