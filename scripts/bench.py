@@ -183,7 +183,7 @@ def learning_rows(ticks: int, repeats: int) -> Iterator[Row]:
         batch_size=n_steps * env.num_envs // 4,
         n_epochs=4,
         rollout_buffer_class=ActiveRolloutBuffer,
-        rollout_buffer_kwargs={"active_column": env.active_column},
+        rollout_buffer_kwargs=env.rollout_buffer_kwargs,
         device="cpu",
     )
     spent = [0.0]

@@ -42,7 +42,7 @@ def main() -> None:
         gae_lambda=0.98,
         learning_rate=1e-3,
         rollout_buffer_class=ActiveRolloutBuffer,  # robots that are dead or in repair do not teach
-        rollout_buffer_kwargs={"active_column": env.active_column},
+        rollout_buffer_kwargs=env.rollout_buffer_kwargs,
         seed=0,
         verbose=1,
         device="cpu",

@@ -67,7 +67,7 @@ def constant_value_ppo(env: SwarmVecEnv, gae_lambda: float) -> PPO:
         gae_lambda=gae_lambda,
         policy_kwargs={"net_arch": [4]},
         rollout_buffer_class=ActiveRolloutBuffer,
-        rollout_buffer_kwargs={"active_column": env.active_column},
+        rollout_buffer_kwargs=env.rollout_buffer_kwargs,
         seed=0,
         device="cpu",
     )
@@ -193,7 +193,7 @@ def test_behind_stacked_frames_the_newest_one_counts():
         n_steps=lives.N_TICKS,
         batch_size=6,
         rollout_buffer_class=ActiveRolloutBuffer,
-        rollout_buffer_kwargs={"active_column": env.active_column, "n_columns": env.interface.layout.size},
+        rollout_buffer_kwargs=env.rollout_buffer_kwargs,
         device="cpu",
     )
     _, callback = model._setup_learn(lives.N_TICKS * lives.N_ROBOTS, _Story())

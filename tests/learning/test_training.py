@@ -81,7 +81,7 @@ def test_ppo_twice_from_one_seed_gives_the_same_weights_after_20000_steps():
             n_epochs=2,
             policy_kwargs={"net_arch": [32]},
             rollout_buffer_class=ActiveRolloutBuffer,
-            rollout_buffer_kwargs={"active_column": env.active_column},
+            rollout_buffer_kwargs=env.rollout_buffer_kwargs,
             seed=seed,
             device="cpu",
         ).learn(20_000)

@@ -27,9 +27,8 @@ class ActiveRolloutBuffer(RolloutBuffer):
     away just then.)
 
     Give it to an algorithm by
-    `rollout_buffer_class=ActiveRolloutBuffer, rollout_buffer_kwargs={"active_column": env.active_column}`.
-    Behind `VecFrameStack`, whose newest frame comes last, add `"n_columns": env.interface.layout.size`: without it the
-    column of the oldest frame is read. Numbers must reach it as the environment gave them:
+    `rollout_buffer_class=ActiveRolloutBuffer, rollout_buffer_kwargs=env.rollout_buffer_kwargs`, with `env` the
+    `SwarmVecEnv`; that holds behind `VecFrameStack`, too. Numbers must reach it as the environment gave them:
     `VecNormalize(norm_obs=True)` is refused.
     """
 

@@ -196,7 +196,7 @@ def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, 
     if plan.algorithm in ON_POLICY:
         buffer = {
             "rollout_buffer_class": ActiveRolloutBuffer,
-            "rollout_buffer_kwargs": {"active_column": env.active_column, "n_columns": env.interface.layout.size},
+            "rollout_buffer_kwargs": env.rollout_buffer_kwargs,
         }
     network = {"net_arch": list(plan.hidden)}
     try:

@@ -140,8 +140,13 @@ class SwarmVecEnv(VecEnv):
 
     @property
     def active_column(self) -> int:
-        """Column of an observation that is 1 for robots at work; what `ActiveRolloutBuffer` wants to know."""
+        """Column of an observation that is 1 for robots at work."""
         return self.interface.active_column
+
+    @property
+    def rollout_buffer_kwargs(self) -> dict[str, Any]:
+        """What `ActiveRolloutBuffer` wants to know of the observations; new in every call."""
+        return {"active_column": self.active_column, "n_columns": self.interface.layout.size}
 
     def action_masks(self) -> BoolArray:
         """Return which discrete actions make sense now, (num_envs, number of actions); see `LearnerInterface.mask`."""
