@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_forage_env.config import ConfigError, ScenarioConfig
+from swarm_forage_env.files import replacing
 from swarm_forage_env.types import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -195,13 +196,8 @@ class RunRecord:
         """
         provenance = json.dumps(dict(self.provenance), sort_keys=True)
         values = (str(SCHEMA_VERSION), self.spec, provenance, _digest(self, provenance))
-        target = Path(path)
-        draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-        try:
+        with replacing(Path(path)) as draft:
             self.to_frame().write_parquet(draft, metadata=dict(zip(_FILE_KEYS, values, strict=True)))
-            draft.replace(target)
-        finally:
-            draft.unlink(missing_ok=True)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> "RunRecord":

@@ -19,7 +19,7 @@ import numpy as np
 from gymnasium import spaces
 
 from swarm_forage_env.config import ConfigError
-from swarm_forage_env.learning.files import replacing
+from swarm_forage_env.files import replacing
 from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.policy import SwarmTask
 from swarm_forage_env.spelling import suggestion

@@ -11,7 +11,7 @@ from typing import Any
 
 from swarm_forage_env.config import ConfigError, ScenarioConfig, with_overrides
 from swarm_forage_env.config import from_mapping as config_from_mapping
-from swarm_forage_env.learning.files import replacing
+from swarm_forage_env.files import replacing
 from swarm_forage_env.learning.interface import InterfaceConfig, interface_from_mapping
 from swarm_forage_env.learning.worlds import same_robots
 from swarm_forage_env.policy import policy_class

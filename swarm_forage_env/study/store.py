@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from swarm_forage_env.config import ConfigError
+from swarm_forage_env.files import replacing
 from swarm_forage_env.recording import RecordError, RunRecord
 from swarm_forage_env.study.spec import RunSpec
 
@@ -98,9 +99,8 @@ class RunStore:
             "traceback": failure.traceback.splitlines(),
             "spec": failure.spec.to_mapping(),
         }
-        draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-        draft.write_text(json.dumps(content, indent=1), encoding="utf-8")
-        draft.replace(path)
+        with replacing(path) as draft:
+            draft.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
     def records(self) -> Iterator[RunRecord]:
         """Read all records, in the order of their ids; raises as `read`."""

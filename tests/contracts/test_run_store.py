@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import polars as pl
 import pytest
@@ -73,6 +74,20 @@ def test_a_bad_file_is_named_and_nothing_is_lost(store, records, damage):
 def test_a_missing_record_is_not_to_be_moved_away(store):
     with pytest.raises(RecordError, match=r"absent\.parquet: No such file or directory\.$"):
         store.read("absent")
+
+
+def test_a_write_that_fails_leaves_no_draft(store, records, monkeypatch):
+    def full_disk(*_, **__):
+        raise OSError("no space left")
+
+    before = sorted(store.folder.rglob("*"))
+    monkeypatch.setattr(pl.DataFrame, "write_parquet", full_disk)
+    with pytest.raises(OSError, match="no space"):
+        store.write(records[0])
+    monkeypatch.setattr(Path, "replace", full_disk)
+    with pytest.raises(OSError, match="no space"):
+        store.write_failure(RunFailure(spec=SPEC, error="error", traceback="trace"))
+    assert sorted(store.folder.rglob("*")) == [*before, store.folder / "failures"]
 
 
 def test_a_failure_is_kept_until_the_run_succeeds(store, records):

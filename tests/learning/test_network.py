@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.env import parallel_env
-from swarm_forage_env.learning.files import replacing
+from swarm_forage_env.files import replacing
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.network import LearnedPolicy, Network, NetworkAbout, NetworkError, NetworkPolicy
 from swarm_forage_env.policy import Policy, load_policy

@@ -24,7 +24,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.utils import safe_mean
 
 from swarm_forage_env.config import ConfigError
-from swarm_forage_env.learning.files import replacing
+from swarm_forage_env.files import replacing
 from swarm_forage_env.learning.network import LearnedPolicy
 from swarm_forage_env.learning.plan import Evaluation, Stage, TrainingPlan, TrainingStatus, read_plan
 from swarm_forage_env.learning.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
