@@ -224,8 +224,10 @@ def schema() -> None:
 @app.command()
 def rerun(file: Annotated[Path, typer.Argument(help="A record (.parquet) or a failure (.json).")]) -> None:
     """Run a stored run again, here; a record is compared with what comes out, a failure shows its traceback."""
+    from swarm_forage_env.config import ConfigError
+    from swarm_forage_env.policy import load_policy
     from swarm_forage_env.recording import RunRecord
-    from swarm_forage_env.study.run import run_one
+    from swarm_forage_env.study.run import run_one, run_policy
     from swarm_forage_env.study.spec import RunSpec
     from swarm_forage_env.study.store import read_failure
 
@@ -233,7 +235,12 @@ def rerun(file: Annotated[Path, typer.Argument(help="A record (.parquet) or a fa
         typer.echo(run_one(read_failure(file).spec).describe())
         return
     stored = RunRecord.read(file)
-    again = run_one(RunSpec.from_json(stored.spec))
+    spec = RunSpec.from_json(stored.spec)
+    try:
+        policy = load_policy(spec.policy, spec.parameters)
+    except ValueError as error:  # not installed here, or its file has gone or changed
+        raise ConfigError(f"Cannot run {file} again: {error}") from error
+    again = run_policy(policy, spec)
     typer.echo(again.describe())
     if not again.same_results(stored):
         raise typer.Exit(complain(f"the results differ from those in {file}", EXIT_FAILURE))

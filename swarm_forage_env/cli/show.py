@@ -85,6 +85,8 @@ def _policy_lines(name: str) -> Iterator[str]:
 
 
 def _file_lines(file: Path) -> Iterator[str]:
+    if not file.is_file():
+        raise ConfigError(f"Cannot read the policy file {file}: there is no such file.")
     if file.suffix.lower() != ".npz":
         yield f"{file}: a model of stable-baselines3. Opening it runs code that it contains, so it is not opened here."
         return
