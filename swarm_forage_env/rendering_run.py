@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swarm_forage_env.config import ScenarioConfig
-from swarm_forage_env.policy import Policy, load_policy
+from swarm_forage_env.policy import Policy, is_policy_file, load_policy
 from swarm_forage_env.rendering import Trails, render_frame
 from swarm_forage_env.rendering_video import Frame, check_film, write_film
 from swarm_forage_env.rendering_view import RenderError, arena_view
@@ -41,7 +41,7 @@ def record_run(
 
     Args:
         scenario: The world; see `caches`.
-        policy: Name of an installed policy, or a fresh policy object.
+        policy: Name of an installed policy, path of a policy file, or a fresh policy object.
         path: File to write, .gif or .mp4.
         seconds: Simulated time to film.
         seed: Run seed; the film shows the run that any other runner makes of it.
@@ -60,16 +60,18 @@ def record_run(
     Raises:
         RenderError: a value out of range; nothing has been run or written then.
         ImportError: Pillow, or for .mp4 imageio with ffmpeg, is not installed.
-        ValueError: unknown policy name.
+        ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the world.
     """
     ticks = _picture_ticks(scenario, seconds, speedup, fps)
     if not (math.isfinite(trail_s) and trail_s >= 0):
         raise RenderError(f"Expected trail_s >= 0 seconds, got {trail_s!r}.")
     path = check_film(path, fps, len(ticks))
     arena_view(scenario, size_px)  # refuses a bad size before the run starts
-    name = policy if isinstance(policy, str) else getattr(policy, "name", type(policy).__name__)
     if isinstance(policy, str):
+        name = Path(policy).stem if is_policy_file(policy) else policy
         policy = load_policy(policy)
+    else:
+        name = getattr(policy, "name", type(policy).__name__)
     if caches is None:
         caches = scenario.caches if scenario.caches != "none" else getattr(policy, "caches", "none")
     scenario = replace(scenario, caches=caches)

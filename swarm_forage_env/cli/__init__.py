@@ -271,6 +271,8 @@ def record(
     from rich.progress import Progress
 
     from swarm_forage_env.cli.plan import WorldOptions, plan_runs
+    from swarm_forage_env.learning.network import NetworkError
+    from swarm_forage_env.policy_models import ModelError
     from swarm_forage_env.rendering_run import record_run
     from swarm_forage_env.rendering_view import RenderError
 
@@ -299,10 +301,11 @@ def record(
                 speedup=speedup,
                 fps=fps,
                 size_px=size,
+                caches=spec.scenario.caches,  # else "none" would mean the policy's own
                 wrappers=spec.wrappers,
                 progress=lambda done, total: bar.update(task, completed=done, total=total),
             )
-    except RenderError as error:
+    except (RenderError, ModelError, NetworkError) as error:
         raise typer.BadParameter(str(error)) from error
     typer.echo(f"wrote {written}")
 

@@ -244,7 +244,7 @@ class NetworkPolicy(LearnedPolicy):
     """A network file as a policy."""
 
     def __init__(self, network: Network) -> None:
-        """Take the network; raises NetworkError where it does not fit the interface it names."""
+        """Take the network; whether it fits its interface shows in a world, see `reset`."""
         about = network.about
         super().__init__(about.interface, network.choose, caches=about.caches)
         self._network = network

@@ -10,11 +10,14 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from swarm_forage_env import cli
+from swarm_forage_env import cli, rendering_run
 from swarm_forage_env.config import ConfigError, field_sections
 from swarm_forage_env.learning import pretrained
+from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env.learning.network import Network, NetworkAbout
 from swarm_forage_env.policy import RandomPolicy, policy_names
 from swarm_forage_env.recording import RunRecord
 from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
@@ -22,6 +25,7 @@ from swarm_forage_env.study.store import load
 
 SHORT = ("--robots", "3", "--objects", "20", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
 RUN = ("run", "--policy", "random", *SHORT)
+SHORT_FILM = ("--robots", "3", "--seconds", "4", "--size", "240", "--fps", "5")
 
 
 @pytest.fixture
@@ -346,6 +350,43 @@ def test_record_films_a_run(command):
     assert Path("film.gif").read_bytes().startswith(b"GIF8")
     assert command("record", *words)[1] == "wrote results/warehouse_small_random.gif\n"
     assert Path("results/warehouse_small_random.gif").read_bytes() == Path("film.gif").read_bytes()
+
+
+@pytest.mark.parametrize(("asked", "filmed"), [((), "static"), (("--caches", "none"), "none")])
+def test_record_films_the_caches_that_were_asked_for(command, monkeypatch, asked, filmed):
+    pytest.importorskip("PIL")
+    build, built = rendering_run.build_stack, []
+
+    def note(config, *args, **options):
+        built.append(config.caches)
+        return build(config, *args, **options)
+
+    monkeypatch.setattr(rendering_run, "build_stack", note)
+    assert command("record", "--policy", "stochm", *asked, *SHORT_FILM)[0] == 0
+    assert built == [filmed]
+
+
+def test_record_names_a_file_without_the_way_there(command, monkeypatch):
+    pytest.importorskip("PIL")
+    shutil.copy(Path(pretrained.__file__).with_name("ppo_warehouse_small.npz"), "mine.npz")
+    render, titles = rendering_run.render_frame, set()
+
+    def note(*args, title, **options):
+        titles.add(title)
+        return render(*args, title=title, **options)
+
+    monkeypatch.setattr(rendering_run, "render_frame", note)
+    assert command("record", "--policy", "mine.npz", *SHORT_FILM)[0] == 0
+    assert titles == {"warehouse small, mine, 32 x 16 m"}
+
+
+def test_record_says_when_a_network_does_not_fit(command):
+    pytest.importorskip("PIL")
+    about = NetworkAbout(interface=InterfaceConfig())
+    Network((np.zeros((2, 3), np.float32),), (np.zeros(3, np.float32),), about).save("mine.npz")
+    code, _, err = command("record", "--policy", "mine.npz", *SHORT_FILM)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "Expected a network from 111 columns to 3 actions" in err
 
 
 @pytest.mark.parametrize(
