@@ -1,7 +1,7 @@
 """What controls a swarm: the Policy protocol, the words it speaks (Grip, Event, Task) and how policies are found.
 
-A policy, scripted or trained, sees observations and never the world. `baselines` and learned policies import from
-here, `layout`, `detection`, `quirks` and `types`, and from nothing else of the environment.
+A policy, scripted or trained, sees observations and never the world. `baselines` imports from here, `layout`,
+`detection`, `quirks`, `types`, and the tools `compiling` and `spelling`, and from nothing else of the environment.
 """
 
 from collections.abc import Callable, Generator, Mapping

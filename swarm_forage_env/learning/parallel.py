@@ -44,8 +44,8 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
             interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
                 observations and continuous actions.
             wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
-                ("population:death_per_tick=0.01"). Trainers that need a
-                fixed number of agents take `deaths="absorbing"`.
+                ("population:death_per_tick=0.01"). Trainers that need a fixed number of agents take
+                "population:deaths=absorbing,...".
             max_cycles: Ticks until truncation; default the scenario's horizon.
             render_mode: None or "rgb_array".
             overrides: Scenario fields by name (`n_robots=20`).
