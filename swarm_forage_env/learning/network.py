@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env.config import ConfigError
+from swarm_forage_env.config import CACHE_KINDS, ConfigError
 from swarm_forage_env.files import replacing
 from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.policy import SwarmTask
@@ -57,6 +57,11 @@ class NetworkAbout:
     def __post_init__(self) -> None:
         if self.activation not in ACTIVATIONS:
             raise NetworkError(f"Expected an activation of {', '.join(ACTIVATIONS)}, got {self.activation!r}.")
+        if self.caches not in CACHE_KINDS:
+            raise NetworkError(f"Expected caches to be one of {', '.join(CACHE_KINDS)}, got {self.caches!r}.")
+        for name, kind, wanted in (("samples", bool, "true or false"), ("card", dict, "a table")):
+            if not isinstance(getattr(self, name), kind):  # files hold anything
+                raise NetworkError(f"Expected {name} to be {wanted}, got {getattr(self, name)!r}.")
 
     def to_json(self) -> str:
         """Return the text that files hold."""
@@ -67,7 +72,7 @@ class NetworkAbout:
         """Read the text back.
 
         Raises:
-            NetworkError: no JSON object, or unknown or missing keys.
+            NetworkError: no JSON object, unknown or missing keys, or values that make no sense.
         """
         try:
             mapping = json.loads(text)

@@ -83,6 +83,12 @@ ABOUT = json.loads(small_network().about.to_json())
         ({"about": np.array("{}")}, "with its interface, got '{}'"),
         ({"about": np.array(json.dumps(ABOUT | {"activaton": "red"}))}, "Did you mean 'activation'"),
         ({"about": np.array(json.dumps(ABOUT | {"interface": {"actions": "diskrete"}}))}, "Did you mean 'discrete'"),
+        (
+            {"about": np.array(json.dumps(ABOUT | {"caches": "statc"}))},
+            "caches to be one of none, static, dynamic, got",
+        ),
+        ({"about": np.array(json.dumps(ABOUT | {"samples": "no"}))}, "samples to be true or false, got 'no'"),
+        ({"about": np.array(json.dumps(ABOUT | {"card": [1]}))}, r"card to be a table, got \[1\]"),
         ({"about": np.array(json.dumps(ABOUT))}, r"layers that follow on each other, got weights \[\]"),
     ],
 )
