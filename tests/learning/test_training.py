@@ -190,6 +190,7 @@ def test_a_training_that_kept_nothing_is_started_again(tmp_path):
     [
         ({}, 3, "processes from 0 to n_arenas = 2, got 3"),
         ({}, -1, "processes from 0 to n_arenas = 2, got -1"),
+        ({"evaluation": EvaluationPlan(baseline="gone.npz")}, 0, r"baseline to be a controller: .*gone\.npz"),
         # Clusters are drawn by the first reset.
         (
             {"scenario": search_and_rescue(side_m=48.0, n_robots=4, horizon_s=200.0),

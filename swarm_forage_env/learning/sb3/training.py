@@ -101,6 +101,7 @@ def train(
     if not 0 <= n_processes <= plan.n_arenas:
         raise ConfigError(f"Expected processes from 0 to n_arenas = {plan.n_arenas}, got {n_processes}.")
     _check_folder(folder, plan, resume=resume)
+    _check_baseline(plan)
     torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
     watch = _Watch(plan, folder, report or _keep_quiet)
     env = SwarmVecEnv(
@@ -159,6 +160,14 @@ def _check_folder(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
             )
     elif any((folder / name).exists() for name in (MODEL_FILE, EVALUATIONS_FILE, POLICY_FILE)):
         raise ConfigError(f"Expected an unused folder, got {folder} with a training run; resume it or go elsewhere.")
+
+
+def _check_baseline(plan: TrainingPlan) -> None:
+    """Refuse a controller to compare with that cannot be opened; the first evaluation would be late for that."""
+    try:
+        load_policy(plan.evaluation.baseline)
+    except (ValueError, OSError) as error:
+        raise ConfigError(f"Expected evaluation.baseline to be a controller: {error}") from error
 
 
 def kept_plan(folder: Path) -> TrainingPlan:
