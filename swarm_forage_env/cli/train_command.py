@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import Caches, ConfigFile, Objects, Robots, Settings, Side, Wrappers
+from swarm_forage_env.cli.options import ConfigFile, Objects, Robots, Settings, Side, Wrappers
 
 
 def train(  # long: one parameter per option
@@ -46,7 +46,7 @@ def train(  # long: one parameter per option
     robots: Robots = None,
     objects: Objects = None,
     side: Side = None,
-    caches: Caches = None,
+    caches: Annotated[str | None, typer.Option(help="none, static or dynamic; default: those of the preset.")] = None,
     settings: Settings = None,
     wrappers: Wrappers = None,
     config: ConfigFile = None,
