@@ -213,6 +213,17 @@ def test_a_training_that_diverges_says_so(tmp_path):
     assert "\n" not in str(refusal.value)
 
 
+def test_a_training_that_diverges_leaves_the_checkpoint_before(tmp_path):
+    plan = tiny_plan(stages=(Stage(steps=128),))
+    train(plan, tmp_path)
+    sound = (tmp_path / "model.zip").read_bytes()
+    wild = {"learning_rate": 1e30, "batch_size": 128, "n_epochs": 1}  # one update, which only the end looks at
+    longer = dataclasses.replace(plan, stages=(*plan.stages, Stage(steps=128, options=wild)))
+    with pytest.raises(ConfigError, match="diverged"):
+        train(longer, tmp_path, resume=True)
+    assert (tmp_path / "model.zip").read_bytes() == sound
+
+
 def test_a_rollout_with_nobody_at_work_says_so(tmp_path):
     plan = tiny_plan(
         scenario=warehouse_small(n_robots=1, n_objects=20, horizon_s=200.0),

@@ -237,17 +237,22 @@ def _learn(model: BaseAlgorithm, steps: int, watch: "_Watch", where: str) -> Non
     try:
         model.learn(steps, callback=watch, reset_num_timesteps=False, tb_log_name=model.__class__.__name__.lower())
     except KeyboardInterrupt:
-        watch.keep(model)
+        if not _has_diverged(model):
+            watch.keep(model)
         raise
     except (ConfigError, EmptyRolloutError) as error:  # worlds that only a reset or a run shows to be impossible
         raise ConfigError(f"Cannot train in {where}: {error}") from error
     except ValueError as error:
-        if all(bool((weights.abs() < _MOST_WEIGHT).all()) for weights in model.policy.parameters()):  # not so for nan
+        if not _has_diverged(model):
             raise
         raise ConfigError(
             f"The training diverged in {where}, after {model.num_timesteps:,} decisions: weights became nan or huge; "
             "lower the learning_rate, or look for a reward or another option out of proportion."
         ) from error
+
+
+def _has_diverged(model: BaseAlgorithm) -> bool:
+    return not all(bool((weights.abs() < _MOST_WEIGHT).all()) for weights in model.policy.parameters())  # nan is not <
 
 
 class _Watch(BaseCallback):
@@ -269,7 +274,13 @@ class _Watch(BaseCallback):
         return self._spent_s + time.perf_counter() - self._started
 
     def keep(self, model: BaseAlgorithm) -> None:
-        """Write a checkpoint, beside the plan that it is one of."""
+        """Write a checkpoint, beside the plan that it is one of.
+
+        Raises:
+            ValueError: the training diverged; the checkpoint before stays.
+        """
+        if _has_diverged(model):
+            raise ValueError("Expected weights that are finite numbers.")
         self._write_plan()
         with replacing(self._folder / MODEL_FILE) as draft:
             model.save(draft)
