@@ -13,6 +13,7 @@ from swarm_forage_env import scenarios
 from swarm_forage_env.config import ConfigError, ScenarioConfig
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.learning.network import Network
+from swarm_forage_env.learning.pretrained import network_file
 from swarm_forage_env.policy import is_policy_file, policy_class, policy_names
 from swarm_forage_env.spelling import suggestion
 
@@ -42,7 +43,8 @@ def information(name: str) -> str:
     if name in scenarios.SCENARIO_NAMES:
         return "\n".join(_scenario_lines(scenarios.scenario(name), _first_line(getattr(scenarios, name))))
     if name in policy_names():
-        return "\n".join(_policy_lines(name))
+        network = network_file(name)
+        return "\n".join([*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])])
     if is_policy_file(name):
         return "\n".join(_file_lines(Path(name)))
     known = (*scenarios.SCENARIO_NAMES, *policy_names())
@@ -75,7 +77,7 @@ def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
 
 def _policy_lines(name: str) -> Iterator[str]:
     policy = policy_class(name)
-    reads = getattr(policy, "reads", None)
+    reads = getattr(policy(), "reads", None)  # of an object: a network's class does not know it
     yield f"{name}: {inspect.getdoc(policy) or 'no description'}"
     yield ""
     yield f"  defined in  {policy.__module__}"
@@ -107,7 +109,7 @@ def _file_lines(file: Path) -> Iterator[str]:
             yield f"  [{part}]"
             if isinstance(values, dict):
                 for name, value in values.items():
-                    yield f"    {name:<24}{_plain(value)}"
+                    yield f"    {name:<24}{value:.6g}" if isinstance(value, float) else f"    {name:<24}{_plain(value)}"
             else:
                 yield f"    {_plain(values)}"
 

@@ -192,6 +192,10 @@ class World:
         return self._obs
 
 
+_FIXED = ("interface", "wrappers")
+"""What people may expect a reset to change, and it cannot."""
+
+
 def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | None:
     """Return the overridden fields that `options` asks for, None when it does not speak of them."""
     if not options:
@@ -209,6 +213,10 @@ def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | N
 
 def _refuse_misplaced(key: Any, value: Any) -> None:
     """Raise ConfigError if a reset option was meant for the scenario: nothing would come of it."""
+    if key in _FIXED:
+        raise ConfigError(
+            f"Expected {key} when the environment is made, not at a reset, which changes the scenario only."
+        )
     known = (*field_sections(), *SECTIONS)
     if key in known:
         raise ConfigError(

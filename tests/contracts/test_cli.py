@@ -268,8 +268,9 @@ def test_without_matplotlib_it_says_how_to_get_the_picture(command, monkeypatch)
     assert not Path("results/warehouse_small/performance.png").exists()
 
 
-def test_info_describes_a_network_file(command):
-    code, out, _ = command("info", pretrained.__file__.replace("__init__.py", "ppo_warehouse_small.npz"))
+@pytest.mark.parametrize("name", ["ppo_warehouse_small", str(pretrained.network_file("ppo_warehouse_small"))])
+def test_info_describes_a_network_by_its_name_or_file(command, name):
+    code, out, _ = command("info", name)
     assert code == 0
     assert "a network of 23 x 64 x 64 x 6 units (tanh)" in out
     assert re.search(r"decision_ticks +5\n", out)

@@ -156,6 +156,8 @@ def test_a_reset_changes_the_scenario_for_all_later_runs_until_told_otherwise():
         ({"objects": 3}, "'objects' inside of"),
         ({"width": 12.0}, "Unknown reset option 'width'. If the scenario field 'width_m'"),
         ({"num_robots": 12}, "'n_robots'"),
+        ({"wrappers": ["sensor_noise:sigma=0.1"]}, "Expected wrappers when the environment is made"),
+        ({"interface": {}}, "Expected interface when the environment is made"),
     ],
 )
 def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):

@@ -19,7 +19,16 @@ def _network(name: str) -> Network:
 
 def plan_file(name: str) -> Path | None:
     """Return the file with the training plan of a shipped policy, None when there is no policy of that name."""
-    path = _FOLDER / f"{name}.toml"
+    return _shipped(f"{name}.toml")
+
+
+def network_file(name: str) -> Path | None:
+    """Return the file with the network of a shipped policy, None when there is no policy of that name."""
+    return _shipped(f"{name}.npz")
+
+
+def _shipped(file: str) -> Path | None:
+    path = _FOLDER / file
     return path if path.is_file() else None
 
 
