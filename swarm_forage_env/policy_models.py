@@ -114,8 +114,7 @@ class ModelPolicy:
     def _fitting_interface(self, task: SwarmTask) -> LearnerInterface | None:
         """Return the interface whose spaces are those of the model; None for a model of the whole swarm."""
         n_robots, size = task.n_robots, task.layout.size
-        spaces_of_model = (self._network.observation_space, self._network.action_space)
-        found = tuple(describe_space(space) for space in spaces_of_model)
+        found = describe_spaces(self._network)
         if self._noted is not None:
             return self._noted_interface(self._noted, task, found)
         if found == (f"Box({n_robots}, {size})", f"Box({n_robots}, 3)"):
@@ -124,7 +123,7 @@ class ModelPolicy:
         for observation, actions, automatic in product(OBSERVATIONS, ACTIONS, (False, True)):
             config = InterfaceConfig(observation=observation, actions=actions, automatic_gripper=automatic)
             interface = LearnerInterface(config, task)
-            fitting = (describe_space(interface.observation_space), describe_space(interface.action_space))
+            fitting = describe_spaces(interface)
             if found == fitting:
                 return interface
             seen.append(" to ".join(fitting))
@@ -136,7 +135,7 @@ class ModelPolicy:
 
     def _noted_interface(self, noted: InterfaceConfig, task: SwarmTask, found: tuple[str, ...]) -> LearnerInterface:
         interface = LearnerInterface(noted, task)
-        fitting = (describe_space(interface.observation_space), describe_space(interface.action_space))
+        fitting = describe_spaces(interface)
         if found != fitting:
             raise ModelError(
                 f"Expected a model from {' to '.join(fitting)}, as the note in {self._path.name} says, got one from "
@@ -202,8 +201,12 @@ def _checked_digest(path: str | Path, planned: str | None) -> str:
     return found
 
 
-def describe_space(space: spaces.Space[Any]) -> str:
-    """Return kind and size of a space, which is what has to agree."""
+def describe_spaces(owner: Any) -> tuple[str, str]:
+    """Return kind and size of what a model or an interface sees and does, which is what has to agree."""
+    return _kind_and_size(owner.observation_space), _kind_and_size(owner.action_space)
+
+
+def _kind_and_size(space: spaces.Space[Any]) -> str:
     size = space.n if isinstance(space, spaces.Discrete) else ", ".join(map(str, space.shape or ()))
     return f"{type(space).__name__}({size})"
 

@@ -140,13 +140,12 @@ def plan_runs(options: WorldOptions, policies: Sequence[str], *, n_seeds: int, f
     config, caches = build_scenario(options, file_fields)
     wrappers = build_wrappers(options, file_wrappers)
     try:
-        return tuple(
-            plan_run(config, name, caches=caches, wrappers=wrappers, seed=seed)
-            for name in policies
-            for seed in range(first_seed, first_seed + n_seeds)
-        )
+        planned = [plan_run(config, name, caches=caches, wrappers=wrappers) for name in policies]
     except ValueError as error:  # of a policy or its file
         raise ConfigError(str(error)) from error
+    return tuple(
+        dataclasses.replace(spec, seed=seed) for spec in planned for seed in range(first_seed, first_seed + n_seeds)
+    )
 
 
 def default_folder(scenario_name: str) -> Path:

@@ -13,7 +13,7 @@ from swarm_forage_env.learning.interface import GivenInterface, InterfaceConfig,
 from swarm_forage_env.scenarios import scenario as preset
 from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.types import BoolArray, ObsArray
-from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.registry import wrapper_configs
 
 SCENARIO_OPTION = "scenario"
@@ -69,12 +69,8 @@ class WorldPlan:
             ConfigError: unknown fields, values that describe no world, or another number of robots.
         """
         scenario = same_robots(self.scenario, overrides)
-        env: ForageEnv | SwarmWrapper = ForageEnv(
-            scenario, max_cycles=self.max_cycles, render_mode=self.render_mode, reads=self.interface.reads
-        )
-        for config in sorted(self.wrappers, key=lambda config: config.stack_position, reverse=True):
-            env = config.wrap(env)
-        return env
+        env = ForageEnv(scenario, max_cycles=self.max_cycles, render_mode=self.render_mode, reads=self.interface.reads)
+        return wrap_in_order(env, self.wrappers)
 
 
 def plan_world(

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,17 +13,15 @@ from swarm_forage_env.policy import Grip, Policy, load_policy
 from swarm_forage_env.recording import RunRecord, software_versions
 from swarm_forage_env.rng import Stream, stream_rng
 from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.wrappers.base import WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.recorder import RunRecorder
-
-if TYPE_CHECKING:
-    from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
 WARM_UP_TICKS = 5
 """Ticks of a warm-up run under its policy: enough to reach every kernel that a tick always calls."""
 
 
 def build_stack(
-    scenario: ScenarioConfig, wrappers: "Iterable[WrapperConfig]" = (), *, reads: tuple[str, ...] | None = None
+    scenario: ScenarioConfig, wrappers: Iterable[WrapperConfig] = (), *, reads: tuple[str, ...] | None = None
 ) -> RunRecorder:
     """Build the environment with its wrappers, in the documented order, and a recorder around them.
 
@@ -32,10 +30,7 @@ def build_stack(
         wrappers: Wrapper configurations in any order, each kind at most once.
         reads: Observation slices that the policy looks at; default all.
     """
-    env: ForageEnv | SwarmWrapper = ForageEnv(scenario, reads=reads)
-    for config in sorted(wrappers, key=lambda config: config.stack_position, reverse=True):
-        env = config.wrap(env)
-    return RunRecorder(env)
+    return RunRecorder(wrap_in_order(ForageEnv(scenario, reads=reads), wrappers))
 
 
 def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:

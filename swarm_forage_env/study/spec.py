@@ -140,7 +140,7 @@ def plan_run(
     Args:
         scenario: The world, but for its caches.
         policy: Registered name, or path of a policy file.
-        parameters: Keyword arguments of the policy, plain values.
+        parameters: Keyword arguments of the policy, plain values; with a "digest" a file is pinned already.
         caches: Which caches the world has; default what the policy states in `caches`, or what the scenario has where
             the policy states nothing.
         fields: Further fields of `RunSpec`.
@@ -150,7 +150,7 @@ def plan_run(
         ValueError: no installed policy has that name, or a file that cannot be opened.
     """
     chosen = dict(parameters or {})
-    if is_policy_file(policy):
+    if is_policy_file(policy) and "digest" not in chosen:
         policy, chosen, stated = pin_policy_file(policy, chosen)
         caches = caches or stated
     elif caches is None:

@@ -5,6 +5,7 @@ wrapper costs microseconds, not a pass over all agents.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -170,3 +171,11 @@ class WrapperConfig(ABC):
             ConfigError: an unknown or missing key, or a value that the class refuses.
         """
         return configs.from_mapping(cls, mapping)
+
+
+def wrap_in_order(env: ForageEnv, wrappers: Iterable[WrapperConfig]) -> ForageEnv | SwarmWrapper:
+    """Put wrappers around an environment in the documented order, whatever the order of their configurations."""
+    stack: ForageEnv | SwarmWrapper = env
+    for config in sorted(wrappers, key=lambda config: config.stack_position, reverse=True):
+        stack = config.wrap(stack)
+    return stack

@@ -7,10 +7,13 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from swarm_forage_env import policy_models
+from swarm_forage_env.cli.plan import WorldOptions, plan_runs
 from swarm_forage_env.config import ConfigError
 from swarm_forage_env.learning.interface import InterfaceConfig
 from swarm_forage_env.learning.network import Network, NetworkAbout
 from swarm_forage_env.policy import policy_class, policy_names
+from swarm_forage_env.policy_models import file_digest
 from swarm_forage_env.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
 from swarm_forage_env.study.spec import RunSpec, plan_run
@@ -201,3 +204,17 @@ def test_a_policy_file_runs_in_the_world_it_was_made_for(tmp_path):
 def test_a_missing_policy_file_is_found_before_anything_is_run(tmp_path):
     with pytest.raises(ValueError, match=r"gone\.npz"):
         plan_run(scenario("warehouse_small"), str(tmp_path / "gone.npz"))
+
+
+def test_a_file_that_is_pinned_already_stays_so(tmp_path):
+    """A plan of many runs opens a file once; that the file has changed since is found by the run."""
+    spec = plan_run(scenario("warehouse_small"), str(tmp_path / "gone.npz"), parameters={"digest": "0"})
+    assert (spec.policy, spec.parameters) == (str(tmp_path / "gone.npz"), {"digest": "0"})
+
+
+def test_runs_of_a_file_open_it_once(tmp_path, monkeypatch):
+    opened = []
+    monkeypatch.setattr(policy_models, "file_digest", lambda path: opened.append(path) or file_digest(path))
+    path = str(network_file(tmp_path / "net.npz"))
+    plan_runs(WorldOptions(scenario="warehouse_small"), [path], n_seeds=3, first_seed=5)
+    assert opened == [path, path]  # once to pin it, once to try it

@@ -13,7 +13,7 @@ from torch import nn
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.learning.network import Network, NetworkAbout, NetworkError
-from swarm_forage_env.policy_models import MODEL_NOTE, describe_space
+from swarm_forage_env.policy_models import MODEL_NOTE, describe_spaces
 from swarm_forage_env.scenarios import scenario
 
 _ACTIVATIONS: dict[type[nn.Module], str] = {nn.Tanh: "tanh", nn.ReLU: "relu"}
@@ -90,8 +90,7 @@ def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
     """Refuse an interface with other observations or actions than the model has."""
     # Any world will do: all have the same columns and actions.
     bound = LearnerInterface(interface, ForageEnv(scenario("warehouse_small", n_robots=1, n_objects=1)).task)
-    wanted = [describe_space(space) for space in (bound.observation_space, bound.action_space)]
-    found = [describe_space(space) for space in (model.observation_space, model.action_space)]
+    wanted, found = describe_spaces(bound), describe_spaces(model)
     if wanted != found:
         raise NetworkError(
             f"Expected a model from {' to '.join(wanted)} for this interface, got one from {' to '.join(found)}; give "
