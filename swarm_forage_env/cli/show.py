@@ -44,7 +44,7 @@ def information(name: str) -> str:
         return "\n".join(_scenario_lines(scenarios.scenario(name), _first_line(getattr(scenarios, name))))
     if name in policy_names():
         network = network_file(name)
-        return "\n".join(_policy_lines(name) if network is None else _shipped_lines(name, network))
+        return "\n".join([*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])])
     if is_policy_file(name):
         return "\n".join(_file_lines(Path(name)))
     known = (*scenarios.SCENARIO_NAMES, *policy_names())
@@ -77,19 +77,14 @@ def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
 
 def _policy_lines(name: str) -> Iterator[str]:
     policy = policy_class(name)
-    reads = getattr(policy, "reads", None)
+    network = network_file(name)
+    reads = getattr(policy, "reads", None) if network is None else Network.load(network).about.interface.reads
     yield f"{name}: {inspect.getdoc(policy) or 'no description'}"
     yield ""
     yield f"  defined in  {policy.__module__}"
     yield f"  parameters  {inspect.signature(policy)}"
     yield f"  caches      {getattr(policy, 'caches', 'none')} (the world it is made for)"
-    yield f"  reads       {_slices(reads)}"
-
-
-def _shipped_lines(name: str, network: Path) -> Iterator[str]:
-    yield f"{name}: {inspect.getdoc(policy_class(name))}"
-    yield ""
-    yield from _file_lines(network)
+    yield f"  reads       {'all slices' if reads is None else ', '.join(reads) or 'nothing'}"
 
 
 def _file_lines(file: Path) -> Iterator[str]:
@@ -109,7 +104,6 @@ def _file_lines(file: Path) -> Iterator[str]:
     for name, value in dataclasses.asdict(about.interface).items():
         yield f"  {name:<20}{_plain(value)}"
     yield f"  {'caches':<20}{about.caches} (the world it is made for)"
-    yield f"  {'reads':<20}{_slices(about.interface.reads)}"
     for part, values in about.card.items():
         if part != "plan":  # a page of its own
             yield ""
@@ -119,10 +113,6 @@ def _file_lines(file: Path) -> Iterator[str]:
                     yield f"    {name:<24}{value:.6g}" if isinstance(value, float) else f"    {name:<24}{_plain(value)}"
             else:
                 yield f"    {_plain(values)}"
-
-
-def _slices(reads: tuple[str, ...] | None) -> str:
-    return "all slices" if reads is None else ", ".join(reads) or "nothing"
 
 
 def _first_line(documented: Any) -> str:
