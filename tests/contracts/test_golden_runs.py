@@ -1,0 +1,38 @@
+"""The same runs give the same bits as before: presets x controllers x readings x wrappers, and batches for learners."""
+
+import json
+
+import pytest
+
+from tests.support.golden_runs import FILE, INTERFACES, batch_fingerprint, golden_specs, machine, run_fingerprint
+
+STORED = json.loads(FILE.read_text(encoding="utf-8"))
+SPECS = golden_specs()
+CHANGED = (
+    "Results have changed. If they were meant to: python -m tests.support.golden_runs, a line in the changelog, and a "
+    "new version of the environment ids."
+)
+
+pytestmark = [
+    pytest.mark.compiled,
+    pytest.mark.skipif(
+        machine() != STORED["made_with"],
+        reason=f"fingerprints are for {STORED['made_with']}, the last bits differ with others",
+    ),
+]
+
+
+def test_every_run_has_a_fingerprint():
+    names = {*SPECS, *(f"batch/{name}" for name in INTERFACES)}
+    assert names == set(STORED["fingerprints"])
+    assert len(set(STORED["fingerprints"].values())) == len(names)
+
+
+@pytest.mark.parametrize("name", SPECS)
+def test_a_run_gives_the_same_bits(name):
+    assert run_fingerprint(SPECS[name]) == STORED["fingerprints"][name], CHANGED
+
+
+@pytest.mark.parametrize("name", INTERFACES)
+def test_a_batch_for_learners_gives_the_same_bits(name):
+    assert batch_fingerprint(INTERFACES[name]) == STORED["fingerprints"][f"batch/{name}"], CHANGED

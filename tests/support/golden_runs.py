@@ -1,0 +1,98 @@
+"""Fingerprints of short runs of every kind: a change that must not change results has to leave them alone.
+
+`python -m tests.support.golden_runs` writes them anew. Do that only for a change that is meant to change results, and
+say in the changelog which ones and why.
+"""
+
+import hashlib
+import json
+import platform
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarm_forage_env import AUTHORS_PROGRAM, SCENARIO_NAMES, Quirks
+from swarm_forage_env.learning.arenas import ArenaBatch
+from swarm_forage_env.learning.worlds import plan_world
+from swarm_forage_env.study.run import run_one
+from swarm_forage_env.study.spec import RunSpec, plan_run
+from tests.contracts.foraging import mild_wrappers, quick_world
+
+FILE = Path(__file__).with_suffix(".json")
+POLICIES = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
+READINGS = {"described": Quirks(), "program": AUTHORS_PROGRAM}
+WRAPPERS = {"calm": (), "adverse": mild_wrappers()}
+FAR: dict[str, dict[str, Any]] = {"warehouse_small": {"nest_centre_m": (3.2, 8.0), "nest_size_m": (3.2, 12.8)}}
+"""The nest where the preset has it: a static cache needs the room in between."""
+INTERFACES: dict[str, dict[str, Any]] = {
+    "full": {},
+    "compact": {"observation": "compact", "actions": "discrete", "automatic_gripper": True, "decision_ticks": 5},
+}
+
+
+def machine() -> dict[str, str]:
+    """What the last bits of a result depend on besides this package."""
+    packages = ("numpy", "numba", "pymunk")
+    return {"machine": platform.machine(), **{name: version(name) for name in packages}}
+
+
+def golden_specs() -> dict[str, RunSpec]:
+    """One run for each preset, controller, reading and set of wrappers, by a name that tells them."""
+    specs = {}
+    for scenario in SCENARIO_NAMES:
+        for policy in POLICIES:
+            for reading, quirks in READINGS.items():
+                for adversity, wrappers in WRAPPERS.items():
+                    world = quick_world(scenario, quirks=quirks, interval_s=60.0, **FAR.get(scenario, {}))
+                    name = f"{scenario}/{policy}/{reading}/{adversity}"
+                    specs[name] = plan_run(world, policy, wrappers=wrappers, seed=7)
+    return specs
+
+
+def run_fingerprint(spec: RunSpec) -> str:
+    """Fingerprint of a run's identity and of every column of its record."""
+    record = run_one(spec)
+    seen = hashlib.sha256(record.run_id.encode())
+    for name, values in record.columns().items():
+        seen.update(name.encode() + values.tobytes())
+    return seen.hexdigest()[:16]
+
+
+def batch_fingerprint(interface: dict[str, Any]) -> str:
+    """Fingerprint of all that a learner meets in two arenas, deaths and new starts included."""
+    plan = plan_world(
+        quick_world("warehouse_small", n_robots=20, horizon_s=40.0, interval_s=40.0),
+        {},
+        interface=interface,
+        wrappers=mild_wrappers(),
+    )
+    batch = ArenaBatch(plan, 2)
+    chance = np.random.default_rng(3)
+    obs, active = batch.reset([5, 6], [None, None])
+    seen = hashlib.sha256(obs.tobytes() + active.tobytes())
+    for _ in range(250):
+        space = batch.interface.action_space
+        actions = np.stack([_action(space, chance) for _ in range(batch.n_rows)])
+        step = batch.step(actions)
+        for part in (step.obs, step.rewards, step.terminated, step.truncated, step.active, step.final_obs):
+            seen.update(part.tobytes())
+    return seen.hexdigest()[:16]
+
+
+def _action(space: Any, chance: np.random.Generator) -> Any:
+    if hasattr(space, "n"):
+        return np.int64(chance.integers(space.n))
+    return chance.uniform(-1.0, 1.0, space.shape).astype(np.float32)
+
+
+def write_all() -> None:
+    """Run everything and write the file of fingerprints."""
+    runs = {name: run_fingerprint(spec) for name, spec in golden_specs().items()}
+    runs |= {f"batch/{name}": batch_fingerprint(interface) for name, interface in INTERFACES.items()}
+    FILE.write_text(json.dumps({"made_with": machine(), "fingerprints": runs}, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_all()
