@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from swarm_forage_env.compiling import kernel
-from swarm_forage_env.types import Row
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.types import Row
 
 from .cache_memory import OneTaskMemory, covers
 from .machines import ACQUIRE, TRANSPORT, Senses

@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env.compiling import kernel
-from swarm_forage_env.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
-from swarm_forage_env.policy import SwarmTask
-from swarm_forage_env.types import IntArray, Row
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
+from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.types import IntArray, Row
 
 from .memory import ObjectMemory, OneMemory, forget, memory_of, new_memory, object_row_of
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel
 
 from .cache_memory import OneTaskMemory
 from .machines import Senses

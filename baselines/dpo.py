@@ -8,9 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env.compiling import kernel
-from swarm_forage_env.policy import SwarmTask
-from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 from .machines import (
     ACQUIRE,

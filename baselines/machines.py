@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarm_forage_env.compiling import inline_kernel, kernel
-from swarm_forage_env.detection import is_obstacle_vector, ring_sum, sees_nest, sees_object
-from swarm_forage_env.layout import EVENT_SCALE
-from swarm_forage_env.policy import Event, Grip
-from swarm_forage_env.types import Row
+from swarm_forage_env._internal.compiling import inline_kernel, kernel
+from swarm_forage_env.contract.codes import Event, Grip
+from swarm_forage_env.contract.detection import is_obstacle_vector, ring_sum, sees_nest, sees_object
+from swarm_forage_env.contract.layout import EVENT_SCALE
+from swarm_forage_env.contract.types import Row
 
 from .motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander
 

@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env.compiling import kernel
-from swarm_forage_env.layout import WINDOW_CELLS
-from swarm_forage_env.types import IntArray, ObsArray, Row
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.layout import WINDOW_CELLS
+from swarm_forage_env.contract.types import IntArray, ObsArray, Row
 
 _WINDOW = WINDOW_CELLS * WINDOW_CELLS
 _REACH = WINDOW_CELLS // 2

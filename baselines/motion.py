@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 
-from swarm_forage_env.compiling import kernel
-from swarm_forage_env.detection import ring_sum
-from swarm_forage_env.types import Row
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.detection import ring_sum
+from swarm_forage_env.contract.types import Row
 
 
 @kernel

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.compiling import inline_kernel, kernel
-from swarm_forage_env.detection import sees_object
-from swarm_forage_env.types import Row
+from swarm_forage_env._internal.compiling import inline_kernel, kernel
+from swarm_forage_env.contract.detection import sees_object
+from swarm_forage_env.contract.types import Row
 
 from .machines import Senses
 from .memory import OneMemory, density

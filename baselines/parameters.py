@@ -12,9 +12,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from swarm_forage_env.policy import SwarmTask
-from swarm_forage_env.spelling import suggestion
-from swarm_forage_env.types import BoolArray, ObsArray
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.types import BoolArray, ObsArray
 
 COLUMNS = (
     "proximity",

@@ -17,10 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarm_forage_env.compiling import kernel
-from swarm_forage_env.policy import Task
-from swarm_forage_env.quirks import Quirks
-from swarm_forage_env.types import BoolArray, CodeArray, FloatArray, IntArray, Row
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray, Row
+from swarm_forage_env.scenarios.quirks import Quirks
 
 from .machines import ACQUIRE, TRANSPORT, WAIT_DROP, WAIT_PICKUP
 from .tasks import N_TABS, N_TASKS, ROOTED_TAB, SOURCE, TAB_CHILDREN, TAB_ROOT, Goal, Tab, TaskParameters

@@ -15,11 +15,11 @@ Source: STOCHM and STOCHX of the paper, section "Candidate Algorithms".
 
 import numpy as np
 
-from swarm_forage_env.compiling import inline_kernel, kernel
-from swarm_forage_env.detection import sees_cache
-from swarm_forage_env.layout import CACHE_FIELDS
-from swarm_forage_env.policy import Event, Task
-from swarm_forage_env.types import ActionArray, BoolArray, FloatArray, ObsArray, Row
+from swarm_forage_env._internal.compiling import inline_kernel, kernel
+from swarm_forage_env.contract.codes import Event, Task
+from swarm_forage_env.contract.detection import sees_cache
+from swarm_forage_env.contract.layout import CACHE_FIELDS
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray, Row
 
 from .cache_choice import cache_is_known, object_is_near, select_cache, select_isolated_object
 from .cache_memory import (

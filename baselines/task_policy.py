@@ -5,8 +5,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env.policy import SwarmTask
-from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 from .cache_memory import new_task_memory
 from .memory import density, remembered_objects

@@ -18,7 +18,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from swarm_forage_env.policy import Grip, Task
+from swarm_forage_env.contract.codes import Grip, Task
 
 from .machines import DRAWS
 from .object_choice import MemoryParameters

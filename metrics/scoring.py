@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from swarm_forage_env.config import ScenarioConfig
-    from swarm_forage_env.recording import RunRecord
+    from swarm_forage_env.scenarios.config import ScenarioConfig
     from swarm_forage_env.study.experiments import Budget, Experiment
+    from swarm_forage_env.study.record import RunRecord
     from swarm_forage_env.study.runner import StudyResult
     from swarm_forage_env.study.spec import RunSpec
 
@@ -209,7 +209,7 @@ def plan_scores(
     caches: str | None = None,
 ) -> ScoringPlan:
     """Return what `score_policy` and `compare_policies` would run; arguments and errors as there."""
-    from swarm_forage_env import scenarios
+    from swarm_forage_env.scenarios.presets import scenario as preset
     from swarm_forage_env.study import experiments
 
     wanted = check_measures(measures)
@@ -217,7 +217,7 @@ def plan_scores(
     allowed = experiments.budget(budget) if isinstance(budget, str) else budget
     if horizon_s is not None:
         allowed = replace(allowed, horizon_s=horizon_s)
-    world = scenarios.scenario(scenario) if isinstance(scenario, str) else scenario
+    world = preset(scenario) if isinstance(scenario, str) else scenario
     named = policies.items() if isinstance(policies, Mapping) else [(None, policy) for policy in policies]
     contestants = tuple(_contestant(policy, name, parameters or {}, world) for name, policy in named)
     contestants = _told_apart(contestants)
@@ -242,7 +242,7 @@ def run_scores(
     progress: bool = True,
 ) -> tuple[ScoreTable, ...]:
     """Run a plan and return one table per policy; arguments and errors as in `score_policy`."""
-    from swarm_forage_env.policy import local_policy
+    from swarm_forage_env.policies.registry import local_policy
     from swarm_forage_env.study.runner import run_all
     from swarm_forage_env.study.store import RunStore
 
@@ -295,7 +295,7 @@ def _contestant(
     policy: PolicyLike, name: str | None, parameters: Mapping[str, Any], world: "ScenarioConfig"
 ) -> Contestant:
     """Find out what was given as a policy."""
-    from swarm_forage_env.policy import from_callable, is_policy_file, policy_class
+    from swarm_forage_env.policies.registry import from_callable, is_policy_file, policy_class
     from swarm_forage_env.study.spec import pin_policy_file
 
     if isinstance(policy, (str, Path)):

@@ -29,17 +29,17 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-import swarm_forage_env.arena as arena_module
-from swarm_forage_env.config import ScenarioConfig, with_overrides
-from swarm_forage_env.env import parallel_env
-from swarm_forage_env.kernels.gaussian import to_normal
-from swarm_forage_env.physics import Physics
-from swarm_forage_env.policy import load_policy, policy_names
-from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.scenarios import warehouse_medium, warehouse_small
+import swarm_forage_env.world.arena as arena_module
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.policies.registry import load_policy, policy_names
+from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.presets import warehouse_medium, warehouse_small
 from swarm_forage_env.study.run import build_stack, run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.views.pettingzoo import parallel_env
+from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.kernels.gaussian import to_normal
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
 OBJECTS_PER_M2 = 0.35
@@ -158,7 +158,7 @@ def learning_rows(ticks: int, repeats: int) -> Iterator[Row]:
     import torch  # pyright: ignore[reportMissingImports]
     from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
 
-    from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, SwarmVecEnv
+    from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, SwarmVecEnv
 
     env = SwarmVecEnv("warehouse_small")
     env.seed(0)
@@ -200,7 +200,7 @@ import time
 started = time.process_time()
 from swarm_forage_env.study.run import warm_up
 from swarm_forage_env.study.spec import plan_run
-from swarm_forage_env.scenarios import warehouse_small
+from swarm_forage_env.scenarios.presets import warehouse_small
 warm_up(plan_run(warehouse_small(), "crw"))
 print(time.process_time() - started)
 """

@@ -21,8 +21,8 @@ import torch
 from torch import nn
 
 import swarm_forage_env  # noqa: F401 - registers the environments
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.network import Network, NetworkAbout
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.network import Network, NetworkAbout
 
 INTERFACE = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
 NARROW = {"width_m": 12.0, "nest_centre_m": (1.2, 8.0), "nest_size_m": (1.2, 12.8)}

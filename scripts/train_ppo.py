@@ -13,9 +13,9 @@ from pathlib import Path
 import torch
 from stable_baselines3 import PPO
 
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, SwarmVecEnv
-from swarm_forage_env.learning.sb3.export import export_network
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, SwarmVecEnv
+from swarm_forage_env.training.sb3.export import export_network
 
 
 def main() -> None:

@@ -10,35 +10,29 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 import pettingzoo
 
-from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 
 if TYPE_CHECKING:
-    from swarm_forage_env.config import ConfigError, ScenarioConfig, with_overrides
-    from swarm_forage_env.env import ForageEnv, parallel_env
-    from swarm_forage_env.layout import ObservationLayout
-    from swarm_forage_env.policy import (
-        Event,
-        Grip,
-        Policy,
-        RandomPolicy,
-        SwarmTask,
-        Task,
-        from_callable,
-        load_policy,
-        policy_names,
-    )
-    from swarm_forage_env.quirks import AUTHORS_PROGRAM, Quirks
-    from swarm_forage_env.recording import RunRecord
-    from swarm_forage_env.rendering_run import record_run
-    from swarm_forage_env.signals import Waveform
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.contract.codes import Event, Grip, Task
+    from swarm_forage_env.contract.layout import ObservationLayout
+    from swarm_forage_env.contract.policy import Policy, SwarmTask
+    from swarm_forage_env.env import ForageEnv
+    from swarm_forage_env.policies.registry import RandomPolicy, from_callable, load_policy, policy_names
+    from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+    from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
+    from swarm_forage_env.study.film import record_run
+    from swarm_forage_env.study.record import RunRecord
     from swarm_forage_env.study.run import build_stack, run_one, run_policy
     from swarm_forage_env.study.runner import run_all
     from swarm_forage_env.study.spec import RunSpec, plan_run
+    from swarm_forage_env.views.pettingzoo import parallel_env
     from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig, SensorNoise, SensorNoiseConfig
     from swarm_forage_env.wrappers.population import PopulationConfig, PopulationDynamics
     from swarm_forage_env.wrappers.recorder import RunRecorder
     from swarm_forage_env.wrappers.registry import parse_wrapper
     from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
+    from swarm_forage_env.wrappers.waveform import Waveform
 
     __version__: str
 
@@ -84,42 +78,42 @@ __all__ = [
 ]
 
 _HOMES = {
-    "AUTHORS_PROGRAM": "quirks",
+    "AUTHORS_PROGRAM": "scenarios.quirks",
     "ActuatorNoise": "wrappers.noise",
     "ActuatorNoiseConfig": "wrappers.noise",
-    "ConfigError": "config",
-    "Event": "policy",
+    "ConfigError": "_internal.fields",
+    "Event": "contract.codes",
     "ForageEnv": "env",
-    "Grip": "policy",
-    "ObservationLayout": "layout",
-    "Policy": "policy",
+    "Grip": "contract.codes",
+    "ObservationLayout": "contract.layout",
+    "Policy": "contract.policy",
     "PopulationConfig": "wrappers.population",
     "PopulationDynamics": "wrappers.population",
-    "Quirks": "quirks",
-    "RandomPolicy": "policy",
-    "RunRecord": "recording",
+    "Quirks": "scenarios.quirks",
+    "RandomPolicy": "policies.registry",
+    "RunRecord": "study.record",
     "RunRecorder": "wrappers.recorder",
     "RunSpec": "study.spec",
-    "ScenarioConfig": "config",
+    "ScenarioConfig": "scenarios.config",
     "SensorNoise": "wrappers.noise",
     "SensorNoiseConfig": "wrappers.noise",
-    "SwarmTask": "policy",
-    "Task": "policy",
+    "SwarmTask": "contract.policy",
+    "Task": "contract.codes",
     "Throttle": "wrappers.throttle",
     "ThrottleConfig": "wrappers.throttle",
-    "Waveform": "signals",
+    "Waveform": "wrappers.waveform",
     "build_stack": "study.run",
-    "from_callable": "policy",
-    "load_policy": "policy",
-    "parallel_env": "env",
+    "from_callable": "policies.registry",
+    "load_policy": "policies.registry",
+    "parallel_env": "views.pettingzoo",
     "parse_wrapper": "wrappers.registry",
     "plan_run": "study.spec",
-    "policy_names": "policy",
-    "record_run": "rendering_run",
+    "policy_names": "policies.registry",
+    "record_run": "study.film",
     "run_all": "study.runner",
     "run_one": "study.run",
     "run_policy": "study.run",
-    "with_overrides": "config",
+    "with_overrides": "scenarios.config",
 }
 """Public name -> submodule that defines it, loaded when the name is first used."""
 
@@ -145,13 +139,13 @@ def _register_environments() -> None:
     for name in SCENARIO_NAMES:
         env_id = f"swarm_forage/{name}-v0"
         kwargs = {"scenario": name}
-        pettingzoo.register("parallel", env_id, "swarm_forage_env.learning.parallel:parallel_env", kwargs=kwargs)
-        pettingzoo.register("aec", env_id, "swarm_forage_env.learning.parallel:env", kwargs=kwargs)
+        pettingzoo.register("parallel", env_id, "swarm_forage_env.views.pettingzoo:parallel_env", kwargs=kwargs)
+        pettingzoo.register("aec", env_id, "swarm_forage_env.views.pettingzoo:env", kwargs=kwargs)
         gymnasium.register(
             env_id,
-            "swarm_forage_env.adapters:JointForageEnv",
+            "swarm_forage_env.views.gymnasium:JointForageEnv",
             kwargs=kwargs,
-            vector_entry_point="swarm_forage_env.adapters:SwarmVectorEnv",
+            vector_entry_point="swarm_forage_env.views.gymnasium:SwarmVectorEnv",
         )
 
 

@@ -7,17 +7,17 @@ from typing import Any, TypeAlias
 import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
-from pettingzoo.utils.conversions import parallel_to_aec
 
-from swarm_forage_env.actuators import ActionError
-from swarm_forage_env.arena import ForagingArena
-from swarm_forage_env.config import ConfigError, ScenarioConfig, with_overrides
-from swarm_forage_env.layout import CELL_M, WHEEL_SCALE_MPS, ObservationLayout
-from swarm_forage_env.policy import SwarmTask
-from swarm_forage_env.rewards import RewardModel
-from swarm_forage_env.scenarios import scenario as preset
-from swarm_forage_env.state import CacheState, ObjectState, ObjectStatus, StepEvents, SwarmState
-from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import ObjectStatus
+from swarm_forage_env.contract.layout import ObservationLayout
+from swarm_forage_env.contract.policy import ActionError, SwarmTask
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.units import CELL_M, WHEEL_SCALE_MPS
+from swarm_forage_env.world.arena import ForagingArena
+from swarm_forage_env.world.rewards import RewardModel
+from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
 BatchStep: TypeAlias = tuple[ObsArray, np.ndarray, BoolArray, bool]
 """Observations (N, D), rewards (N,) float32, terminated (N,), truncated."""
@@ -374,46 +374,9 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
         if self.render_mode is None:
             return None
-        from swarm_forage_env.rendering import render_frame  # optional extra: only when a picture is asked for
+        from swarm_forage_env.rendering.frame import render_frame  # optional extra: only when a picture is asked for
 
         return render_frame(self.scenario, self.swarm, self.objects, self.caches, self.events, tick=self.tick)
 
     def close(self) -> None:
         """Nothing to release."""
-
-
-def parallel_env(
-    scenario: str | ScenarioConfig = "warehouse_small",
-    *,
-    max_cycles: int | None = None,
-    render_mode: str | None = None,
-    **overrides: Any,
-) -> ForageEnv:
-    """Create a parallel environment.
-
-    Args:
-        scenario: Name of a preset, or a complete configuration.
-        max_cycles: Steps until truncation; default the scenario's horizon.
-        render_mode: None or "rgb_array".
-        overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
-
-    Raises:
-        ConfigError: unknown preset or field, or values that describe no world.
-    """
-    for word in ("interface", "wrappers"):
-        if word in overrides:
-            raise ConfigError(
-                f"Expected scenario fields, got {word}=, which pettingzoo.make('parallel', id, {word}=...) and "
-                "swarm_forage_env.learning.parallel.parallel_env take."
-            )
-    if isinstance(scenario, ScenarioConfig):
-        config = with_overrides(scenario, **overrides)
-    else:
-        config = preset(scenario, **overrides)
-    return ForageEnv(config, max_cycles=max_cycles, render_mode=render_mode)
-
-
-def env(scenario: str | ScenarioConfig = "warehouse_small", **options: Any) -> Any:
-    """Create the agent-by-agent (AEC) form by PettingZoo's own conversion; arguments as `parallel_env`."""
-    parallel = parallel_env(scenario, **options)
-    return parallel_to_aec(parallel)  # pyright: ignore[reportArgumentType] - it wants an action type that may be None

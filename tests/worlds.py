@@ -9,12 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.caches import create_cache
-from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, Counter, Event
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import Grip
-from swarm_forage_env.scenarios import scenario
-from swarm_forage_env.state import ObjectStatus
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.world.caches import create_cache
 
 NEST_CELL = (16, 40)
 OPEN_CELL = (60, 40)

@@ -52,8 +52,8 @@ app = typer.Typer(
 
 def main() -> None:
     """Run the command line and exit; whatever a person got wrong is one line on stderr."""
-    from swarm_forage_env.config import ConfigError
-    from swarm_forage_env.recording import RecordError
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.study.record import RecordError
 
     try:
         code = app(standalone_mode=False)
@@ -216,7 +216,7 @@ def info(name: Annotated[str, typer.Argument(help="A scenario, an environment id
 @app.command()
 def schema() -> None:
     """Show the columns of run records: name, type, unit, meaning."""
-    from swarm_forage_env.recording import schema_table
+    from swarm_forage_env.study.record import schema_table
 
     typer.echo(schema_table())
 
@@ -224,9 +224,9 @@ def schema() -> None:
 @app.command()
 def rerun(file: Annotated[Path, typer.Argument(help="A record (.parquet) or a failure (.json).")]) -> None:
     """Run a stored run again, here; a record is compared with what comes out, a failure shows its traceback."""
-    from swarm_forage_env.config import ConfigError
-    from swarm_forage_env.policy import load_policy
-    from swarm_forage_env.recording import RunRecord
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.policies.registry import load_policy
+    from swarm_forage_env.study.record import RunRecord
     from swarm_forage_env.study.run import run_one, run_policy
     from swarm_forage_env.study.spec import RunSpec
     from swarm_forage_env.study.store import read_failure
@@ -271,10 +271,10 @@ def record(
     from rich.progress import Progress
 
     from swarm_forage_env.cli.plan import WorldOptions, plan_runs
-    from swarm_forage_env.learning.network import NetworkError
-    from swarm_forage_env.policy_models import ModelError
-    from swarm_forage_env.rendering_run import record_run
-    from swarm_forage_env.rendering_view import RenderError
+    from swarm_forage_env.policies.model_files import ModelError
+    from swarm_forage_env.policies.network import NetworkError
+    from swarm_forage_env.rendering.view import RenderError
+    from swarm_forage_env.study.film import record_run
 
     options = WorldOptions(
         scenario=scenario,

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env.config import ConfigError
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
 if TYPE_CHECKING:

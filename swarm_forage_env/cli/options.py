@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.extras import install_command
+from swarm_forage_env._internal.extras import install_command
 
 EXIT_FAILURE = 1
 EXIT_USAGE = 2

@@ -5,10 +5,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.cli.config_file import read_config
-from swarm_forage_env.config import SECTIONS, ConfigError, ScenarioConfig, field_sections
-from swarm_forage_env.scenarios import scenario
-from swarm_forage_env.spelling import suggestion
+from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig, field_sections
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper

@@ -12,9 +12,9 @@ from rich.table import Table
 
 from metrics.score_table import counted
 from metrics.statistics import aggregate
-from swarm_forage_env.plots import Curve, draw_curves
-from swarm_forage_env.recording import RunRecord
+from swarm_forage_env.rendering.plots import Curve, draw_curves
 from swarm_forage_env.study.progress import duration
+from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.runner import StudyResult
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import RunStore

@@ -9,23 +9,24 @@ from typing import Any
 
 from rich.table import Table
 
-from swarm_forage_env import scenarios
-from swarm_forage_env.config import ConfigError, ScenarioConfig
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.learning.network import Network
-from swarm_forage_env.learning.pretrained import network_file
-from swarm_forage_env.policy import is_policy_file, policy_class, policy_names
-from swarm_forage_env.spelling import suggestion
+from swarm_forage_env.policies.network import Network
+from swarm_forage_env.policies.pretrained import network_file
+from swarm_forage_env.policies.registry import is_policy_file, policy_class, policy_names
+from swarm_forage_env.scenarios import presets
+from swarm_forage_env.scenarios.config import ScenarioConfig
 
 
 def overview() -> tuple[Table, Table]:
     """Return the tables of scenarios and of policies."""
     worlds = Table("scenario", "robots", "objects", "arena", "what it is", title="scenarios")
-    for name in scenarios.SCENARIO_NAMES:
-        config = scenarios.scenario(name)
+    for name in presets.SCENARIO_NAMES:
+        config = presets.scenario(name)
         size = f"{config.arena.width_m:g} x {config.arena.height_m:g} m"
         counts = (str(config.robots.n_robots), str(config.objects.n_objects))
-        worlds.add_row(name, *counts, size, _first_line(getattr(scenarios, name)))
+        worlds.add_row(name, *counts, size, _first_line(getattr(presets, name)))
     policies = Table("policy", "caches", "what it is", title="policies")
     for name in policy_names():
         policy = policy_class(name)
@@ -40,14 +41,14 @@ def information(name: str) -> str:
         ConfigError: neither a scenario nor a policy has that name, or the file holds none.
     """
     name = re.sub(r"^swarm_forage/(\w+)-v\d+$", r"\1", name)
-    if name in scenarios.SCENARIO_NAMES:
-        return "\n".join(_scenario_lines(scenarios.scenario(name), _first_line(getattr(scenarios, name))))
+    if name in presets.SCENARIO_NAMES:
+        return "\n".join(_scenario_lines(presets.scenario(name), _first_line(getattr(presets, name))))
     if name in policy_names():
         network = network_file(name)
         return "\n".join([*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])])
     if is_policy_file(name):
         return "\n".join(_file_lines(Path(name)))
-    known = (*scenarios.SCENARIO_NAMES, *policy_names())
+    known = (*presets.SCENARIO_NAMES, *policy_names())
     raise ConfigError(f"Unknown scenario or policy {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
 
 

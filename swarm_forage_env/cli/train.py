@@ -9,14 +9,17 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.cli.options import NO_PICTURE
 from swarm_forage_env.cli.plan import WorldOptions, build_scenario, build_wrappers
 from swarm_forage_env.cli.report import PERFORMANCE_WORDS
-from swarm_forage_env.config import ConfigError, ScenarioConfig, with_overrides
-from swarm_forage_env.layout import CELLS_PER_M
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.plan import (
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.pretrained import plan_file
+from swarm_forage_env.rendering.plots import draw_training
+from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.units import CELLS_PER_M
+from swarm_forage_env.training.plan import (
     DEFAULT_HIDDEN,
     DEFAULT_STEPS,
     Evaluation,
@@ -26,8 +29,6 @@ from swarm_forage_env.learning.plan import (
     TrainingStatus,
     read_plan,
 )
-from swarm_forage_env.learning.pretrained import plan_file
-from swarm_forage_env.plots import draw_training
 
 DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
     "ppo": {
@@ -185,7 +186,7 @@ def resumed_plan(folder: Path, described: TrainingPlan | None, steps: int | None
     Raises:
         ConfigError: no training there, options that differ from its plan, or fewer steps.
     """
-    from swarm_forage_env.learning.sb3.training import PLAN_FILE, kept_plan
+    from swarm_forage_env.training.sb3.training import PLAN_FILE, kept_plan
 
     kept = kept_plan(folder)
     plan = kept if steps is None else kept.longer(steps)
@@ -228,7 +229,7 @@ def run_training(plan: TrainingPlan, folder: Path, *, n_processes: int, resume: 
         ImportError: stable-baselines3 is not installed.
         ConfigError: see `training.train`.
     """
-    from swarm_forage_env.learning.sb3.training import MODEL_FILE, train
+    from swarm_forage_env.training.sb3.training import MODEL_FILE, train
 
     console = Console(stderr=True, highlight=False)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())

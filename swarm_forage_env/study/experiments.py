@@ -14,15 +14,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from swarm_forage_env.config import ConfigError, ScenarioConfig
-from swarm_forage_env.quirks import AUTHORS_PROGRAM
-from swarm_forage_env.scenarios import (
-    SEARCH_AND_RESCUE_OBJECTS,
-    robots_at_density,
-    scenario,
-    search_and_rescue,
-)
-from swarm_forage_env.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, robots_at_density, scenario, search_and_rescue
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, noise_levels

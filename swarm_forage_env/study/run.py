@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import Grip, Policy, load_policy
-from swarm_forage_env.recording import RunRecord, software_versions
-from swarm_forage_env.rng import Stream, stream_rng
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.study.record import RunRecord, software_versions
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.wrappers.base import WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.recorder import RunRecorder

@@ -25,8 +25,8 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, TypeAlias
 
-from swarm_forage_env.recording import RunRecord, software_versions
 from swarm_forage_env.study.progress import RunProgress
+from swarm_forage_env.study.record import RunRecord, software_versions
 from swarm_forage_env.study.run import run_one, warm_up
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import RunFailure, RunStore

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env.config import ConfigError, ScenarioConfig, from_mapping, to_mapping
-from swarm_forage_env.policy import is_policy_file, load_policy, policy_class
-from swarm_forage_env.recording import whole_intervals
-from swarm_forage_env.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.policies.registry import is_policy_file, load_policy, policy_class
+from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping, whole_intervals
 from swarm_forage_env.wrappers.registry import wrapper_config_class
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ def pin_policy_file(path: str | Path, parameters: Mapping[str, Any]) -> tuple[st
     Raises:
         ValueError: the file cannot be opened.
     """
-    from swarm_forage_env.policy_models import file_digest  # late: most runs open no model
+    from swarm_forage_env.policies.model_files import file_digest  # late: most runs open no model
 
     file = str(Path(path).resolve())
     checked = {**parameters, "digest": file_digest(file)}

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.files import replacing
-from swarm_forage_env.recording import RecordError, RunRecord
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env.study.record import RecordError, RunRecord
 from swarm_forage_env.study.spec import RunSpec
 
 FAILURES = "failures"

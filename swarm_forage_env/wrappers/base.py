@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 
 from pettingzoo.utils import BaseParallelWrapper
 
-from swarm_forage_env import config as configs
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
-from swarm_forage_env.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env.scenarios import config as configs
 
 STACK_ORDER = ("RunRecorder", "SensorNoise", "PopulationDynamics", "Throttle", "ActuatorNoise", "ForageEnv")
 """The documented stack, outermost first; `SwarmWrapper.stack_position` counts along it."""

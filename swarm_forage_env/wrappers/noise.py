@@ -7,15 +7,16 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env.config import ConfigError, from_mapping
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.contract.types import ActionArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.kernels.gaussian import to_normal
-from swarm_forage_env.kernels.noise import noisy_gain, perturb_readings, turn_heading
-from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.signals import Signal, Waveform, gather_waveform, require_number
-from swarm_forage_env.spelling import suggestion
-from swarm_forage_env.types import ActionArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+from swarm_forage_env.wrappers.kernels.gaussian import to_normal
+from swarm_forage_env.wrappers.kernels.noise import noisy_gain, perturb_readings, turn_heading
+from swarm_forage_env.wrappers.waveform import Signal, Waveform, gather_waveform, require_number
 
 NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
 """Groups of sensors that can be noisy, in the order of their columns."""

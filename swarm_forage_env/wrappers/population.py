@@ -5,12 +5,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env.config import ConfigError
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.queues import EventClocks, EventRates, EventTally, PopulationState, advance_population
-from swarm_forage_env.signals import require_number
-from swarm_forage_env.spelling import suggestion
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+from swarm_forage_env.wrappers.population_process import (
+    EventClocks,
+    EventRates,
+    EventTally,
+    PopulationState,
+    advance_population,
+)
+from swarm_forage_env.wrappers.waveform import require_number
 
 BIRTH_MARGIN_M = 2.0
 """Robots are born this far from the border of the arena (study configuration), or nearer where they start nearer."""

@@ -5,13 +5,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from swarm_forage_env.contract.codes import Counter, Task
+from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.kernels.task_shares import add_task_shares
-from swarm_forage_env.policy import Task
-from swarm_forage_env.recording import RecordError, whole_intervals
-from swarm_forage_env.state import Counter
-from swarm_forage_env.types import BoolArray, CodeArray
+from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.wrappers.base import SwarmWrapper
+from swarm_forage_env.wrappers.kernels.task_shares import add_task_shares
 
 TOTALS: dict[str, Counter] = {
     "collected": Counter.COLLECTED,
@@ -88,7 +87,7 @@ class RunRecorder(SwarmWrapper):
         """Return the columns of the finished run by name, (T,) each.
 
         Raises:
-            RecordError: the run has not ended yet.
+            RuntimeError: the run has not ended yet.
         """
         self._require_complete()
         scenario = self.world.scenario
@@ -111,7 +110,7 @@ class RunRecorder(SwarmWrapper):
 
     def _require_complete(self) -> None:
         if not self._complete:
-            raise RecordError(
+            raise RuntimeError(
                 "Expected a finished run, got one that has not reached its horizon; step until `complete` is true."
             )
 

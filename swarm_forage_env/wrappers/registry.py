@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
 
 if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import WrapperConfig

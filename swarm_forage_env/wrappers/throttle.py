@@ -6,13 +6,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarm_forage_env.actuators import drive_limits
-from swarm_forage_env.config import ConfigError, from_mapping
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.types import ActionArray, FloatArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.kernels.throttle import throttle
-from swarm_forage_env.signals import Waveform, gather_waveform
-from swarm_forage_env.types import ActionArray, FloatArray
+from swarm_forage_env.scenarios.config import from_mapping
+from swarm_forage_env.world.actuators import drive_limits
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+from swarm_forage_env.wrappers.kernels.throttle import throttle
+from swarm_forage_env.wrappers.waveform import Waveform, gather_waveform
 
 IDEAL_THROTTLE = 0.10
 """Constant throttle that the paper's flexibility studies take as ideal conditions."""

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import Grip, SwarmTask
-from swarm_forage_env.types import ActionArray, BoolArray, ObsArray
 
 
 class BusyPolicy:

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from swarm_forage_env.config import ScenarioConfig
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
 

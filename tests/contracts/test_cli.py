@@ -12,15 +12,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from swarm_forage_env import cli, rendering_run
-from swarm_forage_env.config import ConfigError, field_sections
 from swarm_forage_env.learning import pretrained
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.network import Network, NetworkAbout
-from swarm_forage_env.policy import RandomPolicy, policy_names
-from swarm_forage_env.recording import RunRecord
-from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+
+from swarm_forage_env import cli
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.policies.registry import RandomPolicy, policy_names
+from swarm_forage_env.scenarios.config import field_sections
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.study import film
+from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.store import load
 
 SHORT = ("--robots", "3", "--objects", "20", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
@@ -356,13 +358,13 @@ def test_record_films_a_run(command):
 @pytest.mark.parametrize(("asked", "filmed"), [((), "static"), (("--caches", "none"), "none")])
 def test_record_films_the_caches_that_were_asked_for(command, monkeypatch, asked, filmed):
     pytest.importorskip("PIL")
-    build, built = rendering_run.build_stack, []
+    build, built = film.build_stack, []
 
     def note(config, *args, **options):
         built.append(config.caches)
         return build(config, *args, **options)
 
-    monkeypatch.setattr(rendering_run, "build_stack", note)
+    monkeypatch.setattr(film, "build_stack", note)
     assert command("record", "--policy", "stochm", *asked, *SHORT_FILM)[0] == 0
     assert built == [filmed]
 
@@ -370,13 +372,13 @@ def test_record_films_the_caches_that_were_asked_for(command, monkeypatch, asked
 def test_record_names_a_file_without_the_way_there(command, monkeypatch):
     pytest.importorskip("PIL")
     shutil.copy(Path(pretrained.__file__).with_name("ppo_warehouse_small.npz"), "mine.npz")
-    render, titles = rendering_run.render_frame, set()
+    render, titles = film.render_frame, set()
 
     def note(*args, title, **options):
         titles.add(title)
         return render(*args, title=title, **options)
 
-    monkeypatch.setattr(rendering_run, "render_frame", note)
+    monkeypatch.setattr(film, "render_frame", note)
     assert command("record", "--policy", "mine.npz", *SHORT_FILM)[0] == 0
     assert titles == {"warehouse small, mine, 32 x 16 m"}
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from swarm_forage_env import cli
-from swarm_forage_env.policy import RandomPolicy
+from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.study.experiments import BUDGETS, Budget
 from swarm_forage_env.study.store import RunStore, load
 

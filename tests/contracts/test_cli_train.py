@@ -10,13 +10,14 @@ from pathlib import Path
 import pytest
 
 from swarm_forage_env import cli
+from swarm_forage_env._internal.extras import install_command
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.plan import WorldOptions
 from swarm_forage_env.cli.train import TrainOptions, build_plan, small_arena
-from swarm_forage_env.config import ConfigError, with_overrides
-from swarm_forage_env.extras import install_command
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.plan import read_plan
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.scenarios.config import with_overrides
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.training.plan import read_plan
 
 TINY = ("--robots", "4", "--objects", "20", "--steps", "128", "--arenas", "2", "--arg", "n_steps=16", "--arg",
         "batch_size=64", "--evaluate-every", "128")  # fmt: skip
@@ -105,7 +106,7 @@ def test_without_the_training_library_the_message_says_what_to_install(command, 
             raise ModuleNotFoundError("No module named 'stable_baselines3'", name="stable_baselines3")
         return real(name, *rest, **named)
 
-    for name in [name for name in sys.modules if name.startswith("swarm_forage_env.learning.sb3")]:
+    for name in [name for name in sys.modules if name.startswith("swarm_forage_env.training.sb3")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setattr(builtins, "__import__", without)
     code, _, err = command("train", *TINY)
@@ -150,14 +151,14 @@ def test_wrong_words_are_one_line_of_complaint(command, words, reason):
 
 @pytest.mark.parametrize("missing", ["stable_baselines3", "torch"])
 def test_the_message_is_the_same_from_python(missing):
-    code = f"import sys; sys.modules[{missing!r}] = None; import swarm_forage_env.learning.sb3"
+    code = f"import sys; sys.modules[{missing!r}] = None; import swarm_forage_env.training.sb3"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert install_command("train") in result.stderr.splitlines()[-1]
 
 
 @needs_training
 def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
-    from swarm_forage_env.learning.sb3 import training
+    from swarm_forage_env.training.sb3 import training
 
     def stop(*_, **__):
         raise KeyboardInterrupt

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env.codes import Counter, Event
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import Counter, Event
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.quirks import AUTHORS_PROGRAM
-from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from tests.contracts.busy import BusyPolicy, change_population
 from tests.contracts.foraging import quick_world
 from tests.contracts.test_determinism import DENSE, RUNS, fresh, make, side

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from swarm_forage_env import SCENARIO_NAMES
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import Policy, load_policy, policy_names
-from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.policies.registry import load_policy, policy_names
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.run import build_stack
 from tests.contracts.busy import BusyPolicy, change_population
 from tests.contracts.foraging import mild_wrappers, quick_world

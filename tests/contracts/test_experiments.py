@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.quirks import AUTHORS_PROGRAM
-from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.study.experiments import (
     BUDGETS,
     CRITERIA,

@@ -7,11 +7,11 @@ from gymnasium import spaces
 from gymnasium.utils.env_checker import check_env
 
 from swarm_forage_env import SCENARIO_NAMES
-from swarm_forage_env.actuators import ActionError
-from swarm_forage_env.adapters import JointForageEnv, SwarmVectorEnv
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.env import parallel_env
-from swarm_forage_env.learning.interface import InterfaceConfig
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.policy import ActionError
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
+from swarm_forage_env.views.pettingzoo import parallel_env
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)

@@ -9,10 +9,10 @@ from gymnasium.vector.utils import batch_space
 from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
 import swarm_forage_env
-from swarm_forage_env.adapters import JointForageEnv, SwarmVectorEnv
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.parallel import ParallelLearnerEnv
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
+from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.wrappers.noise import SensorNoise
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.learning import lives

@@ -6,11 +6,11 @@ import pytest
 from gymnasium import spaces
 from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
 
-from swarm_forage_env.learning.arenas import ArenaBatch
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.parallel import ParallelLearnerEnv
-from swarm_forage_env.learning.worlds import WorldPlan
-from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.views.arenas import ArenaBatch
+from swarm_forage_env.views.learner_arena import WorldPlan
+from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.wrappers.noise import SensorNoise
 from swarm_forage_env.wrappers.registry import parse_wrapper
 

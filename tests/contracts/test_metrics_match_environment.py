@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 import metrics.plots
-import swarm_forage_env.plots
+import swarm_forage_env.rendering.plots
 from metrics import waveform
 from metrics.score_rows import MEASURE_CRITERIA
 from metrics.study_table import CRITERIA, CURVE_COLUMNS, UNDISTURBED, study_curves
-from swarm_forage_env.recording import RunRecord
-from swarm_forage_env.scenarios import scenario
-from swarm_forage_env.signals import Waveform
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study import experiments
+from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
+from swarm_forage_env.wrappers.waveform import Waveform
 
 TICKS = np.arange(1, 50_001)
 DT_S = 0.2
@@ -44,7 +44,7 @@ def test_criteria_have_the_same_names():
 
 
 def test_pictures_have_the_same_colours():
-    assert metrics.plots.COLOURS == swarm_forage_env.plots.COLOURS
+    assert metrics.plots.COLOURS == swarm_forage_env.rendering.plots.COLOURS
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,8 @@ import pettingzoo
 import pytest
 
 import swarm_forage_env
-from swarm_forage_env.policy import POLICY_ENTRY_POINTS, Policy
+from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.policies.registry import POLICY_ENTRY_POINTS
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]

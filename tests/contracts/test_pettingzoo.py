@@ -9,9 +9,10 @@ from pettingzoo.utils.env import AECEnv
 
 import swarm_forage_env.env as env_module
 from swarm_forage_env import SCENARIO_NAMES
-from swarm_forage_env.actuators import ActionError
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.env import ForageEnv, env, parallel_env
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.policy import ActionError
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.views.pettingzoo import env, parallel_env
 
 SMALL = {"n_robots": 5, "n_objects": 80}
 WORLDS = [(name, caches) for name in SCENARIO_NAMES for caches in ("none", "static", "dynamic")]

@@ -1,7 +1,7 @@
 """What `metrics` reads by name is what records hold: the border between the two is a list of columns."""
 
 from metrics.study_table import CURVE_COLUMNS
-from swarm_forage_env.recording import schema_table
+from swarm_forage_env.study.record import schema_table
 
 NOT_RECORDED = {"deaths_per_s", "malfunctions_per_s", "births_per_s", "repairs_per_s"}
 """Rates are part of a run's specification, not measured; who scores a study adds them."""

@@ -7,15 +7,15 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from swarm_forage_env import policy_models
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.plan import WorldOptions, plan_runs
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.network import Network, NetworkAbout
-from swarm_forage_env.policy import policy_class, policy_names
-from swarm_forage_env.policy_models import file_digest
-from swarm_forage_env.quirks import AUTHORS_PROGRAM
-from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+from swarm_forage_env.policies import model_files
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.model_files import file_digest
+from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.policies.registry import policy_class, policy_names
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers import registry
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
@@ -214,7 +214,7 @@ def test_a_file_that_is_pinned_already_stays_so(tmp_path):
 
 def test_runs_of_a_file_open_it_once(tmp_path, monkeypatch):
     opened = []
-    monkeypatch.setattr(policy_models, "file_digest", lambda path: opened.append(path) or file_digest(path))
+    monkeypatch.setattr(model_files, "file_digest", lambda path: opened.append(path) or file_digest(path))
     path = str(network_file(tmp_path / "net.npz"))
     plan_runs(WorldOptions(scenario="warehouse_small"), [path], n_seeds=3, first_seed=5)
     assert opened == [path, path]  # once to pin it, once to try it

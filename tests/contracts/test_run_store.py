@@ -7,8 +7,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from swarm_forage_env.recording import RecordError, RunRecord
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study.record import RecordError, RunRecord
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import RunFailure, RunStore, load, read_failure

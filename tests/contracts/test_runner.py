@@ -11,15 +11,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarm_forage_env.kernels import interact
-from swarm_forage_env.policy import Grip, RandomPolicy, from_callable
-from swarm_forage_env.recording import RecordError, RunRecord
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.policies.registry import RandomPolicy, from_callable
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study import runner
+from swarm_forage_env.study.record import RecordError, RunRecord
 from swarm_forage_env.study.run import build_stack, run_one, run_policy, warm_up
 from swarm_forage_env.study.runner import StudyInterrupted, WorkerError, run_all, run_each
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import RunFailure, RunStore
+from swarm_forage_env.world.kernels import interact
 from swarm_forage_env.wrappers.base import STACK_ORDER
 from tests.contracts.test_run_spec import InnerConfig, OuterConfig
 

@@ -11,20 +11,20 @@ from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
 from pettingzoo.utils import BaseParallelWrapper
 from pettingzoo.utils.conversions import parallel_to_aec
 
-from swarm_forage_env.adapters import JointForageEnv
-from swarm_forage_env.config import ConfigError
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.recording import KNOWN_CONTRIBUTIONS, RunRecord
-from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.scenarios import scenario
-from swarm_forage_env.signals import Waveform
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study.record import KNOWN_CONTRIBUTIONS, RunRecord
 from swarm_forage_env.study.run import build_stack, run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.wrappers.base import STACK_ORDER, WrapperConfig
 from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig, SensorNoise, SensorNoiseConfig
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.registry import WRAPPERS, parse_wrapper, wrapper_config_class, wrappers_from_mapping
 from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
+from swarm_forage_env.wrappers.waveform import Waveform
 from tests.contracts.busy import BusyPolicy
 from tests.worlds import assert_conserved
 

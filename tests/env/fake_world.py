@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from swarm_forage_env.config import ScenarioConfig
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
-from swarm_forage_env.scenarios import scenario
-from swarm_forage_env.state import Counter, StepEvents, SwarmState
-from swarm_forage_env.types import BoolArray, ObsArray
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.world.state import StepEvents, SwarmState
 
 
 def small_scenario(**overrides) -> ScenarioConfig:

@@ -6,11 +6,10 @@ import sys
 import numpy as np
 import pytest
 
-from swarm_forage_env.arena import ForagingArena
-from swarm_forage_env.codes import Counter, Event, ObjectStatus
+from swarm_forage_env.contract.codes import Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import Grip
-from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.world.arena import ForagingArena
 from tests.worlds import (
     OPEN_CELL,
     act,

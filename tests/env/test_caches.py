@@ -6,7 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from swarm_forage_env.caches import (
+from swarm_forage_env.contract.codes import Counter, Grip, ObjectStatus, Task
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.world.caches import (
     cache_box,
     count_cache_users,
     create_static_caches,
@@ -14,12 +17,8 @@ from swarm_forage_env.caches import (
     restoration_probability,
     restore_static_caches,
 )
-from swarm_forage_env.codes import Counter, ObjectStatus, Task
-from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.placement import static_cache_centres
-from swarm_forage_env.policy import Grip
-from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
-from swarm_forage_env.state import CacheState, ObjectState, StepEvents
+from swarm_forage_env.world.placement import static_cache_centres
+from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents
 from tests.worlds import act, assert_conserved, build_cache, clear, lay, load, stand, tidy_world
 
 STATIC_CENTRE = (72, 40)

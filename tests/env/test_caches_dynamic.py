@@ -5,13 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm_forage_env.caches import MAX_PASSES, cache_box, clear_centre, founding_members, protected_boxes
-from swarm_forage_env.codes import Counter, Event, ObjectStatus
+from swarm_forage_env.contract.codes import Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import Grip
-from swarm_forage_env.quirks import Quirks
-from swarm_forage_env.regions import overlap_cells
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.scenarios.regions import overlap_cells
+from swarm_forage_env.world.caches import MAX_PASSES, cache_box, clear_centre, founding_members, protected_boxes
 from tests.worlds import act, assert_conserved, build_cache, clear, depot, lay, load, stand, tidy_world
 
 MIDDLE = (70, 40)

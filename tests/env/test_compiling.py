@@ -5,17 +5,17 @@ import subprocess
 import sys
 from pathlib import Path
 
-from swarm_forage_env import compiling
+from swarm_forage_env._internal import compiling
 
 INNER = """
-from swarm_forage_env.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel
 
 @kernel
 def inner(x: float) -> float:
     return x + {added}
 """
 OUTER = """
-from swarm_forage_env.compiling import kernel
+from swarm_forage_env._internal.compiling import kernel
 from .inner import inner
 
 @kernel
@@ -32,7 +32,7 @@ def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(tmp_path):
     (package / "outer.py").write_text(OUTER)
     environ = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
     environ["PYTHONDONTWRITEBYTECODE"] = "1"  # Python's own cache does not notice two edits within a second
-    root = str(Path(compiling.__file__).parents[1])
+    root = str(Path(compiling.__file__).parents[2])
 
     def call() -> str:
         run = subprocess.run(

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarm_forage_env.config import (
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.config import (
     SECTIONS,
     ArenaConfig,
     CacheConfig,
-    ConfigError,
     ObjectConfig,
     RobotConfig,
     ScenarioConfig,
@@ -22,8 +22,8 @@ from swarm_forage_env.config import (
     to_mapping,
     with_overrides,
 )
-from swarm_forage_env.quirks import AUTHORS_PROGRAM, Quirks
-from swarm_forage_env.scenarios import SCENARIO_NAMES, SEARCH_AND_RESCUE_OBJECTS, scenario
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, SEARCH_AND_RESCUE_OBJECTS, scenario
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 
 PRESETS = [scenario(name) for name in SCENARIO_NAMES] + [
     scenario("search_and_rescue", side_m=side) for side in SEARCH_AND_RESCUE_OBJECTS

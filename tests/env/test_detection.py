@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from swarm_forage_env.detection import (
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.contract.detection import (
     BEAM_ANGLES_RAD,
     is_obstacle_vector,
     ring_sum,
@@ -17,7 +18,6 @@ from swarm_forage_env.detection import (
     sees_object,
     sees_obstacle,
 )
-from swarm_forage_env.policy import Grip
 from tests.worlds import build_cache, cell_centre, lay, put, tidy_world
 
 FAR_BEHIND_RAD = 2.61

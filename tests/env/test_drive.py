@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_forage_env.actuators import ActionError
-from swarm_forage_env.policy import Grip
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.contract.policy import ActionError
 from tests.reference.motion import MAX_DIFFERENCE_MPS, MAX_SPEED_MPS, WHEEL_SCALE_MPS, limited_wheels, steered_wheels
 from tests.worlds import act, assert_same_world, lay, load, put, snapshot, stand, tidy_world
 

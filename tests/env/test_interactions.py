@@ -5,11 +5,10 @@ from collections import Counter as Tally
 import numpy as np
 import pytest
 
-from swarm_forage_env.codes import CELL_EMPTY, Counter, Event, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_EMPTY, Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.kernels.interact import DELIVER_ONLY, FOUND, GRASP, RELEASE, SITE, band_of
-from swarm_forage_env.policy import Grip
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.world.kernels.interact import DELIVER_ONLY, FOUND, GRASP, RELEASE, SITE, band_of
 from tests.worlds import (
     BASE_CELL,
     CORNER_CACHE,

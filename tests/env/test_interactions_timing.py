@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env.codes import Counter, Event, ObjectStatus
+from swarm_forage_env.contract.codes import Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import Grip
-from swarm_forage_env.quirks import Quirks
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.worlds import (
     BASE_CELL,
     CORNER_CACHE,

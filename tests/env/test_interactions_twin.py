@@ -5,11 +5,11 @@ from collections import Counter as Tally
 import numpy as np
 import pytest
 
-from swarm_forage_env.codes import Counter, Event, ObjectStatus
+from swarm_forage_env.contract.codes import Counter, Event, ObjectStatus
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.kernels import interact as kernel
-from swarm_forage_env.quirks import Quirks
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.world.kernels import interact as kernel
 from tests.reference import interacting
 from tests.reference.interacting import SlowCache, SlowWorld
 from tests.worlds import assert_conserved, build_cache

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env.codes import Counter
-from swarm_forage_env.detection import sees_obstacle
+from swarm_forage_env.contract.codes import Counter, Grip
+from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import Grip
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.scenarios.presets import scenario
 from tests.reference import sensing
 from tests.worlds import act, lay, load, put, stand, tidy_world
 

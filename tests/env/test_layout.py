@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env.layout import SERIAL_SCALE, observation_layout
+from swarm_forage_env.contract.layout import SERIAL_SCALE, observation_layout
 
 SIZES = {
     "proximity": 24,

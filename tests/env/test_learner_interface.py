@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from swarm_forage_env.config import ConfigError
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.learning.interface import (
+from swarm_forage_env.policies.interface import (
     GRIPS,
     MOTIONS,
     InterfaceConfig,
@@ -14,9 +16,8 @@ from swarm_forage_env.learning.interface import (
     chosen_interface,
     interface_from_mapping,
 )
-from swarm_forage_env.policy import Event, Grip, load_policy
-from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.reference.compact_view import compact_row
 from tests.worlds import NEST_CELL, OPEN_CELL, build_cache, cell_centre, lay, load, put, stand, tidy_world

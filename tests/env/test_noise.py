@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.detection import sees_cache, sees_nest, sees_object, sees_obstacle
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.detection import sees_cache, sees_nest, sees_object, sees_obstacle
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.kernels.gaussian import to_normal
-from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.scenarios import scenario
-from swarm_forage_env.signals import Waveform
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.kernels.gaussian import to_normal
 from swarm_forage_env.wrappers.noise import (
     NOISE_GROUPS,
     STUDY_NOISE_GROUPS,
@@ -20,6 +19,7 @@ from swarm_forage_env.wrappers.noise import (
     SensorNoiseConfig,
     noise_levels,
 )
+from swarm_forage_env.wrappers.waveform import Waveform
 from tests.env.fake_world import FakeWorld
 from tests.reference.adversity import by_group, noisy_row
 from tests.worlds import assert_same_world, snapshot, tidy_world

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, chisquare
 
-from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, ObjectStatus
-from swarm_forage_env.kernels.walk import OPEN_BORDERS, can_step, crosses_open_border
-from swarm_forage_env.object_motion import walk_objects
-from swarm_forage_env.regions import Box, distributable_box
-from swarm_forage_env.state import ObjectState
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, ObjectStatus
+from swarm_forage_env.scenarios.regions import Box, distributable_box
+from swarm_forage_env.world.kernels.walk import OPEN_BORDERS, can_step, crosses_open_border
+from swarm_forage_env.world.object_motion import walk_objects
+from swarm_forage_env.world.state import ObjectState
 from tests.reference.object_walk import GAPS_AFTER, walk_slowly
 
 SIGNIFICANCE = 0.001

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
 
-from swarm_forage_env.config import ScenarioConfig, with_overrides
-from swarm_forage_env.physics import Physics
-from swarm_forage_env.scenarios import scenario
-from swarm_forage_env.state import SwarmState
+from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.world.physics import Physics
+from swarm_forage_env.world.state import SwarmState
 from tests.reference.motion import WHEEL_BASE_M, WHEEL_SCALE_MPS, free_motion, limited_wheels
 from tests.worlds import put, tidy_world
 

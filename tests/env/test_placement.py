@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, ObjectStatus
-from swarm_forage_env.config import ArenaConfig, ConfigError, ObjectConfig, RobotConfig, ScenarioConfig
-from swarm_forage_env.kernels.scatter import DRAWS, UNLIMITED, count_objects, draw_source_cell, scatter
-from swarm_forage_env.placement import Source, draw_source, place_all, place_objects
-from swarm_forage_env.regions import PLACEMENTS, Box, source_boxes
-from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
-from swarm_forage_env.state import ObjectState
-from swarm_forage_env.types import IntArray
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, ObjectStatus
+from swarm_forage_env.contract.types import IntArray
+from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, RobotConfig, ScenarioConfig
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, source_boxes
+from swarm_forage_env.world.kernels.scatter import DRAWS, UNLIMITED, count_objects, draw_source_cell, scatter
+from swarm_forage_env.world.placement import Source, draw_source, place_all, place_objects
+from swarm_forage_env.world.state import ObjectState
 from tests.reference.object_placement import choose_cell, random_source, scatter_slowly, waiting_by_the_word
 
 SIGNIFICANCE = 0.001

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from swarm_forage_env.clusters import ClusterLaw, cluster_law, draw_clusters, draw_sizes, footprint
-from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST
-from swarm_forage_env.config import ConfigError, ScenarioConfig
-from swarm_forage_env.kernels.scatter import count_objects
-from swarm_forage_env.placement import draw_source, place_all, static_cache_centres
-from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.scenarios import SEARCH_AND_RESCUE_OBJECTS, scenario
-from swarm_forage_env.state import ObjectState
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, scenario
+from swarm_forage_env.world.clusters import ClusterLaw, cluster_law, draw_clusters, draw_sizes, footprint
+from swarm_forage_env.world.kernels.scatter import count_objects
+from swarm_forage_env.world.placement import draw_source, place_all, static_cache_centres
+from swarm_forage_env.world.state import ObjectState
 
 LAW_TABLE = {
     16: (3, 4, {8}, 10),

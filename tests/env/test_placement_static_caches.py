@@ -4,10 +4,10 @@ import itertools
 
 import pytest
 
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.placement import static_cache_centres
-from swarm_forage_env.regions import overlap_cells
-from swarm_forage_env.scenarios import SEARCH_AND_RESCUE_OBJECTS, scenario
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, scenario
+from swarm_forage_env.scenarios.regions import overlap_cells
+from swarm_forage_env.world.placement import static_cache_centres
 
 CACHE_SIDES = {16: 15, 32: 31, 48: 47, 64: 63, 80: 79, 96: 95, 112: 111, 128: 127}
 """Side of the arena in metres: side of a cache in cells."""

@@ -3,18 +3,17 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env.codes import ObjectStatus
-from swarm_forage_env.config import ConfigError
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import Event, Grip
-from swarm_forage_env.queues import simulate_population
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.population import (
     PopulationConfig,
     PopulationDynamics,
     death_levels,
     malfunction_levels,
 )
+from swarm_forage_env.wrappers.population_process import simulate_population
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from tests.worlds import assert_same_world, cell_centre, lay, load, put, snapshot, stand, tidy_world
 

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from metrics.queues import PopulationRates, mean_away
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.queues import (
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.wrappers.population import death_levels, malfunction_levels
+from swarm_forage_env.wrappers.population_process import (
     EventClock,
     EventClocks,
     EventRates,
@@ -16,7 +17,6 @@ from swarm_forage_env.queues import (
     advance_population,
     simulate_population,
 )
-from swarm_forage_env.wrappers.population import death_levels, malfunction_levels
 from tests.reference.adversity import SlowPopulation
 
 RUN_TICKS = 50_000

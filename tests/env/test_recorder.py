@@ -5,12 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.kernels.task_shares import add_task_shares
-from swarm_forage_env.policy import Task
-from swarm_forage_env.recording import RecordError
-from swarm_forage_env.state import Counter
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import Counter, Task
+from swarm_forage_env.study.record import RecordError
 from swarm_forage_env.wrappers.base import SwarmWrapper
+from swarm_forage_env.wrappers.kernels.task_shares import add_task_shares
 from swarm_forage_env.wrappers.recorder import TICK_MEANS, TOTALS, RunRecorder
 from tests.env.fake_world import FakeWorld, small_scenario
 from tests.reference.task_shares import task_shares

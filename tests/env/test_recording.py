@@ -8,10 +8,11 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarm_forage_env import recording
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.recording import RecordError, RunRecord, schema_table, software_versions, whole_intervals
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.config import whole_intervals
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study import record as recording
+from swarm_forage_env.study.record import RecordError, RunRecord, schema_table, software_versions
 from swarm_forage_env.study.spec import RunSpec
 
 COUNTS = [name for name, dtype in recording._COLUMN_DTYPES.items() if dtype is np.int64]

@@ -7,12 +7,11 @@ from itertools import combinations, product
 import numpy as np
 import pytest
 
-from swarm_forage_env import rendering_paint, rendering_view
-from swarm_forage_env.config import ScenarioConfig
-from swarm_forage_env.layout import CELL_M
-from swarm_forage_env.rendering import Trails, render_frame
-from swarm_forage_env.rendering_paint import paint_box, paint_discs, paint_needles, paint_rings, paint_squares
-from swarm_forage_env.rendering_view import (
+from swarm_forage_env.contract.codes import Counter, ObjectStatus
+from swarm_forage_env.rendering import paint, view
+from swarm_forage_env.rendering.frame import Trails, render_frame
+from swarm_forage_env.rendering.paint import paint_box, paint_discs, paint_needles, paint_rings, paint_squares
+from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
     NEST_OPACITY,
     PALETTE,
@@ -21,8 +20,10 @@ from swarm_forage_env.rendering_view import (
     arena_view,
     legend_rows,
 )
-from swarm_forage_env.scenarios import scenario
-from swarm_forage_env.state import CacheState, Counter, ObjectState, ObjectStatus, StepEvents, SwarmState
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
 pytest.importorskip("PIL")
 
@@ -243,7 +244,7 @@ def test_the_legend_stays_inside_the_picture(width):
     rows = legend_rows(config, width, width / 32.4)
     names = [name for row in rows for name, _, _ in row]
     assert names == ["empty", "carrying", "in interference", "in repair", "object", "source", "nest", "cache"]
-    font = rendering_view.text_font(rendering_view.text_height(width / 900))
+    font = view.text_font(view.text_height(width / 900))
     for row in rows:
         name, x, _ = row[-1]
         assert x + font.getlength(name) < width
@@ -317,7 +318,7 @@ def test_sixteen_thousand_robots_leave_the_floor_visible():
 
 def test_without_pillow_the_message_tells_what_to_install(world, monkeypatch):
     monkeypatch.setitem(sys.modules, "PIL", None)
-    rendering_view.text_font.cache_clear()
+    view.text_font.cache_clear()
     arena_view.cache_clear()
     with pytest.raises(ImportError, match=r'pip install ".\[render\]"'):
         world.draw()
@@ -425,6 +426,6 @@ def test_painting_in_portions_gives_the_same_picture(monkeypatch):
     opacity = np.linspace(0.1, 1.0, 300)
     whole, portions = blank(), blank()
     paint_discs(whole, centre, 2.2, (255, 10, 0), opacity)
-    monkeypatch.setattr(rendering_paint, "_STAMP_BUDGET", 500)
+    monkeypatch.setattr(paint, "_STAMP_BUDGET", 500)
     paint_discs(portions, centre, 2.2, (255, 10, 0), opacity)
     np.testing.assert_array_equal(whole, portions)

@@ -6,11 +6,11 @@ import sys
 import numpy as np
 import pytest
 
-from swarm_forage_env.policy import RandomPolicy
-from swarm_forage_env.rendering_run import record_run
-from swarm_forage_env.rendering_video import check_film, write_film
-from swarm_forage_env.rendering_view import PALETTE, RenderError
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.policies.registry import RandomPolicy
+from swarm_forage_env.rendering.video import check_film, write_film
+from swarm_forage_env.rendering.view import PALETTE, RenderError
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study.film import record_run
 
 Image = pytest.importorskip("PIL.Image")
 

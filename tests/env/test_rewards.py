@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarm_forage_env.config import RewardConfig
+from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import Grip
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.scenarios.config import RewardConfig
+from swarm_forage_env.scenarios.presets import scenario
 from tests.worlds import NEST_CELL, OPEN_CELL, act, lay, load, put, stand, tidy_world
 
 NOTHING = RewardConfig(delivery=0.0, first_pickup=0.0)

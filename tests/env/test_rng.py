@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env.rng import Stream, stream_rng
+from swarm_forage_env._internal.rng import Stream, stream_rng
 
 
 def test_stream_numbers_are_stored_history():

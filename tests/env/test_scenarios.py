@@ -4,9 +4,8 @@ import math
 
 import pytest
 
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.quirks import AUTHORS_PROGRAM, Quirks
-from swarm_forage_env.scenarios import (
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.presets import (
     SCENARIO_NAMES,
     SEARCH_AND_RESCUE_OBJECTS,
     robots_at_density,
@@ -15,6 +14,7 @@ from swarm_forage_env.scenarios import (
     warehouse_medium,
     warehouse_small,
 )
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 
 SIDES = (16, 32, 48, 64, 80, 96, 112, 128)
 ROBOTS = (12, 51, 115, 204, 320, 460, 627, 819)

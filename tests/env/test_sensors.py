@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm_forage_env.config import ConfigError
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.kernels.beams import proximity_reading
-from swarm_forage_env.policy import Event, Grip
-from swarm_forage_env.scenarios import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.world.kernels.beams import proximity_reading
 from tests.reference import sensing
 from tests.worlds import act, build_cache, cell_centre, lay, load, put, stand, tidy_world
 

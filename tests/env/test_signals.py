@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import metrics
-from swarm_forage_env.config import ConfigError, to_mapping
-from swarm_forage_env.signals import WAVEFORM_KINDS, Waveform, gather_waveform
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.config import to_mapping
 from swarm_forage_env.wrappers.noise import ActuatorNoiseConfig
 from swarm_forage_env.wrappers.throttle import IDEAL_THROTTLE, ThrottleConfig, sine_throttles, square_throttles
+from swarm_forage_env.wrappers.waveform import WAVEFORM_KINDS, Waveform, gather_waveform
 
 DT_S = 0.2
 SAMPLES = range(1_000, 50_001, 1_000)

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarm_forage_env.config import ConfigError
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.layout import WHEEL_SCALE_MPS
-from swarm_forage_env.policy import Grip
-from swarm_forage_env.signals import Waveform
+from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig, sine_throttles, square_throttles
+from swarm_forage_env.wrappers.waveform import Waveform
 from tests.env.fake_world import FakeWorld
 from tests.reference.adversity import throttle_gain
 from tests.reference.motion import limited_wheels, steered_wheels

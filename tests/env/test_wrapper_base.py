@@ -7,7 +7,7 @@ import pytest
 from pettingzoo.test import parallel_api_test
 from pettingzoo.utils import BaseParallelWrapper
 
-from swarm_forage_env.actuators import ActionError
+from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.wrappers.base import STACK_ORDER, SwarmWrapper
 from swarm_forage_env.wrappers.recorder import RunRecorder

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.learning.arenas import ArenaBatch, ArenaStep
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.worlds import WorldPlan, plan_world
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
+from swarm_forage_env.views.learner_arena import WorldPlan, plan_world
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.learning import lives
 

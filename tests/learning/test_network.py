@@ -5,11 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from swarm_forage_env.env import parallel_env
-from swarm_forage_env.files import replacing
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.network import LearnedPolicy, Network, NetworkAbout, NetworkError, NetworkPolicy
-from swarm_forage_env.policy import Policy, load_policy
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.network import LearnedPolicy, Network, NetworkAbout, NetworkError, NetworkPolicy
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.views.pettingzoo import parallel_env
 
 
 def small_network(**about) -> Network:

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
-from swarm_forage_env.learning.pretrained import plan_file
-from swarm_forage_env.scenarios import warehouse_small
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.pretrained import plan_file
+from swarm_forage_env.scenarios.presets import warehouse_small
+from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
 
 TOML = """
 algorithm = "dqn"

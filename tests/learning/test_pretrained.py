@@ -5,13 +5,13 @@ import sys
 from pathlib import Path
 
 import pytest
-
 from swarm_forage_env.learning import pretrained
-from swarm_forage_env.learning.network import Network
-from swarm_forage_env.learning.plan import TrainingPlan, read_plan
-from swarm_forage_env.scenarios import warehouse_small
+
+from swarm_forage_env.policies.network import Network
+from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import plan_run
+from swarm_forage_env.training.plan import TrainingPlan, read_plan
 
 FOLDER = Path(pretrained.__file__).parent
 SHIPPED = sorted(path.stem for path in FOLDER.glob("*.npz"))
@@ -31,7 +31,7 @@ def test_a_shipped_policy_has_a_card_a_plan_and_a_small_file(name):
 def test_a_shipped_policy_runs_by_name_without_torch(name):
     code = (
         "import sys; sys.modules['torch'] = sys.modules['stable_baselines3'] = None\n"
-        "from swarm_forage_env.scenarios import warehouse_small\n"
+        "from swarm_forage_env.scenarios.presets import warehouse_small\n"
         "from swarm_forage_env.study.run import run_one\n"
         "from swarm_forage_env.study.spec import plan_run\n"
         "world = warehouse_small(n_robots=5, horizon_s=20.0, interval_s=20.0)\n"

@@ -9,12 +9,12 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-
 from swarm_forage_env.learning import processes
-from swarm_forage_env.learning.arenas import ArenaBatch
-from swarm_forage_env.learning.processes import ArenaProcessError, ArenaProcesses, open_arenas
-from swarm_forage_env.learning.worlds import WorldPlan
-from swarm_forage_env.scenarios import scenario
+
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.views.arenas import ArenaBatch
+from swarm_forage_env.views.learner_arena import WorldPlan
+from swarm_forage_env.views.processes import ArenaProcessError, ArenaProcesses, open_arenas
 
 PLAN = WorldPlan(scenario=scenario("warehouse_small", n_robots=3, n_objects=4), max_cycles=50)
 IDLE = np.zeros((6, 3), np.float32)
@@ -45,7 +45,7 @@ def test_a_process_that_died_is_reported_with_its_exit_code(arenas):
 
 
 UNGUARDED = """
-from swarm_forage_env.adapters import SwarmVectorEnv
+from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 SwarmVectorEnv(n_robots=3, n_processes=1).reset(seed=0)
 """
 

@@ -12,9 +12,9 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecEnvWrapper, VecFrameStack, VecMonitor
 
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.learning.interface import InterfaceConfig
-from swarm_forage_env.learning.sb3 import SwarmVecEnv
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.training.sb3 import SwarmVecEnv
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.learning import lives
 

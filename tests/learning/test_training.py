@@ -14,17 +14,17 @@ pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-b
 import torch
 from stable_baselines3 import DQN, PPO, SAC
 
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.env import parallel_env
-from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.learning.network import Network, NetworkError
-from swarm_forage_env.learning.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
-from swarm_forage_env.learning.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
-from swarm_forage_env.learning.sb3.export import export_network, note_interface
-from swarm_forage_env.learning.sb3.training import train
-from swarm_forage_env.policy import load_policy
-from swarm_forage_env.policy_models import ModelError, ModelPolicy
-from swarm_forage_env.scenarios import search_and_rescue, warehouse_small
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.model_files import ModelError, ModelPolicy
+from swarm_forage_env.policies.network import Network, NetworkError
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.presets import search_and_rescue, warehouse_small
+from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
+from swarm_forage_env.training.sb3.export import export_network, note_interface
+from swarm_forage_env.training.sb3.training import train
+from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
 NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)

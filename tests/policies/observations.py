@@ -6,9 +6,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env.layout import CACHE_FIELDS, EVENT_SCALE, SERIAL_SCALE, VISIBLE_CACHES, observation_layout
-from swarm_forage_env.policy import Event, SwarmTask
-from swarm_forage_env.quirks import Quirks
+from swarm_forage_env.contract.codes import Event
+from swarm_forage_env.contract.layout import CACHE_FIELDS, EVENT_SCALE, SERIAL_SCALE, VISIBLE_CACHES, observation_layout
+from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.scenarios.quirks import Quirks
 
 GREYS = {"floor": 1.0, "nest": 0.7, "cache": 0.4, "object": 0.0}
 CELL_M = 0.2

@@ -10,8 +10,8 @@ from baselines.memory import OneMemory, remember
 from baselines.stochx import STOCHXPolicy
 from baselines.task_policy import TaskPolicy
 from baselines.tasks import ROOTED_TAB, TAB_CHILDREN
-from swarm_forage_env.layout import SERIAL_SCALE
-from swarm_forage_env.policy import Task
+from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.contract.layout import SERIAL_SCALE
 from tests.policies.observations import Observations, make_task
 
 

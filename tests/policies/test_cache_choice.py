@@ -18,7 +18,7 @@ from baselines.machines import Activity
 from baselines.stochm import STOCHMPolicy
 from baselines.task_machines import select_goal
 from baselines.tasks import DRAW_POINT_X, DRAW_POINT_Y, TASK_DRAWS, Goal
-from swarm_forage_env.quirks import Quirks
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.policies.task_robot import TaskRobot
 
 MIDDLE = np.full(TASK_DRAWS, 0.5)

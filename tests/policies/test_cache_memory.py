@@ -2,7 +2,7 @@
 
 import pytest
 
-from swarm_forage_env.quirks import Quirks
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.policies.task_robot import TaskRobot
 
 CENTRE = (72, 40)

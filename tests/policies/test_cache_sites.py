@@ -8,7 +8,7 @@ import pytest
 from baselines.cache_sites import is_allowed, nearest_allowed, select_site
 from baselines.task_policy import site_box_m
 from baselines.tasks import DRAW_POINT_X, DRAW_POINT_Y, TASK_DRAWS
-from swarm_forage_env.quirks import Quirks
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.policies.observations import make_task
 from tests.policies.task_robot import TaskRobot
 

@@ -8,8 +8,8 @@ import pytest
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
 from baselines.machines import DRAWS, VectorState
-from swarm_forage_env.policy import Event
-from swarm_forage_env.quirks import AUTHORS_PROGRAM, Quirks
+from swarm_forage_env.contract.codes import Event
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.policies.observations import GREYS, Observations, make_task
 from tests.reference.controllers import ObjectDictionary, ReferenceRobot
 

@@ -7,8 +7,8 @@ import pytest
 
 from baselines.crw import CRWPolicy
 from baselines.machines import Activity
-from swarm_forage_env.policy import Event, Grip
-from swarm_forage_env.quirks import Quirks
+from swarm_forage_env.contract.codes import Event, Grip
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.policies.observations import Observations, make_task
 
 

@@ -10,8 +10,8 @@ from baselines.machines import Activity, VectorState, restart_acquiring
 from baselines.memory import OneMemory, remember
 from baselines.object_choice import MemoryParameters, object_utility
 from baselines.parameters import kernel_constants
-from swarm_forage_env.policy import Event, Grip
-from swarm_forage_env.quirks import Quirks
+from swarm_forage_env.contract.codes import Event, Grip
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.policies.observations import Observations, make_task
 
 GOAL = (10.5, 10.1)

@@ -9,7 +9,7 @@ from baselines.crw import CRWPolicy
 from baselines.machines import new_robots
 from baselines.motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander
 from baselines.parameters import ControllerParameters, kernel_constants
-from swarm_forage_env.detection import BEAM_ANGLES_RAD
+from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from tests.policies.observations import Observations, make_task
 
 TASK = make_task()

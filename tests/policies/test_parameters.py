@@ -11,8 +11,9 @@ from baselines.object_choice import MemoryParameters
 from baselines.parameters import ControllerParameters, ObservationError, ParameterError, kernel_constants
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
-from swarm_forage_env.policy import Policy, load_policy
-from swarm_forage_env.quirks import Quirks
+from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.policies.observations import make_task
 
 

@@ -11,15 +11,15 @@ from gymnasium import spaces
 
 from metrics import score_policy
 from metrics.scoring import plan_scores
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.env import parallel_env
-from swarm_forage_env.learning.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.learning.network import Network, NetworkAbout
-from swarm_forage_env.policy import is_policy_file, load_policy, local_policy, policy_class
-from swarm_forage_env.policy_models import MODEL_NOTE, ModelError, ModelPolicy, file_digest
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.model_files import MODEL_NOTE, ModelError, ModelPolicy, file_digest
+from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.policies.registry import is_policy_file, load_policy, local_policy, policy_class
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.experiments import Budget
 from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.views.pettingzoo import parallel_env
 
 TINY = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=1, n_sizes=2, n_levels=1)
 ENV = parallel_env("warehouse_small", n_robots=4, n_objects=20)

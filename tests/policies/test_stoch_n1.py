@@ -11,8 +11,8 @@ from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
 from baselines.task_policy import task_constants
 from baselines.tasks import STOCHM_PARAMETERS, STOCHX_PARAMETERS, Tab
-from swarm_forage_env.policy import Task
-from swarm_forage_env.quirks import AUTHORS_PROGRAM, Quirks
+from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.policies.observations import make_task
 from tests.reference import task_chain
 

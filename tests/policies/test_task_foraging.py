@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import Counter, ObjectStatus
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import load_policy
-from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.scenarios import scenario
-from swarm_forage_env.state import Counter, ObjectStatus
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.presets import scenario
 
 SCENARIOS = ["warehouse_small", "warehouse_medium", "search_and_rescue"]
 CACHES = {"stochm": "static", "stochx": "dynamic"}

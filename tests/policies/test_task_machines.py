@@ -7,8 +7,8 @@ from baselines.machines import Activity, VectorState
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
 from baselines.tasks import TASK_DRAWS
-from swarm_forage_env.policy import Event, Grip, Task
-from swarm_forage_env.quirks import Quirks
+from swarm_forage_env.contract.codes import Event, Grip, Task
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.policies.task_robot import TaskRobot
 
 CACHE = (72, 40)

@@ -9,8 +9,8 @@ from baselines.machines import Activity
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
 from baselines.tasks import TASK_DRAWS, Goal
-from swarm_forage_env.policy import Event, Task
-from swarm_forage_env.quirks import AUTHORS_PROGRAM, Quirks
+from swarm_forage_env.contract.codes import Event, Task
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.policies.observations import GREYS, Observations, make_task
 from tests.reference import task_chain
 from tests.reference.controllers import ObjectDictionary

@@ -19,7 +19,7 @@ from baselines.tasks import (
     Goal,
     Tab,
 )
-from swarm_forage_env.policy import Grip, Task
+from swarm_forage_env.contract.codes import Grip, Task
 
 
 def test_every_task_but_the_root_is_a_subtask_once():

@@ -5,8 +5,8 @@ from collections import deque
 
 import numpy as np
 
-from swarm_forage_env.queues import EventRates
-from swarm_forage_env.rng import Stream, stream_rng
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.wrappers.population_process import EventRates
 from tests.reference.motion import limited_wheels
 
 

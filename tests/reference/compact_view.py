@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from swarm_forage_env.layout import ObservationLayout
+from swarm_forage_env.contract.layout import ObservationLayout
 
 RING = [math.radians(7.5 + 15 * k) for k in range(24)]
 

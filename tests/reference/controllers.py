@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from swarm_forage_env.policy import Event, Grip, SwarmTask
+from swarm_forage_env.contract.codes import Event, Grip
+from swarm_forage_env.contract.policy import SwarmTask
 
 RHO = 0.00001
 LOCK_TICKS = 50

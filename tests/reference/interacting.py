@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
-from swarm_forage_env.codes import Event
-from swarm_forage_env.regions import Box
+from swarm_forage_env.contract.codes import Event
+from swarm_forage_env.scenarios.regions import Box
 
 GRASP, RELEASE, DELIVER, SITE, FOUND = "grasp", "release", "deliver", "site", "found"
 Request = tuple[str, int | None]

@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from swarm_forage_env.codes import CELL_EMPTY
-from swarm_forage_env.kernels.scatter import TRIES, UNLIMITED
-from swarm_forage_env.placement import Source
-from swarm_forage_env.regions import Box
-from swarm_forage_env.types import FloatArray, IntArray
+from swarm_forage_env.contract.codes import CELL_EMPTY
+from swarm_forage_env.contract.types import FloatArray, IntArray
+from swarm_forage_env.scenarios.regions import Box
+from swarm_forage_env.world.kernels.scatter import TRIES, UNLIMITED
+from swarm_forage_env.world.placement import Source
 
 Cell = tuple[int, int]
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from swarm_forage_env.codes import CELL_EMPTY, ObjectStatus
-from swarm_forage_env.regions import Box
-from swarm_forage_env.state import ObjectState
-from swarm_forage_env.types import FloatArray
+from swarm_forage_env.contract.codes import CELL_EMPTY, ObjectStatus
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.scenarios.regions import Box
+from swarm_forage_env.world.state import ObjectState
 
 GAPS_AFTER = (5, 40, 43, 45, 47, 50, 52, 55, 57, 60, 62, 65, 67, 70, 72, 75, 77, 81, 86, 91, *range(95, 156, 5))
 """Cell borders with a rounding gap, as published with the study's analysis."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from swarm_forage_env.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST
 from swarm_forage_env.env import ForageEnv
 
 RADIUS_M = 0.085036758

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from swarm_forage_env.policy import Event, Grip
+from swarm_forage_env.contract.codes import Event, Grip
 from tests.reference import task_chain
 from tests.reference.controllers import RHO, ReferenceRobot, drive, sensed, vector_sum, visible_objects
 

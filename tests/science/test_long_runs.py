@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from swarm_forage_env.codes import Counter
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policy import load_policy
-from swarm_forage_env.rng import Stream, stream_rng
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.presets import scenario
 from tests.contracts.busy import BusyPolicy, change_population
 from tests.contracts.test_determinism import made_for
 from tests.worlds import assert_conserved

@@ -11,11 +11,11 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist
 
-from swarm_forage_env.config import with_overrides
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.physics import Physics
-from swarm_forage_env.scenarios import scenario
-from swarm_forage_env.state import SwarmState
+from swarm_forage_env.scenarios.config import with_overrides
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.world.physics import Physics
+from swarm_forage_env.world.state import SwarmState
 
 DIAMETER_M = 2 * 0.085036758
 TOLERATED = 0.05

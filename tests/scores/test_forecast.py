@@ -9,7 +9,7 @@ import metrics
 from metrics import PopulationRates
 from metrics.forecast import FORECAST_HEADER, forecast_population
 from metrics.study_table import RunCurves, StudyCurves
-from swarm_forage_env.queues import EventRates, simulate_population
+from swarm_forage_env.wrappers.population_process import EventRates, simulate_population
 
 CLOCK = np.array([100.0, 200.0])
 

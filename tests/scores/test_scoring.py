@@ -10,9 +10,9 @@ import pytest
 import metrics
 from metrics import CurveError, compare_policies, score_policy
 from metrics.scoring import plan_scores, run_scores
-from swarm_forage_env import policy as policy_module
-from swarm_forage_env.config import ConfigError
-from swarm_forage_env.scenarios import scenario
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies import registry as policy_module
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study import runner
 from swarm_forage_env.study.experiments import Budget
 from swarm_forage_env.study.run import run_one

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env import AUTHORS_PROGRAM, SCENARIO_NAMES, Quirks
-from swarm_forage_env.learning.arenas import ArenaBatch
-from swarm_forage_env.learning.worlds import plan_world
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.views.arenas import ArenaBatch
+from swarm_forage_env.views.learner_arena import plan_world
 from tests.contracts.foraging import mild_wrappers, quick_world
 
 FILE = Path(__file__).with_suffix(".json")

@@ -1,0 +1,61 @@
+"""How functions on arrays are compiled, and when what was compiled before is out of date; for world and controllers."""
+
+import functools
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from numba import njit
+from numba.core.caching import FunctionCache
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+# Without numba's memory runtime an allocation is a compile error, and arrays that are handed around, alone, in rows or
+# as fields of a named tuple, are not reference-counted. That halves the time of functions that call others often.
+_OPTIONS: dict[str, Any] = {"_nrt": False}
+
+_PACKAGE = Path(__file__).parents[1]
+_COMPILED_IN_EVERYWHERE = tuple(
+    _PACKAGE / f"{name}.py"
+    for name in (
+        "_internal/compiling",
+        "contract/codes",
+        "contract/detection",
+        "contract/layout",
+        "scenarios/units",
+    )
+)
+"""Modules whose functions and constants are compiled into those of other folders."""
+_COMPILED_IN_BY_FOLDER = {_PACKAGE / "wrappers/kernels": (_PACKAGE / "world/kernels/drive.py",)}
+"""Further modules that are compiled into the functions of one folder."""
+
+
+@functools.cache
+def _digest_of_sources(folder: Path) -> bytes:
+    """Digest of every source from which something may be compiled into a function of `folder`."""
+    return hashlib.sha256(b"".join(file.read_bytes() for file in sources_of(folder))).digest()
+
+
+def sources_of(folder: Path) -> tuple[Path, ...]:
+    """Return every source from which something may be compiled into a function of `folder`, sorted."""
+    own = () if folder == _PACKAGE / "contract" else folder.glob("*.py")  # that folder is listed file by file
+    return tuple(sorted({*own, *_COMPILED_IN_EVERYWHERE, *_COMPILED_IN_BY_FOLDER.get(folder, ())}))
+
+
+def kernel(function: F) -> F:
+    """Compile a function that allocates nothing; the result is cached on disk until one of its sources changes."""
+    compiled = njit(cache=True, **_OPTIONS)(function)
+    cache = getattr(compiled, "_cache", None)
+    if isinstance(cache, FunctionCache):  # there is none with the compiler switched off
+        # By itself numba watches only the file of the function, and would keep what it has compiled into it from
+        # others. It offers no public way to watch more.
+        cache_file = cache._cache_file
+        sources = _digest_of_sources(Path(function.__code__.co_filename).parent)
+        cache_file._source_stamp = (cache_file._source_stamp, sources)
+    return cast(F, compiled)
+
+
+def inline_kernel(function: F) -> F:
+    """Compile a function into each of its callers; it may take other compiled functions as arguments."""
+    return cast(F, njit(inline="always", **_OPTIONS)(function))

@@ -1,0 +1,85 @@
+"""Four decisions from raw readings: obstacle, nest, object, cache. Pure functions of one robot's readings.
+
+The environment applies them to true readings (interference), policies to what they see. All are compiled, so
+that controllers can call them inside their own kernels; each takes one row of readings and returns a bool.
+Sources: the robot model of the paper's study (field of view, thresholds and grey bands of its sensors).
+"""
+
+import math
+
+import numpy as np
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.types import ObsArray
+
+OBSTACLE_ANGLE_RAD = 2.61
+"""A summed proximity vector that points outside [-2.61, 2.61] rad counts as an obstacle whatever its length."""
+OBSTACLE_LENGTH = 0.1
+"""A summed proximity vector longer than this counts as an obstacle."""
+NEST_GREY = (0.6, 0.8)
+OBJECT_GREY = (-0.05, 0.05)
+CACHE_GREY = (0.3, 0.5)
+
+BEAM_ANGLES_RAD = np.deg2rad(7.5 + 15.0 * np.arange(24))
+"""Body-frame angles of the proximity beams and of the light sensors, counter-clockwise from straight ahead."""
+_CANCELLED = 1e-12
+_BEAM_COS = np.cos(BEAM_ANGLES_RAD)
+_BEAM_SIN = np.sin(BEAM_ANGLES_RAD)
+
+
+@kernel
+def ring_sum(readings: ObsArray) -> tuple[float, float]:
+    """Sum 24 ring readings as polar vectors; returns the body-frame vector (forward, left)."""
+    x = 0.0
+    y = 0.0
+    for k in range(12):  # beam k + 12 points the opposite way, so equal readings cancel exactly
+        difference = np.float64(readings[k]) - np.float64(readings[k + 12])
+        x += difference * _BEAM_COS[k]
+        y += difference * _BEAM_SIN[k]
+    return x, y
+
+
+@kernel
+def is_obstacle_vector(x: float, y: float) -> bool:
+    """Obstacle rule on a summed proximity vector: too long, or pointing straight back."""
+    length_squared = x * x + y * y
+    if length_squared > OBSTACLE_LENGTH * OBSTACLE_LENGTH:
+        return True
+    if length_squared < _CANCELLED:  # equal obstacles on opposite sides cancel up to rounding
+        return False
+    return abs(math.atan2(y, x)) > OBSTACLE_ANGLE_RAD
+
+
+@kernel
+def sees_obstacle(proximity: ObsArray) -> bool:
+    """Return whether one row of 24 proximity readings means an obstacle."""
+    x, y = ring_sum(proximity)
+    return is_obstacle_vector(x, y)
+
+
+@kernel
+def _count_in_band(ground: ObsArray, low: float, high: float) -> int:
+    count = 0
+    for k in range(4):
+        # 1e-6 absorbs the rounding of float32 readings at the edge of a band.
+        if low - 1e-6 <= ground[k] <= high + 1e-6:
+            count += 1
+    return count
+
+
+@kernel
+def sees_nest(ground: ObsArray) -> bool:
+    """Return whether at least 3 of 4 ground readings show the nest."""
+    return _count_in_band(ground, NEST_GREY[0], NEST_GREY[1]) >= 3
+
+
+@kernel
+def sees_object(ground: ObsArray) -> bool:
+    """Return whether all 4 ground readings show an object."""
+    return _count_in_band(ground, OBJECT_GREY[0], OBJECT_GREY[1]) == 4
+
+
+@kernel
+def sees_cache(ground: ObsArray) -> bool:
+    """Return whether at least 3 of 4 ground readings show a cache."""
+    return _count_in_band(ground, CACHE_GREY[0], CACHE_GREY[1]) >= 3

@@ -1,0 +1,287 @@
+"""What a learner sees and does: a choice of observations and actions over the contract of the environment.
+
+The environment always speaks (N, D) observations and (N, 3) commands. A learner may prefer fewer columns, numbered
+actions or a gripper that works by itself; training environments and trained policies translate by the same object,
+so that a policy runs exactly as it was trained.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, TypeAlias
+
+import numpy as np
+from gymnasium import spaces
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.contract.layout import ObservationLayout, ObservationSlice
+from swarm_forage_env.contract.policy import ActionError, SwarmTask
+from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.policies.kernels.commands import (
+    N_GRIPS,
+    N_MOTIONS,
+    automatic_grip,
+    mask_actions,
+    numbered_actions,
+)
+from swarm_forage_env.policies.kernels.compact import COMPACT_COLUMNS, compact_view
+
+OBSERVATIONS = ("full", "compact")
+ACTIONS = ("continuous", "discrete")
+
+MOTIONS = ("stand", "forward", "arc left", "arc right", "turn left", "turn right")
+"""Discrete actions that move, in order."""
+GRIPS = ("grasp", "release", "deliver", "site", "found")
+"""Discrete actions of the gripper, in order after the motions; the wheels stand."""
+_WHEELS = ((0.0, 0.0), (0.5, 0.5), (0.4, 0.6), (0.6, 0.4), (-0.25, 0.25), (0.25, -0.25))
+"""Wheel commands of the motions (our choice): full speed, arcs of 0.35 m radius, turns of 8 degrees per tick."""
+_COMPACT_READS = (
+    "proximity",
+    "light",
+    "ground",
+    "wheel_speed",
+    "position",
+    "heading",
+    "carrying",
+    "interacting",
+    "active",
+    "los_cell",
+    "los_object",
+    "los_cache",
+)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class InterfaceConfig:
+    """Choices of a learner, plain values.
+
+    Raises:
+        ConfigError: an unknown word, or a number of ticks below 1.
+    """
+
+    observation: str = "full"
+    """"full": the (D,) row of the environment; "compact": the columns of `compact_layout`."""
+    actions: str = "continuous"
+    """"continuous": left wheel, right wheel and, unless automatic, gripper in [-1, 1]; "discrete": a number, see
+    `MOTIONS` and `GRIPS`."""
+    automatic_gripper: bool = False
+    """Grasp when empty and over an object or a cache, deliver when carrying in the nest; the learner only drives."""
+    decision_ticks: int = 1
+    """Ticks for which an action is kept; rewards add up. An automatic gripper looks in every tick."""
+
+    def __post_init__(self) -> None:
+        for name, known in (("observation", OBSERVATIONS), ("actions", ACTIONS)):
+            value = getattr(self, name)
+            if value not in known:
+                raise ConfigError(
+                    f"Expected interface.{name} to be one of {', '.join(known)}, got {value!r}."
+                    + suggestion(str(value), known)
+                )
+        if not isinstance(self.automatic_gripper, bool):
+            raise ConfigError(
+                f"Expected interface.automatic_gripper to be True or False, got {self.automatic_gripper!r}."
+            )
+        ticks = self.decision_ticks
+        if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 1:
+            raise ConfigError(f"Expected interface.decision_ticks to be a whole number >= 1, got {ticks!r}.")
+
+    @property
+    def reads(self) -> tuple[str, ...] | None:
+        """Observation slices that are looked at, None = all; what `ForageEnv(reads=...)` takes."""
+        return _COMPACT_READS if self.observation == "compact" else None
+
+
+class LearnerInterface:
+    """Translates between a swarm and a learner that controls each robot alike.
+
+    Attributes:
+        config: The choices.
+        layout: Columns of what the learner sees.
+        observation_space: Box of one robot's row, (d,) float32 in [-1, 1].
+        action_space: Box or Discrete of one robot's action.
+    """
+
+    def __init__(self, config: InterfaceConfig, task: SwarmTask) -> None:
+        """Bind the choices to a world.
+
+        Args:
+            config: The choices.
+            task: The world; see `ForageEnv.task`.
+        """
+        self.config = config
+        self._is_compact = config.observation == "compact"
+        self._is_discrete = config.actions == "discrete"
+        self._dynamic_caches = task.caches == "dynamic"
+        source = task.layout
+        start = {part.name: part.start for part in source}
+        self._heading = source["heading"]
+        self._half_x, self._half_y = (float(scale) for scale in source.part("position").scale)
+        self._view_starts = tuple(start[name] for name in _COMPACT_READS)
+        self._carrying = start["carrying"]
+        self._grip_starts = (start["ground"], start["carrying"], start["los_object"])
+        self._mask_starts = (
+            start["ground"],
+            start["carrying"],
+            start["interacting"],
+            start["active"],
+            start["los_object"],
+        )
+        self._wheels = np.array(_WHEELS, np.float32)
+        self._grips = np.array([Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.FOUND], np.float32)
+        self._commands = np.zeros((task.n_robots, 3), np.float32)
+        self.layout = compact_layout(self._half_x, self._half_y) if self._is_compact else source
+        self.observation_space = self.new_observation_space()
+        self.action_space = self.new_action_space()
+        self._actions_shape = (task.n_robots, *(self.action_space.shape or ()))
+
+    def new_observation_space(self) -> spaces.Box:
+        """Return a space of its own, with a random state of its own, for one robot's row."""
+        return spaces.Box(-1.0, 1.0, (self.layout.size,), np.float32)
+
+    def new_action_space(self) -> spaces.Box | spaces.Discrete:
+        """Return a space of its own, with a random state of its own, for one robot's action."""
+        automatic = self.config.automatic_gripper
+        if self._is_discrete:
+            return spaces.Discrete(N_MOTIONS if automatic else N_MOTIONS + N_GRIPS)
+        return spaces.Box(-1.0, 1.0, (2 if automatic else 3,), np.float32)
+
+    @property
+    def active_column(self) -> int:
+        """Column of what the learner sees that is 1 for robots at work, 0 for all others."""
+        return self.layout.part("active").start
+
+    def observe(self, obs: ObsArray, out: ObsArray | None = None) -> ObsArray:
+        """Return what the learner sees, a new array or `out`.
+
+        Args:
+            obs: (N, D) observations of the environment.
+            out: (N, d) float32 to write into.
+        """
+        if out is None:
+            out = np.empty((len(obs), self.layout.size), np.float32)
+        if self._is_compact:
+            compact_view(obs, self._view_starts, self._half_x, self._half_y, out)
+        else:
+            np.copyto(out, obs)
+        return out
+
+    def command(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
+        """Return commands (N, 3) float32 in a reused buffer.
+
+        Args:
+            actions: (N,) whole numbers or (N, 2 or 3) float, as `action_space` says, one row per robot.
+            obs: (N, D) observations of the environment that the learner's choice is carried out in.
+
+        Raises:
+            ActionError: another shape, or a number that is no action.
+        """
+        commands = self._commands
+        if actions.shape != self._actions_shape:
+            raise ActionError(
+                f"Expected actions with shape {self._actions_shape}, one row per robot as in {self.action_space}, "
+                f"got {actions.shape}."
+            )
+        if self._is_discrete:
+            self._check_numbers(actions)
+            numbered_actions(
+                np.ascontiguousarray(actions, np.int32), self._wheels, self._grips, obs, self._carrying, commands
+            )
+        elif self.config.automatic_gripper:
+            commands[:, :2] = actions
+        else:
+            np.copyto(commands, actions, casting="same_kind")
+        if self.config.automatic_gripper:
+            automatic_grip(obs, self._grip_starts, commands)
+        return commands
+
+    def _check_numbers(self, actions: np.ndarray) -> None:
+        most = int(self.action_space.n) - 1  # type: ignore[union-attr]
+        expected = f"Expected actions as whole numbers from 0 to {most}, got"
+        if actions.dtype.kind not in "iu":
+            raise ActionError(f"{expected} {actions.dtype}.")
+        if actions.min() < 0 or actions.max() > most:
+            raise ActionError(f"{expected} {actions.min()} to {actions.max()}.")
+
+    def mask(self, obs: ObsArray) -> BoolArray:
+        """Return which discrete actions make sense, (N, number of actions) bool; at least one per row.
+
+        Moving is no choice during an interaction, a gripper action none where it would be refused; robots that are
+        not at work may only stand.
+
+        Args:
+            obs: (N, D) observations of the environment.
+
+        Raises:
+            ValueError: the actions are continuous.
+        """
+        if not self._is_discrete:
+            raise ValueError("Expected discrete actions, continuous ones have no mask; set actions='discrete'.")
+        mask = np.empty((len(obs), int(self.action_space.n)), np.bool_)  # type: ignore[union-attr]
+        mask_actions(obs, self._mask_starts, self._dynamic_caches, mask)
+        return mask
+
+
+@lru_cache(maxsize=64)  # a curriculum may ask for a new size in every run
+def compact_layout(half_width_m: float, half_height_m: float) -> ObservationLayout:
+    """Build the layout of the compact view (our choice of what a driver needs); directions are forward and left."""
+    reach = (1.0, 1.0, 1.0)
+    table: list[tuple[str, tuple[float, ...], str, str]] = [
+        ("proximity", (1.0, 1.0), "proximity", "sum of the 24 readings as vectors, cut to length 1"),
+        ("obstacle", (1.0,), "proximity", "1 when that sum means an obstacle"),
+        ("light", (1.0, 1.0), "light", "direction of the nest lights, length 1; zeros in the dark"),
+        ("on_object", (1.0,), "", "1 when a free object lies in the robot's cell"),
+        ("on_nest", (1.0,), "ground", "1 when the ground sensors see the nest"),
+        ("on_cache", (1.0,), "ground", "1 when the ground sensors see a cache"),
+        ("wheel_speed", (0.2, 0.2), "wheel_speed", "applied left, right wheel speed / 0.20 m/s"),
+        ("position", (half_width_m, half_height_m), "position", "2 x / X - 1, 2 y / Y - 1"),
+        ("heading", (1.0, 1.0), "heading", "cos, sin of the heading"),
+        ("carrying", (1.0,), "", "1 while carrying an object"),
+        ("interacting", (1.0,), "", "1 while a pick-up or drop is in progress"),
+        ("active", (1.0,), "", "1 while part of the tasked swarm"),
+        ("object", reach, "", "nearest object in view: m forward, m left, at most 1 m long; 1 if there is one"),
+        ("cache", reach, "", "nearest cache in view: m forward, m left, cut to 1 m; 1 if there is one"),
+    ]
+    slices: list[ObservationSlice] = []
+    start = 0
+    for name, scale, noise_group, meaning in table:
+        slices.append(ObservationSlice(name, start, len(scale), scale, noise_group, meaning))
+        start += len(scale)
+    assert start == COMPACT_COLUMNS
+    return ObservationLayout(tuple(slices))
+
+
+GivenInterface: TypeAlias = InterfaceConfig | Mapping[str, Any] | None
+"""What environments take as their argument `interface`; see `chosen_interface`."""
+
+
+def chosen_interface(given: GivenInterface) -> InterfaceConfig:
+    """Return the choices that were given: as they are, as fields by name, or None for the defaults.
+
+    Raises:
+        ConfigError: none of these, an unknown field or value.
+    """
+    if given is None:
+        return InterfaceConfig()
+    if isinstance(given, InterfaceConfig):
+        return given
+    if isinstance(given, Mapping):
+        return interface_from_mapping(given)
+    raise ConfigError(
+        f"Expected interface as an InterfaceConfig or its fields by name, such as {{'actions': 'discrete'}}, "
+        f"got {given!r}."
+    )
+
+
+def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
+    """Build a configuration from fields by name, as trained policies store it.
+
+    Raises:
+        ConfigError: an unknown key or value.
+    """
+    known = InterfaceConfig.__dataclass_fields__
+    for key in mapping:
+        if key not in known:
+            raise ConfigError(f"Unknown interface option {key!r}.{suggestion(key, known)}")
+    return InterfaceConfig(**mapping)

@@ -1,0 +1,1 @@
+"""Compiled functions behind what a learned policy sees and does."""

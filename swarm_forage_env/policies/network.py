@@ -1,0 +1,273 @@
+"""Trained policies without torch: a small network in a file, evaluated by numpy.
+
+A file is an `.npz` of plain arrays: the layers of the network ("weight_0", "bias_0", ...) and "about", the JSON text
+of `NetworkAbout`. Nothing in it is executed, so that opening a file from a stranger is safe.
+"""
+
+import dataclasses
+import io
+import itertools
+import json
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from gymnasium import spaces
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
+from swarm_forage_env.scenarios.config import CACHE_KINDS
+
+ACTIVATIONS = ("tanh", "relu")
+_ARCHIVE = b"PK\x03\x04"
+"""How a zip file begins, and so an `.npz`."""
+_BROKEN = (ValueError, LookupError, TypeError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error)
+"""What numpy and zipfile raise over an archive that is none or has been damaged."""
+
+
+_LAYER_PARTS = ("weight", "bias")
+
+
+class NetworkError(ValueError):
+    """A file that holds no network, or a network that does not fit its interface."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class NetworkAbout:
+    """What the weights alone do not say. Plain values."""
+
+    interface: InterfaceConfig
+    activation: str = "tanh"
+    """After every layer but the last."""
+    samples: bool = False
+    """Whether discrete actions are drawn by their probabilities; else the likeliest is taken. Continuous actions are
+    always the mean."""
+    caches: str = "none"
+    """World that the policy was trained in; what runs build when not told otherwise."""
+    card: dict[str, Any] = field(default_factory=dict)
+    """How the network came about, for people."""
+
+    def __post_init__(self) -> None:
+        if self.activation not in ACTIVATIONS:
+            raise NetworkError(f"Expected an activation of {', '.join(ACTIVATIONS)}, got {self.activation!r}.")
+        if self.caches not in CACHE_KINDS:
+            raise NetworkError(f"Expected caches to be one of {', '.join(CACHE_KINDS)}, got {self.caches!r}.")
+        for name, kind, wanted in (("samples", bool, "true or false"), ("card", dict, "a table")):
+            if not isinstance(getattr(self, name), kind):  # files hold anything
+                raise NetworkError(f"Expected {name} to be {wanted}, got {getattr(self, name)!r}.")
+
+    def to_json(self) -> str:
+        """Return the text that files hold."""
+        return json.dumps(dataclasses.asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> "NetworkAbout":
+        """Read the text back.
+
+        Raises:
+            NetworkError: no JSON object, unknown or missing keys, or values that make no sense.
+        """
+        try:
+            mapping = json.loads(text)
+        except json.JSONDecodeError as error:
+            raise NetworkError(f"Expected a description of a network as JSON, got {text[:80]!r}.") from error
+        if not isinstance(mapping, dict) or not isinstance(mapping.get("interface"), dict):
+            raise NetworkError(f"Expected a description of a network with its interface, got {text[:80]!r}.")
+        known = cls.__dataclass_fields__
+        for key in mapping:
+            if key not in known:
+                raise NetworkError(f"Unknown key {key!r} about a network.{suggestion(key, known)}")
+        try:
+            return cls(**{**mapping, "interface": interface_from_mapping(mapping["interface"])})
+        except ConfigError as error:
+            raise NetworkError(f"Expected a description of a network that can be used: {error}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """Layers of a perceptron with one hidden activation, and what it is about."""
+
+    weights: tuple[np.ndarray, ...]
+    """(in, out) float32 per layer."""
+    biases: tuple[np.ndarray, ...]
+    """(out,) float32 per layer."""
+    about: NetworkAbout
+
+    def __post_init__(self) -> None:
+        sizes = [weight.shape for weight in self.weights]
+        fits = len(self.weights) == len(self.biases) > 0 and all(
+            weight.ndim == 2 and bias.shape == weight.shape[1:]
+            for weight, bias in zip(self.weights, self.biases, strict=True)
+        )
+        if not fits or any(left[1] != right[0] for left, right in itertools.pairwise(sizes)):
+            raise NetworkError(f"Expected layers that follow on each other, got weights {sizes}.")
+        if not all(layer.dtype.kind == "f" and np.isfinite(layer).all() for layer in (*self.weights, *self.biases)):
+            raise NetworkError("Expected weights and biases that are finite numbers; did the training diverge?")
+
+    def outputs(self, rows: ObsArray) -> np.ndarray:
+        """Return the last layer's values for observations (N, d), before any choice of actions."""
+        value: np.ndarray = rows
+        last = len(self.weights) - 1
+        for layer, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            value = value @ weight + bias
+            if layer < last:
+                value = np.tanh(value) if self.about.activation == "tanh" else np.maximum(value, 0.0)
+        return value
+
+    def choose(self, rows: ObsArray, rng: np.random.Generator) -> np.ndarray:
+        """Return actions for observations (N, d): numbers (N,), or values in [-1, 1], one row per robot."""
+        outputs = self.outputs(rows)
+        if self.about.interface.actions != "discrete":
+            return np.clip(outputs, -1.0, 1.0)
+        if self.about.samples:
+            # Gumbel's trick: the largest of logits plus such noise is a draw by their probabilities.
+            outputs = outputs + rng.gumbel(size=outputs.shape)
+        return np.argmax(outputs, axis=1)
+
+    @classmethod
+    def from_state_dict(
+        cls, state: Mapping[str, Any], about: NetworkAbout, *, n_outputs: int | None = None
+    ) -> "Network":
+        """Take the layers of a perceptron from the state dict of a torch module.
+
+        Args:
+            state: Tensors by name, in the order of the layers: (out, in) under names that end in "weight", (out,) under
+                names that end in "bias". Others are left out.
+            about: What the weights alone do not say.
+            n_outputs: How many outputs are actions; default all. Some libraries let the deviations follow the means.
+
+        Raises:
+            NetworkError: these are no layers that follow on each other.
+        """
+        parts = {end: [_array(tensor) for name, tensor in state.items() if name.endswith(end)] for end in _LAYER_PARTS}
+        weights, biases = ([array.T for array in parts["weight"]], parts["bias"])
+        if n_outputs is not None and weights and biases:
+            weights[-1], biases[-1] = weights[-1][:, :n_outputs], biases[-1][:n_outputs]
+        return cls(tuple(map(np.ascontiguousarray, weights)), tuple(biases), about)
+
+    def save(self, path: str | Path) -> None:
+        """Write the file; an existing one is replaced."""
+        layers = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
+        layers |= {f"bias_{k}": bias for k, bias in enumerate(self.biases)}
+        with replacing(Path(path)) as draft, draft.open("wb") as file:
+            np.savez_compressed(file, about=np.array(self.about.to_json()), **layers)  # type: ignore[arg-type]
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Network":
+        """Read a file.
+
+        Raises:
+            OSError: the file cannot be read.
+            NetworkError: it holds no network.
+        """
+        content = Path(path).read_bytes()
+        try:
+            stored = _parts(content)
+            n_layers = sum(name.startswith("weight_") for name in stored)
+            weights = tuple(_part(stored, f"weight_{k}") for k in range(n_layers))
+            biases = tuple(_part(stored, f"bias_{k}") for k in range(n_layers))
+            return cls(weights, biases, NetworkAbout.from_json(str(_part(stored, "about"))))
+        except NetworkError as error:
+            raise NetworkError(f"Expected {path} to hold a network: {error}") from error
+
+
+def _parts(content: bytes) -> Mapping[str, np.ndarray]:
+    """Return what an archive holds by name, unread. Like `_part` it tells in our words what numpy has others for."""
+    if not content:
+        raise NetworkError("The file is empty.")
+    if not content.startswith(_ARCHIVE):
+        raise NetworkError("The file is no .npz archive.")
+    try:
+        return np.load(io.BytesIO(content), allow_pickle=False)
+    except _BROKEN as error:
+        raise NetworkError("The file is a damaged .npz archive; its table of contents cannot be read.") from error
+
+
+def _part(stored: Mapping[str, np.ndarray], name: str) -> np.ndarray:
+    if name not in stored:
+        raise NetworkError(f"The archive has no part {name!r}; it is damaged, or one of something else.")
+    try:
+        return stored[name]
+    except _BROKEN as error:
+        raise NetworkError(f"Its part {name!r} is damaged, or no plain array of numbers or text.") from error
+
+
+def _array(tensor: Any) -> np.ndarray:
+    on_host = tensor.detach().cpu() if hasattr(tensor, "detach") else tensor
+    return np.asarray(on_host, np.float32)
+
+
+Choose: TypeAlias = Callable[[ObsArray, np.random.Generator], np.ndarray]
+"""From what a learner sees, (N, d), to its actions, one row per robot."""
+
+
+class LearnedPolicy:
+    """A trained controller, the same for every robot, in policy clothes. An instance drives one run.
+
+    Attributes:
+        reads: Observation slices that are looked at.
+        caches: World that the policy was trained in.
+    """
+
+    def __init__(self, interface: InterfaceConfig, choose: Choose, *, caches: str = "none") -> None:
+        """Take the controller.
+
+        Args:
+            interface: What it saw and did in training.
+            choose: The controller.
+            caches: World that it was trained in.
+        """
+        self.reads = interface.reads
+        self.caches = caches
+        self._config = interface
+        self._choose = choose
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Start a run."""
+        self._rng = rng
+        self._interface = LearnerInterface(self._config, task)
+        self._view = np.empty((task.n_robots, self._interface.layout.size), np.float32)
+        self._ticks_left = 0
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
+        if self._ticks_left == 0:
+            self._chosen = self._choose(self._interface.observe(obs, self._view), self._rng)
+            self._ticks_left = self._config.decision_ticks
+        self._ticks_left -= 1
+        return self._interface.command(self._chosen, obs)
+
+
+class NetworkPolicy(LearnedPolicy):
+    """A network file as a policy."""
+
+    def __init__(self, network: Network) -> None:
+        """Take the network; whether it fits its interface shows in a world, see `reset`."""
+        about = network.about
+        super().__init__(about.interface, network.choose, caches=about.caches)
+        self._network = network
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Start a run.
+
+        Raises:
+            NetworkError: the network sees or does something else than its interface in this world.
+        """
+        super().reset(task, rng)
+        space = self._interface.action_space
+        n_actions = int(space.n) if isinstance(space, spaces.Discrete) else space.shape[0]
+        wanted = (self._interface.layout.size, n_actions)
+        found = (self._network.weights[0].shape[0], self._network.weights[-1].shape[1])
+        if wanted != found:
+            raise NetworkError(
+                f"Expected a network from {wanted[0]} columns to {wanted[1]} actions in this world, got one from "
+                f"{found[0]} to {found[1]}."
+            )

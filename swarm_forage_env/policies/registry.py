@@ -1,0 +1,135 @@
+"""How a policy is found and made: by its registered name, from a file, from a function."""
+
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from importlib.metadata import entry_points
+from pathlib import PurePath
+from typing import Any, ClassVar
+
+import numpy as np
+
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.contract.policy import Policy, SwarmTask
+from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+
+POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
+"""Entry-point group under which installed packages offer policies by name."""
+POLICY_FILE_ENTRY_POINTS = "swarm_forage_env.policy_files"
+"""Entry-point group of what opens policy files: the name is the file's suffix without its dot, the value is called with
+the path and the parameters of a run."""
+_LOCAL_POLICIES: dict[str, Callable[..., Policy]] = {}
+"""Names that `local_policy` lends to policies of this process."""
+
+
+class RandomPolicy:
+    """Uniformly random actions: the floor that every other policy has to beat."""
+
+    reads: ClassVar[tuple[str, ...]] = ()
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Keep the swarm size and the generator."""
+        self._shape = (task.n_robots, 3)
+        self._rng = rng
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Return (N, 3) actions drawn uniformly from [-1, 1]."""
+        return self._rng.uniform(-1.0, 1.0, self._shape).astype(np.float32)
+
+
+class CallablePolicy:
+    """A plain function `obs -> actions` in policy clothes; see `from_callable`."""
+
+    def __init__(self, function: Callable[[ObsArray], ActionArray], name: str) -> None:
+        self.function = function
+        self.name = name
+
+    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+        """Remember the expected shape of actions."""
+        self._shape = (task.n_robots, 3)
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Return the function's actions, checked for shape; raises ValueError otherwise."""
+        actions = np.asarray(self.function(obs), dtype=np.float32)
+        if actions.shape != self._shape:
+            raise ValueError(
+                f"Expected policy {self.name!r} to return actions with shape (n_robots, 3) = {self._shape}, "
+                f"got {actions.shape}; return one row per robot."
+            )
+        return actions
+
+
+def from_callable(function: Callable[[ObsArray], ActionArray], *, name: str | None = None) -> CallablePolicy:
+    """Wrap `function(obs) -> actions` as a Policy.
+
+    Args:
+        function: Takes (N, D) observations, returns (N, 3) actions.
+        name: Name under which results are stored; default the function's own name.
+    """
+    return CallablePolicy(function, name or getattr(function, "__name__", type(function).__name__))
+
+
+def policy_names() -> tuple[str, ...]:
+    """Return the names of all installed policies, sorted."""
+    return tuple(sorted({point.name for point in entry_points(group=POLICY_ENTRY_POINTS)}))
+
+
+def is_policy_file(name: str) -> bool:
+    """Return whether `name` is that of a file which an installed package opens as a policy, by its suffix."""
+    return bool(entry_points(group=POLICY_FILE_ENTRY_POINTS, name=_suffix(name)))
+
+
+def _suffix(name: str) -> str:
+    return PurePath(name).suffix.removeprefix(".").lower()
+
+
+def policy_class(name: str) -> Callable[..., Policy]:
+    """Return the class (or factory) registered under `name`, or what opens the policy file of that name.
+
+    Raises:
+        ValueError: no installed policy has that name; the message lists the known ones.
+    """
+    if name in _LOCAL_POLICIES:
+        return _LOCAL_POLICIES[name]
+    if is_policy_file(name):
+        (opener,) = entry_points(group=POLICY_FILE_ENTRY_POINTS, name=_suffix(name))
+        return partial(opener.load(), name)
+    for point in entry_points(group=POLICY_ENTRY_POINTS):
+        if point.name == name:
+            return point.load()
+    known = policy_names()
+    raise ValueError(
+        f"Unknown policy {name!r}.{suggestion(name, known)} Installed policies: {', '.join(known) or 'none'}."
+    )
+
+
+@contextmanager
+def local_policy(name: str, factory: Callable[..., Policy]) -> Generator[None]:
+    """Let `name` stand for `factory` meanwhile, in this process only: workers do not know it, so run with jobs=1.
+
+    Args:
+        name: A name that no installed policy has.
+        factory: Builds a fresh policy for each run.
+
+    Raises:
+        ValueError: the name is taken, or looks like a policy file.
+    """
+    if name in _LOCAL_POLICIES or name in policy_names() or is_policy_file(name):
+        raise ValueError(f"Expected a name of its own for the policy, got {name!r}, which stands for another one.")
+    _LOCAL_POLICIES[name] = factory
+    try:
+        yield
+    finally:
+        del _LOCAL_POLICIES[name]
+
+
+def load_policy(name: str | PurePath, parameters: Mapping[str, Any] | None = None) -> Policy:
+    """Return a fresh policy by registered name or from a policy file, built with keyword `parameters`.
+
+    Raises:
+        TypeError: `name` is neither text nor a path.
+        ValueError: no installed policy has that name; the message lists the known ones.
+    """
+    if not isinstance(name, str | PurePath):  # pyright: ignore[reportUnnecessaryIsInstance] - people pass None
+        raise TypeError(f"Expected the name of a policy or of a policy file, got {name!r}.")
+    return policy_class(str(name))(**dict(parameters or {}))

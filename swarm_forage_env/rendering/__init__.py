@@ -1,0 +1,1 @@
+"""Pictures, films and plots; pure readers of the world."""

@@ -1,0 +1,160 @@
+"""Writing pictures as a film: GIF with Pillow, MP4 with imageio and ffmpeg."""
+
+import math
+from collections.abc import Iterable, Iterator
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_forage_env._internal.extras import install_command
+from swarm_forage_env.rendering.view import CACHE_OPACITY, NEST_OPACITY, PALETTE, SOURCE_OPACITY, RenderError
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+Frame = NDArray[np.uint8]
+SUFFIXES = (".gif", ".mp4")
+MAX_FPS = {".gif": 50, ".mp4": 60}
+"""GIF counts in hundredths of a second, and viewers slow films down that ask for less than two of them per frame."""
+MAX_GIF_FRAMES = 1500
+"""A GIF is built in memory, 1 byte per pixel and frame."""
+
+
+def check_film(path: str | Path, fps: float, n_frames: int) -> Path:
+    """Return `path` if a film can be written there.
+
+    Raises:
+        RenderError: unknown suffix, missing folder, impossible rate, or a GIF of too many frames.
+        ImportError: the library that writes this kind of film is not installed.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise RenderError(f"Expected a path ending in {' or '.join(SUFFIXES)}, got {str(path)!r}.")
+    if not path.parent.is_dir():
+        raise RenderError(f"Expected {str(path.parent)!r} to be an existing folder; create it or choose another.")
+    if not (math.isfinite(fps) and 1 <= fps <= MAX_FPS[suffix]):
+        raise RenderError(f"Expected fps from 1 to {MAX_FPS[suffix]} for {suffix}, got {fps!r}.")
+    if suffix == ".gif" and n_frames > MAX_GIF_FRAMES:
+        raise RenderError(
+            f"Expected at most {MAX_GIF_FRAMES} frames for a GIF, got {n_frames}; "
+            "film a shorter time, raise speedup, lower fps, or write an .mp4."
+        )
+    if suffix == ".mp4":
+        _import_imageio()
+    return path
+
+
+def write_film(frames: Iterable[Frame], path: str | Path, *, fps: float, n_frames: int) -> Path:
+    """Write pictures as a film; the suffix of `path` chooses the format.
+
+    The file appears under its name only when it is complete. GIFs use one palette made for this package's pictures,
+    without dithering, and store only what changed from frame to frame, so they stay small. Identical consecutive
+    pictures become one longer frame of a GIF. GIF rates are rounded to whole hundredths of a second per frame.
+
+    Args:
+        frames: (H, W, 3) uint8 pictures of equal size, consumed one at a time.
+        path: Ends in .gif or .mp4.
+        fps: Pictures per second.
+        n_frames: How many pictures will come at most.
+
+    Returns:
+        The path written.
+
+    Raises:
+        RenderError: what `check_film` refuses.
+        ImportError: the library that writes this kind of film is not installed.
+    """
+    path = check_film(path, fps, n_frames)
+    partial = path.with_name(f".{path.stem}.partial{path.suffix.lower()}")
+    try:
+        if path.suffix.lower() == ".gif":
+            _write_gif(frames, partial, fps)
+        else:
+            _write_mp4(frames, partial, fps)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+    return path
+
+
+def _write_gif(frames: Iterable[Frame], path: Path, fps: float) -> None:
+    from PIL import Image
+
+    palette = _gif_palette()
+
+    def indexed() -> Iterator["Image.Image"]:
+        for frame in frames:
+            yield Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+
+    pictures = indexed()
+    first = next(pictures)
+    delay_ms = 10 * round(100 / fps)
+    first.save(path, save_all=True, append_images=pictures, duration=delay_ms, loop=0, optimize=True, disposal=1)
+
+
+def _gif_palette() -> "Image.Image":
+    """Colours of our pictures: grounds, things on them, and the steps between that antialiasing and fading make.
+
+    Fewer than 256, since one index stands for "unchanged".
+    """
+    from PIL import Image
+
+    colour = PALETTE
+    nest, cache, source = (
+        _mix(colour.floor, tint, share)
+        for tint, share in ((colour.nest, NEST_OPACITY), (colour.cache, CACHE_OPACITY), (colour.source, SOURCE_OPACITY))
+    )
+    grounds = (colour.floor, nest, cache, source, colour.page, colour.wall)
+    things = (
+        colour.empty,
+        colour.carrying,
+        colour.interference,
+        colour.repair,
+        colour.object,
+        colour.light,
+        colour.nest,
+        colour.cache,
+        colour.text,
+    )
+    steps = (0.25, 0.5, 0.75)
+    mixed = [_mix(ground, thing, step) for ground, thing, step in product(grounds, things, steps)]
+    fading = [_mix(colour.floor, thing, step) for thing, step in product(things[:2], (0.06, 0.12, 0.18, 0.37))]
+    glow = [_mix(nest, colour.light, step) for step in (0.06, 0.12, 0.18, 0.31, 0.37, 0.43)]
+    on_robots = [_mix(colour.carrying, colour.object, step) for step in steps]
+    chosen = list(dict.fromkeys([*grounds, *things, *mixed, *fading, *glow, *on_robots]))[:255]
+    picture = Image.new("P", (1, 1))
+    picture.putpalette([channel for entry in chosen for channel in entry])
+    return picture
+
+
+def _mix(ground: tuple[int, int, int], thing: tuple[int, int, int], share: float) -> tuple[int, int, int]:
+    red, green, blue = (round(a + (b - a) * share) for a, b in zip(ground, thing, strict=True))
+    return (red, green, blue)
+
+
+def _write_mp4(frames: Iterable[Frame], path: Path, fps: float) -> None:
+    # The usual pixel format halves the resolution of colour, so sides must be even; imageio's default macro block
+    # would instead rescale the picture to multiples of 16.
+    with _import_imageio().get_writer(
+        path, format="FFMPEG", fps=fps, codec="libx264", quality=8, macro_block_size=1
+    ) as writer:
+        for frame in frames:
+            odd_rows, odd_columns = frame.shape[0] % 2, frame.shape[1] % 2
+            writer.append_data(np.pad(frame, ((0, odd_rows), (0, odd_columns), (0, 0)), mode="edge"))
+
+
+def _import_imageio() -> Any:
+    """Return the module `imageio.v2`, checked to be able to write MP4."""
+    try:
+        import imageio.v2
+        import imageio_ffmpeg  # noqa: F401  (imageio looks it up by itself; without it the error is obscure)
+    except ImportError as error:
+        raise ImportError(
+            "Writing .mp4 needs imageio and imageio-ffmpeg, which are not installed; "
+            f"run {install_command('render')}, or write a .gif."
+        ) from error
+    return imageio.v2

@@ -1,0 +1,1 @@
+"""What a world is, as data: configurations, presets, quirks, regions of the floor."""

@@ -1,0 +1,502 @@
+"""Frozen configurations that are complete and refuse nonsense at construction.
+
+A warehouse and a disaster zone are two configurations, never two environments. Presets live in `scenarios`.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, TypeVar, cast
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, capacity, distributable_box
+from swarm_forage_env.scenarios.units import CELL_M, WHEEL_SCALE_MPS
+
+CACHE_KINDS = ("none", "static", "dynamic")
+PERFORMANCE_MEASURES = ("collected", "first_picked")
+MAX_DISC_SHARE = 0.4
+"""Robot discs may cover at most this share of the start area; beyond it random starting poses stop being findable."""
+MAX_CELLS = 200_000_000
+"""Largest floor, 2.8 km square (our choice: its codes take 800 MB; the largest of the paper has 409,600 cells)."""
+
+
+def _require(condition: bool, message: str) -> None:
+    if not condition:
+        raise ConfigError(message)
+
+
+def _require_finite(section: str, **values: Any) -> None:
+    for name, value in values.items():
+        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        _require(is_number and math.isfinite(value), f"Expected {section}.{name} to be a finite number, got {value!r}.")
+
+
+def _require_positive(section: str, **values: Any) -> None:
+    _require_finite(section, **values)
+    for name, value in values.items():
+        _require(value > 0, f"Expected {section}.{name} > 0, got {value!r}.")
+
+
+def _require_whole(section: str, minimum: int, **values: Any) -> None:
+    for name, value in values.items():
+        is_whole = isinstance(value, int) and not isinstance(value, bool)
+        hint = "; convert it with int()" if hasattr(value, "__index__") and not isinstance(value, bool) else ""
+        _require(is_whole, f"Expected {section}.{name} to be a whole number, got {value!r}{hint}.")
+        _require(value >= minimum, f"Expected {section}.{name} >= {minimum}, got {value}.")
+
+
+def _require_switch(section: str, **values: Any) -> None:
+    for name, value in values.items():
+        _require(isinstance(value, bool), f"Expected {section}.{name} to be True or False, got {value!r}.")
+
+
+def _require_pair(section: str, **values: Any) -> None:
+    for name, value in values.items():
+        is_pair = isinstance(value, tuple) and len(cast("tuple[Any, ...]", value)) == 2
+        _require(is_pair, f"Expected {section}.{name} to be (x, y), got {value!r}.")
+        _require_positive(section, **{f"{name}[0]": value[0], f"{name}[1]": value[1]})
+
+
+def _require_text(section: str, **values: Any) -> None:
+    for name, value in values.items():
+        _require(
+            isinstance(value, str) and bool(value), f"Expected {section}.{name} to be a non-empty text, got {value!r}."
+        )
+
+
+def _require_shares(section: str, **values: Any) -> None:
+    for name, value in values.items():
+        shares = cast("tuple[Any, ...]", value) if isinstance(value, tuple) else ()
+        are_positive = all(isinstance(share, (int, float)) and share > 0 for share in shares)
+        _require(
+            are_positive and abs(sum(shares) - 1.0) < 1e-9,
+            f"Expected {section}.{name} to be positive shares of a tick that sum to 1, got {value!r}.",
+        )
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ArenaConfig:
+    """A rectangular floor with walls and a nest. Origin at the lower left corner."""
+
+    width_m: float
+    """Extent X along x, a multiple of the 0.2 m cell."""
+    height_m: float
+    """Extent Y along y, a multiple of the 0.2 m cell."""
+    nest_centre_m: tuple[float, float]
+    nest_size_m: tuple[float, float]
+    """The nest is snapped to whole cells."""
+
+    def __post_init__(self) -> None:
+        _require_positive("arena", width_m=self.width_m, height_m=self.height_m)
+        for name, extent in (("width_m", self.width_m), ("height_m", self.height_m)):
+            cells = extent / CELL_M
+            _require(
+                abs(cells - round(cells)) < 1e-6 and cells >= 10,
+                f"Expected arena.{name} to be a multiple of {CELL_M} m and at least 2 m, got {extent}.",
+            )
+        _require(
+            math.prod(self.n_cells) <= MAX_CELLS,
+            f"Expected an arena of at most {MAX_CELLS:,} cells of {CELL_M} m, got {self.width_m} x {self.height_m} m.",
+        )
+        _require_pair("arena", nest_centre_m=self.nest_centre_m, nest_size_m=self.nest_size_m)
+        x_low, y_low, x_high, y_high = self.nest_cells
+        nx, ny = self.n_cells
+        _require(
+            x_low < x_high and y_low < y_high,
+            f"Expected arena.nest_size_m of at least one cell ({CELL_M} m), got {self.nest_size_m}.",
+        )
+        _require(
+            x_low >= 0 and y_low >= 0 and x_high <= nx and y_high <= ny,
+            f"Expected the nest inside the {self.width_m} x {self.height_m} m arena, got centre "
+            f"{self.nest_centre_m} and size {self.nest_size_m}.",
+        )
+
+    @property
+    def n_cells(self) -> tuple[int, int]:
+        """Number of floor cells along x and y."""
+        return round(self.width_m / CELL_M), round(self.height_m / CELL_M)
+
+    @property
+    def nest_cells(self) -> Box:
+        """Cells of the nest, half-open."""
+        (cx, cy), (sx, sy) = self.nest_centre_m, self.nest_size_m
+        x_low, y_low = round((cx - sx / 2) / CELL_M), round((cy - sy / 2) / CELL_M)
+        return (x_low, y_low, x_low + round(sx / CELL_M), y_low + round(sy / CELL_M))
+
+    @property
+    def nest_box_m(self) -> tuple[float, float, float, float]:
+        """Closed nest rectangle: x low, y low, x high, y high."""
+        x_low, y_low, x_high, y_high = self.nest_cells
+        return (x_low / 5, y_low / 5, x_high / 5, y_high / 5)
+
+    @property
+    def distributable_cells(self) -> Box:
+        """Cells on which objects may lie, half-open."""
+        return distributable_box(*self.n_cells)
+
+    @property
+    def interior_m(self) -> tuple[float, float, float, float]:
+        """Free interior between the 0.4 m walls: x low, y low, x high, y high. The east wall stands inwards."""
+        return (0.2, 0.2, self.width_m - 0.4, self.height_m - 0.2)
+
+    @property
+    def lights_m(self) -> tuple[tuple[float, float, float], ...]:
+        """Nest lights (x, y, height): one over a square nest, three at 25, 50, 75 % along a rectangular one."""
+        x_low, y_low, x_high, y_high = self.nest_box_m
+        size_x, size_y = x_high - x_low, y_high - y_low
+        centre_x, centre_y = (x_low + x_high) / 2, (y_low + y_high) / 2
+        height = (self.width_m * self.height_m) ** 0.25
+        if abs(size_x - size_y) < 1e-9:
+            return ((centre_x, centre_y, height),)
+        if size_y > size_x:
+            return tuple((centre_x, y_low + share * size_y, height) for share in (0.25, 0.5, 0.75))
+        return tuple((x_low + share * size_x, centre_y, height) for share in (0.25, 0.5, 0.75))
+
+    @property
+    def light_intensity(self) -> float:
+        """Distance scale of the nest lights, (X Y)^(1/2)."""
+        return math.sqrt(self.width_m * self.height_m)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RobotConfig:
+    """Differential-drive robots; defaults are those of the foot-bot used by the paper."""
+
+    n_robots: int
+    radius_m: float = 0.085036758
+    wheel_base_m: float = 0.14
+    max_speed_mps: float = 0.10
+    """Limit of the centre speed."""
+    max_wheel_difference_mps: float = 0.20
+    """Limit of right minus left wheel speed."""
+    start_margin_m: float = 2.8
+    """Robots start at uniform positions at least this far from the arena border."""
+
+    def __post_init__(self) -> None:
+        _require_whole("robots", 1, n_robots=self.n_robots)
+        _require_positive(
+            "robots",
+            radius_m=self.radius_m,
+            wheel_base_m=self.wheel_base_m,
+            max_speed_mps=self.max_speed_mps,
+            max_wheel_difference_mps=self.max_wheel_difference_mps,
+            start_margin_m=self.start_margin_m,
+        )
+        _require(
+            self.start_margin_m >= 0.4 + self.radius_m,
+            f"Expected robots.start_margin_m >= {0.4 + self.radius_m:.3f} (wall plus radius), got "
+            f"{self.start_margin_m}.",
+        )
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ObjectConfig:
+    """One-cell objects: how many, where they appear, whether they wander."""
+
+    n_objects: int
+    placement: str
+    """One of `regions.PLACEMENTS`."""
+    walk_probability: float = 0.0
+    """Probability p_rw that a free object takes a one-cell step, per object and tick."""
+
+    def __post_init__(self) -> None:
+        _require_whole("objects", 1, n_objects=self.n_objects)
+        _require(
+            self.placement in PLACEMENTS,
+            f"Expected objects.placement to be one of {', '.join(PLACEMENTS)}, got {self.placement!r}."
+            + suggestion(str(self.placement), PLACEMENTS),
+        )
+        _require_finite("objects", walk_probability=self.walk_probability)
+        _require(
+            0.0 <= self.walk_probability <= 1.0,
+            f"Expected objects.walk_probability in [0, 1], got {self.walk_probability}.",
+        )
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class CacheConfig:
+    """Caches: square floor areas that hold objects for robots to add to or take from."""
+
+    side_share: float = 0.2
+    """Nominal side as a share of max(X, Y)."""
+    distance_share: float = 0.2
+    """min_dist as a share of min(X, Y): objects this close to a founding drop join a dynamic cache."""
+    static_size: int = 2
+    """Objects that a static cache is created with."""
+    respawn_scale: float = 0.05
+    """Scale s of the restoration probability of static caches."""
+
+    def __post_init__(self) -> None:
+        _require_positive("cache", side_share=self.side_share, distance_share=self.distance_share)
+        _require(self.side_share <= 0.5, f"Expected cache.side_share <= 0.5, got {self.side_share}.")
+        _require_whole("cache", 2, static_size=self.static_size)
+        _require_finite("cache", respawn_scale=self.respawn_scale)
+        _require(self.respawn_scale >= 0, f"Expected cache.respawn_scale >= 0, got {self.respawn_scale}.")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RewardConfig:
+    """Weights of the reward terms in `rewards`; only learners use them. Zero switches a term off."""
+
+    delivery: float = 1.0
+    """Per object delivered to the nest."""
+    first_pickup: float = 0.1
+    """Per pick-up of an object that nobody had carried since it was placed."""
+    nest_progress: float = 0.0
+    """Per metre that a carrying robot comes closer to the nest centre."""
+    interference: float = 0.0
+    """Per tick in interference; give a negative weight for a penalty."""
+    tick: float = 0.0
+    """Per tick of an active robot; give a negative weight for a cost of living."""
+    team: bool = False
+    """Every active robot receives the mean over active robots instead of its own reward."""
+
+    def __post_init__(self) -> None:
+        _require_finite(
+            "reward",
+            delivery=self.delivery,
+            first_pickup=self.first_pickup,
+            nest_progress=self.nest_progress,
+            interference=self.interference,
+            tick=self.tick,
+        )
+        _require_switch("reward", team=self.team)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ScenarioConfig:
+    """A complete world: everything a run needs except the policy, the wrappers and the seed."""
+
+    name: str
+    arena: ArenaConfig
+    robots: RobotConfig
+    objects: ObjectConfig
+    caches: str = "none"
+    """Which caches the world has: "none", "static" or "dynamic"."""
+    cache: CacheConfig = field(default_factory=CacheConfig)
+    reward: RewardConfig = field(default_factory=RewardConfig)
+    performance: str = "collected"
+    """Which count is the performance curve: "collected" or "first_picked"."""
+    dt_s: float = 0.2
+    """Length of a control step (tick)."""
+    horizon_s: float = 10_000.0
+    interval_s: float = 200.0
+    """Length of a recording interval."""
+    physics_substeps: tuple[float, ...] = (0.5, 0.2, 0.15, 0.15)
+    """Shares of a tick that Chipmunk steps by. Free motion is exact for any; contacts are met one substep late, so the
+    last ones bound how deep robots are pushed into each other when a tick ends: 3 % of a diameter for two robots
+    driving head-on, where five equal substeps leave 4 % and one leaves 24 %. It takes at least three substeps after a
+    contact to settle a crowd: with (0.7, 0.15, 0.15) it squeezes robots through walls
+    (`tests/science/test_physics_convergence.py`)."""
+    quirks: Quirks = field(default_factory=Quirks)
+
+    def __post_init__(self) -> None:
+        _require_text("scenario", name=self.name)
+        for section, section_class in SECTIONS.items():
+            value = getattr(self, section)
+            _require(
+                isinstance(value, section_class),
+                f"Expected {section} to be a {section_class.__name__}, got {value!r}.",
+            )
+        _require_switch("quirks", **dataclasses.asdict(self.quirks))
+        for name, known in (("caches", CACHE_KINDS), ("performance", PERFORMANCE_MEASURES)):
+            value = getattr(self, name)
+            _require(
+                value in known,
+                f"Expected {name} to be one of {', '.join(known)}, got {value!r}." + suggestion(str(value), known),
+            )
+        _require_positive("scenario", dt_s=self.dt_s, horizon_s=self.horizon_s, interval_s=self.interval_s)
+        _require_shares("scenario", physics_substeps=self.physics_substeps)
+        for name in ("horizon_s", "interval_s"):
+            ticks = getattr(self, name) / self.dt_s
+            _require(
+                abs(ticks - round(ticks)) < 1e-6 and round(ticks) >= 1,
+                f"Expected {name} to be a whole number of ticks of {self.dt_s} s, got {getattr(self, name)}.",
+            )
+        _require(
+            self.cache_side_cells >= 1,
+            f"Expected cache.side_share to give caches of at least one cell ({CELL_M} m), got {self.cache.side_share} "
+            f"of max(X, Y) = {max(self.arena.width_m, self.arena.height_m)} m.",
+        )
+        speed = min(self.robots.max_speed_mps, WHEEL_SCALE_MPS)
+        _require(
+            speed * self.dt_s <= self.robots.radius_m,
+            f"Expected robots to drive at most their radius of {self.robots.radius_m} m per tick (or they pass through "
+            f"each other), got {speed} m/s for dt_s = {self.dt_s} s; lower dt_s or max_speed_mps.",
+        )
+        self._check_room_for_robots()
+        self._check_room_for_objects()
+
+    def _check_room_for_robots(self) -> None:
+        margin, radius, n_robots = self.robots.start_margin_m, self.robots.radius_m, self.robots.n_robots
+        width, height = self.arena.width_m - 2 * margin, self.arena.height_m - 2 * margin
+        _require(
+            width > 0 and height > 0,
+            f"Expected an arena larger than twice robots.start_margin_m = {margin} m, got "
+            f"{self.arena.width_m} x {self.arena.height_m} m; lower the margin or enlarge the arena.",
+        )
+        disc = math.pi * radius**2
+        most = int(MAX_DISC_SHARE * width * height / disc)
+        _require(
+            n_robots <= most,
+            f"Expected at most {most} robots in a start area of {width:.1f} x {height:.1f} m (discs may cover "
+            f"{MAX_DISC_SHARE:.0%} of it), got {n_robots}; use a larger arena or fewer robots.",
+        )
+
+    def _check_room_for_objects(self) -> None:
+        if self.objects.placement == "power_law":
+            return  # clusters are drawn at reset, which raises when they cannot hold the objects
+        room = _capacity(self.objects.placement, self.arena)
+        _require(
+            self.objects.n_objects <= room,
+            f"Expected at most {room} objects for placement {self.objects.placement!r} in "
+            f"{self.arena.width_m} x {self.arena.height_m} m (one per free cell of the source), "
+            f"got {self.objects.n_objects}; ask for fewer objects or a larger arena.",
+        )
+
+    @property
+    def horizon_ticks(self) -> int:
+        """Length of a run in ticks."""
+        return round(self.horizon_s / self.dt_s)
+
+    @property
+    def interval_ticks(self) -> int:
+        """Length of a recording interval in ticks."""
+        return round(self.interval_s / self.dt_s)
+
+    @property
+    def cache_side_nominal_m(self) -> float:
+        """Nominal cache side; distances derive from it."""
+        return self.cache.side_share * max(self.arena.width_m, self.arena.height_m)
+
+    @property
+    def cache_side_cells(self) -> int:
+        """Side of a cache as built: the nominal one made an odd number of cells."""
+        cells = round(self.cache_side_nominal_m / CELL_M)
+        return cells if cells % 2 else cells - 1
+
+    @property
+    def min_dist_m(self) -> float:
+        """Objects within this distance of a founding drop join a dynamic cache."""
+        return self.cache.distance_share * min(self.arena.width_m, self.arena.height_m)
+
+    @property
+    def cache_proximity_m(self) -> float:
+        """SITE and FOUND drops are refused when a cache centre is within this distance."""
+        return max(2 * self.cache_side_nominal_m, self.min_dist_m)
+
+
+def whole_intervals(scenario: ScenarioConfig, horizon_ticks: int | None = None) -> int:
+    """Return the number of recording intervals T of a run.
+
+    Args:
+        scenario: Gives the length of an interval, and of a run.
+        horizon_ticks: Length of the run in ticks where it differs from the scenario's.
+
+    Raises:
+        ConfigError: the run is not a whole number of intervals, so its last one could not be compared.
+    """
+    ticks = scenario.horizon_ticks if horizon_ticks is None else horizon_ticks
+    if ticks < 1 or ticks % scenario.interval_ticks:
+        raise ConfigError(
+            f"Expected a horizon of a whole number of intervals of {scenario.interval_s:g} s, got "
+            f"{ticks * scenario.dt_s:g} s; choose a multiple, or another interval_s."
+        )
+    return ticks // scenario.interval_ticks
+
+
+@lru_cache(maxsize=64)
+def _capacity(placement: str, arena: ArenaConfig) -> int:
+    return capacity(placement, *arena.n_cells, arena.nest_cells)
+
+
+SECTIONS: dict[str, type] = {
+    "arena": ArenaConfig,
+    "robots": RobotConfig,
+    "objects": ObjectConfig,
+    "cache": CacheConfig,
+    "reward": RewardConfig,
+    "quirks": Quirks,
+}
+"""Sections of a ScenarioConfig and their classes."""
+
+_C = TypeVar("_C")
+
+
+def field_sections() -> dict[str, str]:
+    """Map every overridable field name to the section that holds it ("" = the scenario itself)."""
+    table = {item.name: "" for item in dataclasses.fields(ScenarioConfig) if item.name not in SECTIONS}
+    for section, section_class in SECTIONS.items():
+        table.update({item.name: section for item in dataclasses.fields(section_class)})
+    return table
+
+
+def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
+    """Return `config` with single fields replaced by name, wherever they live.
+
+    Example: `with_overrides(config, n_robots=20, width_m=48.0)`. A section may be replaced whole
+    (`quirks=AUTHORS_PROGRAM`).
+
+    Raises:
+        ConfigError: unknown name (with the nearest known one) or a combination that describes no world.
+    """
+    table = field_sections()
+    per_section: dict[str, dict[str, Any]] = {}
+    top: dict[str, Any] = {}
+    for name, value in overrides.items():
+        if name in SECTIONS:
+            _require(
+                isinstance(value, SECTIONS[name]),
+                f"Expected {name} to be a {SECTIONS[name].__name__}, got {value!r}; single fields of it are given by "
+                f"their own names: {', '.join(item.name for item in dataclasses.fields(SECTIONS[name]))}.",
+            )
+            top[name] = value
+        elif name not in table:
+            raise ConfigError(f"Unknown scenario field {name!r}.{suggestion(name, table)}")
+        elif table[name]:
+            per_section.setdefault(table[name], {})[name] = value
+        else:
+            top[name] = value
+    for section, values in per_section.items():
+        top[section] = dataclasses.replace(top.get(section, getattr(config, section)), **values)
+    return dataclasses.replace(config, **top)
+
+
+def to_mapping(config: Any) -> dict[str, Any]:
+    """Return a configuration as nested dicts of plain values, ready for JSON or TOML; `from_mapping` reads it back."""
+    return dataclasses.asdict(config)
+
+
+def from_mapping(config_class: type[_C], mapping: Mapping[str, Any], *, where: str = "") -> _C:
+    """Build a configuration dataclass from nested mappings (TOML, JSON).
+
+    Raises:
+        ConfigError: no mapping, or an unknown key, with the nearest valid one.
+    """
+    if not isinstance(cast("Any", mapping), Mapping):
+        name = where.rstrip(".") or config_class.__name__
+        raise ConfigError(f"Expected {name} as a table of fields, got {mapping!r}.")
+    fields = {item.name: item for item in dataclasses.fields(config_class)}  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for key, value in mapping.items():
+        if key not in fields:
+            raise ConfigError(f"Unknown key {where + key!r}.{suggestion(key, fields)}")
+        nested = SECTIONS.get(key)
+        if nested is not None and isinstance(value, Mapping):
+            values[key] = from_mapping(nested, cast("Mapping[str, Any]", value), where=f"{where}{key}.")
+        elif isinstance(value, list):
+            values[key] = tuple(cast("list[Any]", value))
+        else:
+            values[key] = value
+    missing = [
+        name
+        for name, item in fields.items()
+        if name not in values and item.default is dataclasses.MISSING and item.default_factory is dataclasses.MISSING
+    ]
+    if missing:
+        raise ConfigError(f"Missing key {where + missing[0]!r} for {config_class.__name__}.")
+    return config_class(**values)

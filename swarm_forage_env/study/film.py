@@ -1,0 +1,126 @@
+"""Filming a run: `record_run` drives a policy and writes a GIF or an MP4.
+
+Drawing reads the world and never writes it: a run that is filmed and one that is not are the same run.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.policies.registry import is_policy_file, load_policy
+from swarm_forage_env.rendering.frame import Trails, render_frame
+from swarm_forage_env.rendering.video import Frame, check_film, write_film
+from swarm_forage_env.rendering.view import RenderError, arena_view
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.study.run import build_stack
+
+if TYPE_CHECKING:
+    from swarm_forage_env.env import ForageEnv
+    from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+
+
+def record_run(
+    scenario: ScenarioConfig,
+    policy: str | Policy,
+    path: str | Path,
+    *,
+    seconds: float = 300.0,
+    seed: int = 0,
+    speedup: float = 20.0,
+    fps: float = 20.0,
+    size_px: int = 900,
+    trail_s: float = 20.0,
+    caches: str | None = None,
+    wrappers: "Iterable[WrapperConfig]" = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Run a policy and film it.
+
+    Args:
+        scenario: The world; see `caches`.
+        policy: Name of an installed policy, path of a policy file, or a fresh policy object.
+        path: File to write, .gif or .mp4.
+        seconds: Simulated time to film.
+        seed: Run seed; the film shows the run that any other runner makes of it.
+        speedup: Simulated seconds per second of film.
+        fps: Pictures per second of film.
+        size_px: Longer side of the drawn arena.
+        trail_s: Simulated time over which the robots' trails fade; 0 for none.
+        caches: Which caches the world has; default what the scenario has or, where it has none, what the policy
+            states in `caches`. Say "none" to film a policy for caches in a world without.
+        wrappers: Configurations of noise, throttling and population dynamics, in any order.
+        progress: Called with (pictures done, pictures in all) after each picture.
+
+    Returns:
+        The path written.
+
+    Raises:
+        RenderError: a value out of range; nothing has been run or written then.
+        ImportError: Pillow, or for .mp4 imageio with ffmpeg, is not installed.
+        ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the world.
+    """
+    ticks = _picture_ticks(scenario, seconds, speedup, fps)
+    if not (math.isfinite(trail_s) and trail_s >= 0):
+        raise RenderError(f"Expected trail_s >= 0 seconds, got {trail_s!r}.")
+    path = check_film(path, fps, len(ticks))
+    arena_view(scenario, size_px)  # refuses a bad size before the run starts
+    if isinstance(policy, str):
+        name = Path(policy).stem if is_policy_file(policy) else policy
+        policy = load_policy(policy)
+    else:
+        name = getattr(policy, "name", type(policy).__name__)
+    if caches is None:
+        caches = scenario.caches if scenario.caches != "none" else getattr(policy, "caches", "none")
+    scenario = replace(scenario, caches=caches)
+    title = f"{scenario.name.replace('_', ' ')}, {name}, {scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
+    stack = build_stack(scenario, wrappers, reads=getattr(policy, "reads", None))
+    n_samples = round(trail_s * fps / speedup) + 1
+    trails = Trails(scenario.robots.n_robots, n_samples) if n_samples > 1 else None
+
+    def frames() -> Iterator[Frame]:
+        for done, world in enumerate(_visit(stack, policy, seed, ticks), start=1):
+            if trails is not None:
+                trails.add(world.swarm)
+            state = (world.swarm, world.objects, world.caches, world.events)
+            yield render_frame(scenario, *state, tick=world.tick, size_px=size_px, trails=trails, title=title)
+            if progress is not None:
+                progress(done, len(ticks))
+
+    return write_film(frames(), path, fps=fps, n_frames=len(ticks))
+
+
+def _visit(stack: "SwarmWrapper", policy: Policy, seed: int, ticks: list[int]) -> "Iterator[ForageEnv]":
+    """Run the policy and yield the world at each of `ticks`."""
+    world = stack.world
+    policy.reset(world.task, stream_rng(seed, Stream.POLICY))
+    obs = stack.reset_batch(seed)
+    for tick in ticks:
+        while world.tick < tick:
+            obs, _, _, _ = stack.step_batch(policy.act(obs, world.active), tasks=getattr(policy, "task", None))
+        yield world
+
+
+def _picture_ticks(scenario: ScenarioConfig, seconds: float, speedup: float, fps: float) -> list[int]:
+    """Return the ticks to draw, 0 first, evenly spaced up to rounding."""
+    for label, value in (("seconds", seconds), ("speedup", speedup), ("fps", fps)):
+        if not (math.isfinite(value) and value > 0):
+            raise RenderError(f"Expected {label} to be a finite number > 0, got {value!r}.")
+    if seconds > scenario.horizon_s:
+        raise RenderError(
+            f"Expected seconds <= {scenario.horizon_s:g}, the scenario's horizon_s, got {seconds:g}; "
+            "film less or give the scenario a longer horizon."
+        )
+    step_s = speedup / fps
+    if step_s < scenario.dt_s:
+        raise RenderError(
+            f"Expected at least one tick of {scenario.dt_s} s per picture, got speedup / fps = {step_s:g} s; "
+            f"use fps <= {speedup / scenario.dt_s:g} or raise speedup."
+        )
+    n_steps = math.floor(seconds / step_s + 1e-9)
+    if n_steps < 1:
+        raise RenderError(f"Expected seconds >= {step_s:g}, the time between two pictures, got {seconds:g}.")
+    return [round(picture * step_s / scenario.dt_s) for picture in range(n_steps + 1)]

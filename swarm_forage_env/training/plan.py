@@ -1,0 +1,309 @@
+"""TrainingPlan: a training run as frozen data, read from TOML and written beside its results; and what it reports."""
+
+import dataclasses
+import json
+import math
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
+from swarm_forage_env.policies.registry import policy_class
+from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.config import from_mapping as config_from_mapping
+from swarm_forage_env.scenarios.presets import scenario as preset
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.views.learner_arena import same_robots
+from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.registry import wrappers_from_mapping
+
+ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
+"""Algorithms of stable-baselines3 that train; the first two on rollouts, the others from replay."""
+DEFAULT_STEPS = 5_000_000
+DEFAULT_HIDDEN = (64, 64)
+_COUNTS = ("n_steps", "batch_size", "n_epochs", "buffer_size")
+_RANGES: dict[str, tuple[str, Callable[[float], bool]]] = {
+    "gamma": ("a number in (0, 1]", lambda value: 0.0 < value <= 1.0),
+    "gae_lambda": ("a number in [0, 1]", lambda value: 0.0 <= value <= 1.0),
+    "tau": ("a number in (0, 1]", lambda value: 0.0 < value <= 1.0),
+    "learning_rate": ("a number > 0", lambda value: 0.0 < value < math.inf),
+    "clip_range": ("a number > 0", lambda value: 0.0 < value < math.inf),
+}
+"""Options of the algorithms that mean the same in all of them, and what they may be."""
+
+
+def _require_whole(name: str, value: Any, *, least: int = 1) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ConfigError(f"Expected {name} to be a whole number >= {least}, got {value!r}.")
+
+
+def _require_options(name: str, options: Any) -> None:
+    """Refuse values that stable-baselines3 takes without a word and that no training survives."""
+    for key, value in _require_table(name, options).items():
+        if key in _COUNTS:
+            _require_whole(f"{name}.{key}", value)
+        wanted, fits = _RANGES.get(key, ("", None))
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if fits is not None and not (is_number and fits(value)):
+            raise ConfigError(f"Expected {name}.{key} to be {wanted}, got {value!r}.")
+
+
+def _require_table(name: str, value: Any) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise ConfigError(f"Expected {name} to be a table, got {value!r}.")
+    return value
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Stage:
+    """A part of the training in a world of its own: a step of a curriculum."""
+
+    steps: int
+    """Decisions of single robots."""
+    scenario: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Fields of the plan's scenario that differ, by name; the number of robots cannot."""
+    options: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Arguments of the algorithm that differ from here on (`learning_rate`, `gamma` ...)."""
+
+    def __post_init__(self) -> None:
+        _require_whole("stage.steps", self.steps)
+        _require_table("stage.scenario", self.scenario)
+        _require_options("stage.options", self.options)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class EvaluationPlan:
+    """How the policy is judged meanwhile: whole runs of the plan's scenario, beside a scripted controller."""
+
+    every_steps: int = 1_000_000
+    """Decisions between two evaluations; there is one more at the end."""
+    horizon_s: float = 2000.0
+    """Length of a run, s."""
+    n_runs: int = 2
+    first_seed: int = 1_000_000
+    """Seeds are counted up from here, away from those of training."""
+    baseline: str = "crw"
+    """Controller to compare with, run once under the same seeds."""
+
+    def __post_init__(self) -> None:
+        _require_whole("evaluation.every_steps", self.every_steps)
+        _require_whole("evaluation.n_runs", self.n_runs)
+        try:
+            policy_class(self.baseline)
+        except ValueError as error:
+            raise ConfigError(f"Expected evaluation.baseline to be a controller: {error}") from error
+
+    def specs(self, scenario: ScenarioConfig, wrappers: tuple[WrapperConfig, ...], policy: str) -> tuple[RunSpec, ...]:
+        """Return one specification per run, in `scenario` but for its horizon.
+
+        Raises:
+            ConfigError: a horizon that is not a whole number of recording intervals.
+        """
+        world = with_overrides(scenario, horizon_s=self.horizon_s)
+        seeds = range(self.first_seed, self.first_seed + self.n_runs)
+        return tuple(RunSpec(scenario=world, policy=policy, wrappers=wrappers, seed=seed) for seed in seeds)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TrainingPlan:
+    """Everything that decides a training run, but for the machine and the installed versions.
+
+    Raises:
+        ConfigError: an unknown algorithm or baseline, sizes below 1, a stage whose world cannot be or has another
+            number of robots, or discrete actions for an algorithm that has none (and the other way round).
+    """
+
+    scenario: ScenarioConfig
+    """The world to be mastered, rewards included; evaluations take place in it."""
+    wrappers: tuple[WrapperConfig, ...] = ()
+    """What disturbs the swarm, in training and in evaluations."""
+    algorithm: str = "ppo"
+    interface: InterfaceConfig = field(default_factory=InterfaceConfig)
+    n_arenas: int = 8
+    hidden: tuple[int, ...] = DEFAULT_HIDDEN
+    """Sizes of the hidden layers of actor and critic."""
+    options: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Arguments of the algorithm's class; what is not here keeps the library's default."""
+    stages: tuple[Stage, ...] = (Stage(steps=DEFAULT_STEPS),)
+    evaluation: EvaluationPlan = field(default_factory=EvaluationPlan)
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.algorithm not in ALGORITHMS:
+            raise ConfigError(
+                f"Expected algorithm to be one of {', '.join(ALGORITHMS)}, got {self.algorithm!r}."
+                + suggestion(str(self.algorithm).lower(), ALGORITHMS)
+            )
+        unfit = {"dqn": "continuous", "sac": "discrete"}.get(self.algorithm)
+        if self.interface.actions == unfit:
+            raise ConfigError(f"Expected actions that {self.algorithm} can choose, got {unfit} ones.")
+        _require_whole("n_arenas", self.n_arenas)
+        if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything
+            raise ConfigError(f"Expected hidden to be sizes of layers, for example [64, 64], got {self.hidden!r}.")
+        for size in self.hidden:
+            _require_whole("hidden", size)
+        if not self.stages:
+            raise ConfigError("Expected at least one stage, got none.")
+        _require_whole("seed", self.seed, least=0)
+        _require_options("options", self.options)
+        for stage in self.stages:
+            same_robots(self.scenario, stage.scenario)
+        self.evaluation.specs(self.scenario, self.wrappers, self.evaluation.baseline)
+
+    @property
+    def total_steps(self) -> int:
+        """Decisions of single robots in all stages."""
+        return sum(stage.steps for stage in self.stages)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the plan as nested plain values."""
+        plain = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
+        nested = {name: dataclasses.asdict(plain[name]) for name in ("scenario", "interface", "evaluation")}
+        wrappers = {config.name: config.to_mapping() for config in self.wrappers}
+        return {**plain, **nested, "wrappers": wrappers, "stages": [dataclasses.asdict(item) for item in self.stages]}
+
+    def differences(self, earlier: "TrainingPlan") -> tuple[str, ...]:
+        """Return what keeps this plan from going on with a training by an earlier one, field by field.
+
+        More steps in the last stage of the earlier plan, and further stages, do not.
+        """
+        last = len(earlier.stages) - 1
+        stages = list(earlier.stages)
+        if last < len(self.stages):
+            stages[last] = dataclasses.replace(stages[last], steps=max(stages[last].steps, self.stages[last].steps))
+        begun = dataclasses.replace(self, stages=self.stages[: last + 1])
+        before, now = (
+            dict(_leaves(plan.to_mapping())) for plan in (dataclasses.replace(earlier, stages=tuple(stages)), begun)
+        )
+        missing = "nothing"
+        return tuple(
+            f"{name}: {before.get(name, missing)} before, {now.get(name, missing)} now"
+            for name in {**before, **now}
+            if before.get(name, missing) != now.get(name, missing)
+        )
+
+    def longer(self, steps: int) -> "TrainingPlan":
+        """Return the plan with a last stage that makes `steps` in all.
+
+        Raises:
+            ConfigError: fewer steps than it has.
+        """
+        if steps < self.total_steps:
+            raise ConfigError(f"Expected at least the {self.total_steps:,} steps of the plan, got {steps:,}.")
+        last = self.stages[-1]
+        last = dataclasses.replace(last, steps=last.steps + steps - self.total_steps)
+        return dataclasses.replace(self, stages=(*self.stages[:-1], last))
+
+    def write(self, path: Path) -> None:
+        """Write the plan as JSON."""
+        text = json.dumps(self.to_mapping(), indent=2) + "\n"
+        with replacing(path) as draft:
+            draft.write_text(text, encoding="utf-8")
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "TrainingPlan":
+        """Build a plan from nested plain values.
+
+        `scenario` is either complete, as `to_mapping` writes it, or a table with the `preset` it starts from and
+        fields by name. `wrappers` is a table of tables by name.
+
+        Raises:
+            ConfigError: unknown keys, or values that make no plan.
+        """
+        values = _known(cls, mapping, "")
+        scenario = dict(_require_table("scenario", values.get("scenario")))
+        if "preset" in scenario:
+            values["scenario"] = preset(scenario.pop("preset"), **_tuples(scenario))
+        else:
+            values["scenario"] = config_from_mapping(ScenarioConfig, scenario, where="scenario.")
+        if "wrappers" in values:
+            values["wrappers"] = wrappers_from_mapping(_require_table("wrappers", values["wrappers"]))
+        if "interface" in values:
+            values["interface"] = interface_from_mapping(dict(_require_table("interface", values["interface"])))
+        if "evaluation" in values:
+            values["evaluation"] = EvaluationPlan(
+                **_known(EvaluationPlan, _require_table("evaluation", values["evaluation"]), "evaluation.")
+            )
+        if "stages" in values:
+            if not isinstance(values["stages"], list):
+                raise ConfigError(f"Expected stages to be a list of tables, [[stages]], got {values['stages']!r}.")
+            tables = [_known(Stage, table, "stages.") for table in values["stages"]]
+            values["stages"] = tuple(
+                Stage(**{**table, "scenario": _tuples(_require_table("stages.scenario", table.get("scenario", {})))})
+                for table in tables
+            )
+        return cls(**_tuples(values))
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Evaluation:
+    """How the policy did at some point of the training, beside the baseline; means over runs."""
+
+    steps: int
+    """Decisions of single robots so far."""
+    wall_time_s: float
+    """Time spent on the training, s; a resumed one counts on from its latest evaluation."""
+    performance: float
+    """What the scenario counts, per 1,000 simulated s."""
+    baseline: float
+    """The same of the baseline."""
+    interference_fraction: float
+    """Mean fraction of active robots in interference."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TrainingStatus:
+    """Where a training run stands."""
+
+    steps: int
+    """Decisions of single robots so far."""
+    wall_time_s: float
+    """Time spent on the training, s; a resumed one counts on from its latest evaluation."""
+    episode_return: float
+    """Mean return of the latest episodes, nan before the first."""
+
+
+def read_plan(path: Path) -> TrainingPlan:
+    """Read a plan from a TOML file, or from the JSON file that a training run leaves.
+
+    Raises:
+        ConfigError: the file cannot be read or holds no plan; the message names it.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        return TrainingPlan.from_mapping(json.loads(text) if path.suffix == ".json" else tomllib.loads(text))
+    except OSError as error:
+        raise ConfigError(f"Cannot read the plan {path}: {error.strerror or error}.") from error
+    except (ValueError, TypeError) as error:  # ConfigError, and what the two parsers raise
+        raise ConfigError(f"Cannot use the plan {path}: {error}") from error
+
+
+def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the plain values of nested tables and lists of tables, by their names with dots."""
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _leaves(item, f"{name}.{key}" if name else str(key))
+    elif isinstance(value, list):
+        for k, item in enumerate(value):
+            yield from _leaves(item, f"{name}[{k}]")
+    else:
+        yield name, value
+
+
+def _known(config_class: type, mapping: Mapping[str, Any], where: str) -> dict[str, Any]:
+    _require_table(where.rstrip(".") or "the plan", mapping)
+    known = [item.name for item in dataclasses.fields(config_class)]
+    for key in mapping:
+        if key not in known:
+            raise ConfigError(f"Unknown key {where + key!r}.{suggestion(key, known)}")
+    return dict(mapping)
+
+
+def _tuples(mapping: Mapping[str, Any]) -> dict[str, Any]:
+    """Turn lists, the only sequences of TOML and JSON, into the tuples of configurations."""
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in mapping.items()}

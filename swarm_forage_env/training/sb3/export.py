@@ -1,0 +1,114 @@
+"""From a trained stable-baselines3 model to a network file that runs without torch, or a zip file that tells more."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import FlattenExtractor
+from stable_baselines3.dqn.policies import DQNPolicy
+from torch import nn
+
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.model_files import MODEL_NOTE, describe_spaces
+from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError
+from swarm_forage_env.scenarios.presets import scenario
+
+_ACTIVATIONS: dict[type[nn.Module], str] = {nn.Tanh: "tanh", nn.ReLU: "relu"}
+
+
+def export_network(
+    model: BaseAlgorithm,
+    interface: InterfaceConfig,
+    *,
+    samples: bool = False,
+    caches: str = "none",
+    card: dict[str, Any] | None = None,
+) -> Network:
+    """Return the acting part of a PPO, A2C or DQN model with an `MlpPolicy`.
+
+    Args:
+        model: The trained model.
+        interface: What it saw and did in training, `SwarmVecEnv.interface.config`.
+        samples: Draw discrete actions by their probabilities (PPO, A2C) instead of taking the likeliest.
+        caches: World that it was trained in.
+        card: How it came about, plain values.
+
+    Raises:
+        NetworkError: a model of another kind (SAC and TD3 among them), layers that a network file cannot hold, or an
+            interface that is not the model's.
+    """
+    _check_interface(model, interface)
+    layers = _acting_layers(model)
+    linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
+    between = {type(layer) for layer in layers if not isinstance(layer, nn.Linear)}
+    alternates = all(isinstance(layer, nn.Linear) == (k % 2 == 0) for k, layer in enumerate(layers))
+    if not alternates or len(between) > 1 or not between <= _ACTIVATIONS.keys():
+        raise NetworkError(
+            "Expected linear layers with one of the activations tanh and ReLU between them, got "
+            f"{[type(layer).__name__ for layer in layers]}."
+        )
+    weights = tuple(_array(layer.weight.T) for layer in linear)
+    biases = tuple(_array(layer.bias) for layer in linear)
+    about = NetworkAbout(
+        interface=interface,
+        activation=_ACTIVATIONS[between.pop()] if between else "tanh",
+        samples=samples,
+        caches=caches,
+        card=card or {},
+    )
+    return Network(weights, biases, about)
+
+
+def note_interface(model: BaseAlgorithm, interface: InterfaceConfig, *, caches: str = "none") -> None:
+    """Note on a model what its spaces do not tell; saved with it, so that its zip file runs as it was trained.
+
+    Args:
+        model: Any model of one robot, before it is saved.
+        interface: What it sees and does in training, `SwarmVecEnv.interface.config`.
+        caches: World that it is trained in.
+
+    Raises:
+        NetworkError: an interface that is not the model's.
+    """
+    _check_spaces(model, interface)
+    setattr(model, MODEL_NOTE, {"interface": asdict(interface), "caches": caches})
+
+
+def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
+    _check_spaces(model, interface)
+    note = getattr(model, MODEL_NOTE, None)
+    if note is not None and note["interface"] != asdict(interface):
+        raise NetworkError(
+            f"Expected the interface that the model was trained with, {note['interface']}, got {interface}."
+        )
+
+
+def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
+    """Refuse an interface with other observations or actions than the model has."""
+    # Any world will do: all have the same columns and actions.
+    bound = LearnerInterface(interface, ForageEnv(scenario("warehouse_small", n_robots=1, n_objects=1)).task)
+    wanted, found = describe_spaces(bound), describe_spaces(model)
+    if wanted != found:
+        raise NetworkError(
+            f"Expected a model from {' to '.join(wanted)} for this interface, got one from {' to '.join(found)}; give "
+            f"the interface that it was trained with (env.interface.config), not {interface}."
+        )
+
+
+def _acting_layers(model: BaseAlgorithm) -> list[nn.Module]:
+    policy = model.policy
+    if isinstance(policy, ActorCriticPolicy) and isinstance(policy.features_extractor, FlattenExtractor):
+        return [*policy.mlp_extractor.policy_net, policy.action_net]
+    if isinstance(policy, DQNPolicy) and isinstance(policy.q_net.features_extractor, FlattenExtractor):
+        return [*policy.q_net.q_net]
+    raise NetworkError(
+        f"Expected a PPO, A2C or DQN model with an MlpPolicy, got {type(model).__name__} with "
+        f"{type(policy).__name__}; run it from its zip file instead."
+    )
+
+
+def _array(tensor: Any) -> np.ndarray:
+    return np.ascontiguousarray(tensor.detach().cpu().numpy(), np.float32)

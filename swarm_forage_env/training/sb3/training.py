@@ -1,0 +1,394 @@
+"""Training by stable-baselines3 as a `TrainingPlan` says: stages, checkpoints, evaluations, resuming.
+
+A folder holds everything of a training run: `plan.json`, `model.zip` (the latest checkpoint), `evaluations.csv`,
+`tensorboard/`, and `policy.npz`, the network alone as it did best in evaluations, for algorithms whose network a file
+can hold.
+"""
+
+import csv
+import importlib.util
+import inspect
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import stable_baselines3
+import torch
+from stable_baselines3 import A2C, DQN, PPO, SAC
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.utils import safe_mean
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.policies.model_files import MODEL_FAULTS
+from swarm_forage_env.policies.network import LearnedPolicy
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.study.record import software_versions
+from swarm_forage_env.study.run import run_policy
+from swarm_forage_env.training.plan import Evaluation, Stage, TrainingPlan, TrainingStatus, read_plan
+from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
+from swarm_forage_env.training.sb3.export import export_network, note_interface
+from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
+
+ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
+ON_POLICY = ("ppo", "a2c")
+EXPORTABLE = ("ppo", "a2c", "dqn")
+MODEL_FILE = "model.zip"
+PLAN_FILE = "plan.json"
+POLICY_FILE = "policy.npz"
+EVALUATIONS_FILE = "evaluations.csv"
+_REPORT_EVERY_S = 1.0
+_MOST_WEIGHT = 1e6
+"""Where torch fails over the outputs of a network, weights this large tell that the training diverged; our choice."""
+_OURS = frozenset(
+    {"policy", "env", "seed", "device", "policy_kwargs", "tensorboard_log", "_init_setup_model"}
+    | {f"{kind}_buffer_{what}" for kind in ("rollout", "replay") for what in ("class", "kwargs")}
+)
+"""Arguments of the algorithms' classes that training gives them."""
+_ELSEWHERE = {"seed": "seed", "policy_kwargs": "hidden", "net_arch": "hidden", "hidden": "hidden"}
+"""What people look for among the options -> the field of a plan that says it."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TrainingResult:
+    """What a training run leaves."""
+
+    model: BaseAlgorithm
+    evaluations: tuple[Evaluation, ...]
+    """All of the folder, oldest first."""
+    policy_file: Path | None
+    """The best network so far; None for an algorithm whose network a file cannot hold."""
+    steps: int
+    """Decisions of single robots that this call added; 0 when the training was finished before."""
+
+
+Report = Callable[[TrainingStatus | Evaluation], None]
+
+
+def train(
+    plan: TrainingPlan,
+    folder: Path,
+    *,
+    n_processes: int = 0,
+    resume: bool = False,
+    report: Report | None = None,
+) -> TrainingResult:
+    """Train, or go on training from the last checkpoint.
+
+    The same plan gives the same weights on the same machine with the same versions. Resumed training is sound, but
+    not the same as one that was never interrupted: arenas start anew, and so does the replay memory of dqn and sac.
+    Ctrl-C keeps a checkpoint before it goes on its way; a crash leaves the one of the latest evaluation.
+
+    Args:
+        plan: What to do. A training goes on by its own plan, or by one with a longer last stage or further stages.
+        folder: Where results go; created.
+        n_processes: Processes that the arenas are spread over; 0 = all in this process.
+        resume: Go on where the checkpoint in `folder` stopped.
+        report: Told the status about once a second, and every evaluation.
+
+    Raises:
+        ConfigError: the algorithm knows no such option, more processes than arenas, the folder holds a training run and
+            nobody said resume, or none to resume, or that of another plan, or files that are broken; a stage whose
+            world cannot be; or a training that diverged.
+    """
+    _check_options(plan)
+    if not 0 <= n_processes <= plan.n_arenas:
+        raise ConfigError(f"Expected processes from 0 to n_arenas = {plan.n_arenas}, got {n_processes}.")
+    _check_folder(folder, plan, resume=resume)
+    _check_baseline(plan)
+    torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
+    watch = _Watch(plan, folder, report or _keep_quiet)
+    env = SwarmVecEnv(
+        plan.scenario,
+        n_arenas=plan.n_arenas,
+        n_processes=n_processes,
+        interface=plan.interface,
+        wrappers=plan.wrappers,
+    )
+    try:
+        model = _checkpoint(plan, folder, env) if resume else None
+        begun = 0 if model is None else model.num_timesteps
+        ends = 0
+        for number, stage in enumerate(plan.stages, 1):
+            ends += stage.steps
+            done = 0 if model is None else model.num_timesteps
+            if done < ends:
+                model = _prepared(plan, stage, folder, env, done)
+                _learn(model, ends - done, watch, f"stage {number}{_changes(stage)}")
+        assert model is not None, "a plan has a stage"
+    finally:
+        env.close()
+    policy_file = folder / POLICY_FILE if plan.algorithm in EXPORTABLE else None
+    return TrainingResult(
+        model=model,
+        evaluations=tuple(watch.evaluations),
+        policy_file=policy_file,
+        steps=model.num_timesteps - begun,
+    )
+
+
+def _check_options(plan: TrainingPlan) -> None:
+    """Refuse options that the algorithm does not know, which a checkpoint would take without a word."""
+    known = set(inspect.signature(ALGORITHM_CLASSES[plan.algorithm]).parameters) - _OURS
+    for options in (plan.options, *(stage.options for stage in plan.stages)):
+        for name in options:
+            if name in known:
+                continue
+            if name in _ELSEWHERE:
+                raise ConfigError(
+                    f"Expected options of {plan.algorithm} without {name!r}: the plan says it in {_ELSEWHERE[name]!r}."
+                )
+            if name in _OURS:
+                raise ConfigError(f"Expected options of {plan.algorithm} without {name!r}, which training sets itself.")
+            raise ConfigError(f"Unknown option {name!r} of {plan.algorithm}.{suggestion(name, sorted(known))}")
+
+
+def _check_folder(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
+    """Refuse a folder that belongs to another training run, or to none where one is to be resumed."""
+    if resume:
+        differences = plan.differences(kept_plan(folder))
+        if differences:
+            raise ConfigError(
+                f"Expected the plan in {folder / PLAN_FILE} to resume its training, got another plan: "
+                f"{'; '.join(differences)}."
+            )
+    elif any((folder / name).exists() for name in (MODEL_FILE, EVALUATIONS_FILE, POLICY_FILE)):
+        raise ConfigError(f"Expected an unused folder, got {folder} with a training run; resume it or go elsewhere.")
+
+
+def _check_baseline(plan: TrainingPlan) -> None:
+    """Refuse a controller to compare with that cannot be opened; the first evaluation would be late for that."""
+    try:
+        load_policy(plan.evaluation.baseline)
+    except (ValueError, OSError) as error:
+        raise ConfigError(f"Expected evaluation.baseline to be a controller: {error}") from error
+
+
+def kept_plan(folder: Path) -> TrainingPlan:
+    """Return the plan of the training that a folder holds.
+
+    Raises:
+        ConfigError: it holds none that can be resumed.
+    """
+    for name in (PLAN_FILE, MODEL_FILE):
+        if not (folder / name).exists():
+            raise ConfigError(
+                f"Expected {folder} to hold a training to resume, {PLAN_FILE} and the checkpoint {MODEL_FILE}, found "
+                f"no {name}; without resume a new one starts."
+            )
+    return read_plan(folder / PLAN_FILE)
+
+
+def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgorithm:
+    path = folder / MODEL_FILE
+    try:
+        return ALGORITHM_CLASSES[plan.algorithm].load(path, env=env, device="cpu")
+    except MODEL_FAULTS as error:
+        reason = " ".join(str(error).split())
+        raise ConfigError(f"Cannot open the checkpoint {path}: {reason}; train anew in another folder.") from error
+
+
+def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, done: int) -> BaseAlgorithm:
+    """Return the model for a stage: a new one, or the checkpoint with the options of the stage."""
+    env.set_options({"scenario": stage.scenario})
+    algorithm = ALGORITHM_CLASSES[plan.algorithm]
+    options: dict[str, Any] = {**plan.options, **stage.options}
+    options["seed"] = training_seed(plan.seed, done)
+    options["tensorboard_log"] = str(folder / "tensorboard") if importlib.util.find_spec("tensorboard") else None
+    buffer: dict[str, Any] = {"replay_buffer_class": PresentReplayBuffer}
+    if plan.algorithm in ON_POLICY:
+        buffer = {
+            "rollout_buffer_class": ActiveRolloutBuffer,
+            "rollout_buffer_kwargs": env.rollout_buffer_kwargs,
+        }
+    network = {"net_arch": list(plan.hidden)}
+    try:
+        if (folder / MODEL_FILE).exists():
+            model = algorithm.load(folder / MODEL_FILE, env=env, device="cpu", **options)
+        else:
+            model = algorithm("MlpPolicy", env, device="cpu", policy_kwargs=network, **buffer, **options)
+    except (AssertionError, TypeError, ValueError) as error:  # how the library refuses values
+        raise ConfigError(f"Cannot prepare {plan.algorithm} with its options: {error}") from error
+    note_interface(model, plan.interface, caches=plan.scenario.caches)
+    return model
+
+
+def training_seed(seed: int, done: int) -> int:
+    """Return the seed for what comes after `done` decisions of a training with `seed`.
+
+    Drawn, so that runs of a later stage or of a resumed training are none that were seen before, and none of the
+    evaluations, whose seeds are counted up from a number of their own.
+    """
+    return int(np.random.default_rng((seed, done)).integers(2**31))
+
+
+def _changes(stage: Stage) -> str:
+    fields = ", ".join(f"{name} = {value}" for name, value in stage.scenario.items())
+    return f", a world with {fields}" if fields else ""
+
+
+def _learn(model: BaseAlgorithm, steps: int, watch: "_Watch", where: str) -> None:
+    try:
+        model.learn(steps, callback=watch, reset_num_timesteps=False, tb_log_name=model.__class__.__name__.lower())
+    except KeyboardInterrupt:
+        if not _has_diverged(model):
+            watch.keep(model)
+        raise
+    except (ConfigError, EmptyRolloutError) as error:  # worlds that only a reset or a run shows to be impossible
+        raise ConfigError(f"Cannot train in {where}: {error}") from error
+    except ValueError as error:
+        if not _has_diverged(model):
+            raise
+        raise ConfigError(
+            f"The training diverged in {where}, after {model.num_timesteps:,} decisions: weights became nan or huge; "
+            "lower the learning_rate, or look for a reward or another option out of proportion."
+        ) from error
+
+
+def _has_diverged(model: BaseAlgorithm) -> bool:
+    return not all(bool((weights.abs() < _MOST_WEIGHT).all()) for weights in model.policy.parameters())  # nan is not <
+
+
+class _Watch(BaseCallback):
+    """Checkpoints, evaluates and reports; knows the whole training, over all its stages."""
+
+    def __init__(self, plan: TrainingPlan, folder: Path, report: Report) -> None:
+        super().__init__()
+        self._plan = plan
+        self._folder = folder
+        self._report = report
+        self._started = time.perf_counter()
+        self._last_report = -math.inf
+        self._next_evaluation = 0
+        self._baseline: float | None = None
+        self.evaluations = _read_evaluations(folder / EVALUATIONS_FILE)
+        self._spent_s = self.evaluations[-1].wall_time_s if self.evaluations else 0.0
+
+    def _wall_time_s(self) -> float:
+        return self._spent_s + time.perf_counter() - self._started
+
+    def keep(self, model: BaseAlgorithm) -> None:
+        """Write a checkpoint, beside the plan that it is one of.
+
+        Raises:
+            ValueError: the training diverged; the checkpoint before stays.
+        """
+        if _has_diverged(model):
+            raise ValueError("Expected weights that are finite numbers.")
+        self._write_plan()
+        with replacing(self._folder / MODEL_FILE) as draft:
+            model.save(draft)
+
+    def _write_plan(self) -> None:
+        self._folder.mkdir(parents=True, exist_ok=True)
+        self._plan.write(self._folder / PLAN_FILE)
+
+    def _on_training_start(self) -> None:
+        self._write_plan()  # not before arenas and model are known to be possible
+        if self._next_evaluation == 0:
+            self._next_evaluation = self.num_timesteps + self._plan.evaluation.every_steps
+
+    def _on_step(self) -> bool:
+        for info in self.locals["infos"]:
+            if "run" in info:
+                counted = info["run"][self._plan.scenario.performance]
+                self.logger.record_mean("rollout/performance_per_1000_s", 1000.0 * counted / info["run"]["seconds"])
+        return True
+
+    def _on_rollout_start(self) -> None:
+        # Not at the end of a rollout, which has not taught anything yet.
+        if self.num_timesteps >= self._next_evaluation:
+            self._evaluate()
+
+    def _on_rollout_end(self) -> None:
+        elapsed = self._wall_time_s()
+        if elapsed - self._last_report >= _REPORT_EVERY_S:
+            self._last_report = elapsed
+            episodes = self.model.ep_info_buffer or ()
+            mean = float(safe_mean([episode["r"] for episode in episodes]))
+            self._report(TrainingStatus(steps=self.num_timesteps, wall_time_s=elapsed, episode_return=mean))
+
+    def _on_training_end(self) -> None:
+        self._evaluate()
+        self.logger.dump(self.num_timesteps)
+
+    def _evaluate(self) -> None:
+        """Keep a checkpoint, run the policy, and note how it did."""
+        self._next_evaluation = self.num_timesteps + self._plan.evaluation.every_steps
+        self.keep(self.model)
+        if self._baseline is None:
+            self._baseline, _ = self._judged(lambda: load_policy(self._plan.evaluation.baseline))
+        performance, interference = self._judged(lambda: LearnedPolicy(self._plan.interface, _acting(self.model)))
+        evaluation = Evaluation(
+            steps=self.num_timesteps,
+            wall_time_s=round(self._wall_time_s(), 1),
+            performance=performance,
+            baseline=self._baseline,
+            interference_fraction=interference,
+        )
+        for name in ("performance", "baseline", "interference_fraction"):
+            self.logger.record(f"evaluation/{name}", getattr(evaluation, name))
+        self.evaluations.append(evaluation)
+        # The network before the table: a table must not boast of a network that is not there.
+        if self._plan.algorithm in EXPORTABLE and performance >= max(past.performance for past in self.evaluations):
+            self._export(evaluation)
+        _write_evaluations(self._folder / EVALUATIONS_FILE, self.evaluations)
+        self._report(evaluation)
+
+    def _export(self, evaluation: Evaluation) -> None:
+        plan = self._plan
+        card = {
+            "plan": plan.to_mapping(),
+            "evaluation": asdict(evaluation),
+            "versions": {
+                **software_versions(),
+                "stable-baselines3": stable_baselines3.__version__,
+                "torch": str(torch.__version__),
+            },
+        }
+        network = export_network(self.model, plan.interface, caches=plan.scenario.caches, card=card)
+        network.save(self._folder / POLICY_FILE)
+
+    def _judged(self, make_policy: Callable[[], Policy]) -> tuple[float, float]:
+        """Return performance per 1,000 s and interference, means over the runs of the evaluation."""
+        plan = self._plan
+        specs = plan.evaluation.specs(plan.scenario, plan.wrappers, "policy")
+        records = [run_policy(make_policy(), spec) for spec in specs]
+        performance = np.mean([record.rate_per_1000_s("performance") for record in records])
+        return float(performance), float(np.mean([record.interference_fraction.mean() for record in records]))
+
+
+def _write_evaluations(path: Path, evaluations: Sequence[Evaluation]) -> None:
+    with replacing(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, [item.name for item in fields(Evaluation)])
+        table.writeheader()
+        table.writerows(map(asdict, evaluations))
+
+
+def _read_evaluations(path: Path) -> list[Evaluation]:
+    if not path.exists():
+        return []
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
+        return [Evaluation(**{**row, "steps": int(row["steps"])}) for row in rows]  # type: ignore[arg-type]
+    except (ValueError, TypeError, KeyError, csv.Error) as error:
+        raise ConfigError(f"Cannot read the evaluations in {path}: {error}; repair or remove the file.") from error
+
+
+def _acting(model: BaseAlgorithm) -> Callable[[np.ndarray, np.random.Generator], np.ndarray]:
+    def choose(rows: np.ndarray, rng: np.random.Generator) -> np.ndarray:  # noqa: ARG001 - nothing is drawn
+        return model.predict(rows, deterministic=True)[0]
+
+    return choose
+
+
+def _keep_quiet(news: TrainingStatus | Evaluation) -> None:
+    """Report to nobody."""

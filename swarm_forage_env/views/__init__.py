@@ -1,0 +1,1 @@
+"""The same swarm in the forms that other libraries ask for."""

@@ -1,0 +1,321 @@
+"""Many arenas stepped as one batch of rows, one row per robot: what vector environments are made of.
+
+Row `a * N + i` is robot i of arena a for ever. The life of a row:
+
+* While its robot is in the world, or not yet born, the row is part of an episode.
+* When the robot dies, the row terminates once, with its last observation (zeros: it has left the world). Until its
+  arena starts anew the row is absent: an observation of zeros, no reward, actions ignored.
+* When the arena ends, at its horizon or with its last robot, it starts anew within the same step and every row is
+  done: rows of robots that could have gone on are truncated, rows that die in this step terminate, and so do absent
+  rows, once more, because their next observation belongs to a new episode. For an absent row no episode ends:
+  `ArenaStep.is_episode` is false there.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol, cast
+
+import numpy as np
+
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.contract.types import BoolArray, IntArray, ObsArray
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.views.learner_arena import World, WorldPlan
+from swarm_forage_env.wrappers.base import SwarmWrapper
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RunOutcome:
+    """How a run of one arena ended."""
+
+    arena: int
+    seed: int
+    seconds: float
+    """Simulated time, s."""
+    collected: int
+    """Objects delivered."""
+    first_picked: int
+    """Objects picked up for the first time."""
+
+
+@dataclass(kw_only=True, slots=True)
+class ArenaStep:
+    """Result of one step of R rows. All arrays with something in them are new and belong to the caller."""
+
+    obs: ObsArray
+    """(R, d) what to act on next; rows of arenas that ended show their new run already."""
+    rewards: np.ndarray
+    """(R,) float32."""
+    terminated: BoolArray
+    """(R,) robots that died in this step, and absent rows whose arena ended."""
+    truncated: BoolArray
+    """(R,) rows whose arena reached its horizon while their robot could have gone on."""
+    active: BoolArray
+    """(R,) whose robot is at work in what `obs` shows."""
+    ended: IntArray
+    """(E,) rows that are done, ascending."""
+    final_obs: ObsArray
+    """(E, d) their last observations."""
+    is_episode: BoolArray
+    """(E,) whether an episode ended, not only an absence."""
+    returns: np.ndarray
+    """(E,) float64, sums of rewards; float32 would lose the small ones of long runs."""
+    lengths: IntArray
+    """(E,) steps that began with the robot in the world."""
+    outcomes: tuple[RunOutcome, ...] = ()
+    """Runs that ended."""
+
+
+class Rows(Protocol):
+    """Sizes of a batch."""
+
+    n_arenas: int
+    n_robots: int
+    n_rows: int
+
+
+def checked_rows(actions: Any, batch: Rows) -> np.ndarray:
+    """Return actions as an array; raises ValueError unless there is one per row of the batch."""
+    actions = np.asarray(actions)
+    if actions.ndim == 0 or len(actions) != batch.n_rows:
+        raise ValueError(
+            f"Expected actions for {batch.n_rows} rows ({batch.n_arenas} arenas of {batch.n_robots} robots), "
+            f"got shape {actions.shape}."
+        )
+    return actions
+
+
+def closed_error() -> RuntimeError:
+    """Return what is raised where closed arenas are asked for something."""
+    return RuntimeError("Expected open arenas, but they were closed.")
+
+
+def _owner(env: ForageEnv | SwarmWrapper, name: str) -> ForageEnv | SwarmWrapper:
+    """Return who in a stack has the attribute: wrappers show those of the environment below without owning them."""
+    while isinstance(env, SwarmWrapper) and name not in vars(env) and not hasattr(type(env), name):
+        env = cast("ForageEnv | SwarmWrapper", env.env)  # which it has checked
+    return env
+
+
+@dataclass(slots=True)
+class _Endings:
+    """What ended in a step, arena by arena."""
+
+    rows: list[IntArray] = field(default_factory=list)
+    final_obs: list[ObsArray] = field(default_factory=list)
+    is_episode: list[BoolArray] = field(default_factory=list)
+    returns: list[np.ndarray] = field(default_factory=list)
+    lengths: list[IntArray] = field(default_factory=list)
+    outcomes: list[RunOutcome] = field(default_factory=list)
+
+    def joined(self, columns: int) -> dict[str, Any]:
+        """Return the fields of an `ArenaStep` of that name; `columns` are those of an observation."""
+        return {
+            "ended": _joined(self.rows, np.zeros(0, np.int32)),
+            "final_obs": _joined(self.final_obs, np.zeros((0, columns), np.float32)),
+            "is_episode": _joined(self.is_episode, np.zeros(0, np.bool_)),
+            "returns": _joined(self.returns, np.zeros(0, np.float64)),
+            "lengths": _joined(self.lengths, np.zeros(0, np.int32)),
+            "outcomes": tuple(self.outcomes),
+        }
+
+
+class ArenaBatch:
+    """Arenas of one kind in this process, stepped together.
+
+    Attributes:
+        n_arenas, n_robots, n_rows: Sizes; n_rows = n_arenas * n_robots.
+        worlds: The arenas.
+        interface: Spaces and layout of what learners see and do.
+    """
+
+    def __init__(self, plan: WorldPlan, n_arenas: int, *, first_arena: int = 0) -> None:
+        """Build the arenas; `reset` must be called before `step`.
+
+        Args:
+            plan: What every arena is made from.
+            n_arenas: How many.
+            first_arena: Number of the first of them, where this is part of a larger batch.
+
+        Raises:
+            ValueError: n_arenas below 1, or a plan that cannot be built.
+        """
+        if n_arenas < 1:
+            raise ValueError(f"Expected n_arenas >= 1, got {n_arenas}.")
+        self._first_arena = first_arena
+        self.worlds = [World(plan) for _ in range(n_arenas)]
+        self.interface = self.worlds[0].interface
+        self.n_arenas = n_arenas
+        self.n_robots = plan.scenario.robots.n_robots
+        self.n_rows = n_arenas * self.n_robots
+        self._is_reset = self._is_closed = False
+        self._absent = np.zeros((n_arenas, self.n_robots), np.bool_)
+        self._present = np.zeros((n_arenas, self.n_robots), np.bool_)
+        self._returns = np.zeros((n_arenas, self.n_robots), np.float64)
+        self._lengths = np.zeros((n_arenas, self.n_robots), np.int32)
+        self._n_columns = self.interface.layout.size
+        self._no_endings = _Endings().joined(self._n_columns)
+
+    def reset(
+        self, seeds: Sequence[int | None], options: Sequence[Mapping[str, Any] | None]
+    ) -> tuple[ObsArray, BoolArray]:
+        """Start a run in every arena; returns observations (R, d) and who is at work (R,).
+
+        Args:
+            seeds: One per arena; see `World.reset`.
+            options: One per arena; see `World.reset`.
+
+        Raises:
+            RuntimeError: closed.
+        """
+        if self._is_closed:
+            raise closed_error()
+        obs = np.empty((self.n_arenas, self.n_robots, self._n_columns), np.float32)
+        self._is_reset = False  # stays so where a seed or an option is refused: half a reset is none
+        for arena, (seed, option) in enumerate(zip(seeds, options, strict=True)):
+            self._start(arena, obs[arena], seed, option)
+        self._is_reset = True
+        return obs.reshape(self.n_rows, -1), self._active()
+
+    def _start(
+        self, arena: int, out: ObsArray, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> None:
+        """Start a run in one arena; writes what learners see to `out`."""
+        world = self.worlds[arena]
+        world.reset(seed, options)
+        self._present[arena] = world.base.swarm.present
+        self._absent[arena] = False
+        self._returns[arena] = 0.0
+        self._lengths[arena] = 0
+        world.observe(out)
+
+    def _active(self) -> BoolArray:
+        return np.concatenate([world.base.active for world in self.worlds])
+
+    def step(self, actions: np.ndarray) -> ArenaStep:
+        """Step every arena by one decision.
+
+        Args:
+            actions: (R,) or (R, k), one action of the interface per row; those of absent rows are ignored.
+
+        Raises:
+            RuntimeError: not reset yet, or closed.
+            ValueError: wrong shape, or actions that the interface or the drive refuses. A note names the arena.
+        """
+        self._require_reset("step")
+        actions = checked_rows(actions, self)
+        shape, columns = (self.n_arenas, self.n_robots), self._n_columns
+        obs = np.empty((*shape, columns), np.float32)
+        rewards = np.zeros(shape, np.float32)
+        terminated, truncated = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
+        endings = _Endings()
+        for arena in range(self.n_arenas):
+            rows = slice(arena * self.n_robots, (arena + 1) * self.n_robots)
+            out = obs[arena], rewards[arena], terminated[arena], truncated[arena]
+            try:
+                self._step_arena(arena, actions[rows], out, endings)
+            except ValueError as error:
+                error.add_note(
+                    f"This was in arena {self._first_arena + arena}: its world was not stepped. Worlds of other arenas "
+                    "may have been; where there are others, reset before going on."
+                )
+                raise
+        return ArenaStep(
+            obs=obs.reshape(self.n_rows, columns),
+            rewards=rewards.ravel(),
+            terminated=terminated.ravel(),
+            truncated=truncated.ravel(),
+            active=self._active(),
+            **(endings.joined(columns) if endings.rows else self._no_endings),
+        )
+
+    def _step_arena(
+        self,
+        arena: int,
+        actions: np.ndarray,
+        out: tuple[ObsArray, np.ndarray, BoolArray, BoolArray],
+        endings: _Endings,
+    ) -> None:
+        """Step one arena; writes its rows of obs, rewards, terminated, truncated and appends to `endings`."""
+        obs, rewards, terminated, truncated = out
+        world, absent = self.worlds[arena], self._absent[arena]
+        dead, all_dead, at_horizon = world.step(actions, rewards)
+        self._lengths[arena] += self._present[arena]  # as last seen: who died in this step had begun it
+        self._present[arena] = world.base.swarm.present
+        self._returns[arena] += rewards
+        world.observe(obs)
+        np.greater(dead, absent, out=terminated)
+        if all_dead or at_horizon:
+            terminated |= absent
+            np.logical_not(terminated, out=truncated)
+            self._note_endings(arena, np.arange(self.n_robots), obs, endings)
+            endings.outcomes.append(self._outcome(arena))
+            self._start(arena, obs)
+        elif np.count_nonzero(terminated):  # a third of the time of any()
+            self._note_endings(arena, np.flatnonzero(terminated), obs, endings)
+            absent |= dead
+
+    def _note_endings(self, arena: int, robots: np.ndarray, obs: ObsArray, endings: _Endings) -> None:
+        endings.rows.append((robots + arena * self.n_robots).astype(np.int32))
+        endings.final_obs.append(obs[robots])
+        endings.is_episode.append(~self._absent[arena, robots])
+        endings.returns.append(self._returns[arena, robots])
+        endings.lengths.append(self._lengths[arena, robots])
+
+    def _outcome(self, arena: int) -> RunOutcome:
+        base = self.worlds[arena].base
+        assert base.seed_value is not None, "a stepped world has a seed"
+        return RunOutcome(
+            arena=self._first_arena + arena,
+            seed=base.seed_value,
+            seconds=base.tick * base.scenario.dt_s,
+            collected=int(base.events.counters[Counter.COLLECTED]),
+            first_picked=int(base.events.counters[Counter.FIRST_PICKED]),
+        )
+
+    def action_masks(self) -> BoolArray:
+        """Return which discrete actions make sense now, (R, number of actions).
+
+        Raises:
+            RuntimeError: not reset yet, or closed.
+            ValueError: the actions are continuous.
+        """
+        self._require_reset("action_masks")
+        return np.concatenate([world.mask() for world in self.worlds])
+
+    def _require_reset(self, what: str) -> None:
+        if self._is_closed:
+            raise closed_error()
+        if not self._is_reset:
+            raise RuntimeError(f"Call reset before {what}.")
+
+    def render(self) -> list[np.ndarray | None]:
+        """Return one picture per arena."""
+        return [world.base.render() for world in self.worlds]
+
+    def get_attribute(self, name: str, arenas: Sequence[int]) -> list[Any]:
+        """Return an attribute of the environments of some arenas; raises AttributeError for unknown names."""
+        return [getattr(self.worlds[arena].env, name) for arena in arenas]
+
+    def set_attribute(self, name: str, value: Any, arenas: Sequence[int]) -> None:
+        """Set an attribute of the environments of some arenas, where it is: in a wrapper or at the bottom."""
+        for arena in arenas:
+            setattr(_owner(self.worlds[arena].env, name), name, value)
+
+    def call_method(self, name: str, arenas: Sequence[int], *args: Any, **kwargs: Any) -> list[Any]:
+        """Call a method of the environments of some arenas, once each; returns what they return.
+
+        What is no method is returned as it is.
+        """
+        found = self.get_attribute(name, arenas)
+        return [member(*args, **kwargs) if callable(member) else member for member in found]
+
+    def close(self) -> None:
+        """Close all environments; they take no reset or step any more."""
+        self._is_closed = True
+        for world in self.worlds:
+            world.env.close()
+
+
+def _joined(parts: list[np.ndarray], nothing: np.ndarray) -> np.ndarray:
+    return np.concatenate(parts) if parts else nothing

@@ -1,0 +1,303 @@
+"""Gymnasium views of the swarm: one agent for all robots, or every robot a sub-environment of a vector environment."""
+
+import time
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from swarm_forage_env.contract.types import BoolArray, ObsArray
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.views.arenas import ArenaStep
+from swarm_forage_env.views.learner_arena import World, plan_world
+from swarm_forage_env.views.processes import open_arenas
+from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.registry import wrapper_configs
+
+
+class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
+    """One agent that sees and steers every robot: the view of single-agent algorithms and of central control.
+
+    Observations are (N, d) float32 in [-1, 1], row i = robot i; the columns are those of the parallel environment
+    (`world.layout`), or of the interface (`interface.layout`). Actions are (N, 3) or (N, 2) float32 in [-1, 1], or
+    (N,) whole numbers where the interface has discrete ones. The reward is the sum over robots and over the ticks of
+    a decision. An episode terminates when every robot is dead and is truncated at the horizon.
+
+    `info["active"]` is (N,) bool, the tasked swarm. With discrete actions, `info["action_mask"]` is (N, number of
+    actions) int8, 1 = makes sense; `action_space.sample(mask=tuple(info["action_mask"]))` draws from these.
+    """
+
+    metadata = ForageEnv.metadata
+
+    def __init__(
+        self,
+        scenario: str | ScenarioConfig = "warehouse_small",
+        *,
+        interface: GivenInterface = None,
+        wrappers: Iterable[WrapperConfig | str] = (),
+        max_cycles: int | None = None,
+        render_mode: str | None = None,
+        **overrides: Any,
+    ) -> None:
+        """Create the environment.
+
+        Args:
+            scenario: Name of a preset, or a complete configuration.
+            interface: What is seen and done of each robot, an `InterfaceConfig` or its fields by name; default full
+                observations and continuous actions.
+            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+                ("population:death_per_tick=0.01").
+            max_cycles: Ticks until truncation; default the scenario's horizon.
+            render_mode: None or "rgb_array".
+            overrides: Scenario fields by name (`n_robots=20`).
+
+        Raises:
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+        """
+        plan = plan_world(
+            scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
+        )
+        self._world = World(plan)
+        self._is_discrete = plan.interface.actions == "discrete"
+        self.render_mode = render_mode
+        n_robots = plan.scenario.robots.n_robots
+        self.observation_space = batch_space(self.interface.observation_space, n_robots)
+        self.action_space = batch_space(self.interface.action_space, n_robots)
+
+    @property
+    def interface(self) -> LearnerInterface:
+        """Spaces and layout of one robot's row; another one after a reset that changed the scenario."""
+        return self._world.interface
+
+    @property
+    def world(self) -> ForageEnv:
+        """The parallel environment at the bottom; another one after a reset that changed the scenario."""
+        return self._world.base
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[ObsArray, dict[str, Any]]:
+        """Start an episode; returns observations (N, d) and info.
+
+        Args:
+            seed: Seed of this episode and of the sequence of those after it.
+            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `World.reset`.
+        """
+        super().reset(seed=seed)
+        self._world.reset(seed, options)
+        return self._world.observe(), self._info()
+
+    def step(self, action: np.ndarray) -> tuple[ObsArray, float, bool, bool, dict[str, Any]]:
+        """Advance by one decision.
+
+        Args:
+            action: (N,) or (N, k), rows of robots that are away included (and ignored).
+
+        Raises:
+            ActionError: wrong shape, numbers that are no actions, or an active robot's action that is not finite.
+        """
+        rewards = np.zeros(self.world.scenario.robots.n_robots)  # float64: the sum shall not depend on the order
+        _, terminated, truncated = self._world.step(np.asarray(action), rewards)
+        return self._world.observe(), float(rewards.sum()), terminated, truncated, self._info()
+
+    def render(self) -> np.ndarray | None:
+        """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
+        return self.world.render()
+
+    def close(self) -> None:
+        """Close the wrapped stack."""
+        self._world.env.close()
+
+    def _info(self) -> dict[str, Any]:
+        info: dict[str, Any] = {"active": self.world.active.copy()}
+        if self._is_discrete:
+            info["action_mask"] = self._world.mask().astype(np.int8)
+        return info
+
+
+class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
+    """Every robot of every arena as a sub-environment that one shared policy acts in.
+
+    Sub-environment `a * N + i` is robot i of arena a. How rows end, stay absent and start anew is told in
+    `learning.arenas`: an arena starts anew within the step that ends it (`AutoresetMode.SAME_STEP`), so that
+    `infos["final_obs"]` holds the last observations; a dead robot terminates once and is a row of zeros until then.
+
+    Infos are arrays over rows, with masks under the name with an underscore in front, as Gymnasium does it:
+    `active` always; `final_obs` (objects, None elsewhere) and `final_info` ({}) of rows that are done; `episode`
+    (return "r", steps "l", seconds since creation "t") of rows whose episode ended. Gymnasium's
+    `RecordEpisodeStatistics` is therefore not needed, refuses to write over it, and under another key would count
+    absent rows as episodes.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012 - declared like this by Gymnasium
+        **ForageEnv.metadata,
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(
+        self,
+        scenario: str | ScenarioConfig = "warehouse_small",
+        *,
+        num_envs: int = 1,
+        n_arenas: int | None = None,
+        n_processes: int = 0,
+        interface: GivenInterface = None,
+        wrappers: Iterable[WrapperConfig | str] = (),
+        swarm_wrappers: Iterable[WrapperConfig | str] = (),
+        max_cycles: int | None = None,
+        render_mode: str | None = None,
+        **overrides: Any,
+    ) -> None:
+        """Create the environment.
+
+        Args:
+            scenario: Name of a preset, or a complete configuration.
+            num_envs: Robots in all arenas together, a multiple of the scenario's; 1, which is what
+                `gymnasium.make_vec` says when nobody asked for a number, leaves the choice to `n_arenas`.
+            n_arenas: Arenas that run side by side; default as many as `num_envs` needs, at least one.
+            n_processes: Processes that the arenas are spread over; 0 = all in this process.
+            interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
+                observations and continuous actions.
+            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+                ("population:death_per_tick=0.01").
+            swarm_wrappers: More of them, for `gymnasium.make_vec`, which takes an argument `wrappers` for itself.
+            max_cycles: Ticks until truncation; default the scenario's horizon.
+            render_mode: None or "rgb_array".
+            overrides: Scenario fields by name (`n_robots=20`).
+
+        Raises:
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+            ValueError: num_envs and n_arenas that do not fit together, or more processes than arenas.
+        """
+        plan = plan_world(
+            scenario,
+            overrides,
+            interface=interface,
+            wrappers=(*wrapper_configs(wrappers), *wrapper_configs(swarm_wrappers)),
+            max_cycles=max_cycles,
+            render_mode=render_mode,
+        )
+        arenas = _number_of_arenas(num_envs, n_arenas, plan.scenario.robots.n_robots)
+        self._arenas = open_arenas(plan, arenas, n_processes)
+        self.interface = self._arenas.interface
+        self.n_arenas, self.n_robots = arenas, self._arenas.n_robots
+        self.num_envs = self._arenas.n_rows
+        self.render_mode = render_mode
+        self.single_observation_space = self.interface.observation_space
+        self.single_action_space = self.interface.action_space
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._started = time.perf_counter()
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[ObsArray, dict[str, Any]]:
+        """Start an episode in every arena; returns observations (num_envs, d) and infos.
+
+        Args:
+            seed: Arena a runs seed + a; or one seed per arena.
+            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `World.reset`.
+
+        Raises:
+            ValueError: a list of seeds that is not as long as there are arenas.
+        """
+        if seed is None or isinstance(seed, int | np.integer):
+            seeds = [None if seed is None else int(seed) + arena for arena in range(self.n_arenas)]
+        else:
+            seeds = list(seed)
+        if len(seeds) != self.n_arenas:
+            raise ValueError(f"Expected one seed per arena ({self.n_arenas}), got {len(seeds)}.")
+        super().reset(seed=seeds[0])
+        obs, active = self._arenas.reset(seeds, [options] * self.n_arenas)
+        return obs, self._with_masks({"active": active})
+
+    def step(self, actions: np.ndarray) -> tuple[ObsArray, np.ndarray, BoolArray, BoolArray, dict[str, Any]]:
+        """Step every arena by one decision.
+
+        Args:
+            actions: (num_envs,) or (num_envs, k); those of absent robots are ignored.
+
+        Returns:
+            Observations (num_envs, d), rewards, terminations, truncations (num_envs,) and infos, all new.
+        """
+        step = self._arenas.step(actions)
+        return step.obs, step.rewards, step.terminated, step.truncated, self._infos(step)
+
+    def _infos(self, step: ArenaStep) -> dict[str, Any]:
+        infos = self._with_masks({"active": step.active})
+        if len(step.ended) == 0:
+            return infos
+        is_done = np.zeros(self.num_envs, np.bool_)
+        is_done[step.ended] = True
+        final_obs = np.full(self.num_envs, None, object)
+        for row, obs in zip(step.ended.tolist(), step.final_obs, strict=True):
+            final_obs[row] = obs
+        infos |= {"final_obs": final_obs, "_final_obs": is_done, "final_info": {}, "_final_info": is_done.copy()}
+        rows = step.ended[step.is_episode]
+        if len(rows):
+            is_episode = np.zeros(self.num_envs, np.bool_)
+            is_episode[rows] = True
+            returns, lengths = np.zeros(self.num_envs, np.float32), np.zeros(self.num_envs, np.int32)
+            returns[rows], lengths[rows] = step.returns[step.is_episode], step.lengths[step.is_episode]
+            seconds = np.where(is_episode, round(time.perf_counter() - self._started, 6), 0.0)
+            infos |= {"episode": {"r": returns, "l": lengths, "t": seconds}, "_episode": is_episode}
+        return infos
+
+    def _with_masks(self, columns: dict[str, np.ndarray]) -> dict[str, Any]:
+        return columns | {f"_{name}": np.ones(self.num_envs, np.bool_) for name in columns}
+
+    def action_masks(self) -> BoolArray:
+        """Return which discrete actions make sense now, (num_envs, number of actions)."""
+        return self._arenas.action_masks()
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Return one picture (height, width, 3) per arena when created with render_mode="rgb_array", else None."""
+        if self.render_mode is None:
+            return None
+        return tuple(picture for picture in self._arenas.render() if picture is not None)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Call a method of every arena's environment, or read an attribute; returns one result per arena."""
+        return tuple(self._arenas.call_method(name, range(self.n_arenas), *args, **kwargs))
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute of every arena's environment."""
+        return tuple(self._arenas.get_attribute(name, range(self.n_arenas)))
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of every arena's environment: one value for all, or a list or tuple of one per arena."""
+        per_arena = list(values) if isinstance(values, list | tuple) else [values] * self.n_arenas
+        if len(per_arena) != self.n_arenas:
+            raise ValueError(f"Expected one value per arena ({self.n_arenas}), got {len(per_arena)}.")
+        for arena, value in enumerate(per_arena):
+            self._arenas.set_attribute(name, value, [arena])
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close all arenas and end their processes."""
+        self._arenas.close()
+
+
+def _number_of_arenas(num_envs: int, n_arenas: int | None, n_robots: int) -> int:
+    if n_arenas is not None and num_envs not in (1, n_arenas * n_robots):
+        raise ValueError(
+            f"Expected num_envs = {n_arenas * n_robots} for n_arenas = {n_arenas} of n_robots = {n_robots} (one "
+            f"sub-environment per robot), got {num_envs}; leave num_envs or n_arenas away."
+        )
+    if n_arenas is not None:
+        return n_arenas
+    if num_envs == 1:
+        return 1
+    if num_envs < 1 or num_envs % n_robots:
+        raise ValueError(
+            f"Expected num_envs to be a multiple of n_robots = {n_robots} (one sub-environment per robot), got "
+            f"{num_envs}; choose another n_robots, or give n_arenas instead."
+        )
+    return num_envs // n_robots

@@ -1,0 +1,231 @@
+"""A world as a learner meets it: environment, wrappers, interface, seeds, and fields overridden for a curriculum."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.contract.types import BoolArray, ObsArray
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, LearnerInterface, chosen_interface
+from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig, field_sections, with_overrides
+from swarm_forage_env.scenarios.presets import scenario as preset
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
+from swarm_forage_env.wrappers.registry import wrapper_configs
+
+SCENARIO_OPTION = "scenario"
+"""Key of the options of a reset that is read here. Others, but for misplaced scenario fields, are left to those who
+put them there: both Gymnasium and PettingZoo hand options on to everything in the stack."""
+
+
+def configured(scenario: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
+    """Return a preset by name, or a complete configuration, with fields overridden by name.
+
+    Raises:
+        ConfigError: unknown preset or field, or values that describe no world.
+    """
+    if isinstance(scenario, ScenarioConfig):
+        return with_overrides(scenario, **overrides)
+    return preset(scenario, **overrides)
+
+
+def same_robots(scenario: ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
+    """Return the scenario with fields overridden by name, but for the number of robots.
+
+    Raises:
+        ConfigError: unknown fields, values that describe no world, or another number of robots.
+    """
+    changed = with_overrides(scenario, **overrides)
+    n_robots = scenario.robots.n_robots
+    if changed.robots.n_robots != n_robots:
+        raise ConfigError(
+            f"Expected n_robots to stay {n_robots}, the number of rows that spaces promise, got "
+            f"{changed.robots.n_robots}; make another environment, or let robots be born during the run (the "
+            "population wrapper with initial_robots)."
+        )
+    return changed
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class WorldPlan:
+    """What a world is made from; picklable."""
+
+    scenario: ScenarioConfig
+    wrappers: tuple[WrapperConfig, ...] = ()
+    """What disturbs the swarm, in any order."""
+    interface: InterfaceConfig = field(default_factory=InterfaceConfig)
+    """What a learner sees and does."""
+    max_cycles: int | None = None
+    """Ticks until truncation; default the scenario's horizon."""
+    render_mode: str | None = None
+
+    def build(self, overrides: Mapping[str, Any]) -> ForageEnv | SwarmWrapper:
+        """Build the environment in its wrappers, scenario fields overridden by name.
+
+        Raises:
+            ConfigError: unknown fields, values that describe no world, or another number of robots.
+        """
+        scenario = same_robots(self.scenario, overrides)
+        env = ForageEnv(scenario, max_cycles=self.max_cycles, render_mode=self.render_mode, reads=self.interface.reads)
+        return wrap_in_order(env, self.wrappers)
+
+
+def plan_world(
+    scenario: str | ScenarioConfig,
+    overrides: Mapping[str, Any],
+    *,
+    interface: GivenInterface = None,
+    wrappers: Iterable[WrapperConfig | str] = (),
+    max_cycles: int | None = None,
+    render_mode: str | None = None,
+) -> WorldPlan:
+    """Plan a world from what the constructors of environments take.
+
+    Args:
+        scenario: Name of a preset, or a complete configuration.
+        overrides: Scenario fields by name.
+        interface: See `chosen_interface`.
+        wrappers: See `wrapper_configs`.
+        max_cycles: Ticks until truncation; default the scenario's horizon.
+        render_mode: None or "rgb_array".
+
+    Raises:
+        ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+    """
+    return WorldPlan(
+        scenario=configured(scenario, overrides),
+        wrappers=wrapper_configs(wrappers),
+        interface=chosen_interface(interface),
+        max_cycles=max_cycles,
+        render_mode=render_mode,
+    )
+
+
+class World:
+    """One world as a learner meets it, and the sequence of its runs.
+
+    Attributes:
+        env: Environment and wrappers as one stack.
+        base: The ForageEnv at its bottom.
+        interface: Translates for the learner; its spaces stay the same, the object does not.
+    """
+
+    def __init__(self, plan: WorldPlan) -> None:
+        """Build the world of `plan`; raises ConfigError where it cannot be."""
+        self._plan = plan
+        self._overrides: dict[str, Any] = {}
+        self._seeds = np.random.default_rng()
+        self._adopt(plan.build({}))
+
+    def _adopt(self, env: ForageEnv | SwarmWrapper) -> None:
+        self.env = env
+        self.base: ForageEnv = env.world if isinstance(env, SwarmWrapper) else env
+        self.interface = LearnerInterface(self._plan.interface, self.base.task)
+        self._obs: ObsArray | None = None  # of the environment, (N, D)
+
+    def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
+        """Start a run.
+
+        Args:
+            seed: Seed of the run and of those that follow it; None continues the sequence of the last seed given.
+            options: `{"scenario": {field: value}}` overrides fields of the scenario that the world was planned with,
+                in this run and all later ones; `{"scenario": {}}` goes back to the plan. Without that key nothing
+                changes. Keys that have nothing to do with a scenario are ignored.
+
+        Raises:
+            ConfigError: a scenario field beside `scenario`, an option that is nearly one of these, an unknown field,
+                or another number of robots; the world stays as it was.
+        """
+        overrides = _scenario_overrides(options)
+        if overrides is not None and overrides != self._overrides:
+            self._adopt(self._plan.build(overrides))
+            self._overrides = overrides
+        if seed is None:
+            seed = int(self._seeds.integers(2**31))
+        else:
+            self._seeds = np.random.default_rng(seed)
+        self._obs = self.env.reset_batch(seed)
+
+    def step(self, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
+        """Carry a decision out: one tick after the other, until its ticks or the run are over.
+
+        Args:
+            actions: One action of the interface per robot, see `LearnerInterface.command`.
+            rewards: (N,) what the robots earn is added here.
+
+        Returns:
+            Dead robots (N,), whether that is all of them, and whether the horizon is reached.
+
+        Raises:
+            RuntimeError: before the first reset.
+            ActionError: actions that the interface or the drive refuses.
+        """
+        obs, dead, all_dead, truncated = self._last_obs, np.zeros(0, np.bool_), False, False
+        for _ in range(self._plan.interface.decision_ticks):
+            obs, reward, dead, truncated = self.env.step_batch(self.interface.command(actions, obs))
+            self._obs = obs
+            rewards += reward
+            all_dead = bool(dead[0] and dead.all())
+            if truncated or all_dead:
+                break
+        return dead, all_dead, truncated
+
+    def observe(self, out: ObsArray | None = None) -> ObsArray:
+        """Return what the learner sees now, (N, d): a new array, or `out`."""
+        return self.interface.observe(self._last_obs, out)
+
+    def mask(self) -> BoolArray:
+        """Return which discrete actions make sense now, (N, number of actions); see `LearnerInterface.mask`."""
+        return self.interface.mask(self._last_obs)
+
+    @property
+    def _last_obs(self) -> ObsArray:
+        if self._obs is None:
+            raise RuntimeError("Call reset first: there is no run yet.")
+        return self._obs
+
+
+_FIXED = ("interface", "wrappers")
+"""What people may expect a reset to change, and it cannot."""
+
+
+def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    """Return the overridden fields that `options` asks for, None when it does not speak of them."""
+    if not options:
+        return None
+    for key in options:
+        if key != SCENARIO_OPTION:
+            _refuse_misplaced(key, options[key])
+    if SCENARIO_OPTION not in options:
+        return None
+    fields = options[SCENARIO_OPTION]
+    if not isinstance(fields, Mapping):
+        raise ConfigError(f"Expected the reset option 'scenario' as fields by name, got {fields!r}.")
+    return dict(fields)
+
+
+def _refuse_misplaced(key: Any, value: Any) -> None:
+    """Raise ConfigError if a reset option was meant for the scenario: nothing would come of it."""
+    if key in _FIXED:
+        raise ConfigError(
+            f"Expected {key} when the environment is made, not at a reset, which changes the scenario only."
+        )
+    known = (*field_sections(), *SECTIONS)
+    if key in known:
+        raise ConfigError(
+            f"Expected the scenario field {key!r} inside of the reset option 'scenario': "
+            f"options={{'scenario': {{{key!r}: {value!r}}}}}."
+        )
+    nearest = suggestion(str(key), (SCENARIO_OPTION,))
+    if nearest:
+        raise ConfigError(f"Unknown reset option {key!r}.{nearest}")
+    # Nearer than `suggestion` asks for: options of others, such as "high", are no misspelt fields.
+    for name in get_close_matches(str(key), known, n=1, cutoff=0.8):
+        raise ConfigError(
+            f"Unknown reset option {key!r}. If the scenario field {name!r} is meant: "
+            f"options={{'scenario': {{{name!r}: {value!r}}}}}."
+        )

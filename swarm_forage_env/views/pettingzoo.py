@@ -1,0 +1,235 @@
+"""The learner's interface under the PettingZoo API: for libraries that want one agent per robot and dictionaries."""
+
+from collections.abc import Iterable
+from typing import Any, overload
+
+import numpy as np
+from gymnasium import spaces
+from pettingzoo import ParallelEnv
+from pettingzoo.utils.conversions import parallel_to_aec
+
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.views.learner_arena import World, plan_world
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+
+Infos = dict[str, dict[str, Any]]
+
+
+class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
+    """`ForageEnv` with the observations and actions of an `InterfaceConfig`; agents live and die as there.
+
+    `infos[agent]` holds `active` and, for discrete actions, `action_mask`: int8 (number of actions,), 1 = makes sense.
+    A step is one decision of `decision_ticks` ticks. Dictionaries cost more than the world itself; where a library can
+    take vector environments, `SwarmVectorEnv` is the faster way.
+    """
+
+    metadata: dict[str, Any] = {**ForageEnv.metadata, "name": "swarm_forage_learner_v0"}  # noqa: RUF012 - as PettingZoo
+
+    def __init__(
+        self,
+        scenario: str | ScenarioConfig = "warehouse_small",
+        *,
+        interface: GivenInterface = None,
+        wrappers: Iterable[WrapperConfig | str] = (),
+        max_cycles: int | None = None,
+        render_mode: str | None = None,
+        **overrides: Any,
+    ) -> None:
+        """Create the environment.
+
+        Args:
+            scenario: Name of a preset, or a complete configuration.
+            interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
+                observations and continuous actions.
+            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+                ("population:death_per_tick=0.01"). Trainers that need a fixed number of agents take
+                "population:deaths=absorbing,...".
+            max_cycles: Ticks until truncation; default the scenario's horizon.
+            render_mode: None or "rgb_array".
+            overrides: Scenario fields by name (`n_robots=20`).
+
+        Raises:
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+        """
+        plan = plan_world(
+            scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
+        )
+        self._is_discrete = plan.interface.actions == "discrete"
+        self._world = World(plan)
+        self.render_mode = render_mode
+        self.possible_agents = list(self._world.base.possible_agents)
+        self.agents: list[str] = []
+        self._row_of = {agent: row for row, agent in enumerate(self.possible_agents)}
+        # One space object per agent: each has a random state of its own.
+        self._observation_space = {agent: self.interface.new_observation_space() for agent in self.possible_agents}
+        self._action_space = {agent: self.interface.new_action_space() for agent in self.possible_agents}
+
+    @property
+    def interface(self) -> LearnerInterface:
+        """Spaces and layout of what learners see and do; another one after a reset that changed the scenario."""
+        return self._world.interface
+
+    @property
+    def world(self) -> ForageEnv:
+        """The parallel environment at the bottom; another one after a reset that changed the scenario."""
+        return self._world.base
+
+    def observation_space(self, agent: str) -> spaces.Box:
+        """(d,) float32 in [-1, 1]."""
+        return self._observation_space[agent]
+
+    def action_space(self, agent: str) -> spaces.Box | spaces.Discrete:
+        """What one robot chooses from."""
+        return self._action_space[agent]
+
+    @property
+    def state_space(self) -> spaces.Box:
+        """Space of `state()`."""
+        return self.world.state_space
+
+    def state(self) -> np.ndarray:
+        """Return the global view, see `ForageEnv.state`."""
+        return self.world.state()
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], Infos]:
+        """Start a run; returns observations and infos per agent.
+
+        Args:
+            seed: Seed of this run and of the sequence of those after it.
+            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `World.reset`.
+        """
+        self._world.reset(seed, options)
+        self.agents = list(self.possible_agents)
+        return self._per_agent(self._world.observe()), self._infos()
+
+    def step(
+        self, actions: dict[str, Any]
+    ) -> tuple[dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
+        """Advance by one decision, with one action per agent in `agents`.
+
+        Raises:
+            RuntimeError: not reset, or everybody is done.
+            ValueError: an agent without an action, or actions that are none.
+        """
+        if not self.agents:
+            raise RuntimeError("Call reset before step; no agent is left.")
+        missing = [agent for agent in self.agents if agent not in actions]
+        if missing:
+            raise ValueError(f"Expected an action for each of the {len(self.agents)} agents, missing {missing[:3]}.")
+        chosen = self._chosen(actions)
+        rewards = np.zeros(len(self.possible_agents))
+        dead, _, truncated = self._world.step(chosen, rewards)
+        results = (
+            self._per_agent(self._world.observe()),
+            self._per_agent(rewards.tolist()),
+            self._per_agent(dead.tolist()),
+            dict.fromkeys(self.agents, truncated),
+            self._infos(),
+        )
+        self.agents = [] if truncated else [agent for agent in self.agents if not dead[self._row_of[agent]]]
+        return results
+
+    def _chosen(self, actions: dict[str, Any]) -> np.ndarray:
+        """Return one row per robot; those of robots that are gone are zeros."""
+        space = self.interface.action_space
+        given = {agent: np.asarray(actions[agent]) for agent in self.agents}
+        # Assigning to an array would stretch what is too small and cut what is no whole number.
+        for agent, action in given.items():
+            if action.shape != space.shape or not np.can_cast(action.dtype, space.dtype, casting="same_kind"):
+                raise ValueError(
+                    f"Expected an action of {space} for {agent}, got {action.dtype} with shape {action.shape}."
+                )
+        chosen = np.zeros((len(self.possible_agents), *(space.shape or ())), space.dtype)
+        for agent, action in given.items():
+            chosen[self._row_of[agent]] = action
+        return chosen
+
+    def _per_agent(self, rows: Any) -> dict[str, Any]:
+        return {agent: rows[self._row_of[agent]] for agent in self.agents}
+
+    def _infos(self) -> Infos:
+        active = self.world.active
+        infos: Infos = {agent: {"active": bool(active[self._row_of[agent]])} for agent in self.agents}
+        if self._is_discrete:
+            mask = self._world.mask().astype(np.int8)
+            for agent, info in infos.items():
+                info["action_mask"] = mask[self._row_of[agent]]
+        return infos
+
+    def render(self) -> np.ndarray | None:
+        """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
+        return self.world.render()
+
+    def close(self) -> None:
+        """Close the stack."""
+        self._world.env.close()
+
+
+@overload
+def parallel_env(
+    scenario: str | ScenarioConfig = ...,
+    *,
+    interface: None = ...,
+    wrappers: tuple[()] = ...,
+    max_cycles: int | None = ...,
+    render_mode: str | None = ...,
+    **overrides: Any,
+) -> ForageEnv: ...
+@overload
+def parallel_env(
+    scenario: str | ScenarioConfig = ...,
+    *,
+    interface: GivenInterface = ...,
+    wrappers: Iterable[WrapperConfig | str] = ...,
+    max_cycles: int | None = ...,
+    render_mode: str | None = ...,
+    **overrides: Any,
+) -> ForageEnv | SwarmWrapper | ParallelLearnerEnv: ...
+def parallel_env(
+    scenario: str | ScenarioConfig = "warehouse_small",
+    *,
+    interface: GivenInterface = None,
+    wrappers: Iterable[WrapperConfig | str] = (),
+    max_cycles: int | None = None,
+    render_mode: str | None = None,
+    **overrides: Any,
+) -> ForageEnv | SwarmWrapper | ParallelLearnerEnv:
+    """Create a parallel environment; `pettingzoo.make("parallel", id, ...)` calls this function, too.
+
+    Args:
+        scenario: Name of a preset, or a complete configuration.
+        interface: What a learner sees and does, see `ParallelLearnerEnv`; None = full observations and continuous
+            actions.
+        wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+            ("population:death_per_tick=0.01").
+        max_cycles: Steps until truncation; default the scenario's horizon.
+        render_mode: None or "rgb_array".
+        overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
+
+    Returns:
+        A `ForageEnv`; with wrappers the outermost of them; with an interface a `ParallelLearnerEnv` around them all.
+
+    Raises:
+        ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+    """
+    if interface is not None:
+        return ParallelLearnerEnv(
+            scenario,
+            interface=interface,
+            wrappers=wrappers,
+            max_cycles=max_cycles,
+            render_mode=render_mode,
+            **overrides,
+        )
+    plan = plan_world(scenario, overrides, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode)
+    return plan.build({})
+
+
+def env(scenario: str | ScenarioConfig = "warehouse_small", **options: Any) -> Any:
+    """Create the agent-by-agent (AEC) form by PettingZoo's own conversion; arguments as `parallel_env`."""
+    parallel = parallel_env(scenario, **options)
+    return parallel_to_aec(parallel)  # pyright: ignore[reportArgumentType] - it wants an action type that may be None

@@ -1,0 +1,208 @@
+"""SwarmVecEnv: robots times arenas as the sub-environments of one stable-baselines3 vector environment."""
+
+import time
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.types import BoolArray
+from swarm_forage_env.policies.interface import GivenInterface
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.views.arenas import ArenaStep
+from swarm_forage_env.views.learner_arena import plan_world
+from swarm_forage_env.views.processes import open_arenas
+from swarm_forage_env.wrappers.base import WrapperConfig
+
+
+class SwarmVecEnv(VecEnv):
+    """Every robot of every arena as a sub-environment that one shared policy acts in.
+
+    Sub-environment `a * N + i` is robot i of arena a. Arrays pass straight through: no per-agent dicts. How rows end,
+    stay absent and start anew is told in `learning.arenas`; in terms of stable-baselines3:
+
+    * `dones` is true when the observation returned is the first of a new episode, and when a robot dies.
+    * `infos[row]["terminal_observation"]` is there whenever `dones[row]` is; `"TimeLimit.truncated"` is true where the
+      robot could have gone on, so that the value of the terminal observation is bootstrapped there and nowhere else.
+    * `infos[row]["episode"]` (return "r", steps "l", seconds since creation "t") is there when an episode ended, also
+      by death; no `VecMonitor` is needed, and one would count absent rows as episodes.
+    * `infos[row]["run"]`, on the first row of an arena that ended: seed, simulated seconds, collected, first_picked.
+    * Robots that are absent or in repair must not teach: build the algorithm with `ActiveRolloutBuffer` (on-policy)
+      or `PresentReplayBuffer` (off-policy).
+
+    Attributes:
+        n_arenas, n_robots: num_envs = n_arenas * n_robots.
+        interface: What a learner sees and does.
+        active: (num_envs,) bool, robots at work in the last observation.
+    """
+
+    def __init__(
+        self,
+        scenario: str | ScenarioConfig = "warehouse_small",
+        *,
+        n_arenas: int = 1,
+        n_processes: int = 0,
+        interface: GivenInterface = None,
+        wrappers: Iterable[WrapperConfig | str] = (),
+        max_cycles: int | None = None,
+        render_mode: str | None = None,
+        **overrides: Any,
+    ) -> None:
+        """Create the environment.
+
+        Args:
+            scenario: Name of a preset, or a complete configuration.
+            n_arenas: Arenas that run side by side.
+            n_processes: Processes that the arenas are spread over; 0 = all in this process.
+            interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
+                observations and continuous actions.
+            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+                ("population:death_per_tick=0.01").
+            max_cycles: Ticks until truncation; default the scenario's horizon.
+            render_mode: None or "rgb_array".
+            overrides: Scenario fields by name (`n_robots=20`, `nest_progress=0.1`).
+
+        Raises:
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+            ValueError: n_arenas below 1, or more processes than arenas.
+        """
+        if "num_envs" in overrides:
+            raise ConfigError("Expected n_arenas, not num_envs: each arena gives one sub-environment per robot.")
+        plan = plan_world(
+            scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
+        )
+        self._arenas = open_arenas(plan, n_arenas, n_processes)
+        self.n_arenas, self.n_robots = n_arenas, self._arenas.n_robots
+        self.interface = self._arenas.interface
+        self._started = time.perf_counter()
+        self._actions: np.ndarray | None = None
+        super().__init__(self._arenas.n_rows, self.interface.observation_space, self.interface.action_space)
+        self.active: BoolArray = np.zeros(self.num_envs, np.bool_)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Set the seeds of the next reset: arena a runs seed + a, and from there a sequence of its own.
+
+        Returns:
+            One seed per row, that of its arena.
+        """
+        if seed is None:
+            seed = int(np.random.default_rng().integers(2**31))
+        self._seeds = [seed + row // self.n_robots for row in range(self.num_envs)]
+        return self._seeds
+
+    def reset(self) -> VecEnvObs:
+        """Start a run in every arena; returns observations (num_envs, d).
+
+        Options that were set by `set_options` are taken from the first row of each arena; see `World.reset`.
+        """
+        first_rows = range(0, self.num_envs, self.n_robots)
+        obs, self.active = self._arenas.reset(
+            [self._seeds[row] for row in first_rows], [self._options[row] for row in first_rows]
+        )
+        self.reset_infos = [{} for _ in range(self.num_envs)]
+        self._reset_seeds()
+        self._reset_options()
+        return obs
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keep the actions, (num_envs,) or (num_envs, k), for `step_wait`."""
+        self._actions = actions
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Step every arena by one decision; returns observations, rewards, dones and infos, all new."""
+        assert self._actions is not None, "step_async comes before step_wait"
+        step = self._arenas.step(self._actions)
+        self.active = step.active
+        return step.obs, step.rewards, step.terminated | step.truncated, self._infos(step)  # type: ignore[return-value]
+
+    def _infos(self, step: ArenaStep) -> list[dict[str, Any]]:
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        if len(step.ended):
+            seconds = round(time.perf_counter() - self._started, 6)
+            for k, row in enumerate(step.ended.tolist()):
+                info = infos[row]
+                info["terminal_observation"] = step.final_obs[k]
+                info["TimeLimit.truncated"] = bool(step.truncated[row])
+                if step.is_episode[k]:
+                    info["episode"] = {"r": float(step.returns[k]), "l": int(step.lengths[k]), "t": seconds}
+            for outcome in step.outcomes:
+                infos[outcome.arena * self.n_robots]["run"] = {
+                    "seed": outcome.seed,
+                    "seconds": outcome.seconds,
+                    "collected": outcome.collected,
+                    "first_picked": outcome.first_picked,
+                }
+        return infos
+
+    @property
+    def active_column(self) -> int:
+        """Column of an observation that is 1 for robots at work."""
+        return self.interface.active_column
+
+    @property
+    def rollout_buffer_kwargs(self) -> dict[str, Any]:
+        """What `ActiveRolloutBuffer` wants to know of the observations; new in every call."""
+        return {"active_column": self.active_column, "n_columns": self.interface.layout.size}
+
+    def action_masks(self) -> BoolArray:
+        """Return which discrete actions make sense now, (num_envs, number of actions); see `LearnerInterface.mask`."""
+        return self._arenas.action_masks()
+
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        """Return one picture per arena."""
+        return self._arenas.render()
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """Return an attribute of the environment that each row is a part of, one value per row."""
+        rows = self._rows(indices)
+        if attr_name == "action_masks":  # the name under which algorithms with masks look for them
+            if self.interface.config.actions != "discrete":
+                raise AttributeError("Continuous actions have no masks.")
+            return [self.action_masks] * len(rows)
+        return self._per_row(rows, lambda arenas: self._arenas.get_attribute(attr_name, arenas))
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Set an attribute of the environments that the rows are parts of."""
+        self._arenas.set_attribute(attr_name, value, self._arenas_of(self._rows(indices)))
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method of the environments, once per arena; returns its arena's result for each row.
+
+        `action_masks` is answered row by row, as algorithms with masks expect.
+        """
+        rows = self._rows(indices)
+        if method_name == "action_masks":
+            return list(self.action_masks()[rows])
+        return self._per_row(
+            rows, lambda arenas: self._arenas.call_method(method_name, arenas, *method_args, **method_kwargs)
+        )
+
+    def env_is_wrapped(self, wrapper_class: type[gymnasium.Wrapper], indices: VecEnvIndices = None) -> list[bool]:
+        """Return False for each row, but True for `Monitor`: rows tell their episodes as it would.
+
+        `evaluate_policy` and `EvalCallback` ask for it, and then count episodes instead of dones, which absent rows
+        have, too.
+        """
+        return [wrapper_class is Monitor] * len(self._rows(indices))
+
+    def close(self) -> None:
+        """Close all arenas and end their processes."""
+        self._arenas.close()
+
+    def _rows(self, indices: VecEnvIndices) -> list[int]:
+        return list(self._get_indices(indices))
+
+    def _arenas_of(self, rows: Sequence[int]) -> list[int]:
+        return sorted({row // self.n_robots for row in rows})
+
+    def _per_row(self, rows: Sequence[int], ask: Any) -> list[Any]:
+        arenas = self._arenas_of(rows)
+        values = dict(zip(arenas, ask(arenas), strict=True))
+        return [values[row // self.n_robots] for row in rows]

@@ -1,0 +1,215 @@
+"""ForagingArena: the world behind the environment. It owns the arrays and the order of a tick, nothing else."""
+
+from collections.abc import Collection
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.contract.codes import Counter, ObjectStatus
+from swarm_forage_env.contract.layout import observation_layout
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.units import CELLS_PER_M
+from swarm_forage_env.world.actuators import Drive
+from swarm_forage_env.world.caches import create_static_caches, found_caches, n_cache_slots, restore_static_caches
+from swarm_forage_env.world.interactions import Interactions
+from swarm_forage_env.world.interference import mark_interference
+from swarm_forage_env.world.object_motion import walk_objects
+from swarm_forage_env.world.physics import Physics
+from swarm_forage_env.world.placement import draw_source, place_all, place_objects, static_cache_centres
+from swarm_forage_env.world.sensors import SensorSuite, sense, sense_proximity
+from swarm_forage_env.world.start_poses import draw_start_poses
+from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
+
+
+class ForagingArena:
+    """A foraging world of one scenario, reset for each run and stepped one tick at a time.
+
+    Attributes:
+        config: The scenario.
+        layout: Layout of the observation rows.
+        reads: Observation slices that are looked at; sensors of others may stay zero.
+        tick: Ticks done since reset.
+        swarm, objects, caches, events: The state; read freely, write through the methods.
+    """
+
+    def __init__(self, config: ScenarioConfig, *, reads: Collection[str] | None = None) -> None:
+        """Prepare a world; `reset` must be called before `step`.
+
+        Args:
+            config: The scenario.
+            reads: Observation slices that are looked at; the sensors of others may stay zero. Default: all.
+
+        Raises:
+            ConfigError: a name in `reads` that no slice has.
+        """
+        self.config = config
+        arena = config.arena
+        self.layout = observation_layout(arena.width_m, arena.height_m, config.objects.n_objects)
+        self.reads = self.layout.names if reads is None else tuple(reads)
+        for name in self.reads:
+            if name not in self.layout.names:
+                hint = suggestion(name, self.layout.names)
+                raise ConfigError(
+                    f"Unknown observation slice {name!r} in reads.{hint} Known: {', '.join(self.layout.names)}."
+                )
+        self._drive = Drive(config)
+        self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
+        self._scratch = np.zeros(config.objects.n_objects)
+        self._chance = np.zeros(config.robots.n_robots)
+        self.tick = 0
+
+    def reset(self, seed: int) -> ObsArray:
+        """Build a fresh world from `seed` and return the first observation, (N, D)."""
+        config = self.config
+        n_robots = config.robots.n_robots
+        self.tick = 0
+        self.swarm = SwarmState.empty(n_robots)
+        self.objects = ObjectState.empty(config)
+        self.caches = CacheState.empty(n_cache_slots(config))
+        self.events = StepEvents.empty(n_robots)
+        self._placement_rng = stream_rng(seed, Stream.PLACEMENT)
+        self._motion_rng = stream_rng(seed, Stream.OBJECT_MOTION)
+        self._interaction_rng = stream_rng(seed, Stream.INTERACTION)
+        self._cache_rng = stream_rng(seed, Stream.CACHE)
+        self._interactions = Interactions(config, self.swarm, self.objects, self.caches, self.events)
+        self._suite = SensorSuite.build(config, self.layout, self.reads)
+        self._furnish()
+        position, heading = draw_start_poses(config, stream_rng(seed, Stream.START_POSE))
+        self.swarm.position[:], self.swarm.heading[:] = position, heading
+        self.swarm.facing[:] = np.column_stack((np.cos(heading), np.sin(heading)))
+        self._physics = Physics(config, position, heading)
+        return self.observe()
+
+    def observe(self) -> ObsArray:
+        """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
+        sense_proximity(self.swarm, self._suite)
+        return sense(self.swarm, self.objects, self.caches, self.events, self._suite)
+
+    def _furnish(self) -> None:
+        """Place all objects and create static caches: before the clusters are drawn in the power law, else after."""
+        config = self.config
+        clustered = config.objects.placement == "power_law"
+        if self._static_caches and clustered:
+            create_static_caches(config, self.objects, self.caches, self.events, supply=ObjectStatus.WAITING)
+        self._source = draw_source(config, self.objects.floor, self._placement_rng)
+        place_all(self.objects, self._source, config.arena.distributable_cells, self._placement_rng)
+        if self._static_caches and not clustered:
+            create_static_caches(config, self.objects, self.caches, self.events)
+
+    def step(
+        self,
+        actions: ActionArray,
+        *,
+        wheel_gain: FloatArray | None = None,
+        tasks: CodeArray | None = None,
+    ) -> ObsArray:
+        """Advance the world by one tick and return the observation, (N, D); the buffer is reused.
+
+        Args:
+            actions: (N, 3) float32 in [-1, 1]: left wheel, right wheel, gripper.
+            wheel_gain: (N, 2) factor on each wheel's limited speed, or None.
+            tasks: (N,) int8 `policy.Task` codes, if the policy tells them.
+        """
+        swarm, objects, caches, events, suite = self.swarm, self.objects, self.caches, self.events, self._suite
+        self._drive.apply(actions, wheel_gain, swarm, self._physics.twist)
+        self.tick += 1
+        self._physics.advance(swarm)
+        sense_proximity(swarm, suite)
+        mark_interference(swarm, events, suite.obs, suite.near)
+        if self._serve_requests(actions):
+            self._found_caches()
+            self._replace_displaced()
+        if self._static_caches:
+            self._restore_caches(tasks)
+        self._walk_objects()
+        self._count_caches()
+        return sense(swarm, objects, caches, events, suite)
+
+    def _serve_requests(self, actions: ActionArray) -> bool:
+        if self.config.caches != "none":
+            self._interaction_rng.random(out=self._chance)
+        return self._interactions.serve(actions, self.tick, self._chance)
+
+    def _found_caches(self) -> None:
+        founders = self._interactions.founded()
+        if len(founders):
+            found_caches(
+                founders,
+                self.config,
+                self._source,
+                self._robot_cells(),
+                self.objects,
+                self.caches,
+                self.events,
+                self._cache_rng,
+            )
+
+    def _robot_cells(self) -> IntArray:
+        nx, ny = self.config.arena.n_cells
+        cells = np.floor(self.swarm.position * CELLS_PER_M).astype(np.int32)
+        return np.clip(cells, 0, (nx - 1, ny - 1))
+
+    def _replace_displaced(self) -> None:
+        rows = self._interactions.displaced()
+        if len(rows):
+            area = self.config.arena.distributable_cells
+            place_objects(rows, self.objects, self._source, area, self._placement_rng)
+
+    def _restore_caches(self, tasks: CodeArray | None) -> None:
+        if np.count_nonzero(self.caches.alive) < self._static_caches:
+            restore_static_caches(
+                self.config, self.swarm, self.objects, self.caches, self.events, tasks, self._cache_rng
+            )
+
+    def _walk_objects(self) -> None:
+        probability = self.config.objects.walk_probability
+        if probability > 0.0:
+            self.events.counters[Counter.OBJECTS_MOVED] += walk_objects(
+                self.objects,
+                self.config.arena.distributable_cells,
+                probability,
+                self._motion_rng,
+                self.config.quirks.motion_self_conflict,
+                self._scratch,
+            )
+
+    def _count_caches(self) -> None:
+        if self.config.caches != "none":
+            self.events.counters[Counter.CACHES_ALIVE] += np.count_nonzero(self.caches.alive)
+            self.events.counters[Counter.OBJECTS_CACHED] += self.caches.count.sum()
+
+    def set_population(self, *, active: BoolArray, present: BoolArray) -> None:
+        """Say who is in the world and who is at work; takes effect in the next step.
+
+        A robot that leaves the world drops its cargo where it is (into a cache, onto the floor, or re-placed) and its
+        body is parked. A robot that comes (back) takes the pose in `swarm.position` and `swarm.heading`.
+
+        Args:
+            active: (N,) present and not in repair.
+            present: (N,) born and not dead.
+
+        Raises:
+            ValueError: wrong shapes, or a robot that is active but not present.
+        """
+        swarm = self.swarm
+        if active.shape != swarm.active.shape or present.shape != swarm.present.shape:
+            raise ValueError(
+                f"Expected active and present with shape {swarm.active.shape}, got {active.shape} and {present.shape}."
+            )
+        if np.any(active & ~present):
+            raise ValueError("Expected active robots to be present; a robot that is not in the world cannot work.")
+        leaving = np.flatnonzero(swarm.present & ~present)
+        for robot in leaving.tolist():
+            self._interactions.drop_cargo(robot)
+            self._replace_displaced()
+            self._physics.park(robot)
+            swarm.wheel_speed[robot] = 0.0
+        for robot in np.flatnonzero(~swarm.present & present).tolist():
+            x, y = swarm.position[robot].tolist()
+            angle = float(swarm.heading[robot])
+            swarm.facing[robot] = np.cos(angle), np.sin(angle)
+            self._physics.place(robot, x, y, angle)
+        swarm.active[:], swarm.present[:] = active, present

@@ -1,0 +1,95 @@
+"""Pick-ups and drops of one tick: the arrays and constants behind `kernels.interact`, where each rule is a function.
+
+An interaction takes one tick: a request that can be met starts it, and it takes effect in the next tick if the robot
+still asks for the same and the condition still holds. A RELEASE onto open floor acts at once.
+"""
+
+import numpy as np
+
+from swarm_forage_env.contract.types import ActionArray, FloatArray, IntArray
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.world.kernels import interact as kernel
+from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
+
+
+class Interactions:
+    """Serves the gripper requests of a swarm; holds views of the state arrays and no state of its own."""
+
+    def __init__(
+        self,
+        config: ScenarioConfig,
+        swarm: SwarmState,
+        objects: ObjectState,
+        caches: CacheState,
+        events: StepEvents,
+    ) -> None:
+        """Bind the state arrays; they must not be replaced afterwards, only edited."""
+        n_robots = config.robots.n_robots
+        self._happened = events.happened
+        self.world = kernel.World(
+            position=swarm.position,
+            carried_object=swarm.carried_object,
+            cargo_from_cache=swarm.cargo_from_cache,
+            pending_kind=swarm.pending_kind,
+            pending_band=swarm.pending_band,
+            pending_target=swarm.pending_target,
+            active=swarm.active,
+            floor=objects.floor,
+            status=objects.status,
+            object_cell=objects.cell,
+            cache_slot=objects.cache_slot,
+            carriers=objects.carriers,
+            cache_alive=caches.alive,
+            cache_cell=caches.cell,
+            cache_serial=caches.serial,
+            cache_count=caches.count,
+            code=events.code,
+            event_object=events.event_object,
+            event_cache=events.event_cache,
+            first_picked=events.first_picked,
+            counters=events.counters,
+            displaced=np.zeros(n_robots + 1, np.int32),
+            founded=np.zeros(n_robots + 1, np.int32),
+            queue=np.zeros(2 * n_robots, np.int32),
+            handler_used=np.zeros(5, np.bool_),
+        )
+        nest = config.arena.nest_box_m
+        area = config.arena.distributable_cells
+        self.rules = kernel.Rules(
+            *nest,
+            *area,
+            cache_half_side=config.cache_side_cells // 2,
+            cache_proximity_m=config.cache_proximity_m,
+            dynamic_caches=config.caches == "dynamic",
+            serialized=config.quirks.serialized_interactions,
+        )
+
+    def serve(self, actions: ActionArray, tick: int, chance: FloatArray) -> bool:
+        """Serve all requests of this tick and write the events; returns whether there was any.
+
+        Args:
+            actions: (N, 3); the third column is the gripper.
+            tick: Current tick, for the order of robots that want the same.
+            chance: (N,) uniform in [0, 1), which object leaves a cache.
+        """
+        world = self.world
+        busy = kernel.clear_events(
+            actions, world.carried_object, world.pending_kind, world.active, world.code, world.first_picked
+        )
+        self._happened[0] = busy
+        if busy:
+            kernel.interact(world, self.rules, actions, tick, chance)
+        return busy
+
+    def drop_cargo(self, robot: int) -> None:
+        """Let a dying robot lose its cargo where it is: into the cache, onto the floor, or re-placed."""
+        self.world.displaced[-1] = 0
+        kernel.drop_cargo(self.world, self.rules, robot)
+
+    def displaced(self) -> IntArray:
+        """Object rows that must be re-placed after the last call: delivered, or dropped without a free cell."""
+        return self.world.displaced[: self.world.displaced[-1]]
+
+    def founded(self) -> IntArray:
+        """Robot rows whose FOUND drop left an object lying at their cell in the last call."""
+        return self.world.founded[: self.world.founded[-1]]

@@ -1,0 +1,108 @@
+"""Proximity readings: 24 beams against the discs of other robots and the four walls."""
+
+import math
+
+import numpy as np
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
+from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.world.kernels.neighbours import bin_of
+
+_BEAM_COS = np.cos(BEAM_ANGLES_RAD)
+_BEAM_SIN = np.sin(BEAM_ANGLES_RAD)
+_CONTACT_M = 0.00989
+_READING_NUMERATOR = 0.0100527
+_READING_OFFSET_M = 0.000163144
+
+
+@kernel
+def proximity_reading(gap_m: float) -> float:
+    """Reading for a free distance along a beam: 1 at contact, falling like 1 / distance (foot-bot sensor model)."""
+    if gap_m < _CONTACT_M:
+        return 1.0
+    return _READING_NUMERATOR / (gap_m + _READING_OFFSET_M)
+
+
+@kernel
+def _beam_to_disc(dx: float, dy: float, cos: float, sin: float, radius: float) -> float:
+    """Distance from a disc's centre along (cos, sin) to a disc of equal radius at (dx, dy), minus the radius."""
+    along = dx * cos + dy * sin
+    if along <= 0.0:
+        return math.inf
+    across_squared = dx * dx + dy * dy - along * along
+    room = radius * radius - across_squared
+    if room < 0.0:
+        return math.inf
+    return along - math.sqrt(room) - radius
+
+
+@kernel
+def _beam_to_wall(to_low: float, to_high: float, direction: float, radius: float) -> float:
+    """Free distance to the wall ahead on one axis; to_low and to_high are centre-to-wall distances."""
+    if direction > 1e-12:
+        return to_high / direction - radius
+    if direction < -1e-12:
+        return to_low / -direction - radius
+    return math.inf
+
+
+@kernel
+def proximity(
+    position: FloatArray,
+    facing: FloatArray,
+    present: BoolArray,
+    bins: tuple[float, IntArray, IntArray],
+    interior: FloatArray,
+    radius: float,
+    reach: float,
+    obs: ObsArray,
+    near: BoolArray,
+) -> None:
+    """Write readings into obs[:, 0:24] and into `near` (N,) whether anything is within reach of any beam.
+
+    `bins` = (cell size in m, first_in_bin, next_in_bin) from `bin_robots` with cells of at least
+    2 radius + reach; `interior` = x low, y low, x high, y high of the free floor; `reach` is measured from the body.
+    """
+    cell_m, first_in_bin, next_in_bin = bins
+    n_bins = first_in_bin.shape[0]
+    sight = 2.0 * radius + reach
+    sight_squared = sight * sight
+    wall_sight = radius + reach
+    for i in range(position.shape[0]):
+        for k in range(24):
+            obs[i, k] = 0.0
+        near[i] = False
+        if not present[i]:
+            continue
+        x = position[i, 0]
+        y = position[i, 1]
+        west, east = x - interior[0], interior[2] - x
+        south, north = y - interior[1], interior[3] - y
+        cos_h = facing[i, 0]
+        sin_h = facing[i, 1]
+        if min(west, east, south, north) < wall_sight:
+            near[i] = True
+            for k in range(24):
+                cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
+                sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
+                gap = min(_beam_to_wall(west, east, cos, radius), _beam_to_wall(south, north, sin, radius))
+                if gap <= reach:
+                    obs[i, k] = proximity_reading(gap)
+        cell_x = int(x / cell_m)
+        cell_y = int(y / cell_m)
+        for step_x in range(-1, 2):
+            for step_y in range(-1, 2):
+                j = first_in_bin[bin_of(cell_x + step_x, cell_y + step_y, n_bins)]
+                while j >= 0:
+                    dx = position[j, 0] - x
+                    dy = position[j, 1] - y
+                    if j != i and dx * dx + dy * dy <= sight_squared:
+                        near[i] = True
+                        for k in range(24):
+                            cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
+                            sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
+                            gap = _beam_to_disc(dx, dy, cos, sin, radius)
+                            if gap <= reach:
+                                obs[i, k] = max(obs[i, k], proximity_reading(gap))
+                    j = next_in_bin[j]

@@ -1,0 +1,81 @@
+"""Wheel commands to body velocities, and body poses back to positions and headings."""
+
+import math
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray
+
+
+@kernel
+def limit_command(
+    command_left: float, command_right: float, scale: float, max_speed: float, max_difference: float
+) -> tuple[float, float]:
+    """Left and right wheel speed (m/s) for commands in [-1, 1]: centre speed and difference each clipped.
+
+    `scale` is the wheel speed that a command of 1 stands for; all limits in m/s.
+    """
+    wanted_left = min(1.0, max(-1.0, command_left)) * scale
+    wanted_right = min(1.0, max(-1.0, command_right)) * scale
+    speed = min(max_speed, max(-max_speed, 0.5 * (wanted_left + wanted_right)))
+    difference = min(max_difference, max(-max_difference, wanted_right - wanted_left))
+    return speed - 0.5 * difference, speed + 0.5 * difference
+
+
+@kernel
+def drive(
+    actions: ActionArray,
+    wheel_gain: FloatArray,
+    active: BoolArray,
+    pending_kind: CodeArray,
+    facing: FloatArray,
+    limits: FloatArray,
+    dt_s: float,
+    wheel_speed: FloatArray,
+    twist: FloatArray,
+) -> int:
+    """Fill wheel speeds (N, 2) m/s and twists (N + 1, 3): world velocity x, y in m/s and turn rate in rad/s.
+
+    `limits` holds wheel scale, centre-speed limit, wheel-difference limit (m/s) and wheel base (m). The velocity is
+    the chord of the exact arc over one tick, so that free motion is exact however the tick is divided.
+    Returns -1, or the first active row with a command or gain that is not finite; then nothing is written.
+    """
+    for i in range(facing.shape[0]):
+        command = float(actions[i, 0]) + float(actions[i, 1]) + float(actions[i, 2])
+        if active[i] and not math.isfinite(command + wheel_gain[i, 0] + wheel_gain[i, 1]):
+            return i
+    scale, max_speed, max_difference, wheel_base = limits[0], limits[1], limits[2], limits[3]
+    for i in range(facing.shape[0]):
+        left = 0.0
+        right = 0.0
+        if active[i] and pending_kind[i] == 0:
+            left, right = limit_command(float(actions[i, 0]), float(actions[i, 1]), scale, max_speed, max_difference)
+            left *= wheel_gain[i, 0]
+            right *= wheel_gain[i, 1]
+        wheel_speed[i, 0] = left
+        wheel_speed[i, 1] = right
+        turn = (right - left) / wheel_base
+        half_angle = 0.5 * turn * dt_s
+        chord = 0.5 * (left + right)
+        sin_half = math.sin(half_angle)
+        cos_half = math.cos(half_angle)
+        if half_angle != 0.0:
+            chord *= sin_half / half_angle
+        twist[i, 0] = chord * (facing[i, 0] * cos_half - facing[i, 1] * sin_half)
+        twist[i, 1] = chord * (facing[i, 1] * cos_half + facing[i, 0] * sin_half)
+        twist[i, 2] = turn
+    return -1
+
+
+@kernel
+def unpack_poses(
+    poses: FloatArray, present: BoolArray, position: FloatArray, heading: FloatArray, facing: FloatArray
+) -> None:
+    """Copy body poses (>= N, 3: x, y, angle) of present robots; angles are wrapped to (-pi, pi]."""
+    for i in range(heading.shape[0]):
+        if present[i]:
+            position[i, 0] = poses[i, 0]
+            position[i, 1] = poses[i, 1]
+            angle = poses[i, 2]
+            facing[i, 0] = math.cos(angle)
+            facing[i, 1] = math.sin(angle)
+            heading[i] = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))

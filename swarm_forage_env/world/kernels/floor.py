@@ -1,0 +1,198 @@
+"""What robots sense of the floor and the light above it: ground readings, nest light, line-of-sight window."""
+
+import math
+
+import numpy as np
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
+from swarm_forage_env.contract.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
+from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.scenarios.units import CELLS_PER_M
+
+_GROUND_X = np.array([0.063, 0.063, -0.063, -0.063])
+_GROUND_Y = np.array([0.0116, -0.0116, 0.0116, -0.0116])
+_GREY_OBJECT = 0.0
+_GREY_EMPTY = 1.0
+_GREY_NEST = 179.0 / 255.0
+_GREY_CACHE = 102.0 / 255.0
+_LIGHT_CUTOFF = 2.5
+"""Scaled distance beyond which a light is not seen."""
+_FIRST_SENSOR_RAD = BEAM_ANGLES_RAD[0]
+_SENSOR_STEP_RAD = BEAM_ANGLES_RAD[1] - BEAM_ANGLES_RAD[0]
+_HALF_WINDOW = WINDOW_CELLS // 2
+
+
+@kernel
+def grey_of(code: int) -> float:
+    """Grey level of a floor code (state.CELL_*): object 0, nest 0.70, cache 0.40, empty 1."""
+    if code >= 0:
+        return _GREY_OBJECT
+    if code == -1:
+        return _GREY_EMPTY
+    if code == -2:
+        return _GREY_NEST
+    return _GREY_CACHE
+
+
+@kernel
+def ground(
+    position: FloatArray, facing: FloatArray, present: BoolArray, floor: IntArray, obs: ObsArray, start: int
+) -> None:
+    """Write four grey readings per robot into obs[:, start:start + 4]; outside the grid reads empty."""
+    ny, nx = floor.shape
+    for i in range(position.shape[0]):
+        if not present[i]:
+            obs[i, start : start + 4] = 0.0
+            continue
+        cos = facing[i, 0]
+        sin = facing[i, 1]
+        grey = _GREY_EMPTY
+        last_x = -2
+        last_y = -2
+        for k in range(4):
+            x = position[i, 0] + cos * _GROUND_X[k] - sin * _GROUND_Y[k]
+            y = position[i, 1] + sin * _GROUND_X[k] + cos * _GROUND_Y[k]
+            cell_x = int(math.floor(x * CELLS_PER_M))
+            cell_y = int(math.floor(y * CELLS_PER_M))
+            # Mostly all four sensors are over one cell; a large floor does not fit the processor's cache.
+            if cell_x != last_x or cell_y != last_y:
+                inside = 0 <= cell_x < nx and 0 <= cell_y < ny
+                grey = grey_of(floor[cell_y, cell_x]) if inside else _GREY_EMPTY
+                last_x = cell_x
+                last_y = cell_y
+            obs[i, start + k] = grey
+
+
+@kernel
+def light(
+    position: FloatArray,
+    facing: FloatArray,
+    present: BoolArray,
+    lights: FloatArray,
+    intensity: float,
+    obs: ObsArray,
+    start: int,
+) -> None:
+    """Write 24 light readings per robot into obs[:, start:start + 24].
+
+    Per light of `lights` (L, 3: x, y, height in m): exp(-2 distance / intensity), falling linearly to 0 at
+    90 degrees between sensor axis and light; lights add up; clamped to 1.
+    """
+    for i in range(position.shape[0]):
+        for k in range(start, start + 24):
+            obs[i, k] = 0.0
+        if not present[i]:
+            continue
+        for lamp in range(lights.shape[0]):
+            dx = lights[lamp, 0] - position[i, 0]
+            dy = lights[lamp, 1] - position[i, 1]
+            height = lights[lamp, 2]
+            scaled = math.sqrt(dx * dx + dy * dy + height * height) / intensity
+            if scaled > _LIGHT_CUTOFF:
+                continue
+            base = math.exp(-2.0 * scaled)
+            cos = facing[i, 0]
+            sin = facing[i, 1]
+            bearing = math.atan2(dy * cos - dx * sin, dx * cos + dy * sin)
+            # Only the sensors within a quarter turn of the light: 12 or 13 in a row, counted round the ring.
+            first = math.ceil((bearing - 0.5 * math.pi - _FIRST_SENSOR_RAD) / _SENSOR_STEP_RAD)
+            away = _FIRST_SENSOR_RAD + first * _SENSOR_STEP_RAD - bearing
+            k = int(first) % 24
+            while away < 0.5 * math.pi:
+                obs[i, start + k] = min(1.0, obs[i, start + k] + base * (1.0 - abs(away) / (0.5 * math.pi)))
+                away += _SENSOR_STEP_RAD
+                k = 0 if k == 23 else k + 1
+
+
+@kernel
+def line_of_sight(
+    position: FloatArray,
+    present: BoolArray,
+    floor: IntArray,
+    n_objects: int,
+    caches: tuple[BoolArray, IntArray, IntArray, IntArray],
+    half_side: int,
+    obs: ObsArray,
+    starts: tuple[int, int, int],
+) -> None:
+    """Write the robot's cell, the objects of its 5 x 5 window and the caches that meet it.
+
+    `caches` = alive, centre cell, serial, count per slot; `half_side` = (cache side in cells - 1) / 2;
+    `starts` = first columns of los_cell, los_object, los_cache.
+    """
+    ny, nx = floor.shape
+    cell_start, object_start, cache_start = starts
+    for i in range(position.shape[0]):
+        obs[i, cell_start] = 0.0
+        obs[i, cell_start + 1] = 0.0
+        for k in range(object_start, cache_start + CACHE_FIELDS * VISIBLE_CACHES):
+            obs[i, k] = 0.0
+        if not present[i]:
+            continue
+        cell_x = min(nx - 1, max(0, int(position[i, 0] * CELLS_PER_M)))
+        cell_y = min(ny - 1, max(0, int(position[i, 1] * CELLS_PER_M)))
+        obs[i, cell_start] = (2 * cell_x + 1) / nx - 1.0
+        obs[i, cell_start + 1] = (2 * cell_y + 1) / ny - 1.0
+        column = object_start
+        for y in range(cell_y - _HALF_WINDOW, cell_y + _HALF_WINDOW + 1):
+            for x in range(cell_x - _HALF_WINDOW, cell_x + _HALF_WINDOW + 1):
+                if 0 <= x < nx and 0 <= y < ny and floor[y, x] >= 0:
+                    obs[i, column] = (floor[y, x] + 1) / n_objects
+                column += 1
+        if caches[0].shape[0] > 0:
+            _visible_caches(cell_x, cell_y, position, caches, half_side, i, obs, cache_start, (nx, ny, n_objects))
+
+
+@kernel
+def _visible_caches(
+    cell_x: int,
+    cell_y: int,
+    position: FloatArray,
+    caches: tuple[BoolArray, IntArray, IntArray, IntArray],
+    half_side: int,
+    i: int,
+    obs: ObsArray,
+    start: int,
+    sizes: tuple[int, int, int],
+) -> None:
+    """List up to VISIBLE_CACHES caches whose square meets the window, nearest centre first, ties by slot."""
+    alive, centre, serial, count = caches
+    last_distance = -1.0
+    last_slot = -1
+    for place in range(VISIBLE_CACHES):
+        best = -1
+        best_distance = math.inf
+        for slot in range(alive.shape[0]):
+            if not alive[slot]:
+                continue
+            reach = half_side + _HALF_WINDOW
+            if abs(centre[slot, 0] - cell_x) > reach or abs(centre[slot, 1] - cell_y) > reach:
+                continue
+            dx = (centre[slot, 0] + 0.5) / CELLS_PER_M - position[i, 0]
+            dy = (centre[slot, 1] + 0.5) / CELLS_PER_M - position[i, 1]
+            distance = dx * dx + dy * dy
+            listed = distance < last_distance or (distance == last_distance and slot <= last_slot)
+            if not listed and distance < best_distance:
+                best = slot
+                best_distance = distance
+        if best < 0:
+            return
+        fields = (serial[best], centre[best, 0], centre[best, 1], count[best])
+        write_cache(obs, i, start + CACHE_FIELDS * place, fields, sizes)
+        last_distance = best_distance
+        last_slot = best
+
+
+@kernel
+def write_cache(
+    obs: ObsArray, i: int, start: int, fields: tuple[int, int, int, int], sizes: tuple[int, int, int]
+) -> None:
+    """Write the fields of a cache into four columns of row i: serial x 2^-24, centre x, y as position, count / M.
+
+    `fields` = serial, centre cell x, y, count; `sizes` = cells along x, along y, objects.
+    """
+    obs[i, start] = fields[0] / SERIAL_SCALE
+    obs[i, start + 1] = (2 * fields[1] + 1) / sizes[0] - 1.0
+    obs[i, start + 2] = (2 * fields[2] + 1) / sizes[1] - 1.0
+    obs[i, start + 3] = fields[3] / sizes[2]

@@ -1,0 +1,474 @@
+"""Pick-ups and drops, one function per rule, in a fixed order; ties go round the swarm, no draw.
+
+A robot's gripper command asks for something (`request_of`). A request whose condition fails is refused at once; one
+that holds starts an interaction, which takes effect one tick later if the same is still asked and still possible.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, Counter, Event, ObjectStatus
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray
+from swarm_forage_env.scenarios.units import CELLS_PER_M
+
+NO_REQUEST = 0
+DELIVER = 1
+CACHE_DROP = 2
+FLOOR_DROP = 3
+SITE_DROP = 4
+FOUND_DROP = 5
+FLOOR_PICKUP = 6
+CACHE_PICKUP = 7
+NOTHING = 8
+"""Asked for something that is not possible here."""
+TOO_NEAR = 9
+"""Asked for a cache site too near an existing cache."""
+
+GRASP, RELEASE, DELIVER_ONLY, SITE, FOUND = range(1, 6)
+"""Gripper bands (`policy.Grip`), from the top: g > 0, > -0.25, > -0.5, > -0.75, and below."""
+
+FREE_PICKUP_HANDLER, NEST_HANDLER, CACHE_HANDLER, SITE_HANDLER, FOUND_HANDLER = range(5)
+
+_PICKED_UP, _PICKED_FROM_CACHE, _DELIVERED = int(Event.PICKED_UP), int(Event.PICKED_FROM_CACHE), int(Event.DELIVERED)
+_DROPPED, _ELSEWHERE, _JOINED_CACHE = int(Event.DROPPED), int(Event.DROPPED_ELSEWHERE), int(Event.JOINED_CACHE)
+_NOTHING_HERE, _VANISHED, _CACHE_TOO_NEAR = int(Event.NOTHING_HERE), int(Event.VANISHED), int(Event.CACHE_TOO_NEAR)
+
+_FREE, _CARRIED = int(ObjectStatus.FREE), int(ObjectStatus.CARRIED)
+_CACHED, _WAITING = int(ObjectStatus.CACHED), int(ObjectStatus.WAITING)
+_COLLECTED, _FREE_PICKUPS, _FIRST_PICKED = int(Counter.COLLECTED), int(Counter.FREE_PICKUPS), int(Counter.FIRST_PICKED)
+_CACHE_PICKUPS, _CACHE_DROPS = int(Counter.CACHE_PICKUPS), int(Counter.CACHE_DROPS)
+_FLOOR_DROPS, _DISPLACED = int(Counter.FLOOR_DROPS), int(Counter.DISPLACED_DROPS)
+_DEPLETED = int(Counter.CACHES_DEPLETED)
+
+
+class World(NamedTuple):
+    """The arrays that interactions read and write; fields as in `state`, letters N, M, K as there."""
+
+    position: FloatArray
+    carried_object: IntArray
+    cargo_from_cache: BoolArray
+    pending_kind: CodeArray
+    pending_band: CodeArray
+    pending_target: IntArray
+    active: BoolArray
+    floor: IntArray
+    status: CodeArray
+    object_cell: IntArray
+    cache_slot: IntArray
+    carriers: IntArray
+    cache_alive: BoolArray
+    cache_cell: IntArray
+    cache_serial: IntArray
+    cache_count: IntArray
+    code: CodeArray
+    event_object: IntArray
+    event_cache: IntArray
+    first_picked: BoolArray
+    counters: np.ndarray
+    displaced: IntArray
+    """(N + 1,) object rows to re-place this tick; the last entry holds their number."""
+    founded: IntArray
+    """(N + 1,) robot rows whose FOUND drop left an object lying; the last entry holds their number."""
+    queue: IntArray
+    """(2 N,) scratch: robots with a request and what they ask."""
+    handler_used: BoolArray
+    """(5,) scratch: kinds of interaction that finished this tick."""
+
+
+class Rules(NamedTuple):
+    """Constants of interactions."""
+
+    nest_x_low: float
+    nest_y_low: float
+    nest_x_high: float
+    nest_y_high: float
+    area_x_low: int
+    area_y_low: int
+    area_x_high: int
+    area_y_high: int
+    cache_half_side: int
+    """(cache side in cells - 1) / 2."""
+    cache_proximity_m: float
+    """SITE and FOUND are refused this close to a cache centre."""
+    dynamic_caches: bool
+    serialized: bool
+    """At most one interaction per handler finishes in a tick (quirk `serialized_interactions`)."""
+
+
+@kernel
+def clear_events(
+    gripper: ActionArray,
+    carried_object: IntArray,
+    pending_kind: CodeArray,
+    active: BoolArray,
+    code: CodeArray,
+    first_picked: BoolArray,
+) -> bool:
+    """Forget last tick's events; returns whether any robot asks for or is in an interaction."""
+    busy = False
+    for i in range(code.shape[0]):
+        code[i] = 0
+        first_picked[i] = False
+        if pending_kind[i] != 0:
+            busy = True
+        elif active[i]:
+            grasps = gripper[i, 2] > 0.0
+            if grasps != (carried_object[i] >= 0):
+                busy = True
+    return busy
+
+
+@kernel
+def _cell(world: World, i: int) -> tuple[int, int]:
+    ny, nx = world.floor.shape
+    return (
+        min(nx - 1, max(0, int(world.position[i, 0] * CELLS_PER_M))),
+        min(ny - 1, max(0, int(world.position[i, 1] * CELLS_PER_M))),
+    )
+
+
+@kernel
+def _floor_code(world: World, i: int) -> int:
+    x, y = _cell(world, i)
+    return world.floor[y, x]
+
+
+@kernel
+def _in_nest(world: World, rules: Rules, i: int) -> bool:
+    x = world.position[i, 0]
+    y = world.position[i, 1]
+    return rules.nest_x_low <= x <= rules.nest_x_high and rules.nest_y_low <= y <= rules.nest_y_high
+
+
+@kernel
+def _cache_too_near(world: World, rules: Rules, i: int) -> int:
+    """Slot of the nearest cache whose centre is within the proximity distance of robot i, or -1."""
+    nearest = -1
+    limit = rules.cache_proximity_m * rules.cache_proximity_m
+    for slot in range(world.cache_alive.shape[0]):
+        if world.cache_alive[slot]:
+            dx = (world.cache_cell[slot, 0] + 0.5) * 0.2 - world.position[i, 0]
+            dy = (world.cache_cell[slot, 1] + 0.5) * 0.2 - world.position[i, 1]
+            distance = dx * dx + dy * dy
+            if distance <= limit:
+                nearest = slot
+                limit = distance
+    return nearest
+
+
+@kernel
+def band_of(grip: float) -> int:
+    """Gripper band of a command."""
+    if grip > 0.0:
+        return GRASP
+    if grip > -0.25:
+        return RELEASE
+    if grip > -0.5:
+        return DELIVER_ONLY
+    if grip > -0.75:
+        return SITE
+    return FOUND
+
+
+@kernel
+def request_of(world: World, rules: Rules, band: int, i: int) -> tuple[int, int]:
+    """What robot i asks for, given where it is, and the object row or cache slot that it is about (-1 = none)."""
+    code = _floor_code(world, i)
+    if world.carried_object[i] < 0:
+        if band != GRASP:
+            return NO_REQUEST, -1
+        if code <= CELL_CACHE:
+            return CACHE_PICKUP, CELL_CACHE - code
+        if code >= 0:
+            return FLOOR_PICKUP, code
+        return NOTHING, -1
+    if band == GRASP:
+        return NO_REQUEST, -1
+    if _in_nest(world, rules, i):
+        return DELIVER, -1
+    if code <= CELL_CACHE:
+        return CACHE_DROP, CELL_CACHE - code
+    if band == DELIVER_ONLY:
+        return NOTHING, -1
+    if band == RELEASE or not rules.dynamic_caches:
+        return FLOOR_DROP, -1
+    near = _cache_too_near(world, rules, i)
+    if near >= 0:
+        return TOO_NEAR, near
+    return (SITE_DROP if band == SITE else FOUND_DROP), -1
+
+
+@kernel
+def _report(world: World, i: int, event: int, row: int, slot: int) -> None:
+    world.code[i] = event
+    world.event_object[i] = row
+    world.event_cache[i, :] = 0
+    if slot >= 0:
+        world.event_cache[i, 0] = world.cache_serial[slot]
+        world.event_cache[i, 1] = world.cache_cell[slot, 0]
+        world.event_cache[i, 2] = world.cache_cell[slot, 1]
+        world.event_cache[i, 3] = world.cache_count[slot]
+
+
+@kernel
+def _forget_pending(world: World, i: int) -> None:
+    world.pending_kind[i] = NO_REQUEST
+    world.pending_band[i] = 0
+    world.pending_target[i] = -1
+
+
+@kernel
+def _empty_hands(world: World, i: int) -> int:
+    row = world.carried_object[i]
+    world.carried_object[i] = -1
+    world.cargo_from_cache[i] = False
+    return row
+
+
+@kernel
+def _displace(world: World, row: int) -> None:
+    """Hand an object over to the distributor, which re-places it later in this tick."""
+    world.status[row] = _WAITING
+    world.object_cell[row, :] = -1
+    last = world.displaced.shape[0] - 1
+    world.displaced[world.displaced[last]] = row
+    world.displaced[last] += 1
+
+
+@kernel
+def deliver(world: World, i: int) -> None:
+    """Robot i leaves its object in the nest; the object re-enters the world through the distributor."""
+    row = _empty_hands(world, i)
+    _displace(world, row)
+    world.counters[_COLLECTED] += 1
+    _report(world, i, _DELIVERED, row, -1)
+
+
+@kernel
+def drop_into_cache(world: World, i: int, slot: int) -> None:
+    """Robot i adds its object to the cache it stands in."""
+    row = _empty_hands(world, i)
+    world.status[row] = _CACHED
+    world.cache_slot[row] = slot
+    world.object_cell[row, 0] = world.cache_cell[slot, 0]
+    world.object_cell[row, 1] = world.cache_cell[slot, 1]
+    world.cache_count[slot] += 1
+    world.counters[_CACHE_DROPS] += 1
+    _report(world, i, _JOINED_CACHE, row, slot)
+
+
+@kernel
+def lay_on_floor(world: World, rules: Rules, i: int) -> bool:
+    """Robot i lays its object on its cell if that is free, else the object is re-placed; returns whether it lies."""
+    row = _empty_hands(world, i)
+    x, y = _cell(world, i)
+    inside = rules.area_x_low <= x < rules.area_x_high and rules.area_y_low <= y < rules.area_y_high
+    world.counters[_FLOOR_DROPS] += 1
+    if inside and world.floor[y, x] == CELL_EMPTY:
+        world.floor[y, x] = row
+        world.status[row] = _FREE
+        world.object_cell[row, 0] = x
+        world.object_cell[row, 1] = y
+        _report(world, i, _DROPPED, row, -1)
+        return True
+    world.counters[_DISPLACED] += 1
+    _displace(world, row)
+    _report(world, i, _ELSEWHERE, row, -1)
+    return False
+
+
+@kernel
+def _lift(world: World, i: int, row: int) -> None:
+    world.status[row] = _CARRIED
+    world.object_cell[row, :] = -1
+    world.carried_object[i] = row
+    if world.carriers[row] == 0:
+        world.first_picked[i] = True
+        world.counters[_FIRST_PICKED] += 1
+    world.carriers[row] += 1
+
+
+@kernel
+def take_from_floor(world: World, i: int, row: int) -> None:
+    """Robot i picks up the free object under its centre."""
+    world.floor[world.object_cell[row, 1], world.object_cell[row, 0]] = CELL_EMPTY
+    _lift(world, i, row)
+    world.cargo_from_cache[i] = False
+    world.counters[_FREE_PICKUPS] += 1
+    _report(world, i, _PICKED_UP, row, -1)
+
+
+@kernel
+def take_from_cache(world: World, rules: Rules, i: int, slot: int, chance: float) -> None:
+    """Robot i takes an object, uniform among the cache's contents (`chance` in [0, 1)); a last pair dissolves it."""
+    wanted = int(chance * world.cache_count[slot])
+    taken = -1
+    for row in range(world.cache_slot.shape[0]):
+        if world.cache_slot[row] == slot:
+            if wanted == 0:
+                taken = row
+                break
+            wanted -= 1
+    world.cache_slot[taken] = -1
+    world.cache_count[slot] -= 1
+    _lift(world, i, taken)
+    world.cargo_from_cache[i] = True
+    world.counters[_CACHE_PICKUPS] += 1
+    _report(world, i, _PICKED_FROM_CACHE, taken, slot)
+    if world.cache_count[slot] == 1:
+        _dissolve(world, rules, slot)
+
+
+@kernel
+def _dissolve(world: World, rules: Rules, slot: int) -> None:
+    """Remove a cache with one object left; the orphan lies free on the centre cell."""
+    cx = world.cache_cell[slot, 0]
+    cy = world.cache_cell[slot, 1]
+    half = rules.cache_half_side
+    world.floor[cy - half : cy + half + 1, cx - half : cx + half + 1] = CELL_EMPTY
+    for row in range(world.cache_slot.shape[0]):
+        if world.cache_slot[row] == slot:
+            world.cache_slot[row] = -1
+            world.status[row] = _FREE
+            world.floor[cy, cx] = row
+    world.cache_alive[slot] = False
+    world.cache_count[slot] = 0
+    world.counters[_DEPLETED] += 1
+
+
+@kernel
+def drop_cargo(world: World, rules: Rules, i: int) -> None:
+    """Robot i loses its cargo here, whatever is here: the rule for dying robots (cache, floor or re-placement)."""
+    _forget_pending(world, i)
+    if world.carried_object[i] < 0:
+        return
+    code = _floor_code(world, i)
+    if code <= CELL_CACHE:
+        drop_into_cache(world, i, CELL_CACHE - code)
+    else:
+        lay_on_floor(world, rules, i)
+
+
+@kernel
+def _handler_of(kind: int) -> int:
+    if kind == FLOOR_PICKUP:
+        return FREE_PICKUP_HANDLER
+    if kind == DELIVER:
+        return NEST_HANDLER
+    if kind == SITE_DROP:
+        return SITE_HANDLER
+    if kind == FOUND_DROP:
+        return FOUND_HANDLER
+    return CACHE_HANDLER
+
+
+@kernel
+def _target_identity(world: World, kind: int, target: int) -> int:
+    """What must stay the same while an interaction runs: the object row, or the serial of the cache."""
+    if kind == CACHE_DROP or kind == CACHE_PICKUP:
+        return world.cache_serial[target]
+    return target
+
+
+@kernel
+def _take_effect(world: World, rules: Rules, i: int, kind: int, target: int, chance: float) -> None:
+    if kind == DELIVER:
+        deliver(world, i)
+    elif kind == CACHE_DROP:
+        drop_into_cache(world, i, target)
+    elif kind == FLOOR_PICKUP:
+        take_from_floor(world, i, target)
+    elif kind == CACHE_PICKUP:
+        take_from_cache(world, rules, i, target, chance)
+    elif lay_on_floor(world, rules, i) and kind == FOUND_DROP:
+        last = world.founded.shape[0] - 1
+        world.founded[world.founded[last]] = i
+        world.founded[last] += 1
+
+
+@kernel
+def _continue(world: World, rules: Rules, i: int, kind: int, target: int, chance: float) -> None:
+    """Finish the interaction that robot i has in progress, or report that its condition is lost."""
+    same = kind == world.pending_kind[i] and _target_identity(world, kind, target) == world.pending_target[i]
+    if same:
+        handler = _handler_of(kind)
+        if rules.serialized and world.handler_used[handler]:
+            return
+        world.handler_used[handler] = True
+    _forget_pending(world, i)
+    if same:
+        _take_effect(world, rules, i, kind, target, chance)
+    else:
+        _report(world, i, _VANISHED, -1, -1)
+
+
+@kernel
+def _serve(world: World, rules: Rules, band: int, i: int, chance: float) -> None:
+    """Start, continue, refuse or cancel what robot i asks, by the state of the world at its turn."""
+    kind, target = request_of(world, rules, band, i)
+    if world.pending_kind[i] != NO_REQUEST:
+        if band == world.pending_band[i]:
+            _continue(world, rules, i, kind, target, chance)
+            return
+        _forget_pending(world, i)
+    if kind == FLOOR_DROP:
+        lay_on_floor(world, rules, i)
+    elif kind == NOTHING:
+        _report(world, i, _NOTHING_HERE, -1, -1)
+    elif kind == TOO_NEAR:
+        _report(world, i, _CACHE_TOO_NEAR, -1, target)
+    elif kind != NO_REQUEST:
+        world.pending_kind[i] = kind
+        world.pending_band[i] = band
+        world.pending_target[i] = _target_identity(world, kind, target)
+
+
+@kernel
+def _phase_of(kind: int, band: int) -> int:
+    """Order within a tick: deliver 0, cache drop 1, floor drops 2, pick-ups 3, those that find nothing yet included."""
+    if kind == DELIVER:
+        return 0
+    if kind == CACHE_DROP:
+        return 1
+    if band == GRASP:
+        return 3
+    return 2
+
+
+@kernel
+def _band_now(world: World, gripper: ActionArray, i: int) -> int:
+    """Band that robot i sends; a robot in repair keeps sending the band of its running interaction."""
+    if world.active[i]:
+        return band_of(gripper[i, 2])
+    return world.pending_band[i]
+
+
+@kernel
+def interact(world: World, rules: Rules, gripper: ActionArray, tick: int, chance: FloatArray) -> None:
+    """Serve all requests of one tick, phase by phase; within a phase lowest (row - tick) mod N first.
+
+    `gripper` is the (N, 3) action array; `chance` (N,) uniform in [0, 1) decides which object leaves a cache.
+    """
+    n_robots = world.code.shape[0]
+    world.displaced[-1] = 0
+    world.founded[-1] = 0
+    world.handler_used[:] = False
+    n_queued = 0
+    for k in range(n_robots):
+        i = (tick + k) % n_robots
+        idle = not world.active[i] or (world.carried_object[i] >= 0) == (gripper[i, 2] > 0.0)
+        if world.pending_kind[i] == NO_REQUEST and idle:
+            continue  # not here, holding, or empty and not grasping: most robots in most ticks
+        band = _band_now(world, gripper, i)
+        kind, _ = request_of(world, rules, band, i)
+        if kind != NO_REQUEST or world.pending_kind[i] != NO_REQUEST:
+            world.queue[n_queued] = i
+            world.queue[n_robots + n_queued] = _phase_of(kind, band)
+            n_queued += 1
+    for phase in range(4):
+        for place in range(n_queued):
+            if world.queue[n_robots + place] == phase:
+                i = int(world.queue[place])
+                _serve(world, rules, _band_now(world, gripper, i), i, chance[i])

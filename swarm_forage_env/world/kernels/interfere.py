@@ -1,0 +1,37 @@
+"""The obstacle rule over a swarm, and the robot-tick counters."""
+
+import numpy as np
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.contract.detection import sees_obstacle
+from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
+
+_INTERFERING, _ACTIVE, _PRESENT = int(Counter.INTERFERING), int(Counter.ACTIVE), int(Counter.PRESENT)
+
+
+@kernel
+def mark(
+    obs: ObsArray,
+    near: BoolArray,
+    active: BoolArray,
+    present: BoolArray,
+    interfering: BoolArray,
+    counters: np.ndarray,
+    interference_sum: FloatArray,
+) -> None:
+    """Flag robots in interference and add this tick to the counters; arguments as in `interference`."""
+    n_interfering = 0
+    n_active = 0
+    n_present = 0
+    for i in range(active.shape[0]):
+        flag = active[i] and near[i] and sees_obstacle(obs[i, 0:24])
+        interfering[i] = flag
+        n_interfering += flag
+        n_active += active[i]
+        n_present += present[i]
+    counters[_INTERFERING] += n_interfering
+    counters[_ACTIVE] += n_active
+    counters[_PRESENT] += n_present
+    if n_active > 0:
+        interference_sum[0] += n_interfering / n_active

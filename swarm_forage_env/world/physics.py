@@ -1,0 +1,111 @@
+"""The only file that knows pymunk: robots are discs in Chipmunk, read and written in batch.
+
+Facts this file relies on, each held by a test:
+
+* Chipmunk moves bodies first and resolves contacts afterwards, so a contact is met one substep late. How a tick is
+  divided bounds how deep robots push into each other; poses are only looked at when a tick ends, so a long first
+  substep and short last ones serve best. `tests/science/test_physics_convergence.py` shows the choice.
+* A batch lists dynamic bodies in the order they were added, then the space's static body. Bodies are never removed
+  (removal would reorder them): a robot that leaves the world is parked, out of reach and colliding with nothing.
+* Chipmunk's search tree pads each box by what the body covers in 0.1 time units. Speeds are of the order of
+  0.1 m/s, so that in seconds nearly every body leaves its box in every tick. Time is therefore counted in units of
+  `TIME_UNIT_S`, which changes no trajectory and makes a step several times cheaper.
+"""
+
+import numpy as np
+import pymunk
+import pymunk.batch
+
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.world.kernels.drive import unpack_poses
+from swarm_forage_env.world.state import SwarmState
+
+TIME_UNIT_S = 40.0
+"""Seconds per Chipmunk time unit."""
+MASS_KG = 1.6
+FRICTION = 0.7
+COLLISION_SLOP_M = 0.001
+"""Overlap that Chipmunk leaves alone. Its default of 0.1 m would be more than a robot's radius."""
+WALL_RADIUS_M = 0.2
+"""Half the thickness of a wall."""
+
+_POSE = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.ANGLE
+_TWIST = pymunk.batch.BodyFields.VELOCITY | pymunk.batch.BodyFields.ANGULAR_VELOCITY
+
+
+class Physics:
+    """Bodies and walls of one run.
+
+    Attributes:
+        twist: (N + 1, 3) float64 to be filled before `advance`: velocity x, y in m/s and turn rate in rad/s.
+            The last row belongs to the static body and stays zero.
+    """
+
+    def __init__(self, config: ScenarioConfig, position: FloatArray, heading: FloatArray) -> None:
+        """Create the space with one disc per robot at `position` (N, 2) m and `heading` (N,) rad."""
+        n_robots = len(heading)
+        self.twist: FloatArray = np.zeros((n_robots + 1, 3))
+        self._scaled = np.zeros((n_robots + 1, 3))
+        self._substeps = [config.dt_s / TIME_UNIT_S * share for share in config.physics_substeps]
+        self._space = pymunk.Space()
+        self._space.collision_slop = COLLISION_SLOP_M
+        self._space.collision_bias = 0.0  # any overlap beyond the slop is undone in the next substep
+        self._add_walls(config)
+        self._bodies: list[pymunk.Body] = []
+        self._shapes: list[pymunk.Circle] = []
+        moment = pymunk.moment_for_circle(MASS_KG, 0.0, config.robots.radius_m)
+        for (x, y), angle in zip(position.tolist(), heading.tolist(), strict=True):
+            body = pymunk.Body(MASS_KG, moment)
+            body.position = (x, y)
+            body.angle = angle
+            disc = pymunk.Circle(body, config.robots.radius_m)
+            disc.friction = FRICTION
+            self._space.add(body, disc)
+            self._bodies.append(body)
+            self._shapes.append(disc)
+        self._poses = pymunk.batch.Buffer()
+        self._write = pymunk.batch.Buffer()
+        self._write.set_float_buf(self._scaled)
+
+    def _add_walls(self, config: ScenarioConfig) -> None:
+        x_low, y_low, x_high, y_high = config.arena.interior_m
+        west, east = x_low - WALL_RADIUS_M, x_high + WALL_RADIUS_M
+        south, north = y_low - WALL_RADIUS_M, y_high + WALL_RADIUS_M
+        corners = [(west, south), (east, south), (east, north), (west, north)]
+        for start, end in zip(corners, corners[1:] + corners[:1], strict=True):
+            wall = pymunk.Segment(self._space.static_body, start, end, WALL_RADIUS_M)
+            wall.friction = FRICTION
+            self._space.add(wall)
+
+    def advance(self, swarm: SwarmState) -> None:
+        """Move all bodies by one tick along `twist` and write position, heading and facing of present robots."""
+        np.multiply(self.twist, TIME_UNIT_S, out=self._scaled)
+        pymunk.batch.set_space_bodies(self._space, _TWIST, self._write)
+        for substep in self._substeps:
+            self._space.step(substep)
+        unpack_poses(self.poses(), swarm.present, swarm.position, swarm.heading, swarm.facing)
+
+    def poses(self) -> FloatArray:
+        """Poses of all bodies, (N + 1, 3): x, y in m and unwrapped angle in rad; valid until the next call."""
+        self._poses.clear()
+        pymunk.batch.get_space_bodies(self._space, _POSE, self._poses)
+        return np.frombuffer(self._poses.float_buf(), dtype=np.float64).reshape(-1, 3)
+
+    def park(self, row: int) -> None:
+        """Take a robot's body out of the world: far outside, colliding with nothing, a metre from other parked ones.
+
+        Bodies parked on one spot would be tested against each other in every substep, only to be told apart by filter.
+        """
+        body = self._bodies[row]
+        self._shapes[row].filter = pymunk.ShapeFilter(categories=0, mask=0)
+        body.position = (-10.0 - row, -10.0)
+        self._space.reindex_shapes_for_body(body)
+
+    def place(self, row: int, x: float, y: float, angle: float) -> None:
+        """Put a robot's body (back) into the world at a pose in m and rad."""
+        body = self._bodies[row]
+        self._shapes[row].filter = pymunk.ShapeFilter()
+        body.position = (x, y)
+        body.angle = angle
+        self._space.reindex_shapes_for_body(body)

@@ -1,0 +1,198 @@
+"""Where objects appear: the source of a run, first placement, re-placement; and where static caches stand.
+
+Every object lies on its own free cell: inside the distributable box, empty, neither nest nor cache.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import ObjectStatus
+from swarm_forage_env.contract.types import IntArray
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.regions import Box, overlap_cells, source_boxes
+from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.world.clusters import draw_clusters
+from swarm_forage_env.world.kernels.scatter import DRAWS, UNLIMITED, scatter
+from swarm_forage_env.world.state import ObjectState
+
+_CHUNK = 8192
+"""Objects whose random numbers are held in memory at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where objects come from in one run: regions of the floor, in groups of equal capacity."""
+
+    regions: IntArray
+    """(R, 4) boxes in cells, half-open: x low, y low, x high, y high; rows of one group are neighbours."""
+    capacity: IntArray
+    """(R,) objects that a region takes, those dropped there included; `UNLIMITED` = as many as it has free cells."""
+    group_start: IntArray
+    """(G + 1,) first region of each group, then R."""
+
+
+def draw_source(config: ScenarioConfig, floor: IntArray, rng: np.random.Generator) -> Source:
+    """Return the source regions of a run; only power-law clusters are random.
+
+    Args:
+        config: The scenario.
+        floor: (ny, nx) floor codes with nest and static caches painted; clusters keep off both.
+        rng: Generator of the placement stream.
+
+    Raises:
+        ConfigError: the clusters drawn hold fewer objects than the scenario has, or find no room.
+    """
+    if config.objects.placement != "power_law":
+        regions = np.array(source_boxes(config.objects.placement, *config.arena.n_cells), np.int32)
+        n_regions = len(regions)
+        return Source(regions, np.full(n_regions, UNLIMITED, np.int32), np.array([0, n_regions], np.int32))
+    regions, capacity = draw_clusters(config, floor, rng)
+    total = int(capacity.sum())
+    if total < config.objects.n_objects:
+        raise ConfigError(
+            f"Expected at most {total} objects for the {len(capacity)} power-law clusters drawn in "
+            f"{config.arena.width_m} x {config.arena.height_m} m, got {config.objects.n_objects}; ask for fewer "
+            "objects or a larger arena."
+        )
+    order = np.argsort(capacity, kind="stable")
+    regions, capacity = regions[order], capacity[order]
+    group_start = np.concatenate(([0], np.flatnonzero(np.diff(capacity)) + 1, [len(capacity)]))
+    return Source(regions, capacity, group_start.astype(np.int32))
+
+
+def place_objects(
+    rows: Sequence[int] | IntArray,
+    objects: ObjectState,
+    source: Source,
+    distributable_box: Box,
+    rng: np.random.Generator,
+) -> None:
+    """Bring objects (back) into the world, one after the other, each on a random free cell of the source.
+
+    A random group of regions, a random region in it, both cyclically skipping full ones, then a uniform choice among
+    the free cells (study). A placed object starts anew: free, carried by nobody so far. One that finds no cell waits;
+    with every object placed, all waiting ones are tried too, longest wait first.
+
+    Args:
+        rows: Object rows that lie nowhere on the floor and do not wait.
+        objects: Edited in place.
+        source: Regions of this run.
+        distributable_box: Cells on which objects may lie, half-open.
+        rng: Generator of the placement stream.
+    """
+    if len(rows) == 0:
+        return
+    newest = [int(row) for row in rows]
+    # Trying in this order until the first failure equals trying the whole waiting list after every new object: when
+    # one finds no cell nothing behind it can, and once all waiting ones lie the list is empty.
+    queue = np.array([newest[0], *objects.waiting, *newest[1:]], np.int32)
+    n_placed = _place_until_full(queue, objects, source, distributable_box, rng)
+    if n_placed == 0:
+        objects.waiting.extend(newest)
+    else:
+        objects.waiting[:] = queue[n_placed:].tolist()
+
+
+def place_all(objects: ObjectState, source: Source, distributable_box: Box, rng: np.random.Generator) -> None:
+    """Place every waiting object at the start of a run.
+
+    Args:
+        objects: Edited in place.
+        source: Regions of this run.
+        distributable_box: Cells on which objects may lie, half-open.
+        rng: Generator of the placement stream.
+
+    Raises:
+        ConfigError: the source has too few free cells; the message says how many objects fit.
+    """
+    queue = np.array(objects.waiting, np.int32)
+    n_placed = _place_until_full(queue, objects, source, distributable_box, rng)
+    objects.waiting[:] = queue[n_placed:].tolist()
+    if objects.waiting:
+        n_objects = len(objects.status)
+        raise ConfigError(
+            f"Expected at most {n_objects - len(objects.waiting)} objects (one per free cell of the source, up to its "
+            f"capacity), got {n_objects}; ask for fewer objects or a larger arena."
+        )
+
+
+def _place_until_full(
+    queue: IntArray, objects: ObjectState, source: Source, distributable_box: Box, rng: np.random.Generator
+) -> int:
+    """Place rows in order until one finds no cell; that one and all behind it wait. Returns how many were placed."""
+    n_placed = 0
+    for start in range(0, len(queue), _CHUNK):
+        chunk = queue[start : start + _CHUNK]
+        n_placed += scatter(
+            chunk,
+            objects.floor,
+            objects.cell,
+            source.regions,
+            source.capacity,
+            source.group_start,
+            distributable_box,
+            rng.random((len(chunk), DRAWS)),
+        )
+        if n_placed < start + len(chunk):
+            break
+    placed, waiting = queue[:n_placed], queue[n_placed:]
+    objects.status[placed] = ObjectStatus.FREE
+    objects.carriers[placed] = 0
+    objects.status[waiting] = ObjectStatus.WAITING
+    objects.cell[waiting] = -1
+    objects.cache_slot[queue] = -1
+    return n_placed
+
+
+def static_cache_centres(config: ScenarioConfig) -> tuple[tuple[int, int], ...]:
+    """Return the centre cells (x, y) of the static caches of a scenario.
+
+    Locations are the study's: half way between nest and each region for one or two sources; west, east, south and
+    north of the nest for four; at the quarters of the arena for the rest. The quad source is moved outwards where
+    its squares would reach into the nest (our choice: a floor cell is either nest or cache).
+
+    Raises:
+        ConfigError: a cache square leaves the arena, reaches into the nest or overlaps another.
+    """
+    nx, ny = config.arena.n_cells
+    nest = config.arena.nest_cells
+    half = config.cache_side_cells // 2
+    boxes = source_boxes(config.objects.placement, nx, ny)
+    centres: tuple[tuple[int, int], ...]
+    if config.objects.placement in ("single_source", "dual_source"):
+        centres = tuple(
+            ((nest[0] + nest[2] + box[0] + box[2]) // 4, (nest[1] + nest[3] + box[1] + box[3]) // 4) for box in boxes
+        )
+    elif config.objects.placement == "quad_source":
+        _, left, bottom, _ = boxes
+        region_x, region_y = (bottom[0] + bottom[2]) // 2, (left[1] + left[3]) // 2
+        centres = (
+            (min(30 * nx // 100, nest[0] - half - 1), region_y),
+            (max(675 * nx // 1000, nest[2] + half), region_y),
+            (region_x, min(30 * ny // 100, nest[1] - half - 1)),
+            (region_x, max(675 * ny // 1000, nest[3] + half)),
+        )
+    else:
+        centres = ((nx // 4, ny // 2), (3 * nx // 4, ny // 2), (nx // 2, ny // 4), (nx // 2, 3 * ny // 4))
+    _check_cache_squares(config, centres)
+    return centres
+
+
+def _check_cache_squares(config: ScenarioConfig, centres: tuple[tuple[int, int], ...]) -> None:
+    nx, ny = config.arena.n_cells
+    half = config.cache_side_cells // 2
+    taken: list[Box] = [config.arena.nest_cells]
+    for x, y in centres:
+        square = (x - half, y - half, x + half + 1, y + half + 1)
+        inside = square[0] >= 0 and square[1] >= 0 and square[2] <= nx and square[3] <= ny
+        if not inside or any(overlap_cells(square, other) for other in taken):
+            side_m = config.cache_side_cells * CELL_M
+            raise ConfigError(
+                f"Expected static caches inside the arena, clear of the nest and of each other, got a square of "
+                f"{side_m:.1f} m centred at ({(x + 0.5) * CELL_M:.1f}, {(y + 0.5) * CELL_M:.1f}) m; lower "
+                "cache.side_share or move the nest."
+            )
+        taken.append(square)

@@ -1,0 +1,293 @@
+"""Population dynamics: when robots die, are born, break down and are repaired. Knows rows and ticks, not the world.
+
+Four processes act on the swarm as a whole, each with a clock of its own; their rates do not depend on how many robots
+there are. Event clock: after an event at tick t the next is due at t + floor(w), w exponential with the rate of the
+process; a run starts as if an event had happened at tick 0. An event that nobody can suffer stays due and is tried
+again in every tick. In a tick each process has at most one event, in this order:
+
+    death         a robot drawn from all present ones, those in repair included, leaves for good
+    birth         the next row that is not yet born enters, if there is room for it
+    malfunction   a robot drawn from the active ones joins the end of the repair queue
+    repair        the robot at the head of the queue is active again; on an empty queue the event is lost
+
+Source: section on population dynamics of the paper; the clocks are those of the study's program.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.types import BoolArray, IntArray
+from swarm_forage_env.wrappers.waveform import require_number
+
+FindPlace: TypeAlias = Callable[[int, np.random.Generator], bool]
+"""Puts the row that is to be born somewhere, drawing from the generator; returns False if there is no room now."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class EventRates:
+    """Events per tick of the whole swarm; 0 = never.
+
+    Raises:
+        ConfigError: a rate that is negative or no number.
+    """
+
+    death: float = 0.0
+    birth: float = 0.0
+    malfunction: float = 0.0
+    repair: float = 0.0
+
+    def __post_init__(self) -> None:
+        for process in ("death", "birth", "malfunction", "repair"):
+            require_number(f"the rate of {process}", getattr(self, process), at_least=0.0)
+
+
+class EventClock:
+    """When the next event of one process is due, and the draws that belong to the event.
+
+    Processes have generators of their own, one for times and one for choices: at another rate the same choices are
+    made at times that scale, so runs of a sweep stay paired.
+    """
+
+    def __init__(self, rate: float, times: np.random.Generator, choices: np.random.Generator) -> None:
+        """Start at tick 0; `rate` in events per tick."""
+        self._rate = rate
+        self._times = times
+        self.choices = choices
+        self.next_tick = np.inf
+        """First tick at which the next event may happen."""
+        if rate > 0.0:
+            self.restart(0)
+
+    def restart(self, tick: int) -> None:
+        """Draw when the next event is due, after one at `tick`."""
+        self.next_tick = tick + float(np.floor(self._times.standard_exponential() / self._rate))
+
+    def choose(self, candidates: BoolArray) -> int:
+        """Draw one row of `candidates` (N,), of which there is at least one.
+
+        A number is drawn for every row and the highest among the candidates wins, so that a robot's luck does not
+        depend on who else is a candidate.
+        """
+        lots = self.choices.random(len(candidates))
+        return int(np.argmax(np.where(candidates, lots, -1.0)))
+
+
+class EventClocks:
+    """The clocks of the four processes."""
+
+    def __init__(self, rates: EventRates, seed: int) -> None:
+        """Start all clocks of the run with `seed`."""
+        sources = stream_rng(seed, Stream.POPULATION).spawn(8)
+        self.death = EventClock(rates.death, sources[0], sources[1])
+        self.birth = EventClock(rates.birth, sources[2], sources[3])
+        self.malfunction = EventClock(rates.malfunction, sources[4], sources[5])
+        self.repair = EventClock(rates.repair, sources[6], sources[7])
+
+    @property
+    def next_tick(self) -> float:
+        """First tick at which anything may happen."""
+        return min(self.death.next_tick, self.birth.next_tick, self.malfunction.next_tick, self.repair.next_tick)
+
+
+@dataclass(slots=True)
+class EventTally:
+    """What happened since the tally was started."""
+
+    deaths: int = 0
+    births: int = 0
+    malfunctions: int = 0
+    repairs: int = 0
+    """Robots that returned; repairs of nobody are not counted."""
+    stays: int = 0
+    """Times at work that ended, by malfunction or by the death of an active robot."""
+    stay_ticks: int = 0
+    """Sum of their lengths."""
+    absence_ticks: int = 0
+    """Sum of the lengths of absences that ended by repair."""
+
+
+@dataclass(slots=True)
+class PopulationState:
+    """Who is where; edited by `advance_population` only."""
+
+    present: BoolArray
+    """(N,) born and not dead."""
+    active: BoolArray
+    """(N,) present and not in repair."""
+    dead: BoolArray
+    """(N,) dead for good."""
+    born: int
+    """Rows below are born."""
+    max_present: int
+    """No births while this many robots are present."""
+    repair_queue: list[int]
+    """Rows in repair, longest wait first."""
+    since: IntArray
+    """(N,) first tick of the current stay or absence."""
+    tally: EventTally
+
+    @classmethod
+    def start(
+        cls, n_robots: int, *, initial_robots: int | None = None, max_robots: int | None = None
+    ) -> "PopulationState":
+        """All robots active (or the first `initial_robots`), nobody in repair.
+
+        Args:
+            n_robots: Rows N, all robots that can ever appear.
+            initial_robots: Robots at the start; default all.
+            max_robots: Most robots that may be present at once; default N.
+
+        Raises:
+            ConfigError: no robots at the start, or more than there are rows.
+        """
+        born = n_robots if initial_robots is None else initial_robots
+        if not 1 <= born <= n_robots:
+            raise ConfigError(f"Expected initial_robots from 1 to n_robots = {n_robots}, got {born}.")
+        present = np.arange(n_robots) < born
+        return cls(
+            present=present,
+            active=present.copy(),
+            dead=np.zeros(n_robots, np.bool_),
+            born=born,
+            max_present=n_robots if max_robots is None else max_robots,
+            repair_queue=[],
+            since=np.ones(n_robots, np.int32),
+            tally=EventTally(),
+        )
+
+
+def advance_population(
+    state: PopulationState, clocks: EventClocks, tick: int, find_place: FindPlace | None = None
+) -> bool:
+    """Let happen what is due at `tick`; ticks may be skipped as long as nothing is due in them.
+
+    Args:
+        state: Edited.
+        clocks: Advanced by the events that happen.
+        tick: The tick that is about to be executed; the first is 1.
+        find_place: Places a row that is to be born; default: there is always room.
+
+    Returns:
+        Whether anyone's state has changed.
+    """
+    changed = False
+    if tick >= clocks.death.next_tick and state.present.any():
+        _die(state, clocks.death.choose(state.present), tick)
+        clocks.death.restart(tick)
+        changed = True
+    if (
+        tick >= clocks.birth.next_tick
+        and _has_room(state)
+        and (find_place is None or find_place(state.born, clocks.birth.choices))
+    ):
+        _enter(state, tick)
+        clocks.birth.restart(tick)
+        changed = True
+    if tick >= clocks.malfunction.next_tick and state.active.any():
+        _break_down(state, clocks.malfunction.choose(state.active), tick)
+        clocks.malfunction.restart(tick)
+        changed = True
+    if tick >= clocks.repair.next_tick:
+        if state.repair_queue:
+            _return(state, tick)
+            changed = True
+        clocks.repair.restart(tick)
+    return changed
+
+
+def _die(state: PopulationState, row: int, tick: int) -> None:
+    if state.active[row]:
+        _end_stay(state, row, tick)
+    else:
+        state.repair_queue.remove(row)
+    state.present[row] = False
+    state.dead[row] = True
+    state.tally.deaths += 1
+
+
+def _has_room(state: PopulationState) -> bool:
+    return state.born < len(state.present) and int(np.count_nonzero(state.present)) < state.max_present
+
+
+def _enter(state: PopulationState, tick: int) -> None:
+    row = state.born
+    state.present[row] = state.active[row] = True
+    state.since[row] = tick
+    state.born += 1
+    state.tally.births += 1
+
+
+def _break_down(state: PopulationState, row: int, tick: int) -> None:
+    _end_stay(state, row, tick)
+    state.since[row] = tick
+    state.repair_queue.append(row)
+    state.tally.malfunctions += 1
+
+
+def _end_stay(state: PopulationState, row: int, tick: int) -> None:
+    state.active[row] = False
+    state.tally.stays += 1
+    state.tally.stay_ticks += tick - int(state.since[row])
+
+
+def _return(state: PopulationState, tick: int) -> None:
+    row = state.repair_queue.pop(0)
+    state.active[row] = True
+    state.tally.repairs += 1
+    state.tally.absence_ticks += tick - int(state.since[row])
+    state.since[row] = tick
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, slots=True)
+class PopulationHistory:
+    """A population over a run, without a world around it."""
+
+    n_active: IntArray
+    """(ticks,) active robots during each tick."""
+    n_present: IntArray
+    """(ticks,) robots in the world during each tick."""
+    tally: EventTally
+    """Totals of the run."""
+
+
+def simulate_population(
+    rates: EventRates,
+    n_robots: int,
+    ticks: int,
+    seed: int,
+    *,
+    initial_robots: int | None = None,
+    max_robots: int | None = None,
+) -> PopulationHistory:
+    """Play population dynamics alone, in milliseconds; exactly what a run with this seed will do.
+
+    Births always find room here, which in a world they nearly always do.
+
+    Args:
+        rates: Events per tick.
+        n_robots: Rows N.
+        ticks: Length of the run.
+        seed: Seed of the run.
+        initial_robots: As in `PopulationState.start`.
+        max_robots: As in `PopulationState.start`.
+
+    Raises:
+        ConfigError: as `PopulationState.start`.
+    """
+    state = PopulationState.start(n_robots, initial_robots=initial_robots, max_robots=max_robots)
+    clocks = EventClocks(rates, seed)
+    n_active, n_present = np.zeros(ticks, np.int32), np.zeros(ticks, np.int32)
+    tick = 1
+    while tick <= ticks:
+        advance_population(state, clocks, tick)
+        following = int(min(max(clocks.next_tick, tick + 1), ticks + 1))
+        # Tick 1 is at index 0; nothing changes until the next event is due.
+        n_active[tick - 1 : following - 1] = np.count_nonzero(state.active)
+        n_present[tick - 1 : following - 1] = np.count_nonzero(state.present)
+        tick = following
+    return PopulationHistory(n_active=n_active, n_present=n_present, tally=state.tally)

@@ -1,0 +1,218 @@
+"""Waveforms: conditions that change over the ticks of a run, as data.
+
+A waveform drives how strongly robots are throttled or how noisy their sensors are. The formulas are those of the
+study's program, evaluated in double precision as written, with the period in ticks:
+
+    constant    A
+    sine        O + A sin(2 pi (t / period) + phase)
+    square      O + A sign(sin(2 pi (t / period) + phase)),  sign(0) = +1
+    sawtooth    O + 2 A (t / period - floor(t / period + 1/2) + phase)
+    step        O before start_s, O + A from then on
+    table       straight lines between given points, the first and last value beyond them
+
+The last two are ours: the study's program makes steps of square waves whose period exceeds the run.
+"""
+
+import bisect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, TypeAlias
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.scenarios.config import from_mapping
+
+Signal: TypeAlias = Callable[[int], float]
+"""Value at a tick; the first tick of a run is 1."""
+
+_FIELDS_OF_KIND: dict[str, tuple[str, ...]] = {
+    "constant": ("amplitude",),
+    "sine": ("amplitude", "offset", "period_s", "phase"),
+    "square": ("amplitude", "offset", "period_s", "phase"),
+    "sawtooth": ("amplitude", "offset", "period_s", "phase"),
+    "step": ("amplitude", "offset", "start_s"),
+    "table": ("times_s", "values"),
+}
+WAVEFORM_KINDS = tuple(_FIELDS_OF_KIND)
+"""Names of the waveforms."""
+
+
+def require_number(where: str, value: Any, *, at_least: float = -math.inf, above: float = -math.inf) -> None:
+    """Check one number of a configuration.
+
+    Args:
+        where: Name of the field, for the message.
+        value: What was given.
+        at_least: Smallest allowed value.
+        above: The value must be larger than this.
+
+    Raises:
+        ConfigError: no finite number, or one out of range.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise ConfigError(f"Expected {where} to be a finite number, got {value!r}.")
+    if value < at_least:
+        raise ConfigError(f"Expected {where} >= {at_least:g}, got {value!r}.")
+    if value <= above:
+        raise ConfigError(f"Expected {where} > {above:g}, got {value!r}.")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Waveform:
+    """One value per tick, as a formula or a table.
+
+    Raises:
+        ConfigError: an unknown kind, a field that its kind does not use, a missing one, or one that makes no sense.
+    """
+
+    kind: str
+    """One of `WAVEFORM_KINDS`."""
+    amplitude: float = 0.0
+    """A, in the unit of what the waveform drives."""
+    offset: float = 0.0
+    """O, in the same unit."""
+    period_s: float | None = None
+    """Length of one cycle. The paper's frequency "f = 5000" is such a period in seconds."""
+    phase: float = 0.0
+    """In radians; for the sawtooth in cycles, where it raises the whole signal, as in the study's program."""
+    start_s: float | None = None
+    """When a step happens."""
+    times_s: tuple[float, ...] = ()
+    """Rising times of a table."""
+    values: tuple[float, ...] = ()
+    """Values of a table, one per time."""
+
+    def __post_init__(self) -> None:
+        if self.kind not in _FIELDS_OF_KIND:
+            raise ConfigError(
+                f"Expected the kind of a waveform to be one of {', '.join(WAVEFORM_KINDS)}, got {self.kind!r}."
+                + suggestion(str(self.kind), WAVEFORM_KINDS)
+            )
+        used = ("kind", *_FIELDS_OF_KIND[self.kind])
+        for item in fields(self):
+            if item.name not in used and getattr(self, item.name) != item.default:
+                raise ConfigError(
+                    f"Expected a {self.kind} waveform to be given by {', '.join(used[1:])} only, "
+                    f"got {item.name} as well."
+                )
+        for name in ("amplitude", "offset", "phase"):
+            require_number(f"{name} of a waveform", getattr(self, name))
+        if "period_s" in used:
+            require_number(f"period_s of a {self.kind} waveform", self.period_s, above=0.0)
+        if "start_s" in used:
+            require_number("start_s of a step waveform", self.start_s, at_least=0.0)
+        if self.kind == "table":
+            self._check_table()
+
+    def _check_table(self) -> None:
+        for name in ("times_s", "values"):
+            numbers = getattr(self, name)
+            if not isinstance(numbers, tuple) or not numbers:
+                raise ConfigError(f"Expected {name} of a table waveform to be one or more numbers, got {numbers!r}.")
+            for number in numbers:
+                require_number(f"every one of {name} of a table waveform", number)
+        if len(self.times_s) != len(self.values):
+            raise ConfigError(
+                f"Expected as many values as times_s in a table waveform, got {len(self.values)} values at "
+                f"{len(self.times_s)} times."
+            )
+        if any(later <= earlier for earlier, later in zip(self.times_s, self.times_s[1:], strict=False)):
+            raise ConfigError(f"Expected times_s of a table waveform to rise strictly, got {self.times_s}.")
+
+    @classmethod
+    def sampled(cls, function: Callable[[float], float], *, until_s: float, every_s: float) -> "Waveform":
+        """Tabulate a function of time, so that it can be stored with a run.
+
+        Args:
+            function: Takes a time in seconds.
+            until_s: Last time that is sampled, if it is a multiple of `every_s`.
+            every_s: Distance of the samples.
+        """
+        require_number("until_s", until_s, at_least=0.0)
+        require_number("every_s", every_s, above=0.0)
+        times = tuple(index * every_s for index in range(math.floor(until_s / every_s + 1e-9) + 1))
+        return cls(kind="table", times_s=times, values=tuple(float(function(time_s)) for time_s in times))
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "Waveform":
+        """Build a waveform from plain values; raises ConfigError on unknown or missing keys and bad values."""
+        return from_mapping(cls, mapping)
+
+    @property
+    def peak(self) -> float:
+        """Largest value that the signal can take."""
+        if self.kind == "constant":
+            return self.amplitude
+        if self.kind == "table":
+            return max(self.values)
+        if self.kind == "step":
+            return self.offset + max(0.0, self.amplitude)
+        shift = 2.0 * self.amplitude * self.phase if self.kind == "sawtooth" else 0.0
+        return self.offset + shift + abs(self.amplitude)
+
+    def signal(self, dt_s: float) -> Signal:
+        """Return V as a function of the tick, for ticks of `dt_s` seconds."""
+        amplitude, offset, phase = self.amplitude, self.offset, self.phase
+        if self.kind == "constant":
+            return lambda _: amplitude
+        if self.kind == "table":
+            return _interpolation([time_s / dt_s for time_s in self.times_s], self.values)
+        if self.kind == "step":
+            assert self.start_s is not None, "checked at construction"
+            # Half a millionth of a tick absorbs the rounding of start_s / dt_s.
+            start = self.start_s / dt_s - 5e-7
+            return lambda tick: offset + amplitude if tick >= start else offset
+        assert self.period_s is not None, "checked at construction"
+        period = self.period_s / dt_s
+        if self.kind == "sawtooth":
+            return lambda tick: offset + 2.0 * amplitude * (tick / period - math.floor(tick / period + 0.5) + phase)
+        if self.kind == "sine":
+            return lambda tick: offset + amplitude * math.sin(2.0 * math.pi * (tick / period) + phase)
+        return lambda tick: (
+            offset + (amplitude if math.sin(2.0 * math.pi * (tick / period) + phase) >= 0.0 else -amplitude)
+        )
+
+
+def _interpolation(ticks: list[float], values: tuple[float, ...]) -> Signal:
+    def value(tick: int) -> float:
+        after = bisect.bisect_right(ticks, tick)
+        if after == 0:
+            return values[0]
+        if after == len(ticks):
+            return values[-1]
+        share = (tick - ticks[after - 1]) / (ticks[after] - ticks[after - 1])
+        return values[after - 1] + share * (values[after] - values[after - 1])
+
+    return value
+
+
+def gather_waveform(mapping: Mapping[str, Any], key: str, owner: type) -> dict[str, Any]:
+    """Return `mapping` with the waveform under `key` built.
+
+    Two forms are read: a table of its fields under `key` (as `to_mapping` writes it), and the name of its kind under
+    `key` with its fields beside it, which is shorter: `{"waveform": "square", "amplitude": 0.2, "period_s": 5000}`.
+
+    Args:
+        mapping: Fields of a configuration.
+        key: Field that may hold a waveform.
+        owner: Dataclass of the configuration, for its other fields.
+
+    Raises:
+        ConfigError: values that describe no waveform, unknown keys beside its kind, or its fields without its kind.
+    """
+    values = dict(mapping)
+    given = values.get(key)
+    if isinstance(given, Mapping):
+        values[key] = Waveform.from_mapping(given)
+    wave_fields = [item.name for item in fields(Waveform) if item.name != "kind"]
+    if isinstance(given, str):
+        known = [*(item.name for item in fields(owner)), *wave_fields]
+        for name in values:
+            if name not in known:
+                raise ConfigError(f"Unknown key {name!r}.{suggestion(name, known)}")
+        beside = {name: values.pop(name) for name in wave_fields if name in values}
+        values[key] = Waveform.from_mapping({"kind": given, **beside})
+    elif key not in values and not values.keys().isdisjoint(wave_fields):
+        raise ConfigError(f"Missing key {key!r}, the kind of the waveform: one of {', '.join(WAVEFORM_KINDS)}.")
+    return values
