@@ -18,7 +18,7 @@ from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.learner_arena import plan_world
-from tests.contracts.foraging import mild_wrappers, quick_world
+from tests.support.foraging import mild_wrappers, quick_world
 
 FILE = Path(__file__).with_suffix(".json")
 POLICIES = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")

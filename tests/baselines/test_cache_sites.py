@@ -1,0 +1,141 @@
+"""Where caches are started: the allowed point nearest to half way to the nest, against a search through all points."""
+
+import math
+
+import numpy as np
+import pytest
+
+from baselines.cache_sites import is_allowed, nearest_allowed, select_site
+from baselines.task_policy import site_box_m
+from baselines.tasks import DRAW_POINT_X, DRAW_POINT_Y, TASK_DRAWS
+from swarm_forage_env.scenarios.quirks import Quirks
+from tests.support.observations import make_task
+from tests.support.task_robot import TaskRobot
+
+MEDIUM = {
+    "arena_size_m": (48.0, 48.0),
+    "nest_centre_m": (24.0, 24.0),
+    "nest_size_m": (9.6, 9.6),
+    "cache_side_m": 9.4,
+    "cache_side_nominal_m": 9.6,
+    "min_dist_m": 9.6,
+    "cache_proximity_m": 19.2,
+}
+
+
+def choose(robot: TaskRobot, x: float, y: float, u: float = 0.0, v: float = 0.0) -> tuple[float, float] | None:
+    """Site chosen by a robot at (x, y) with the draws u (direction) and v (length) of the offset."""
+    draws = np.zeros(TASK_DRAWS)
+    draws[[DRAW_POINT_X, DRAW_POINT_Y]] = u, v
+    robot.seen.pose(x, y)
+    found = select_site(robot.record, robot.senses, robot.constants, draws, robot.memory)
+    return robot.goal if found else None
+
+
+def test_half_way_to_the_nest_with_a_small_offset():
+    robot = TaskRobot()
+    assert choose(robot, 24.0, 8.0) == pytest.approx((13.6 + 0.1, 8.0), abs=1e-6)
+    assert choose(robot, 24.0, 8.0, u=0.25, v=0.5) == pytest.approx((13.6, 8.3), abs=1e-6)
+    assert robot.record.goal_tolerance_m == 0.8
+
+
+def test_near_the_nest_the_site_is_pushed_out_to_the_proximity_distance():
+    robot = TaskRobot(**MEDIUM)
+    x, y = choose(robot, 30.0, 24.0)
+    assert (x, y) == pytest.approx((33.6, 24.0), abs=1e-5)
+    x, y = choose(robot, 30.0, 24.0, u=0.0, v=1.0)
+    assert (x, y) == pytest.approx((33.65, 24.0), abs=1e-5)
+    x, y = choose(robot, 30.0, 24.0, u=0.5, v=1.0)
+    assert (x, y) == pytest.approx((33.65, 24.0), abs=1e-5), "an offset into the disc is turned round"
+    x, y = choose(robot, 24.0, 24.0, u=0.25)
+    assert (x, y) == pytest.approx((24.0, 33.6), abs=1e-5), "any direction from the very centre"
+    assert choose(robot, 24.0, 43.4) == pytest.approx((24.1, 33.7), abs=1e-6), "19.4 m away, half way is allowed"
+
+
+def test_sites_keep_away_from_remembered_caches():
+    robot = TaskRobot()
+    robot.know_cache(1, (72, 40), 5)  # at (14.5, 8.1)
+    x, y = choose(robot, 24.0, 8.0)
+    assert math.dist((x, y), (14.5, 8.1)) == pytest.approx(6.4, abs=0.06)
+    assert math.dist((x, y), (3.2, 8.0)) >= 6.4
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "allowed"),
+    [
+        (9.61, 8.0, True),
+        (9.59, 8.0, False),  # 6.4 m from the nest centre at (3.2, 8)
+        (28.79, 8.1, True),
+        (28.81, 8.1, False),  # border of the box
+        (20.0, 3.21, True),
+        (20.0, 3.19, False),
+        (20.91, 8.1, True),
+        (20.89, 8.1, False),  # 6.4 m from the cache at (14.5, 8.1)
+    ],
+)
+def test_what_is_allowed(x, y, allowed):
+    robot = TaskRobot()
+    if x > 20.0:
+        robot.know_cache(1, (72, 40), 5)
+    assert is_allowed(robot.record, x, y, robot.constants, robot.memory) == allowed
+
+
+def test_a_box_without_any_allowed_point_gives_no_site():
+    robot = TaskRobot()
+    for serial, cell in enumerate([(30, 40), (72, 40), (114, 40), (50, 40), (95, 40), (140, 40)], start=1):
+        robot.know_cache(serial, cell, 5)
+    assert choose(robot, 24.0, 8.0) is None
+
+
+def test_no_offset_where_none_is_allowed():
+    robot = TaskRobot()
+    robot.policy._constants["site_x_low_m"] = robot.policy._constants["site_x_high_m"] = 13.6
+    assert choose(robot, 24.0, 8.0, u=0.0, v=1.0) == pytest.approx((13.6, 8.0))
+    assert choose(robot, 24.0, 8.0, u=0.25, v=1.0) == pytest.approx((13.6, 8.5))
+
+
+@pytest.mark.parametrize(
+    ("changes", "box"),
+    [
+        ({}, (3.2, 3.2, 28.8, 12.8)),
+        ({"quirks": Quirks(site_box_truncated=True)}, (3.0, 3.0, 28.0, 12.0)),
+        (MEDIUM, (4.8, 4.8, 43.2, 43.2)),
+        ({**MEDIUM, "quirks": Quirks(site_box_truncated=True)}, (4.0, 4.0, 43.0, 43.0)),
+    ],
+)
+def test_quirk_site_box_truncated(changes, box):
+    task = make_task(**changes)
+    assert site_box_m(task) == pytest.approx(box)
+    constants = TaskRobot(**changes).constants
+    sides = [constants[f"site_{side}_m"] for side in ("x_low", "y_low", "x_high", "y_high")]
+    assert sides == pytest.approx(box)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_allowed_point_is_nearer(seed):
+    """Caches anywhere, even overlapping, as a memory of caches that are long gone may have them."""
+    rng = np.random.default_rng(seed)
+    robot = TaskRobot(**(MEDIUM if seed % 2 else {}))
+    width_m, height_m = robot.seen.task.arena_size_m
+    for serial in range(1, int(rng.integers(1, 6))):
+        robot.know_cache(serial, (int(rng.integers(width_m * 5)), int(rng.integers(height_m * 5))), 5)
+    middle = rng.uniform((0.0, 0.0), (width_m, height_m))
+    best = nearest_allowed(robot.record, *middle, 0.3, robot.constants, robot.memory)
+    c, step = robot.constants, 0.1
+    grid = [
+        (x, y)
+        for x in np.arange(c.site_x_low_m, c.site_x_high_m + 1e-9, step)
+        for y in np.arange(c.site_y_low_m, c.site_y_high_m + 1e-9, step)
+    ]
+    discs = [robot.seen.task.nest_centre_m]
+    discs += [((x + 0.5) * 0.2, (y + 0.5) * 0.2) for x, y, *_ in robot.policy.remembered_caches(0).values()]
+    radius = robot.seen.task.cache_side_nominal_m
+    allowed = [point for point in grid if all(math.dist(point, disc) >= radius for disc in discs)]
+    nearest = min((math.dist(point, middle) for point in allowed), default=math.inf)
+    if best.distance == math.inf:
+        assert nearest == math.inf
+        return
+    assert is_allowed(robot.record, best.x, best.y, c, robot.memory)
+    assert math.dist((best.x, best.y), middle) == pytest.approx(math.sqrt(best.distance))
+    assert math.sqrt(best.distance) <= nearest + 1e-5
+    assert nearest <= math.sqrt(best.distance) + 4 * step, "the grid must have a point near the best one"

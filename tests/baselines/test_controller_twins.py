@@ -1,0 +1,123 @@
+"""The compiled controllers against the slow ones, on random observations that visit every state."""
+
+import math
+
+import numpy as np
+import pytest
+
+from baselines.crw import CRWPolicy
+from baselines.dpo import DPOPolicy
+from baselines.machines import DRAWS, VectorState
+from swarm_forage_env.contract.codes import Event
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
+from tests.reference.controllers import ObjectDictionary, ReferenceRobot
+from tests.support.observations import GREYS, Observations, make_task
+
+N_ROBOTS = 6
+STATES = ["acquire", "wait for pick-up", "homing", "homing in nest", "wait for drop", "leave nest"]
+
+
+class Fuzz:
+    """Random observations whose parts stay for a while."""
+
+    def __init__(self, task, seed: int) -> None:
+        self.seen = Observations(task)
+        self.rng = np.random.default_rng(seed)
+
+    def perturb(self, i: int, goal: tuple[float, float] | None) -> None:
+        rng, seen = self.rng, self.seen
+        if rng.random() < 0.08:
+            seen.ground(rng.choice(list(GREYS)), i)
+        elif rng.random() < 0.02:
+            seen.set("ground", rng.random(4), i)
+        if rng.random() < 0.3:
+            seen.obstacle(rng.uniform(-math.pi, math.pi) if rng.random() < 0.25 else None, i)
+            # Two equal beams would point exactly at the edge between soft and hard turns, which rounding decides.
+            seen.set("proximity", seen.get("proximity", i) * rng.uniform(0.9, 1.0, 24), i)
+        seen.set("light", rng.random(24), i)
+        seen.set("wheel_speed", rng.choice([-0.5, 0.0, 0.0004, 0.45], 2), i)
+        cell = rng.integers(40, 46, 2)
+        seen.pose(*((cell + rng.random(2)) * 0.2), rng.uniform(-math.pi, math.pi), i)
+        if rng.random() < 0.3:
+            seen.believed_position(*rng.uniform((1.0, 1.0), (31.0, 15.0)), i)
+        elif goal is not None and rng.random() < 0.3:
+            seen.believed_position(goal[0] + rng.choice([0.01, 0.1]), goal[1], i)
+        if rng.random() < 0.03:
+            seen.carry(None if seen.get("carrying", i)[0] else int(rng.integers(200)), i)
+        seen.event(Event(int(rng.integers(1, 10))) if rng.random() < 0.1 else Event.NONE, i)
+        shown = rng.choice(200, 2, replace=False) if rng.random() < 0.1 else []
+        seen.window({(int(rng.integers(-2, 3)), k): int(row) for k, row in enumerate(shown)}, i)
+
+
+@pytest.mark.parametrize("quirks", [Quirks(), AUTHORS_PROGRAM], ids=["as described", "authors' program"])
+@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy])
+def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
+    task = make_task(N_ROBOTS, quirks=quirks)
+    has_memory = policy_class is DPOPolicy
+    fuzz = Fuzz(task, seed=1)
+    policy = policy_class()
+    policy.reset(task, np.random.default_rng(2))
+    draws_again = np.random.default_rng(2)
+    twins = [ReferenceRobot(task, ObjectDictionary() if has_memory else None) for _ in range(N_ROBOTS)]
+    activities: set[int] = set()
+    stages: set[int] = set()
+    for _ in range(1500):
+        for i, twin in enumerate(twins):
+            fuzz.perturb(i, twin.goal if has_memory else None)
+        active = fuzz.rng.random(N_ROBOTS) < 0.95
+        actions = policy.act(fuzz.seen.array, active)
+        draws = draws_again.random((N_ROBOTS, DRAWS))
+        for i in np.flatnonzero(active):
+            expected = twins[i].act(fuzz.seen.array[i], draws[i])
+            assert actions[i] == pytest.approx(expected, abs=2e-6)
+        assert [STATES[code] for code in policy.activity] == [twin.state for twin in twins]
+        activities |= set(policy.activity.tolist())
+        stages |= set(policy._robots["vector_state"].tolist())
+    assert activities == set(range(len(STATES)))
+    if isinstance(policy, DPOPolicy):
+        assert stages == set(VectorState)
+        for i, twin in enumerate(twins):
+            assert set(policy.remembered(i)) == set(twin.memory.known)
+
+
+@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy])
+def test_only_declared_slices_are_read(policy_class):
+    task = make_task(N_ROBOTS)
+    fuzz = Fuzz(task, seed=3)
+    garbage = np.random.default_rng(4)
+    plain, fooled = policy_class(), policy_class()
+    for policy in (plain, fooled):
+        policy.reset(task, np.random.default_rng(5))
+    unread = [task.layout[name] for name in task.layout.names if name not in policy_class.reads]
+    assert unread
+    active = np.ones(N_ROBOTS, bool)
+    for _ in range(500):
+        for i in range(N_ROBOTS):
+            fuzz.perturb(i, None)
+        expected = plain.act(fuzz.seen.array, active).copy()
+        other = fuzz.seen.array.copy()
+        for columns in unread:
+            other[:, columns] = garbage.uniform(-1, 1, other[:, columns].shape)
+        np.testing.assert_array_equal(fooled.act(other, active), expected)
+
+
+@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy])
+def test_actions_repeat_with_the_seed_and_stay_in_range(policy_class):
+    task = make_task(N_ROBOTS)
+
+    def actions(seed: int) -> np.ndarray:
+        fuzz = Fuzz(task, seed=6)
+        policy = policy_class()
+        policy.reset(task, np.random.default_rng(seed))
+        history = []
+        for _ in range(300):
+            for i in range(N_ROBOTS):
+                fuzz.perturb(i, None)
+            history.append(policy.act(fuzz.seen.array, np.ones(N_ROBOTS, bool)).copy())
+        return np.array(history)
+
+    first = actions(7)
+    np.testing.assert_array_equal(first, actions(7))
+    assert not np.array_equal(first, actions(8))
+    assert first.dtype == np.float32
+    assert np.abs(first).max() <= 1.0

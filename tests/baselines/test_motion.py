@@ -1,0 +1,167 @@
+"""Steering forces and drive: the worked numbers of the robot model, and the statistics of the random walk."""
+
+import math
+
+import numpy as np
+import pytest
+
+from baselines.crw import CRWPolicy
+from baselines.machines import new_robots
+from baselines.motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander
+from baselines.parameters import ControllerParameters, kernel_constants
+from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
+from tests.support.observations import Observations, make_task
+
+TASK = make_task()
+C = kernel_constants(ControllerParameters(), TASK)[0]
+
+
+def polar(force: tuple[float, float]) -> tuple[float, float]:
+    """Length in cm/s and angle in degrees."""
+    return 100.0 * math.hypot(*force), math.degrees(math.atan2(force[1], force[0]))
+
+
+def wheels(length_cmps: float, angle_deg: float) -> np.ndarray:
+    """Wheel speeds in cm/s for a force."""
+    action = np.zeros(3, np.float32)
+    angle = math.radians(angle_deg)
+    drive(0.01 * length_cmps * math.cos(angle), 0.01 * length_cmps * math.sin(angle), C, action)
+    return 20.0 * action[:2]
+
+
+@pytest.mark.parametrize(
+    ("length", "angle", "expected"),
+    [
+        (9.0, 10.0, (3.0, 15.0)),
+        (9.0, -10.0, (15.0, 3.0)),
+        (9.0, 0.0, (9.0, 9.0)),
+        (17.0, 0.0, (10.0, 10.0)),
+        (9.0, 20.0, (-10.0, 10.0)),
+        (9.0, -20.0, (10.0, -10.0)),
+        (0.5, 180.0, (-10.0, 10.0)),
+        (0.0, 0.0, (0.0, 0.0)),
+    ],
+)
+def test_drive_turns_softly_up_to_15_degrees_and_on_the_spot_beyond(length, angle, expected):
+    assert wheels(length, angle) == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("length", "angle", "turn_deg", "advance_cm"),
+    [(9.0, 10.0, 9.82, 1.8), (9.0, 20.0, 16.37, 0.0), (8.0, 10.0, 8.73, 1.6), (10.0, 10.0, 10.91, 2.0)],
+)
+def test_turn_and_advance_per_tick(length, angle, turn_deg, advance_cm):
+    left, right = wheels(length, angle)
+    assert math.degrees((right - left) / 14.0 * 0.2) == pytest.approx(turn_deg, abs=0.01)
+    assert (left + right) / 2 * 0.2 == pytest.approx(advance_cm, abs=1e-5)
+
+
+def test_drive_never_exceeds_the_limits_of_the_robot():
+    rng = np.random.default_rng(3)
+    for force in rng.uniform(-0.3, 0.3, (500, 2)):
+        action = np.zeros(3, np.float32)
+        drive(force[0], force[1], C, action)
+        left, right = 0.2 * action[:2].astype(float)
+        assert abs(left + right) / 2 <= 0.1 + 1e-7
+        assert abs(right - left) <= 0.2 + 1e-7
+        assert np.all(np.abs(action) <= 1.0)
+
+
+@pytest.mark.parametrize(("distance", "length"), [(0.5, 8.0), (0.21, 8.0), (0.1, 4.0), (0.01, 1.0), (0.0, 1.0)])
+def test_arrival_slows_down_near_the_goal(distance, length):
+    robot = new_robots(1)[0]
+    robot.goal_x_m, robot.goal_y_m = 5.0 + distance, 3.0
+    force = arrival(robot, 5.0, 3.0, 1.0, 0.0, C)
+    assert polar(force) == pytest.approx((length, 0.0), abs=1e-9)
+    assert bool(robot.is_slowing) == (distance <= 0.2)
+
+
+def test_arrival_points_to_the_goal_in_the_robot_frame():
+    robot = new_robots(1)[0]
+    robot.goal_x_m, robot.goal_y_m = 5.0, 6.0
+    heading = math.radians(30.0)
+    force = arrival(robot, 5.0, 3.0, math.cos(heading), math.sin(heading), C)
+    assert polar(force) == pytest.approx((8.0, 60.0))
+
+
+def test_avoidance_is_opposite_to_the_obstacle():
+    assert polar(avoidance(0.3, 0.3, C)) == pytest.approx((8.0, -135.0))
+
+
+def test_phototaxis_follows_the_light_and_goes_straight_in_the_dark():
+    readings = np.maximum(0.0, np.cos(BEAM_ANGLES_RAD - math.radians(40.0))).astype(np.float32)
+    assert polar(phototaxis(readings, C)) == pytest.approx((8.0, 40.0), abs=1e-4)
+    assert phototaxis(np.zeros(24, np.float32), C) == (0.08, 0.0)
+
+
+def test_recovery_is_straight_ahead():
+    assert polar(recovery(C)) == pytest.approx((7.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "standing"), [(10.0, -10.0, True), (0.0, 0.0, True), (0.2, 0.0, True), (0.3, 0.0, False)]
+)
+def test_standing_means_at_most_a_millimetre_per_second(left, right, standing):
+    reading = np.array([left, right], np.float32) / 20.0
+    assert is_standing(reading, C) == standing
+
+
+def test_wander_angle_wraps_through_zero_and_keeps_its_sign():
+    robot = new_robots(1)[0]
+    robot.wander_deg = 4.0
+    wander(robot, C, 0.8)  # U(-5, 5) = 3
+    assert robot.wander_deg == pytest.approx(2.0)
+    robot.wander_deg = -4.0
+    wander(robot, C, 0.2)
+    assert robot.wander_deg == pytest.approx(-2.0)
+
+
+def test_wander_force_is_9_cm_per_second_a_little_wider_than_its_angle():
+    robot = new_robots(1)[0]
+    robot.wander_deg = 3.0
+    assert polar(wander(robot, C, 0.5)) == pytest.approx((9.0, 3.0 * 1.0416), abs=2e-4)
+
+
+@pytest.fixture(scope="module")
+def turns_deg() -> np.ndarray:
+    """Heading changes (ticks, robots) of free random walkers, each an exact arc of one tick."""
+    n_robots, ticks = 2000, 900
+    task = make_task(n_robots)
+    observations = Observations(task)
+    policy = CRWPolicy()
+    policy.reset(task, np.random.default_rng(11))
+    active = np.ones(n_robots, bool)
+    turns = np.empty((ticks, n_robots))
+    for tick in range(ticks):
+        left, right = 0.2 * policy.act(observations.array, active)[:, :2].T.astype(float)
+        np.testing.assert_allclose((left + right) / 2 * task.dt_s, 0.018, atol=1e-7)
+        turns[tick] = np.degrees((right - left) / task.wheel_base_m * task.dt_s)
+    return turns
+
+
+@pytest.mark.compiled
+def test_turns_of_a_free_walk_have_the_expected_spread_and_bound(turns_deg):
+    settled = turns_deg[20:]
+    assert settled.std() == pytest.approx(2.56, abs=0.02)
+    assert np.abs(settled).max() < 0.982 * 5.21
+    assert np.abs(settled).max() > 0.982 * 5.15
+    assert settled.mean() == pytest.approx(0.0, abs=0.02)
+
+
+@pytest.mark.compiled
+def test_turns_of_a_free_walk_are_correlated(turns_deg):
+    settled = turns_deg[20:]
+    variance = settled.var()
+    assert (settled[1:] * settled[:-1]).mean() / variance == pytest.approx(0.50, abs=0.01)
+    assert (settled[2:] * settled[:-2]).mean() / variance == pytest.approx(0.25, abs=0.01)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("seconds", "cosine"), [(5, 0.93), (10, 0.86), (20, 0.75), (40, 0.56), (80, 0.30), (160, 0.10)]
+)
+def test_heading_is_forgotten_at_the_expected_rate(turns_deg, seconds, cosine):
+    ticks = round(seconds / 0.2)
+    headings = np.radians(np.cumsum(turns_deg[20:], axis=0))
+    change = headings[ticks:] - headings[:-ticks]
+    assert np.cos(change).mean() == pytest.approx(cosine, abs=0.02)

@@ -1,0 +1,100 @@
+"""Controller parameters refuse nonsense and reach the policies by name."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from baselines.crw import CRWPolicy
+from baselines.dpo import DPOPolicy
+from baselines.object_choice import MemoryParameters
+from baselines.parameters import ControllerParameters, ObservationError, ParameterError, kernel_constants
+from baselines.stochm import STOCHMPolicy
+from baselines.stochx import STOCHXPolicy
+from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.quirks import Quirks
+from tests.support.observations import make_task
+
+
+@pytest.mark.parametrize("name", ["crw", "dpo"])
+def test_controllers_are_found_by_name(name):
+    policy = load_policy(name, {"wander_speed_mps": 0.07})
+    assert isinstance(policy, Policy)
+    assert isinstance(policy, CRWPolicy | DPOPolicy)
+    assert policy.parameters.wander_speed_mps == 0.07
+
+
+def test_overrides_build_on_given_parameters():
+    policy = DPOPolicy(MemoryParameters(object_priority=2.0), evaporation_per_tick=0.1)
+    assert policy.parameters == MemoryParameters(object_priority=2.0, evaporation_per_tick=0.1)
+
+
+def test_unknown_parameter_names_the_nearest_one():
+    with pytest.raises(ParameterError, match="Did you mean 'wander_speed_mps'"):
+        CRWPolicy(wander_speed=0.1)
+
+
+@pytest.mark.parametrize("field", [field.name for field in dataclasses.fields(MemoryParameters)])
+@pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf"), True, "1"])
+def test_every_parameter_must_be_a_finite_number_from_zero(field, value):
+    with pytest.raises(ParameterError, match=field):
+        MemoryParameters(**{field: value})
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"wander_max_change_deg": 0.0},
+        {"soft_turn_deg": 0.0},
+        {"slowing_radius_m": 0.0},
+        {"wander_circle_radius": 4.0},
+        {"evaporation_per_tick": 1.0},
+    ],
+)
+def test_values_that_make_no_sense_are_refused(values):
+    with pytest.raises(ParameterError, match=next(iter(values))):
+        MemoryParameters(**values)
+
+
+def test_durations_become_ticks_and_quirks_reach_the_kernels():
+    constants = kernel_constants(ControllerParameters(), make_task(dt_s=0.1))[0]
+    assert (constants.exploration_lock_ticks, constants.recovery_ticks) == (100, 20)
+    assert constants.explore_double_start == 0
+    task = make_task(quirks=Quirks(explore_double_start=True))
+    assert kernel_constants(ControllerParameters(), task)[0].explore_double_start == 1
+
+
+@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, STOCHMPolicy, STOCHXPolicy])
+def test_observations_of_another_swarm_are_refused(policy_class):
+    policy = policy_class()
+    policy.reset(make_task(4), np.random.default_rng(0))
+    for rows, columns in ((3, policy._task.layout.size), (4, 10)):
+        with pytest.raises(ObservationError, match=rf"\(n_robots, columns\) = \(4, .*got \({rows}, {columns}\)"):
+            policy.act(np.zeros((rows, columns), np.float32), np.ones(rows, np.bool_))
+    with pytest.raises(ObservationError, match=r"active with shape \(n_robots,\) = \(4,\), got \(5,\)"):
+        policy.act(np.zeros((4, policy._task.layout.size), np.float32), np.ones(5, np.bool_))
+
+
+@pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, STOCHMPolicy, STOCHXPolicy])
+def test_acting_without_a_reset_is_refused(policy_class):
+    with pytest.raises(ObservationError, match="Expected reset before act"):
+        policy_class().act(np.zeros((1, 114), np.float32), np.ones(1, np.bool_))
+
+
+@pytest.mark.parametrize(
+    ("policy_class", "parameters", "message"),
+    [
+        (CRWPolicy, {"wander_speed_mps": 0.1}, "to be ControllerParameters, got dict; give single numbers by name"),
+        (DPOPolicy, ControllerParameters(), "to be MemoryParameters, got ControllerParameters"),
+        (STOCHXPolicy, MemoryParameters(), "to be TaskParameters, got MemoryParameters"),
+    ],
+)
+def test_parameters_of_another_controller_are_refused(policy_class, parameters, message):
+    with pytest.raises(ParameterError, match=message):
+        policy_class(parameters)
+
+
+def test_something_else_than_a_name_is_refused():
+    with pytest.raises(TypeError, match="Expected the name of a policy or of a policy file, got None"):
+        load_policy(None)

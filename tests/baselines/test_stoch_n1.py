@@ -1,0 +1,404 @@
+"""Task allocation: every equation by worked numbers, the procedures step by step, and the long run of both."""
+
+import math
+
+import numpy as np
+import pytest
+
+from baselines import stoch_n1
+from baselines.machines import Activity
+from baselines.stochm import STOCHMPolicy
+from baselines.stochx import STOCHXPolicy
+from baselines.task_policy import task_constants
+from baselines.tasks import STOCHM_PARAMETERS, STOCHX_PARAMETERS, Tab
+from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
+from tests.reference import task_chain
+from tests.support.observations import make_task
+
+M_PARTITION = (4.0, 1.25, 1.75)
+X_PARTITION = (1.0, 1.25, 1.0)
+
+
+# Equations
+
+
+@pytest.mark.parametrize(
+    ("root", "subtasks", "stochm", "stochx"),
+    [
+        (3000, 2900, 0.52, 0.446),
+        (3000, 6000, 0.083, 0.321),
+        (3000, 4000, 0.7305, 0.479),
+        (3000, 3000, 1.0, 0.562),
+        (3000, 2999.9, 0.471, 0.438),
+        (3000, 2400, 0.875, 0.5),
+        (3000, 2000, 1.0, 0.562),
+        (3000, 0, 0.875, 0.5),
+        (0, 3000, 0.875, 0.5),
+    ],
+)
+def test_partition_probability_in_real_numbers(root, subtasks, stochm, stochx):
+    assert stoch_n1.partition_probability(root, subtasks, *M_PARTITION, False) == pytest.approx(stochm, abs=6e-4)
+    assert stoch_n1.partition_probability(root, subtasks, *X_PARTITION, False) == pytest.approx(stochx, abs=6e-4)
+
+
+@pytest.mark.parametrize(
+    ("root", "subtasks", "stochm", "stochx"),
+    [
+        (3000, 2900, 0.875, 0.5),
+        (3000, 999, 1.0, 0.731),
+        (3000, 1001, 0.875, 0.5),
+        (4000, 999, 1.0, 0.881),
+        (1000, 2999, 0.875, 0.5),
+        (1000, 3000, 0.0315, 0.269),
+        (1000, 4999, 0.0006, 0.119),
+        (3000, 3000, 0.875, 0.5),
+    ],
+)
+def test_partition_probability_in_whole_numbers(root, subtasks, stochm, stochx):
+    assert stoch_n1.partition_probability(root, subtasks, *M_PARTITION, True) == pytest.approx(stochm, abs=6e-4)
+    assert stoch_n1.partition_probability(root, subtasks, *X_PARTITION, True) == pytest.approx(stochx, abs=6e-4)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "stochm", "stochx"),
+    [(1.0, 0.352, 0.438), (0.75, 0.328, 0.378), (0.5, 0.306, 0.321), (0.25, 0.283, 0.269)],
+)
+def test_switch_probability(ratio, stochm, stochx):
+    assert stoch_n1.switch_probability(ratio * 2000, 2000, 0.5, 1.25, 0.75) == pytest.approx(stochm, abs=6e-4)
+    assert stoch_n1.switch_probability(ratio * 2000, 2000, 1.0, 1.25, 1.0) == pytest.approx(stochx, abs=6e-4)
+
+
+@pytest.mark.parametrize(("last", "other"), [(2000, 1000), (0, 1000), (1000, 0), (1000, 1000)])
+def test_switch_ratio_is_one_when_the_other_subtask_is_no_slower_or_unknown(last, other):
+    assert stoch_n1.switch_probability(last, other, 1.0, 1.25, 1.0) == pytest.approx(1 / (1 + math.exp(0.25)))
+
+
+@pytest.mark.parametrize(("ratio", "expected"), [(1, 0.0002), (2, 0.009), (3, 0.25), (4, 0.491)])
+def test_move_probability_by_ratio_of_imbalances(ratio, expected):
+    # Imbalances of ratio / 10 and 1 / 10 of a root of 1000 ticks.
+    p = stoch_n1.move_probability(1000, 1000 + 100 * ratio, 1000, 900, 4.0, 3.0, 0.5, False)
+    assert p == pytest.approx(expected, abs=6e-4)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "is_integer"),
+    [
+        ((1000, 1000, 1000, 900), False),
+        ((1000, 900, 1000, 1000), False),
+        ((0, 5, 1000, 900), False),
+        ((1000, 900, 0, 5), False),
+        ((1000, 1999, 1000, 1500), True),
+        ((1000, 2500, 1000, 1500), True),
+    ],
+)
+def test_move_probability_of_balanced_or_unknown_blocks(blocks, is_integer):
+    assert stoch_n1.move_probability(*blocks, 4.0, 3.0, 0.5, is_integer) == 0.5
+
+
+def test_move_probability_of_two_blocks_without_root_estimates_compares_subtasks():
+    assert stoch_n1.move_probability(0, 300, 0, 100, 4.0, 3.0, 0.5, False) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "expected"),
+    [
+        (0, 6.1e-06),
+        (0.5, 4.5e-05),
+        (1, 0.00034),
+        (1.5, 0.0025),
+        (2, 0.018),
+        (2.5, 0.12),
+        (3, 0.5),
+        (3.5, 0.12),
+        (4, 0.018),
+        (5, 0.00034),
+        (1000000.0, 0.0),
+    ],
+)
+def test_abort_probability_is_a_bump(ratio, expected):
+    assert stoch_n1.abort_probability(1000 * ratio, 1000, 4.0, 3.0, 1.0, 1e-4) == pytest.approx(expected, rel=0.02)
+
+
+def test_abort_probability_without_an_estimate_is_the_least():
+    assert stoch_n1.abort_probability(1000, 0, 4.0, 3.0, 1.0, 1e-4) == 1e-4
+
+
+@pytest.mark.parametrize(("estimate", "median"), [(1000, 1.53), (1500, 1.43), (3000, 1.26), (4000, 1.18)])
+def test_median_abort_of_continuous_execution(estimate, median):
+    alive, ticks = 1.0, 0
+    while alive > 0.5:
+        alive *= 1.0 - stoch_n1.abort_probability(ticks, estimate, 4.0, 3.0, 1.0, 1e-4)
+        ticks += 1
+    assert ticks / estimate == pytest.approx(median, abs=0.01)
+
+
+def test_moving_average():
+    assert stoch_n1.new_estimate(1500, 2001, 0.5, True) == 1750
+    assert stoch_n1.new_estimate(1500, 2001, 0.5, False) == 1750.5
+
+
+def test_logistic_does_not_overflow():
+    assert stoch_n1.logistic(-1e6) == 0.0
+    assert stoch_n1.logistic(1e6) == 1.0
+
+
+# Procedures
+
+
+class Robot:
+    """Allocation of one robot that has just been made, with its constants."""
+
+    def __init__(self, policy_class=STOCHXPolicy, quirks: Quirks = Quirks(), **overrides) -> None:  # noqa: B008
+        policy = policy_class(**overrides)
+        self.c = task_constants(policy.parameters, make_task(quirks=quirks), policy.n_tabs)[0]
+        rng = np.random.default_rng(1)
+        self.a = stoch_n1.new_allocation(1, policy.parameters, quirks, policy.n_tabs, rng)
+
+    def be(self, tab: Tab, task: Task) -> None:
+        self.a.tab[0], self.a.task[0] = tab, task
+
+    def next(self, move: float = 1.0, partition: float = 1.0, switch: float = 1.0, now: int = 1) -> Task:
+        stoch_n1.next_task(self.a, 0, now, self.c, move, partition, switch)
+        return self.task
+
+    @property
+    def task(self) -> Task:
+        return Task(int(self.a.task[0]))
+
+    @property
+    def tab(self) -> Tab:
+        return Tab(int(self.a.tab[0]))
+
+
+def test_first_block_estimates_and_coins():
+    n = 4000
+    a = stoch_n1.new_allocation(n, STOCHX_PARAMETERS, Quirks(), 3, np.random.default_rng(3))
+    assert (a.task == Task.NONE).all()
+    assert np.mean(a.tab == Tab.HARVESTER) == pytest.approx(0.5, abs=0.04)
+    assert np.mean(a.tab == Tab.COLLECTOR) == pytest.approx(0.5, abs=0.04)
+    assert np.mean(a.last_child, axis=0) == pytest.approx([0.5] * 3, abs=0.04)
+    np.testing.assert_array_equal(a.last_child[:, Tab.HARVESTER], a.last_child[:, Tab.COLLECTOR])
+    whole = a.estimate[:, 1:]
+    np.testing.assert_array_equal(whole, np.floor(whole))
+    assert (whole.min(axis=0) >= [2000] + [1000] * 6).all()
+    assert (whole.max(axis=0) <= [4000] + [2000] * 6).all()
+    assert whole.mean(axis=0) == pytest.approx([3000] + [1500] * 6, rel=0.02)
+    m = stoch_n1.new_allocation(n, STOCHM_PARAMETERS, Quirks(), 1, np.random.default_rng(3))
+    assert (m.tab == Tab.GENERALIST).all()
+
+
+def test_first_partition_probability_comes_from_the_estimates_or_from_nothing():
+    a = stoch_n1.new_allocation(5, STOCHM_PARAMETERS, Quirks(), 1, np.random.default_rng(3))
+    e = a.estimate
+    expected = [
+        stoch_n1.partition_probability(root, parts, *M_PARTITION, False)
+        for root, parts in zip(e[:, Task.GENERALIST], e[:, Task.HARVESTER] + e[:, Task.COLLECTOR], strict=True)
+    ]
+    assert a.partition[:, Tab.GENERALIST] == pytest.approx(expected)
+    coded = stoch_n1.new_allocation(5, STOCHM_PARAMETERS, AUTHORS_PROGRAM, 1, np.random.default_rng(3))
+    assert (coded.partition == 0.875).all()
+
+
+def test_root_or_subtask_by_the_stored_probability():
+    robot = Robot(STOCHMPolicy)
+    robot.a.partition[0, Tab.GENERALIST] = 0.6
+    robot.a.last_child[0, Tab.GENERALIST] = 1
+    assert robot.next(partition=0.6) is Task.GENERALIST
+    assert robot.next(partition=0.59) is Task.COLLECTOR
+    assert robot.next(partition=0.59, switch=0.0) is Task.HARVESTER
+    assert robot.next(partition=0.59) is Task.HARVESTER, "the subtask done last is the one to repeat"
+
+
+@pytest.mark.parametrize(
+    ("tab", "last", "moves_to"),
+    [
+        (Tab.HARVESTER, Task.HARVESTER, Tab.GENERALIST),
+        (Tab.COLLECTOR, Task.COLLECTOR, Tab.GENERALIST),
+        (Tab.GENERALIST, Task.HARVESTER, Tab.HARVESTER),
+        (Tab.GENERALIST, Task.COLLECTOR, Tab.COLLECTOR),
+        (Tab.GENERALIST, Task.GENERALIST, Tab.GENERALIST),
+        (Tab.HARVESTER, Task.STARTER, Tab.HARVESTER),
+        (Tab.HARVESTER, Task.FINISHER, Tab.HARVESTER),
+        (Tab.COLLECTOR, Task.TRANSFERER, Tab.COLLECTOR),
+        (Tab.COLLECTOR, Task.CACHE_COLLECTOR, Tab.COLLECTOR),
+        (Tab.HARVESTER, Task.NONE, Tab.HARVESTER),
+    ],
+)
+def test_active_block_moves_by_one_level(tab, last, moves_to):
+    robot = Robot()
+    robot.be(tab, last)
+    robot.next(move=0.0)
+    assert robot.tab is moves_to
+    robot.be(tab, last)
+    robot.next(move=0.6)  # p <= 0.5
+    assert robot.tab is tab
+
+
+def test_stochm_never_leaves_its_only_block():
+    robot = Robot(STOCHMPolicy)
+    for last in (Task.GENERALIST, Task.HARVESTER, Task.COLLECTOR):
+        robot.be(Tab.GENERALIST, last)
+        robot.next(move=0.0)
+        assert robot.tab is Tab.GENERALIST
+
+
+def test_ending_a_task_updates_its_estimate_and_its_block_only():
+    robot = Robot()
+    robot.be(Tab.HARVESTER, Task.STARTER)
+    robot.a.estimate[0] = 1500
+    robot.a.exec_time[0, Task.STARTER] = 2001
+    robot.a.partition[:] = -1
+    stoch_n1.end_task(robot.a, 0, 77, robot.c)
+    assert robot.a.estimate[0, Task.STARTER] == 1750.5
+    assert np.count_nonzero(robot.a.estimate[0] == 1500) == 7
+    expected = stoch_n1.partition_probability(1500, 3250.5, *X_PARTITION, False)
+    assert robot.a.partition[0].tolist() == [-1, expected, -1]
+    assert robot.a.exec_start[0, Task.STARTER] == 77
+
+
+def run_ticks(robot: Robot, first: int, last: int, activity: Activity) -> None:
+    for now in range(first, last + 1):
+        stoch_n1.after_tick(robot.a, 0, now, activity, robot.c)
+
+
+def test_execution_time_counts_from_the_start_of_this_execution():
+    robot = Robot()
+    robot.be(Tab.HARVESTER, Task.HARVESTER)
+    robot.a.exec_start[0, Task.HARVESTER] = 100
+    robot.next(partition=1.0, now=500)
+    run_ticks(robot, 501, 510, Activity.ACQUIRE)
+    assert robot.a.exec_time[0, Task.HARVESTER] == 10
+
+
+def test_quirk_execution_time_counts_from_the_last_completion():
+    robot = Robot(quirks=Quirks(exec_time_since_last_completion=True))
+    robot.be(Tab.HARVESTER, Task.HARVESTER)
+    robot.a.exec_start[0, Task.HARVESTER] = 100
+    robot.next(partition=1.0, now=500)
+    run_ticks(robot, 501, 510, Activity.ACQUIRE)
+    assert robot.a.exec_time[0, Task.HARVESTER] == 410
+
+
+def test_a_task_that_ends_before_its_first_full_tick_took_no_time():
+    robot = Robot()
+    robot.be(Tab.HARVESTER, Task.HARVESTER)
+    robot.a.estimate[0, Task.HARVESTER] = 1500
+    robot.a.exec_time[0, Task.HARVESTER] = 700
+    assert robot.next(partition=1.0, now=500) is Task.HARVESTER
+    stoch_n1.end_task(robot.a, 0, 501, robot.c)
+    assert robot.a.estimate[0, Task.HARVESTER] == 750
+
+
+@pytest.mark.parametrize(
+    ("task", "activities"),
+    [
+        (Task.GENERALIST, {}),
+        (Task.HARVESTER, {Activity.TRANSPORT}),
+        (Task.STARTER, {Activity.TRANSPORT}),
+        (Task.FINISHER, {Activity.TRANSPORT}),
+        (Task.COLLECTOR, {Activity.ACQUIRE}),
+        (Task.CACHE_COLLECTOR, {Activity.ACQUIRE}),
+        (Task.TRANSFERER, {Activity.ACQUIRE, Activity.TRANSPORT}),
+    ],
+)
+def test_interfaces_are_active_where_tasks_meet(task, activities):
+    robot = Robot()
+    goes_home = task in (Task.GENERALIST, Task.COLLECTOR, Task.CACHE_COLLECTOR)
+    way = [Activity.HOMING, Activity.HOMING_IN_NEST] if goes_home else [Activity.TRANSPORT]
+    has_interface = False
+    for activity in [Activity.ACQUIRE, Activity.WAIT_PICKUP, *way, Activity.WAIT_DROP, Activity.FINISHED]:
+        has_interface = stoch_n1.interface_after(has_interface, task, activity, robot.c)
+        assert has_interface == (activity in activities), activity
+
+
+def test_quirk_transferer_interface_is_entered_with_the_transport_and_never_left():
+    robot = Robot(quirks=Quirks(transferer_interface_never_leaves=True))
+    has_interface, seen = False, []
+    for activity in (Activity.ACQUIRE, Activity.WAIT_PICKUP, Activity.TRANSPORT, Activity.WAIT_DROP, Activity.ACQUIRE):
+        has_interface = stoch_n1.interface_after(has_interface, Task.TRANSFERER, activity, robot.c)
+        seen.append(has_interface)
+    assert seen == [False, False, True, True, True]
+    assert not stoch_n1.interface_after(True, Task.HARVESTER, Activity.WAIT_DROP, robot.c)
+
+
+@pytest.mark.parametrize("survives", [False, True])
+def test_quirk_interface_flag_survives_abort(survives):
+    robot = Robot(quirks=Quirks(interface_flag_survives_abort=survives))
+    robot.be(Tab.HARVESTER, Task.HARVESTER)
+    robot.a.estimate[0, Task.HARVESTER] = 1000
+    run_ticks(robot, 1, 5, Activity.TRANSPORT)
+    assert robot.a.has_interface[0, Task.HARVESTER]
+    stoch_n1.end_task(robot.a, 0, 6, robot.c)  # an abort during the transport
+    assert robot.next(partition=1.0, now=6) is Task.HARVESTER
+    run_ticks(robot, 7, 8, Activity.ACQUIRE)
+    assert robot.a.has_interface[0, Task.HARVESTER] == survives
+    formula = robot.a.p_abort[0, Task.HARVESTER] != robot.c.least_abort_probability
+    assert formula == survives
+
+
+def test_abort_probability_is_the_least_without_an_interface_except_for_generalists():
+    robot = Robot()
+    robot.a.estimate[0] = 1000
+    robot.be(Tab.HARVESTER, Task.HARVESTER)
+    run_ticks(robot, 2000, 2000, Activity.ACQUIRE)
+    assert robot.a.p_abort[0, Task.HARVESTER] == 1e-4
+    run_ticks(robot, 2000, 2000, Activity.TRANSPORT)
+    assert robot.a.p_abort[0, Task.HARVESTER] == 1e-4, "the interface counts from the next tick on"
+    run_ticks(robot, 2000, 2000, Activity.TRANSPORT)
+    assert robot.a.p_abort[0, Task.HARVESTER] == pytest.approx(0.018, abs=1e-4)
+    robot.be(Tab.GENERALIST, Task.GENERALIST)
+    run_ticks(robot, 2000, 2000, Activity.ACQUIRE)
+    assert robot.a.p_abort[0, Task.GENERALIST] == pytest.approx(0.018, abs=1e-4)
+
+
+# The long run
+
+NAMES = {task.name.lower(): task for task in Task if task is not Task.NONE}
+EVEN = {name: 3000 if name == "generalist" else 1500 for name in NAMES}
+UNEVEN = dict(zip(NAMES, (2500, 900, 1300, 1000, 800, 1200, 700), strict=True))
+CONTROLLERS = {"stochm": (STOCHMPolicy, ("generalist",)), "stochx": (STOCHXPolicy, tuple(task_chain.CHILDREN))}
+
+
+def chain_shares(controller: str, is_integer: bool, estimates: dict[str, float]) -> dict[str, float]:
+    policy_class, blocks = CONTROLLERS[controller]
+    p = policy_class.default_parameters
+    k, gamma = p.partition_reactivity, p.partition_gamma
+    partition = {block: task_chain.partition(estimates, block, k, gamma, is_integer) for block in blocks}
+    subtask = (p.subtask_reactivity, p.subtask_gamma)
+    return task_chain.stationary_shares(estimates, blocks, partition, subtask, is_integer)
+
+
+@pytest.mark.parametrize(
+    ("controller", "is_integer", "generalist", "halves", "leaves"),
+    [
+        ("stochm", True, 0.125, 0.4375, 0.0),
+        ("stochm", False, 0.0, 0.5, 0.0),
+        ("stochx", True, 0.25, 0.25, 0.0625),
+        ("stochx", False, 0.2395, 0.3076, 0.0363),
+    ],
+)
+def test_stationary_shares_of_the_exact_chain(controller, is_integer, generalist, halves, leaves):
+    shares = chain_shares(controller, is_integer, EVEN)
+    assert shares.pop("generalist") == pytest.approx(generalist, abs=5e-5)
+    assert [shares.pop("harvester"), shares.pop("collector")] == pytest.approx([halves] * 2, abs=5e-5)
+    assert list(shares.values()) == pytest.approx([leaves] * len(shares), abs=5e-5)
+
+
+@pytest.mark.parametrize("estimates", [EVEN, UNEVEN], ids=["even", "uneven"])
+@pytest.mark.parametrize("is_integer", [False, True])
+@pytest.mark.parametrize("controller", ["stochm", "stochx"])
+def test_long_sequences_approach_the_exact_chain(controller, is_integer, estimates):
+    robot = Robot(CONTROLLERS[controller][0], Quirks(integer_estimates=is_integer), estimate_weight=0.0)
+    for name, task in NAMES.items():
+        robot.a.estimate[0, task] = estimates[name]
+    counts = np.zeros(len(Task))
+    n = 20_000
+    for now, draws in enumerate(np.random.default_rng(7).random((n + 200, 3)).tolist()):
+        if robot.task is not Task.NONE:
+            stoch_n1.end_task(robot.a, 0, now, robot.c)
+        robot.next(*draws, now=now)
+        counts[robot.task] += now >= 200
+    for name, share in chain_shares(controller, is_integer, estimates).items():
+        # Successive tasks depend on each other, which is worth a few times the error of independent draws.
+        assert counts[NAMES[name]] / n == pytest.approx(share, abs=1e-9 + 5 * math.sqrt(max(share, 0) / n)), name

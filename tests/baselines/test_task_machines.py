@@ -1,0 +1,461 @@
+"""The machine of every task, state by state, and how tasks end: finished, refused or given up."""
+
+import numpy as np
+import pytest
+
+from baselines.machines import Activity, VectorState
+from baselines.stochm import STOCHMPolicy
+from baselines.stochx import STOCHXPolicy
+from baselines.tasks import TASK_DRAWS
+from swarm_forage_env.contract.codes import Event, Grip, Task
+from swarm_forage_env.scenarios.quirks import Quirks
+from tests.support.task_robot import TaskRobot
+
+CACHE = (72, 40)
+"""Centre cell of the cache at (14.5, 8.1) m; its square is 11.4 .. 17.6 m by 5.0 .. 11.2 m."""
+CACHE_SEEN = (7, CACHE, 12)
+HARVESTS = [Task.GENERALIST, Task.HARVESTER, Task.STARTER, Task.FINISHER]
+COLLECTS = [Task.COLLECTOR, Task.TRANSFERER, Task.CACHE_COLLECTOR]
+TO_NEST = [Task.GENERALIST, Task.COLLECTOR, Task.CACHE_COLLECTOR]
+
+
+@pytest.fixture
+def robot() -> TaskRobot:
+    return TaskRobot()
+
+
+def wait_for_pickup(robot: TaskRobot, task: Task) -> None:
+    """Start a task and bring the robot to where it asks for an object."""
+    robot.start(task)
+    robot.finish_soon()
+    if task in COLLECTS:
+        robot.seen.caches(CACHE_SEEN)
+        robot.act()
+        assert robot.stage is VectorState.VECTOR
+        robot.seen.pose(*robot.goal)
+        robot.seen.ground("cache")
+    else:
+        robot.seen.window({(2, 0): 3})
+        robot.act()
+        robot.seen.pose(*robot.goal)
+        robot.seen.window({(0, 0): 3})
+        robot.seen.ground("object")
+    action = robot.act()
+    assert robot.activity is Activity.WAIT_PICKUP
+    assert action.tolist() == [0.0, 0.0, Grip.GRASP]
+
+
+def pick_up(robot: TaskRobot, task: Task) -> np.ndarray:
+    """Start a task and give the robot object 3 where it asks for it; returns the action after that."""
+    wait_for_pickup(robot, task)
+    robot.seen.window({})
+    robot.seen.carry(3)
+    event = Event.PICKED_FROM_CACHE if task in COLLECTS else Event.PICKED_UP
+    robot.seen.event(event, object_row=3, cache=CACHE_SEEN if task in COLLECTS else None)
+    action = robot.act()
+    robot.seen.event(Event.NONE)
+    robot.seen.ground("floor")
+    return action
+
+
+def wait_for_drop(robot: TaskRobot, task: Task) -> np.ndarray:
+    """Bring the robot to where it asks to drop; returns the action."""
+    pick_up(robot, task)
+    if task in TO_NEST:
+        robot.seen.ground("nest")
+        robot.act()
+        robot.seen.caches()
+        robot.seen.pose(3.2, 8.0)
+    elif task is Task.STARTER:
+        robot.seen.pose(*robot.goal)
+    elif task is Task.FINISHER:
+        robot.know_object(9, (80, 10))
+        robot.act()
+        robot.seen.pose(16.1, 2.7)  # the object at (16.1, 2.1) is out of the window, but near
+    else:
+        cell = (120, 40) if task is Task.TRANSFERER else CACHE
+        robot.seen.pose(20.5, 8.1)
+        robot.seen.caches((8, cell, 5))
+        robot.act()
+        robot.seen.pose(*robot.goal)
+        robot.seen.ground("cache")
+    action = robot.act()
+    assert robot.activity is Activity.WAIT_DROP
+    assert action[:2].tolist() == [0.0, 0.0]
+    return action
+
+
+def drop(robot: TaskRobot, event: Event = Event.DROPPED, **about) -> None:
+    """Let the drop happen, with another task to follow."""
+    robot.seen.carry(None)
+    robot.seen.ground("floor")
+    robot.seen.event(event, **about)
+    robot.act()
+    robot.seen.event(Event.NONE)
+
+
+# Sources
+
+
+@pytest.mark.parametrize("task", [*HARVESTS, *COLLECTS])
+def test_a_task_starts_by_acquiring_in_the_same_tick(robot, task):
+    assert robot.start(task)[2] == np.float32(Grip.RELEASE)
+    assert robot.activity is Activity.ACQUIRE
+    assert robot.record.explore_ticks == 1
+
+
+@pytest.mark.parametrize("task", HARVESTS)
+def test_free_objects_are_found_by_ground_sensor_after_ten_seconds(robot, task):
+    robot.start(task)
+    robot.finish_soon()
+    robot.seen.ground("object")
+    robot.act(49)
+    assert robot.activity is Activity.ACQUIRE
+    robot.act()
+    assert robot.activity is Activity.WAIT_PICKUP
+
+
+@pytest.mark.parametrize("task", COLLECTS)
+def test_caches_are_not_found_by_ground_sensor(robot, task):
+    robot.start(task)
+    robot.policy._allocation.estimate[:] = 1e9  # never gives up
+    robot.seen.ground("cache")
+    robot.act(120)
+    assert robot.activity is Activity.ACQUIRE
+
+
+@pytest.mark.parametrize("task", [*HARVESTS, *COLLECTS])
+def test_every_task_goes_to_its_source_and_asks_there(robot, task):
+    wait_for_pickup(robot, task)
+
+
+@pytest.mark.parametrize("event", [Event.NOTHING_HERE, Event.VANISHED])
+@pytest.mark.parametrize("task", [Task.HARVESTER, Task.COLLECTOR])
+def test_a_refused_pickup_is_an_acquisition_again(robot, task, event):
+    wait_for_pickup(robot, task)
+    robot.seen.window({})
+    robot.seen.event(event)
+    robot.act()
+    assert robot.activity is Activity.ACQUIRE
+    assert robot.task is task
+
+
+def test_a_collector_gives_way_when_others_have_emptied_the_cache_too_far(robot):
+    wait_for_pickup(robot, Task.COLLECTOR)
+    robot.seen.caches((7, CACHE, 3))
+    assert robot.act()[2] == Grip.GRASP
+    robot.seen.caches((7, CACHE, 2))
+    assert robot.act()[2] == np.float32(Grip.RELEASE)
+    assert robot.activity is Activity.ACQUIRE
+
+
+def test_a_target_cache_that_is_gone_is_given_up(robot):
+    robot.start(Task.COLLECTOR)
+    robot.finish_soon()
+    robot.seen.caches(CACHE_SEEN)
+    robot.act()
+    robot.seen.caches()
+    robot.seen.pose(11.5, 8.1)
+    robot.act()
+    assert robot.policy.n_caches.tolist() == [0]
+    assert robot.record.is_searching, "the search for another one begins where it was"
+    assert robot.goal == pytest.approx((14.5, 8.1))
+
+
+def test_a_search_goes_to_the_last_known_cache_and_then_at_random(robot):
+    robot.seen.caches(CACHE_SEEN)
+    robot.act()
+    robot.seen.caches()
+    robot.seen.pose(11.5, 8.1)
+    robot.start(Task.COLLECTOR)
+    robot.finish_soon()
+    assert robot.record.is_searching
+    assert robot.stage is VectorState.VECTOR
+    robot.seen.pose(14.5, 8.1)
+    robot.act()
+    assert not robot.record.is_searching
+    assert robot.stage is VectorState.IDLE
+    robot.act(3)
+    assert robot.activity is Activity.ACQUIRE
+    assert robot.stage is VectorState.IDLE, "a random walk from now on"
+
+
+def test_a_cache_in_sight_ends_the_search(robot):
+    robot.seen.caches(CACHE_SEEN)
+    robot.act()
+    robot.seen.caches()
+    robot.seen.pose(11.5, 8.1)
+    robot.start(Task.COLLECTOR)
+    robot.finish_soon()
+    robot.seen.caches((8, (100, 40), 5))
+    robot.act()
+    assert not robot.record.is_searching
+    assert robot.goal != pytest.approx((14.5, 8.1))
+    assert robot.stage is VectorState.VECTOR
+
+
+@pytest.mark.parametrize("doubled", [False, True])
+def test_quirk_explore_double_start_of_a_search(doubled):
+    robot = TaskRobot(quirks=Quirks(explore_double_start=doubled))
+    robot.start(Task.COLLECTOR)
+    robot.act()
+    robot.record.explore_ticks = -1
+    single = robot.record.wander_deg
+    robot.policy._rng = np.random.default_rng(8)
+    draws = np.random.default_rng(8).random((1, TASK_DRAWS))[0]
+    robot.act()
+    steps = [10.0 * draws[2] - 5.0] * doubled + [10.0 * draws[1] - 5.0]
+    for step in steps:
+        single = np.fmod(single + step, 5.0)
+    assert robot.record.wander_deg == pytest.approx(single)
+
+
+# Destinations
+
+
+@pytest.mark.parametrize("task", [*HARVESTS, *COLLECTS])
+def test_a_robot_that_has_picked_up_sets_out_for_its_destination_holding(robot, task):
+    assert pick_up(robot, task)[2] == Grip.GRASP
+    assert robot.activity is (Activity.HOMING if task in TO_NEST else Activity.TRANSPORT)
+    assert 3 not in robot.memory.objects.row[: robot.record.n_known]
+
+
+@pytest.mark.parametrize("task", [*HARVESTS, *COLLECTS])
+def test_every_task_asks_to_drop_with_its_own_word(robot, task):
+    expected = {Task.STARTER: Grip.SITE, Task.FINISHER: Grip.FOUND}.get(task, Grip.DELIVER)
+    assert wait_for_drop(robot, task)[2] == np.float32(expected)
+
+
+@pytest.mark.parametrize("task", [*HARVESTS, *COLLECTS])
+@pytest.mark.parametrize("event", [Event.NOTHING_HERE, Event.VANISHED])
+def test_a_refused_drop_is_a_transport_again(robot, task, event):
+    wait_for_drop(robot, task)
+    robot.seen.ground("floor")
+    robot.seen.pose(20.5, 15.0)
+    robot.seen.caches()
+    robot.seen.event(event)
+    assert robot.act()[2] == Grip.GRASP
+    assert robot.activity is (Activity.HOMING if task in TO_NEST else Activity.TRANSPORT)
+    assert robot.task is task
+
+
+@pytest.mark.parametrize("task", [Task.STARTER, Task.FINISHER])
+def test_a_cache_too_near_is_remembered_and_another_place_chosen(robot, task):
+    wait_for_drop(robot, task)
+    before = robot.goal
+    near = (11, (int(before[0] / 0.2), int(before[1] / 0.2)), 4)
+    robot.seen.event(Event.CACHE_TOO_NEAR, cache=near)
+    robot.act()
+    assert robot.activity is Activity.TRANSPORT
+    assert list(robot.policy.remembered_caches(0)) == [11]
+    if task is Task.STARTER:
+        assert np.hypot(robot.goal[0] - before[0], robot.goal[1] - before[1]) > 6.0
+    else:
+        assert robot.stage is VectorState.IDLE, "no isolated object left"
+
+
+def test_a_starter_stands_while_no_site_is_allowed(robot):
+    wait_for_pickup(robot, Task.STARTER)
+    for serial, cell in enumerate([(30, 40), (72, 40), (114, 40), (95, 40), (140, 40)], start=1):
+        robot.know_cache(serial, cell, 5)
+    robot.seen.caches((6, (50, 40), 5))
+    robot.seen.carry(3)
+    assert robot.act().tolist() == [0.0, 0.0, Grip.GRASP]
+    assert robot.act().tolist() == [0.0, 0.0, Grip.GRASP]
+    robot.record.n_caches = 0
+    assert robot.act()[:2].tolist() != [0.0, 0.0]
+
+
+def test_a_finisher_without_a_candidate_walks_with_its_object(robot):
+    pick_up(robot, Task.FINISHER)
+    robot.act(5)
+    assert robot.activity is Activity.TRANSPORT
+    assert robot.stage is VectorState.IDLE
+    assert robot.record.explore_ticks == 6
+
+
+@pytest.mark.parametrize("mismatch", [False, True])
+def test_quirk_finisher_tolerance_mismatch(mismatch):
+    robot = TaskRobot(quirks=Quirks(finisher_tolerance_mismatch=mismatch))
+    pick_up(robot, Task.FINISHER)
+    robot.know_object(9, (80, 10))  # at (16.1, 2.1)
+    robot.seen.pose(20.5, 8.1)
+    robot.act()
+    assert robot.stage is VectorState.VECTOR
+    robot.seen.pose(16.1, 6.7)  # 4.6 m away
+    robot.act()
+    # Arrived at 4.8 m, but not within 0.8 m: the goal is reset.
+    assert robot.stage is (VectorState.IDLE if mismatch else VectorState.VECTOR)
+    robot.seen.pose(16.1, 2.7)
+    robot.act(2)
+    # Selected again within tolerance, which never counts as arriving.
+    assert robot.activity is (Activity.TRANSPORT if mismatch else Activity.WAIT_DROP)
+
+
+def test_starting_within_tolerance_is_arrival():
+    robot = TaskRobot()
+    pick_up(robot, Task.FINISHER)
+    robot.know_object(9, (80, 10))
+    robot.seen.pose(16.1, 2.7)
+    robot.act()
+    assert robot.activity is Activity.WAIT_DROP
+
+
+# How tasks end
+
+
+@pytest.mark.parametrize("task", [*HARVESTS, *COLLECTS])
+def test_a_drop_ends_the_task_and_the_next_one_starts_in_the_same_tick(robot, task):
+    wait_for_drop(robot, task)
+    lasted = robot.policy._allocation.exec_time[0, task]
+    estimate = robot.policy.task_estimates[0, task]
+    drop(robot)
+    assert robot.policy.task_estimates[0, task] == pytest.approx((estimate + lasted) / 2)
+    assert robot.activity is Activity.ACQUIRE
+    has_begun = robot.record.explore_ticks == 1 or robot.stage is VectorState.VECTOR
+    assert has_begun
+
+
+def give_up(robot: TaskRobot) -> np.ndarray:
+    robot.policy._allocation.p_abort[:] = 2.0
+    action = robot.act()
+    robot.finish_soon()
+    return action
+
+
+def test_giving_up_empty_starts_the_next_task_at_once(robot):
+    wait_for_pickup(robot, Task.HARVESTER)
+    robot.seen.window({})
+    robot.seen.ground("floor")
+    assert give_up(robot)[2] == np.float32(Grip.RELEASE)
+    assert robot.activity is Activity.ACQUIRE
+
+
+@pytest.mark.parametrize("task", [*HARVESTS, *COLLECTS])
+def test_giving_up_while_carrying_stands_and_releases_until_the_object_is_gone(robot, task):
+    pick_up(robot, task)
+    for _ in range(2):  # over a cache or in the nest it takes two ticks
+        action = give_up(robot) if robot.activity is not Activity.LET_GO else robot.act()
+        assert action.tolist() == [0.0, 0.0, np.float32(Grip.RELEASE)]
+        assert robot.activity is Activity.LET_GO
+    drop(robot)
+    assert robot.activity is Activity.ACQUIRE
+
+
+def test_giving_up_while_waiting_cancels_the_interaction(robot):
+    wait_for_drop(robot, Task.STARTER)
+    robot.seen.set("interacting", 1.0)
+    assert give_up(robot).tolist() == [0.0, 0.0, np.float32(Grip.RELEASE)]
+
+
+def test_the_abort_draw_is_compared_with_the_abort_probability(robot):
+    robot.start(Task.GENERALIST)
+    draws = np.random.default_rng(8).random((1, TASK_DRAWS))[0]
+    for p, gives_up in [(draws[4], False), (np.nextafter(draws[4], 1.0), True)]:
+        robot.policy._rng = np.random.default_rng(8)
+        robot.policy._allocation.p_abort[:] = p
+        before = robot.policy._allocation.exec_start[0].max()
+        robot.act()
+        assert (robot.policy._allocation.exec_start[0].max() > before) == gives_up
+
+
+# Exception lists
+
+
+@pytest.mark.parametrize("task", [Task.STARTER, Task.FINISHER])
+def test_a_dropped_object_is_left_alone_by_its_dropper_for_one_task(robot, task):
+    wait_for_drop(robot, task)
+    drop(robot, object_row=3)
+    assert robot.memory.shunned[3] == robot.record.shun_round
+    give_up(robot)
+    assert robot.memory.shunned[3] != robot.record.shun_round
+
+
+def test_dropped_objects_add_up_over_successive_tasks_that_drop(robot):
+    wait_for_drop(robot, Task.STARTER)
+    drop(robot, object_row=3)
+    robot.policy._allocation.p_abort[:] = 0.0
+    robot.record.activity = Activity.WAIT_DROP
+    robot.policy._allocation.task[0] = Task.FINISHER
+    drop(robot, object_row=4)
+    assert [bool(robot.memory.shunned[row] == robot.record.shun_round) for row in (3, 4)] == [True, True]
+
+
+def test_objects_that_are_let_go_are_not_left_alone(robot):
+    pick_up(robot, Task.STARTER)
+    give_up(robot)
+    drop(robot, object_row=3)
+    assert robot.memory.shunned[3] != robot.record.shun_round
+
+
+def test_a_transferer_adds_to_another_cache_than_it_took_from(robot):
+    pick_up(robot, Task.TRANSFERER)
+    assert robot.memory.caches[0].no_drop
+    robot.seen.pose(20.5, 8.1)
+    robot.act()
+    assert robot.stage is VectorState.IDLE, "the only cache known is the one it came from"
+
+
+@pytest.mark.parametrize("next_task", [Task.TRANSFERER, Task.COLLECTOR])
+def test_caches_of_a_transfer_are_left_alone_by_the_next_transfer_only(robot, next_task):
+    wait_for_drop(robot, Task.TRANSFERER)
+    robot.policy._constants["partition_gamma"] = 1e9 if next_task is Task.TRANSFERER else 0.0
+    robot.policy._constants["tab_gamma"] = 0.0
+    drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, (120, 40), 6))
+    assert robot.task is next_task
+    shunned = next_task is Task.TRANSFERER
+    marks = {int(cache.serial): (bool(cache.no_pickup), bool(cache.no_drop)) for cache in robot.memory.caches[:2]}
+    assert marks == {7: (False, shunned), 8: (shunned, False)}
+
+
+def test_a_transfer_that_moved_nothing_ends_the_shielding_of_caches(robot):
+    wait_for_drop(robot, Task.TRANSFERER)
+    robot.policy._constants["partition_gamma"] = 1e9
+    robot.policy._constants["tab_gamma"] = 0.0
+    drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, (120, 40), 6))
+    assert any(cache.no_drop for cache in robot.memory.caches[:2])
+    give_up(robot)
+    assert robot.task is Task.TRANSFERER
+    assert not any(cache.no_pickup or cache.no_drop for cache in robot.memory.caches[:2])
+
+
+# The policies
+
+
+@pytest.mark.parametrize(("policy_class", "kind"), [(STOCHMPolicy, "static"), (STOCHXPolicy, "dynamic")])
+def test_policies_name_the_world_they_are_made_for(policy_class, kind):
+    assert policy_class.caches == kind
+
+
+def test_nobody_has_a_task_before_the_first_tick_and_everybody_after():
+    robot = TaskRobot(STOCHMPolicy())
+    assert robot.policy.task.dtype == np.int8
+    assert robot.policy.task_shares.tolist() == [1.0, 0, 0, 0, 0, 0, 0, 0]
+    robot.act()
+    assert robot.task in (Task.GENERALIST, Task.HARVESTER, Task.COLLECTOR)
+    assert robot.policy.task_shares.sum() == 1.0
+    assert robot.policy.task_shares[0] == 0.0
+
+
+@pytest.mark.parametrize("activity", list(Activity))
+def test_inactive_robots_keep_their_state_and_stand(robot, activity):
+    robot.start(Task.HARVESTER)
+    robot.record.activity = activity
+    robots, allocation = robot.policy._robots.copy(), [part.copy() for part in robot.policy._allocation]
+    robot.seen.carry(3)
+    robot.seen.caches(CACHE_SEEN)
+    assert robot.act(5, active=False).tolist() == [0.0, 0.0, 0.0]
+    np.testing.assert_array_equal(robot.policy._robots, robots)
+    for part, before in zip(robot.policy._allocation, allocation, strict=True):
+        np.testing.assert_array_equal(part, before)
+    assert robot.policy.n_caches.tolist() == [0]
+
+
+def test_a_robot_whose_drop_was_completed_in_repair_has_finished(robot):
+    wait_for_drop(robot, Task.STARTER)
+    estimate = robot.policy.task_estimates[0, Task.STARTER]
+    robot.seen.carry(None)
+    robot.act(3, active=False)
+    robot.act()
+    assert robot.policy.task_estimates[0, Task.STARTER] != estimate
+    assert robot.activity is Activity.ACQUIRE

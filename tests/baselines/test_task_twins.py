@@ -1,0 +1,163 @@
+"""The compiled task machines against the slow ones, on random observations that visit every task and state."""
+
+import math
+
+import numpy as np
+import pytest
+
+from baselines.machines import Activity
+from baselines.stochm import STOCHMPolicy
+from baselines.stochx import STOCHXPolicy
+from baselines.tasks import TASK_DRAWS, Goal
+from swarm_forage_env.contract.codes import Event, Task
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
+from tests.reference import task_chain
+from tests.reference.controllers import ObjectDictionary
+from tests.reference.task_controllers import TASKS, ReferenceTaskRobot
+from tests.support.observations import GREYS, Observations, make_task
+
+N_ROBOTS = 6
+STATES = [
+    "acquire",
+    "wait for pick-up",
+    "homing",
+    "homing in nest",
+    "wait for drop",
+    "leave nest",
+    "transport",
+    "finished",
+    "let go",
+]
+PLACES = [(38, 38), (38, 46), (46, 38), (48, 46), (43, 43)]
+"""Centre cells of small caches around the cells where the robots are."""
+
+
+def crowded_task(**changes):
+    """A world of small caches, five cells wide, and short distances."""
+    return make_task(
+        N_ROBOTS,
+        caches="dynamic",
+        cache_side_m=1.0,
+        cache_side_nominal_m=1.01,  # no distance between cells, so that rounding decides nothing
+        min_dist_m=1.0,
+        cache_proximity_m=2.0,
+        **changes,
+    )
+
+
+class Fuzz:
+    """Random observations whose parts stay for a while, and which often grant what a robot waits for."""
+
+    def __init__(self, task, seed: int) -> None:
+        self.seen = Observations(task)
+        self.rng = np.random.default_rng(seed)
+
+    def perturb(self, i: int, robot: np.record) -> None:
+        rng, seen = self.rng, self.seen
+        activity, carrying = Activity(int(robot.activity)), bool(seen.get("carrying", i)[0])
+        if rng.random() < 0.15:
+            seen.ground(rng.choice(list(GREYS)), i)
+        if rng.random() < 0.3:
+            seen.obstacle(rng.uniform(-math.pi, math.pi) if rng.random() < 0.25 else None, i)
+            # Two equal beams would point exactly at the edge between soft and hard turns, which rounding decides.
+            seen.set("proximity", seen.get("proximity", i) * rng.uniform(0.9, 1.0, 24), i)
+        seen.set("light", rng.random(24), i)
+        seen.set("wheel_speed", rng.choice([-0.5, 0.0, 0.0004, 0.45], 2), i)
+        cell = rng.integers(40, 46, 2)
+        seen.pose(*((cell + rng.random(2)) * 0.2), rng.uniform(-math.pi, math.pi), i)
+        if rng.random() < 0.1:
+            seen.believed_position(*rng.uniform((1.0, 1.0), (31.0, 15.0)), i)
+        elif rng.random() < 0.4:
+            seen.believed_position(robot.goal_x_m + rng.choice([0.01, 0.1]), robot.goal_y_m, i)
+        caches = [(int(10 * k + rng.integers(1, 4)), PLACES[k], int(rng.integers(2, 6))) for k in rng.permutation(5)]
+        if rng.random() < 0.1:
+            seen.caches(*caches[: rng.integers(0, 5)], robots=i)
+        event = Event(int(rng.integers(1, 10))) if rng.random() < 0.05 else Event.NONE
+        served = activity in (Activity.WAIT_PICKUP, Activity.WAIT_DROP, Activity.LET_GO) and rng.random() < 0.4
+        if served or rng.random() < 0.005:
+            seen.carry(None if carrying else int(rng.integers(200)), i)
+            event = Event.JOINED_CACHE if carrying else Event.PICKED_FROM_CACHE
+        object_row, cache = int(rng.integers(200)), caches[4]
+        seen.event(event, i, object_row if rng.random() < 0.8 else None, cache if rng.random() < 0.8 else None)
+        if rng.random() < 0.1:
+            rows = rng.choice(200, 2, replace=False)
+            seen.window({(int(rng.integers(-2, 3)), k): int(row) for k, row in enumerate(rows)}, i)
+        elif rng.random() < 0.5:
+            seen.window({}, i)
+
+
+def twin_of(policy, i: int, task) -> ReferenceTaskRobot:
+    """A slow robot with the first estimates, probabilities and coins of a compiled one."""
+    a, p = policy._allocation, policy.parameters
+    blocks = list(task_chain.CHILDREN)[: policy.n_tabs]
+
+    def site() -> tuple[float, float] | None:
+        robot = policy._robots[i]
+        return (float(robot.goal_x_m), float(robot.goal_y_m))
+
+    def last_forgotten() -> tuple[int, int]:
+        robot = policy._robots[i]
+        return (int(robot.last_cache_x_m / 0.2), int(robot.last_cache_y_m / 0.2))
+
+    return ReferenceTaskRobot(
+        task,
+        ObjectDictionary(),
+        estimates={name: float(a.estimate[i, code]) for code, name in enumerate(TASKS) if name},
+        partition={block: float(a.partition[i, k]) for k, block in enumerate(blocks)},
+        last_child={block: task_chain.CHILDREN[block][a.last_child[i, k]] for k, block in enumerate(blocks)},
+        block=blocks[a.tab[i]],
+        numbers=(p.partition_reactivity, p.partition_gamma, p.subtask_reactivity, p.subtask_gamma),
+        smallest_cache=int(p.smallest_cache),
+        site=site,
+        last_forgotten=last_forgotten,
+    )
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("quirks", [Quirks(), AUTHORS_PROGRAM], ids=["as described", "authors' program"])
+@pytest.mark.parametrize("policy_class", [STOCHMPolicy, STOCHXPolicy])
+def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
+    task = crowded_task(quirks=quirks)
+    fuzz = Fuzz(task, seed=1)
+    # Short estimates let robots give up, and a high probability of subtasks lets them do all, often enough.
+    policy = policy_class(
+        partition_gamma=1.6,
+        generalist_estimate_low_ticks=20.0,
+        generalist_estimate_high_ticks=200.0,
+        subtask_estimate_low_ticks=20.0,
+        subtask_estimate_high_ticks=200.0,
+    )
+    policy.reset(task, np.random.default_rng(2))
+    twins = [twin_of(policy, i, task) for i in range(N_ROBOTS)]
+    visited: set[tuple[Task, Activity]] = set()
+    goals: set[int] = set()
+    searching = 0
+    for now in range(1, 2001):
+        for i in range(N_ROBOTS):
+            fuzz.perturb(i, policy._robots[i])
+        active = fuzz.rng.random(N_ROBOTS) < 0.95
+        actions = policy.act(fuzz.seen.array, active)
+        for i in np.flatnonzero(active):
+            expected = twins[i].tick(fuzz.seen.array[i], policy._draws[i], now)
+            assert [TASKS[policy.task[i]], STATES[policy.activity[i]]] == [twins[i].job, twins[i].state]
+            assert actions[i] == pytest.approx(expected, abs=2e-6)
+            visited.add((Task(int(policy.task[i])), Activity(int(policy.activity[i]))))
+            goals.add(int(policy._robots[i].goal_kind))
+            searching += policy._robots[i].is_searching
+    for i, twin in enumerate(twins):
+        known = {cache.serial: (*cell, cache.count) for cell, cache in twin.caches.items()}
+        assert {serial: value[:3] for serial, value in policy.remembered_caches(i).items()} == known
+        assert {row: cell for row, (*cell, _) in policy.remembered(i).items()} == {
+            row: list(cell) for row, (cell, _) in twin.memory.known.items()
+        }
+        estimates = policy.task_estimates[i]
+        assert {name: estimates[code] for code, name in enumerate(TASKS) if name} == pytest.approx(twin.estimates)
+    tasks = list(Task)[1:] if policy_class is STOCHXPolicy else list(Task)[1:4]
+    assert {task for task, _ in visited} == set(tasks)
+    moving = {Activity.HOMING, Activity.HOMING_IN_NEST, Activity.TRANSPORT}
+    waiting = {Activity.WAIT_PICKUP, Activity.WAIT_DROP, Activity.LET_GO}
+    assert {activity for _, activity in visited} == {Activity.ACQUIRE} | moving | waiting
+    assert goals == ({Goal.OBJECT, Goal.CACHE} if policy_class is STOCHMPolicy else set(Goal) - {Goal.NONE, Goal.NEST})
+    # The quirk compares metres with cells, which lie so far apart here that no cache is ever forgotten.
+    assert (searching > 100) != quirks.cache_forget_unit_mismatch
+    assert policy._draws.shape == (N_ROBOTS, TASK_DRAWS)

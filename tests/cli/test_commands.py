@@ -1,0 +1,472 @@
+"""The console command, as a person uses it: words in, text and exit code out."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from swarm_forage_env.policies import pretrained
+
+from swarm_forage_env import cli
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.policies.registry import RandomPolicy, policy_names
+from swarm_forage_env.scenarios.config import field_sections
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.study import film
+from swarm_forage_env.study.record import RunRecord
+from swarm_forage_env.study.store import load
+
+SHORT = ("--robots", "3", "--objects", "20", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
+RUN = ("run", "--policy", "random", *SHORT)
+SHORT_FILM = ("--robots", "3", "--seconds", "4", "--size", "240", "--fps", "5")
+
+
+@pytest.fixture
+def command(tmp_path, monkeypatch, capsys):
+    """Run swarm-forage in an empty folder; returns exit code, stdout, stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words):
+        monkeypatch.setattr(sys, "argv", ["swarm-forage", *words])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        shown = capsys.readouterr()
+        return end.value.code or 0, shown.out, shown.err
+
+    return call
+
+
+def test_run_shows_a_table_and_keeps_records_and_a_picture(command):
+    code, out, err = command(*RUN, "--seeds", "2")
+    assert code == 0
+    assert "warehouse_small: 3 robots, 20 objects, 4 s" in out
+    for word in ("random", "none", "deliveries", "per 1,000 s", "interference", "simulated s", "± 95% t interval"):
+        assert word in out
+    folder = Path("results/warehouse_small")
+    assert [record.seed for record in sorted(load(folder), key=lambda record: record.seed)] == [0, 1]
+    assert (folder / "performance.png").read_bytes().startswith(b"\x89PNG")
+    assert "2 records in results/warehouse_small" in err
+
+
+def test_a_single_seed_has_no_interval(command):
+    _, out, _ = command(*RUN)
+    assert "one seed, so no interval" in out
+    assert "±" not in out
+
+
+def test_first_pickups_are_shown_where_they_are_the_performance(command):
+    words = ("run", "--policy", "random", "--scenario", "search_and_rescue", "--side", "16", "--jobs", "1")
+    code, out, _ = command(*words, "--horizon", "4", "--set", "interval_s=2")
+    assert code == 0
+    assert "first pick-ups" in out
+    assert "12 robots, 80 objects" in out
+
+
+def test_the_same_command_again_runs_nothing(command, monkeypatch):
+    command(*RUN, "--seeds", "2")
+    monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))
+    code, out, _ = command(*RUN, "--seeds", "2")
+    assert code == 0
+    assert "random" in out
+
+
+def test_json_is_the_only_thing_on_stdout(command):
+    code, out, _ = command(*RUN, "--seeds", "2", "--first-seed", "5", "--json", "--out", "here")
+    assert code == 0
+    answer = json.loads(out)
+    assert (answer["scenario"], answer["out"], answer["failures"]) == ("warehouse_small", "here", [])
+    assert [run["seed"] for run in answer["runs"]] == [5, 6]
+    (summary,) = answer["controllers"]
+    assert (summary["controller"], summary["caches"], summary["n_runs"]) == ("random", "none", 2)
+    record = RunRecord.read(answer["runs"][0]["file"])
+    assert answer["runs"][0]["first_pickups_per_1000_s"] == record.rate_per_1000_s("first_picked")
+
+
+def test_json_has_null_where_there_is_no_interval(command):
+    _, out, _ = command(*RUN, "--json")
+    assert json.loads(out)["controllers"][0]["deliveries_per_1000_s"]["low"] is None
+
+
+def test_several_controllers_and_their_worlds(command):
+    code, out, _ = command("run", "--policy", "random, crw,random", *SHORT, "--caches", "static", "--dry-run")
+    assert code == 0
+    rows = [line.split("│")[2:4] for line in out.splitlines() if "│ to do" in line]
+    assert [[cell.strip() for cell in row] for row in rows] == [["random", "static"], ["crw", "static"]]
+
+
+@pytest.mark.parametrize("words", [("run", "--controller", "crw,dpo"), ("compare", "--policies", "crw,dpo")])
+def test_policies_are_found_under_the_other_names_of_the_option_too(command, words):
+    code, out, _ = command(*words, "--dry-run")
+    assert code == 0
+    assert "to do" in out
+
+
+def test_a_dry_run_plans_estimates_and_touches_nothing(command):
+    code, out, _ = command("run", "--policy", "random", "--seeds", "3", "--jobs", "2", "--dry-run")
+    assert code == 0
+    assert out.count("│ to do") == 3
+    assert "3 runs to do, 30,000 simulated seconds: roughly 8 s on 2 processes" in out
+    assert not list(Path.cwd().iterdir())
+
+
+def test_a_dry_run_knows_what_is_stored(command):
+    command(*RUN)
+    _, out, _ = command(*RUN, "--seeds", "2", "--dry-run", "--json")
+    answer = json.loads(out)
+    assert [run["stored"] for run in answer["runs"]] == [True, False]
+    assert answer["runs"][1]["spec"]["seed"] == 1
+    assert answer["estimated_wall_s"] == pytest.approx(3 * 20 / 0.5e6)
+
+
+def test_set_changes_any_field_with_its_type(command):
+    words = (
+        "--set",
+        "team=true",
+        "--set",
+        "nest_size_m=2,4",
+        "--set",
+        "walk_probability=0.5",
+        "--set",
+        "static_size=3",
+        "--set",
+        "name=depot",
+    )
+    _, out, _ = command(*RUN, *words, "--set", "physics_substeps=0.5,0.5", "--dry-run", "--json")
+    world = json.loads(out)["runs"][0]["spec"]["scenario"]
+    assert world["reward"]["team"] is True
+    assert world["arena"]["nest_size_m"] == [2.0, 4.0]
+    assert world["objects"]["walk_probability"] == 0.5
+    assert world["cache"]["static_size"] == 3
+    assert world["name"] == "depot"
+    assert world["physics_substeps"] == [0.5, 0.5]
+
+
+def test_wrappers_disturb_the_run_and_are_part_of_its_record(command):
+    words = ("--wrapper", "actuator_noise:sigma=0.1", "--wrapper", "throttle:waveform=constant,amplitude=0.2")
+    code, out, _ = command(*RUN, *words, "--json")
+    assert code == 0
+    record = RunRecord.read(json.loads(out)["runs"][0]["file"])
+    assert record.adversity.tolist() == pytest.approx([0.2, 0.2])
+    assert "4 s, with throttle, actuator_noise" in command(*RUN, *words)[1]
+    assert [wrapper["wrapper"] for wrapper in json.loads(record.spec)["wrappers"]] == ["throttle", "actuator_noise"]
+
+
+@pytest.mark.parametrize("name", sorted(field_sections()))
+def test_every_field_can_be_set_to_the_value_it_has(name):
+    from swarm_forage_env.cli.plan import parse_setting
+
+    config = scenario("warehouse_small")
+    section = field_sections()[name]
+    value = getattr(getattr(config, section) if section else config, name)
+    text = ",".join(map(str, value)) if isinstance(value, tuple) else str(value)
+    assert parse_setting(f"{name}={text}") == (name, value)
+
+
+def test_a_failed_run_is_reported_with_the_way_to_run_it_again(command, monkeypatch):
+    def refuse(self, obs, active):
+        raise RuntimeError("I would rather not")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(RandomPolicy, "act", refuse)
+        code, out, err = command(*RUN)
+        assert code == 1
+        assert out == ""
+        assert "RuntimeError: I would rather not" in err
+        again = err.strip().splitlines()[-1].split("again, alone: swarm-forage ")[1].split()
+        with pytest.raises(RuntimeError, match="I would rather not"):
+            command(*again)
+    code, out, _ = command(*again)
+    assert code == 0
+    assert "random in warehouse_small, 3 robots" in out
+
+
+def test_rerun_compares_with_the_record(command):
+    command(*RUN)
+    (file,) = Path("results/warehouse_small").glob("*.parquet")
+    code, out, _ = command("rerun", str(file))
+    assert code == 0
+    assert f"bit for bit the same as {file}" in out
+
+
+def test_rerun_notices_a_difference(command, monkeypatch):
+    command(*RUN)
+    (file,) = Path("results/warehouse_small").glob("*.parquet")
+    monkeypatch.setattr(RunRecord, "same_results", lambda *_: False)
+    code, _, err = command("rerun", str(file))
+    assert code == 1
+    assert "the results differ" in err
+
+
+def test_rerun_says_when_the_policy_is_not_what_it_was(command):
+    shipped = Path(pretrained.__file__).with_name("ppo_warehouse_small.npz")
+    copy = Path(shutil.copy(shipped, "mine.npz"))
+    command("run", "--policy", "mine.npz", *SHORT)
+    (file,) = Path("results/warehouse_small").glob("*.parquet")
+    assert command("rerun", str(file))[0] == 0
+    for change, said in ((lambda: copy.write_bytes(b"other"), "has changed since"), (copy.unlink, "No such file")):
+        change()
+        code, _, err = command("rerun", str(file))
+        assert (code, err.count("\n")) == (2, 1)
+        assert f"Cannot run {file} again: " in err
+        assert said in err
+
+
+def test_ctrl_c_in_this_process(command, monkeypatch):
+    def interrupt(self, task, rng):
+        raise KeyboardInterrupt
+
+    command(*RUN)
+    monkeypatch.setattr(RandomPolicy, "reset", interrupt)
+    code, _, err = command(*RUN, "--seeds", "3")
+    assert code == 130
+    expected = "swarm-forage: Interrupted: 1 of 3 runs are finished and kept. They are in results/warehouse_small; "
+    assert err.splitlines()[-1] == expected + "the same command does the rest."
+
+
+@pytest.mark.slow
+def test_ctrl_c_with_worker_processes(tmp_path):
+    words = [
+        "run",
+        "--policy",
+        "random",
+        "--jobs",
+        "2",
+        "--seeds",
+        "6",
+        "--horizon",
+        "20000",
+        "--out",
+        str(tmp_path),
+    ]
+    program = [sys.executable, "-m", "swarm_forage_env.cli", *words]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(program, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as process:
+        while not list(tmp_path.glob("*.parquet")) and process.poll() is None:
+            time.sleep(0.1)
+        os.killpg(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=10)
+    assert process.returncode == 130
+    assert out == ""
+    assert "runs are finished and kept" in err
+    assert "Traceback" not in err
+    assert 1 <= len(load(tmp_path)) < 6
+
+
+def test_without_matplotlib_it_says_how_to_get_the_picture(command, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    code, out, err = command(*RUN)
+    assert code == 0
+    assert "random" in out
+    assert 'pip install ".[plots]"' in err
+    assert not Path("results/warehouse_small/performance.png").exists()
+
+
+@pytest.mark.parametrize("name", ["ppo_warehouse_small", str(pretrained.network_file("ppo_warehouse_small"))])
+def test_info_describes_a_network_by_its_name_or_file(command, name):
+    code, out, _ = command("info", name)
+    assert code == 0
+    assert "a network of 23 x 64 x 64 x 6 units (tanh)" in out
+    assert re.search(r"decision_ticks +5\n", out)
+    assert re.search(r"stable-baselines3 +\d", out)
+
+
+@pytest.mark.parametrize(
+    ("file", "said"),
+    [
+        ("gone.npz", "Cannot read the policy file gone.npz: there is no such file."),
+        ("gone.zip", "Cannot read the policy file gone.zip: there is no such file."),
+        ("bad.npz", "Expected bad.npz to hold a network: The file is no .npz archive."),
+    ],
+)
+def test_info_says_what_is_wrong_with_a_file(command, file, said):
+    Path("bad.npz").write_bytes(b"no network")
+    assert command("info", file) == (2, "", f"swarm-forage: {said}\n")
+
+
+def test_info_opens_no_model_that_could_run_code(command):
+    Path("model.zip").write_bytes(b"no model")
+    code, out, _ = command("info", "model.zip")
+    assert code == 0
+    assert "not opened here" in out
+
+
+def test_list_names_everything(command):
+    code, out, _ = command("list")
+    assert code == 0
+    for name in (*SCENARIO_NAMES, *policy_names()):
+        assert name in out
+
+
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_info_shows_every_field_space_and_slice_of_a_scenario(command, name):
+    code, out, _ = command("info", name)
+    assert code == 0
+    words = out.split()
+    assert set(field_sections()) <= set(words)
+    assert command("info", f"swarm_forage/{name}-v0")[1] == out, "by its environment id"
+    for part in ("Box(-1.0, 1.0, (111,), float32)", "Box(-1.0, 1.0, (3,), float32)", "los_cache", "proximity"):
+        assert part in out
+
+
+@pytest.mark.parametrize("name", policy_names())
+def test_info_describes_a_controller(command, name):
+    code, out, _ = command("info", name)
+    assert code == 0
+    for word in ("caches", "reads", "parameters", "defined in"):
+        assert word in out
+
+
+def test_schema_lists_the_columns(command):
+    _, out, _ = command("schema")
+    assert "interference_fraction" in out
+
+
+def test_version_and_help(command):
+    assert command("--version") == (0, "swarm-forage 0.1.0\n", "")
+    for words in ((), ("--help",)):
+        code, out, _ = command(*words)
+        assert code == 0
+        assert "record" in out
+
+
+def test_help_loads_neither_physics_nor_tables():
+    heavy = "{'numba', 'pymunk', 'polars', 'scipy', 'matplotlib'}"
+    program = f"import sys; from swarm_forage_env import cli; print({heavy} & set(sys.modules))"
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert answer.stdout == "set()\n"
+
+
+def test_record_films_a_run(command):
+    pytest.importorskip("PIL")
+    words = ("--policy", "random", "--robots", "3", "--seconds", "8", "--size", "240", "--fps", "5")
+    code, out, _ = command("record", "--out", "film.gif", *words)
+    assert (code, out) == (0, "wrote film.gif\n")
+    assert Path("film.gif").read_bytes().startswith(b"GIF8")
+    assert command("record", *words)[1] == "wrote results/warehouse_small_random.gif\n"
+    assert Path("results/warehouse_small_random.gif").read_bytes() == Path("film.gif").read_bytes()
+
+
+@pytest.mark.parametrize(("asked", "filmed"), [((), "static"), (("--caches", "none"), "none")])
+def test_record_films_the_caches_that_were_asked_for(command, monkeypatch, asked, filmed):
+    pytest.importorskip("PIL")
+    build, built = film.build_stack, []
+
+    def note(config, *args, **options):
+        built.append(config.caches)
+        return build(config, *args, **options)
+
+    monkeypatch.setattr(film, "build_stack", note)
+    assert command("record", "--policy", "stochm", *asked, *SHORT_FILM)[0] == 0
+    assert built == [filmed]
+
+
+def test_record_names_a_file_without_the_way_there(command, monkeypatch):
+    pytest.importorskip("PIL")
+    shutil.copy(Path(pretrained.__file__).with_name("ppo_warehouse_small.npz"), "mine.npz")
+    render, titles = film.render_frame, set()
+
+    def note(*args, title, **options):
+        titles.add(title)
+        return render(*args, title=title, **options)
+
+    monkeypatch.setattr(film, "render_frame", note)
+    assert command("record", "--policy", "mine.npz", *SHORT_FILM)[0] == 0
+    assert titles == {"warehouse small, mine, 32 x 16 m"}
+
+
+def test_record_says_when_a_network_does_not_fit(command):
+    pytest.importorskip("PIL")
+    about = NetworkAbout(interface=InterfaceConfig())
+    Network((np.zeros((2, 3), np.float32),), (np.zeros(3, np.float32),), about).save("mine.npz")
+    code, _, err = command("record", "--policy", "mine.npz", *SHORT_FILM)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "Expected a network from 111 columns to 3 actions" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("run", "--scenario", "warehouse_smal"), "Unknown scenario 'warehouse_smal'. Did you mean 'warehouse_small'?"),
+        (("run", "--policy", "crw,crv"), "Unknown policy 'crv'. Did you mean 'crw'?"),
+        (("run", "--policy", "crw,gone.npz"), "gone.npz"),
+        (("run", "--policy", ","), "Expected one or more names separated by commas"),
+        (("run", "--bogus"), "No such option: --bogus"),
+        (("run", "extra"), "unexpected extra argument"),
+        (("run", "--seeds", "0"), "'--seeds'"),
+        (("run", "--seeds", "many"), "'--seeds'"),
+        (("run", "--first-seed", "-1"), "'--first-seed'"),
+        (("run", "--jobs", "0"), "'--jobs'"),
+        (("run", "--robots", "0"), "'--robots'"),
+        (("run", "--robots", "100000"), "Expected at most"),
+        (("run", "--objects", "100000"), "Expected at most"),
+        (("run", "--horizon", "100"), "Expected a horizon of a whole number of intervals of 200 s, got 100 s"),
+        (("run", "--horizon", "-200"), "horizon_s > 0"),
+        (("run", "--side", "32"), "Expected --side with search_and_rescue only"),
+        (("run", "--scenario", "search_and_rescue", "--side", "33"), "Expected side_m to be one of"),
+        (("run", "--caches", "foo"), "Expected caches to be one of none, static, dynamic, got 'foo'"),
+        (("run", "--set", "n_robot=5"), "Unknown scenario field 'n_robot'. Did you mean 'n_robots'?"),
+        (("run", "--set", "n_robots"), "Expected --set key=value, got 'n_robots'"),
+        (("run", "--set", "n_robots=x"), "Expected n_robots to be a whole number, got 'x'"),
+        (("run", "--set", "dt_s=fast"), "Expected dt_s to be a number, got 'fast'"),
+        (("run", "--set", "dt_s=nan"), "finite number"),
+        (("run", "--set", "width_m=1e9"), "at most 200,000,000 cells"),
+        (("run", "--set", "team=maybe"), "Expected team to be true or false, got 'maybe'"),
+        (("run", "--set", "nest_size_m=1"), "Expected nest_size_m to be numbers separated by commas"),
+        (("run", "--set", "n_robots=3", "--robots", "4"), "Expected n_robots once"),
+        (("run", "--wrapper", "throtle:amplitude=1"), "Unknown wrapper 'throtle'. Did you mean 'throttle'?"),
+        (("run", "--wrapper", "actuator_noise:sigma"), "Expected the settings of wrapper actuator_noise as key=value"),
+        (("run", "--out", "file"), "Expected a folder for run records, got the file file"),
+        (("record", "--out", "x.avi"), "ending in .gif or .mp4"),
+        (("info", "crv"), "Did you mean 'crw'?"),
+        (("rerun", "missing.parquet"), "Cannot read missing.parquet: No such file or directory"),
+        (("rerun", "file"), "Cannot read file: it is no Parquet file or a damaged one"),
+        (("bogus",), "No such command 'bogus'"),
+    ],
+    ids=lambda value: " ".join(value)[:40] if isinstance(value, tuple) else "",
+)
+def test_a_mistake_is_one_line_and_exit_code_2(command, words, complaint):
+    Path("file").write_text("no record")
+    code, out, err = command(*words)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("swarm-forage: ")
+    assert err.count("\n") == 1
+    assert complaint in err
+    assert [path.name for path in Path.cwd().iterdir()] == ["file"]
+
+
+def test_a_damaged_record_in_the_folder_is_named(command):
+    _, out, _ = command(*RUN, "--dry-run", "--json")
+    damaged = Path("results/warehouse_small") / f"{json.loads(out)['runs'][0]['run_id']}.parquet"
+    damaged.parent.mkdir(parents=True)
+    damaged.write_bytes(b"damaged")
+    code, _, err = command(*RUN)
+    assert code == 2
+    assert str(damaged) in err
+    assert damaged.read_bytes() == b"damaged"
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(command):
+    Path("file").write_text("")
+    code, _, err = command(*RUN, "--out", "file/inside")
+    assert code == 1
+    assert "Errno" not in err
+    assert "Not a directory: file" in err
+    assert err.count("\n") == 1
+
+
+def test_split_names_drops_repetitions():
+    from swarm_forage_env.cli.plan import split_names
+
+    assert split_names("crw, dpo,crw,") == ("crw", "dpo")
+    with pytest.raises(ConfigError):
+        split_names(" ")

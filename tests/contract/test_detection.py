@@ -1,0 +1,181 @@
+"""Obstacle, nest, object and cache from readings: thresholds, and what they mean in the world."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.contract.detection import (
+    BEAM_ANGLES_RAD,
+    is_obstacle_vector,
+    ring_sum,
+    sees_cache,
+    sees_nest,
+    sees_object,
+    sees_obstacle,
+)
+from tests.support.stage import build_cache, cell_centre, lay, put, tidy_world
+
+FAR_BEHIND_RAD = 2.61
+OBSTACLE_LENGTH = 0.1
+ring = npst.arrays(np.float32, 24, elements=st.floats(0, 1, width=32))
+
+
+def vector_of(readings) -> complex:
+    """Sum of the readings as polar vectors, in complex numbers."""
+    return complex(sum(np.float64(readings) * np.exp(1j * BEAM_ANGLES_RAD)))
+
+
+def test_beams_are_15_degrees_apart_from_7_5_degrees():
+    np.testing.assert_allclose(np.degrees(BEAM_ANGLES_RAD), [7.5 + 15 * k for k in range(24)])
+
+
+@given(readings=ring)
+def test_ring_sum_adds_polar_vectors(readings):
+    assert ring_sum(readings) == pytest.approx((vector_of(readings).real, vector_of(readings).imag), abs=1e-9)
+
+
+@given(readings=ring, scale=st.sampled_from([1.0, 0.1, 0.02]))
+def test_obstacle_is_a_long_vector_or_one_that_points_back(readings, scale):
+    readings = readings * np.float32(scale)
+    vector = vector_of(readings)
+    length, angle = abs(vector), abs(math.atan2(vector.imag, vector.real))
+    if length > 1e-5 and abs(length - OBSTACLE_LENGTH) > 1e-6 and abs(angle - FAR_BEHIND_RAD) > 1e-6:
+        assert sees_obstacle(readings) == (length > OBSTACLE_LENGTH or angle > FAR_BEHIND_RAD)
+
+
+@pytest.mark.parametrize(
+    ("length", "angle", "obstacle"),
+    [
+        (0.0, 0.0, False),
+        (0.0999, 0.0, False),
+        (0.1001, 0.0, True),
+        (0.1001, -1.5, True),
+        (0.001, 2.60, False),
+        (0.001, 2.62, True),
+        (0.001, -2.60, False),
+        (0.001, -2.62, True),
+        (0.001, math.pi, True),
+    ],
+)
+def test_obstacle_thresholds(length, angle, obstacle):
+    assert is_obstacle_vector(length * math.cos(angle), length * math.sin(angle)) == obstacle
+
+
+def test_one_reading_at_full_range_is_an_obstacle():
+    readings = np.zeros(24, np.float32)
+    readings[3] = 0.1004
+    assert sees_obstacle(readings)
+    readings[3] = 0.0996
+    assert not sees_obstacle(readings)
+
+
+@pytest.mark.parametrize(
+    ("greys", "seen"),
+    [
+        ((0.7, 0.7, 0.7, 0.7), "nest"),
+        ((0.7, 0.7, 0.7, 1.0), "nest"),
+        ((0.6, 0.8, 0.7, 1.0), "nest"),
+        ((0.7, 0.7, 1.0, 1.0), ""),
+        ((0.59, 0.7, 0.7, 1.0), ""),
+        ((0.7, 0.81, 0.7, 1.0), ""),
+        ((0.0, 0.0, 0.0, 0.0), "object"),
+        ((0.05, 0.0, 0.05, 0.0), "object"),
+        ((0.0, 0.0, 0.0, 1.0), ""),
+        ((0.06, 0.0, 0.0, 0.0), ""),
+        ((0.4, 0.4, 0.4, 0.4), "cache"),
+        ((0.3, 0.5, 0.4, 0.0), "cache"),
+        ((0.4, 0.4, 1.0, 1.0), ""),
+        ((0.29, 0.4, 0.4, 1.0), ""),
+        ((0.51, 0.4, 0.4, 1.0), ""),
+        ((1.0, 1.0, 1.0, 1.0), ""),
+    ],
+)
+def test_ground_bands(greys, seen):
+    row = np.array(greys, np.float32)
+    assert {"nest": sees_nest(row), "object": sees_object(row), "cache": sees_cache(row)} == {
+        name: name == seen for name in ("nest", "object", "cache")
+    }
+
+
+# In the world
+
+
+def sensed(env, name, robot=0):
+    """A slice of what a robot observes after standing for one tick."""
+    actions = np.zeros((len(env.active), 3), np.float32)
+    actions[:, 2] = Grip.RELEASE
+    obs = env.step_batch(actions)[0]
+    return obs[robot, env.layout[name]].copy()
+
+
+@pytest.fixture(scope="module")
+def stage():
+    return tidy_world(n_robots=3)
+
+
+@pytest.mark.parametrize(
+    ("ahead", "left", "seen"),
+    [
+        (0.0, 0.0, True),
+        (0.036, 0.0, True),
+        (-0.036, 0.0, True),
+        (0.038, 0.0, False),
+        (-0.038, 0.0, False),
+        (0.0, 0.088, True),
+        (0.0, 0.089, False),
+        (0.036, -0.088, True),
+    ],
+)
+@pytest.mark.parametrize("heading", [0.0, math.pi / 2, math.pi, -math.pi / 2])
+def test_an_object_is_seen_within_3_7_cm_along_the_heading(stage, ahead, left, seen, heading):
+    lay(stage, 0, (60, 40))
+    x, y = cell_centre((60, 40))
+    cos, sin = math.cos(heading), math.sin(heading)
+    put(stage, 0, x + cos * ahead - sin * left, y + sin * ahead + cos * left, heading)
+    assert sees_object(sensed(stage, "ground")) == seen
+
+
+def test_nest_and_cache_are_seen_from_inside():
+    env = tidy_world(n_robots=3, caches="static")
+    build_cache(env, [0, 1], (60, 40))
+    put(env, 0, *cell_centre((60, 40)))
+    put(env, 1, *cell_centre((16, 40)))
+    put(env, 2, *cell_centre((100, 60)))
+    grounds = [sensed(env, "ground", robot) for robot in range(3)]
+    assert [sees_cache(row) for row in grounds] == [True, False, False]
+    assert [sees_nest(row) for row in grounds] == [False, True, False]
+    assert [sees_object(row) for row in grounds] == [False, False, False]
+
+
+@pytest.mark.parametrize(("apart", "obstacle"), [(0.28, False), (0.26, True)])
+def test_facing_robots_see_each_other_from_27_cm(stage, apart, obstacle):
+    put(stage, 0, 16.0, 8.0, 0.0)
+    put(stage, 1, 16.0 + apart, 8.0, math.pi)
+    put(stage, 2, 20.0, 8.0)
+    assert [sees_obstacle(sensed(stage, "proximity", robot)) for robot in (0, 1)] == [obstacle, obstacle]
+    assert stage.events.interfering.tolist() == [obstacle, obstacle, False]
+
+
+@pytest.mark.parametrize(("gap", "obstacle"), [(0.101, False), (0.099, True)])
+def test_walls_are_seen_from_a_reach_beyond_the_body(stage, gap, obstacle):
+    # Beam 0 points 7.5 degrees off; turned by that it meets the wall at a right angle.
+    put(stage, 0, 31.6 - 0.085036758 - gap, 8.0, -math.radians(7.5))
+    assert sees_obstacle(sensed(stage, "proximity")) == obstacle
+
+
+@pytest.mark.parametrize("apart", [0.18, 0.2, 0.22, 0.25])
+@pytest.mark.parametrize("heading", np.linspace(0.0, 3.0, 13))
+def test_equal_obstacles_on_opposite_sides_cancel(stage, heading, apart):
+    put(stage, 0, 16.0, 8.0, heading)
+    put(stage, 1, 16.0 + apart, 8.0)
+    put(stage, 2, 16.0 - apart, 8.0)
+    readings = sensed(stage, "proximity")
+    assert readings.max() > 0.1
+    assert not sees_obstacle(readings)
+    assert not stage.events.interfering[0]
+    assert stage.events.interfering[1:].all()

@@ -1,0 +1,104 @@
+"""Compiled functions: nothing out of date is taken from the cache."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env._internal import compiling
+
+INNER = """
+from swarm_forage_env._internal.compiling import kernel
+
+@kernel
+def inner(x: float) -> float:
+    return x + {added}
+"""
+OUTER = """
+from swarm_forage_env._internal.compiling import kernel
+from .inner import inner
+
+@kernel
+def outer(x: float) -> float:
+    return inner(x)
+"""
+CALL = "from controllers.outer import outer; print(outer(1.0), sum(outer.stats.cache_hits.values()))"
+
+
+def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(tmp_path):
+    package = tmp_path / "controllers"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "outer.py").write_text(OUTER)
+    environ = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
+    environ["PYTHONDONTWRITEBYTECODE"] = "1"  # Python's own cache does not notice two edits within a second
+    root = str(Path(compiling.__file__).parents[2])
+
+    def call() -> str:
+        run = subprocess.run(
+            [sys.executable, "-c", f"import sys; sys.path[:0] = [{str(tmp_path)!r}, {root!r}]; {CALL}"],
+            env=environ,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return run.stdout.strip()
+
+    (package / "inner.py").write_text(INNER.format(added=1.0))
+    assert call() == "2.0 0"
+    assert call() == "2.0 1", "what is up to date comes from the cache"
+    (package / "inner.py").write_text(INNER.format(added=2.0))
+    assert call() == "3.0 0"
+
+
+ROOT = Path(compiling.__file__).parents[2]
+FOLDERS = sorted(
+    {
+        file.parent
+        for package in ("swarm_forage_env", "baselines")
+        for file in (ROOT / package).rglob("*.py")
+        if "compiling import" in file.read_text()
+    }
+)
+
+
+def imported_files(file: Path) -> set[Path]:
+    """Files of this distribution that a module imports, by its import statements."""
+    found: set[Path] = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module is not None:
+            base = ROOT.joinpath(*node.module.split(".")) if node.level == 0 else file.parent / node.module
+            found |= {base.with_suffix(".py"), *(base / f"{alias.name}.py" for alias in node.names)}
+    return {path for path in found if path.is_file()}
+
+
+def uses_compiler(file: Path) -> bool:
+    return compiling_file in imported_files(file)
+
+
+compiling_file = Path(compiling.__file__)
+NOT_COMPILED_IN = {
+    ROOT / f"swarm_forage_env/{name}.py"
+    for name in (
+        "contract/types",  # annotations
+        "contract/policy",  # a protocol and a dataclass, for the policies beside the kernels
+        "scenarios/quirks",  # a dataclass; kernels are handed single switches
+        "_internal/spelling",  # error messages
+    )
+}
+"""Imported beside kernels, but never compiled into them."""
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.relative_to(ROOT).as_posix())
+def test_every_source_of_a_kernel_is_watched(folder):
+    """From the imports: what a module with kernels imports may be compiled into them, and so on."""
+    reached: set[Path] = set()
+    todo = {file for file in folder.glob("*.py") if uses_compiler(file)}
+    while todo:
+        file = todo.pop()
+        reached.add(file)
+        todo |= imported_files(file) - reached - NOT_COMPILED_IN
+    assert reached <= set(compiling.sources_of(folder))

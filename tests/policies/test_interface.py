@@ -1,0 +1,257 @@
+"""What learners see and do: the compact view against a slow twin, actions and masks by hand."""
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import Event, Grip
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.interface import (
+    GRIPS,
+    MOTIONS,
+    InterfaceConfig,
+    LearnerInterface,
+    chosen_interface,
+    interface_from_mapping,
+)
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.reference.compact_view import compact_row
+from tests.support.stage import NEST_CELL, OPEN_CELL, build_cache, cell_centre, lay, load, put, stand, tidy_world
+
+STAND, FORWARD = MOTIONS.index("stand"), MOTIONS.index("forward")
+GRASP, RELEASE, DELIVER, SITE, FOUND = (len(MOTIONS) + k for k in range(len(GRIPS)))
+
+
+def bound(env: ForageEnv, **choices) -> LearnerInterface:
+    return LearnerInterface(InterfaceConfig(**choices), env.task)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_the_compact_view_matches_its_twin_along_runs(caches, noise):
+    env = ForageEnv(scenario("warehouse_small", n_robots=30, n_objects=300, width_m=16.0, nest_centre_m=(1.6, 8.0),
+                             nest_size_m=(1.6, 12.8), caches=caches))  # fmt: skip
+    stack = parse_wrapper(f"sensor_noise:sigma={noise}").wrap(env) if noise else env
+    policy = load_policy({"none": "dpo", "static": "stochm", "dynamic": "stochx"}[caches])
+    policy.reset(env.task, stream_rng(0, Stream.POLICY))
+    interface = bound(env, observation="compact")
+    obs = stack.reset_batch(4)
+    kinds_seen = np.zeros(interface.layout.size)
+    for tick in range(1400):
+        obs, *_ = stack.step_batch(policy.act(obs, env.active), tasks=getattr(policy, "task", None))
+        if tick == 700:
+            away = np.arange(30) % 7 == 3
+            env.set_population(active=~away & (np.arange(30) != 5), present=~away)
+        if tick % 7 == 0:
+            view = interface.observe(obs)
+            expected = np.array([compact_row(row, env.layout) for row in obs])
+            np.testing.assert_allclose(view, expected, atol=1e-5)
+            assert view.min() >= -1.0
+            assert view.max() <= 1.0
+            kinds_seen += np.abs(view).sum(axis=0)
+    if caches == "static" and not noise:
+        assert kinds_seen.all(), "every column is put to the test in at least this world"
+
+
+def test_the_compact_view_of_robots_in_caches_and_of_robots_that_are_away_matches_its_twin():
+    env = tidy_world(n_robots=3, n_objects=8, caches="dynamic")
+    build_cache(env, [0, 1], OPEN_CELL)
+    x, y = cell_centre(OPEN_CELL)
+    put(env, 0, x + 0.3, y - 0.2, 2.0)
+    here = np.array([True, True, False])
+    env.set_population(active=here, present=here)
+    obs = env.arena.observe()
+    view = bound(env, observation="compact").observe(obs)
+    np.testing.assert_allclose(view, [compact_row(row, env.layout) for row in obs], atol=1e-5)
+    assert view[0, -1] == view[0, 7] == 1.0
+    assert not view[2].any()
+
+
+def test_the_view_of_a_robot_by_hand():
+    env = tidy_world(n_robots=1, n_objects=3)
+    x, y = cell_centre(OPEN_CELL)
+    put(env, 0, x, y, np.pi / 2)
+    lay(env, 0, (OPEN_CELL[0] + 1, OPEN_CELL[1]))  # 0.2 m to the east, on the right of a robot that looks north
+    lay(env, 1, (OPEN_CELL[0], OPEN_CELL[1] + 2))  # 0.4 m to the north
+    interface = bound(env, observation="compact")
+    row = interface.observe(env.arena.observe())[0]
+    seen = {part.name: row[part.start : part.stop] for part in interface.layout}
+    np.testing.assert_allclose(seen["object"], [0.0, -0.2, 1.0], atol=1e-6)
+    np.testing.assert_allclose(seen["light"], [0.0, 1.0], atol=0.02)  # the nest lies to the west, on the left
+    np.testing.assert_allclose(seen["heading"], [0.0, 1.0], atol=1e-6)
+    assert seen["proximity"].tolist() == [0.0, 0.0]
+    assert seen["active"].tolist() == [1.0]
+    assert not np.concatenate([seen[name] for name in ("obstacle", "on_object", "on_nest", "carrying", "cache")]).any()
+
+
+def test_full_observations_are_those_of_the_environment():
+    env = tidy_world()
+    interface = bound(env)
+    obs = env.arena.observe()
+    seen = interface.observe(obs)
+    np.testing.assert_array_equal(seen, obs)
+    assert seen is not obs
+    assert interface.layout is env.layout
+    assert interface.active_column == env.layout.part("active").start
+
+
+@pytest.mark.parametrize(
+    ("choices", "space"),
+    [
+        ({}, spaces.Box(-1.0, 1.0, (3,), np.float32)),
+        ({"automatic_gripper": True}, spaces.Box(-1.0, 1.0, (2,), np.float32)),
+        ({"actions": "discrete"}, spaces.Discrete(11)),
+        ({"actions": "discrete", "automatic_gripper": True}, spaces.Discrete(6)),
+    ],
+)
+def test_action_spaces(choices, space):
+    assert bound(tidy_world(), **choices).action_space == space
+
+
+def test_continuous_actions_pass_through():
+    env = tidy_world(n_robots=2)
+    actions = np.array([[0.1, -0.2, 0.3], [1.0, 2.0, -1.0]], np.float32)
+    np.testing.assert_array_equal(bound(env).command(actions, env.arena.observe()), actions)
+
+
+def test_motions_drive_and_ask_for_nothing():
+    env = tidy_world(n_robots=6, n_objects=8)
+    load(env, 0, 0)
+    interface = bound(env, actions="discrete")
+    commands = interface.command(np.arange(6), env.arena.observe())
+    expected = [(0, 0), (0.5, 0.5), (0.4, 0.6), (0.6, 0.4), (-0.25, 0.25), (0.25, -0.25)]
+    np.testing.assert_allclose(commands[:, :2], expected)
+    np.testing.assert_allclose(commands[:, 2], [Grip.GRASP] + [Grip.RELEASE] * 5)
+    start = env.swarm.position.copy(), env.swarm.heading.copy()
+    env.step_batch(commands)
+    assert not env.events.code.any()
+    travelled = np.hypot(*(env.swarm.position - start[0]).T)
+    np.testing.assert_allclose(travelled[[0, 1, 4, 5]], [0.0, 0.02, 0.0, 0.0], atol=1e-6)
+    turned = env.swarm.heading - start[1]
+    assert turned[2] > 0 > turned[3]
+    np.testing.assert_allclose(np.rad2deg(turned[4:]), [8.185, -8.185], atol=0.01)
+
+
+def test_gripper_actions_by_number():
+    env = tidy_world(n_robots=5)
+    commands = bound(env, actions="discrete").command(np.array([GRASP, RELEASE, DELIVER, SITE, FOUND]),
+                                                      env.arena.observe())  # fmt: skip
+    assert not commands[:, :2].any()
+    np.testing.assert_allclose(commands[:, 2], [Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.FOUND])
+
+
+def test_the_automatic_gripper_carries_an_object_from_the_floor_to_the_nest():
+    env = tidy_world(n_robots=2, n_objects=4)
+    stand(env, 0, OPEN_CELL)
+    lay(env, 0, OPEN_CELL)
+    interface = bound(env, automatic_gripper=True)
+    idle, told = np.zeros((2, 2), np.float32), []
+    obs = env.arena.observe()
+    for tick in range(6):
+        if tick == 3:
+            stand(env, 0, NEST_CELL)
+            obs = env.arena.observe()
+        obs, *_ = env.step_batch(interface.command(idle, obs))
+        told.append(Event(env.events.code[0]))
+    assert told == [Event.NONE, Event.PICKED_UP, Event.NONE, Event.NONE, Event.DELIVERED, Event.NONE]
+    assert env.events.counters[0] == 1
+
+
+def test_the_automatic_gripper_takes_from_caches():
+    env = tidy_world(n_robots=1, n_objects=5, caches="dynamic")
+    build_cache(env, [0, 1, 2], OPEN_CELL)
+    stand(env, 0, OPEN_CELL)
+    commands = bound(env, automatic_gripper=True).command(np.zeros((1, 2), np.float32), env.arena.observe())
+    assert commands[0, 2] == Grip.GRASP
+
+
+@pytest.mark.parametrize("caches", ["none", "dynamic"])
+def test_masks_by_hand(caches):
+    env = tidy_world(n_robots=8, n_objects=8, caches=caches)
+    lay(env, 0, OPEN_CELL)
+    stand(env, 0, OPEN_CELL)  # over an object
+    load(env, 2, 2)  # carrying on open floor
+    load(env, 3, 3)
+    stand(env, 3, NEST_CELL)  # carrying in the nest
+    env.swarm.pending_kind[4] = 1  # in an interaction, empty
+    load(env, 5, 5)
+    env.swarm.pending_kind[5] = 2  # in an interaction, carrying
+    here = np.arange(8) < 7
+    env.set_population(active=here & (np.arange(8) != 6), present=here)  # 6 in repair, 7 away
+    moves = set(range(len(MOTIONS)))
+    site = {SITE, FOUND} if caches == "dynamic" else set()
+    expected = [
+        moves | {GRASP},
+        moves,
+        moves | {RELEASE} | site,
+        moves | {RELEASE, DELIVER},
+        {GRASP},
+        {RELEASE} | site,
+        {STAND},
+        {STAND},
+    ]
+    obs = env.arena.observe()
+    mask = bound(env, actions="discrete").mask(obs)
+    assert [set(np.flatnonzero(row).tolist()) for row in mask] == expected
+    driven = bound(env, actions="discrete", automatic_gripper=True).mask(obs)
+    assert [set(np.flatnonzero(row).tolist()) for row in driven] == [moves] * 4 + [{STAND}] * 4
+
+
+def test_masks_are_for_discrete_actions():
+    env = tidy_world()
+    with pytest.raises(ValueError, match="actions='discrete'"):
+        bound(env).mask(env.arena.observe())
+
+
+@pytest.mark.parametrize(
+    ("choices", "actions", "reason"),
+    [
+        ({}, np.zeros((4, 2), np.float32), r"shape \(4, 3\)"),
+        ({"automatic_gripper": True}, np.zeros((4, 3), np.float32), r"shape \(4, 2\)"),
+        ({"actions": "discrete"}, np.zeros((4, 1), np.int64), r"shape \(4,\)"),
+        ({"actions": "discrete"}, np.full(4, 11), "from 0 to 10"),
+        ({"actions": "discrete"}, np.full(4, -1), "from 0 to 10"),
+        ({"actions": "discrete"}, np.zeros(4), "whole numbers"),
+    ],
+)
+def test_actions_that_are_none_are_refused(choices, actions, reason):
+    env = tidy_world(n_robots=4)
+    with pytest.raises(ValueError, match=reason):
+        bound(env, **choices).command(actions, env.arena.observe())
+
+
+@pytest.mark.parametrize(
+    ("choices", "reason"),
+    [
+        ({"observation": "compakt"}, "Did you mean 'compact'"),
+        ({"actions": "numbers"}, "continuous, discrete"),
+        ({"automatic_gripper": 1}, "True or False"),
+        ({"decision_ticks": 0}, ">= 1"),
+        ({"decision_ticks": True}, ">= 1"),
+    ],
+)
+def test_choices_that_are_none_are_refused(choices, reason):
+    with pytest.raises(ConfigError, match=reason):
+        InterfaceConfig(**choices)
+
+
+def test_choices_are_read_back_from_plain_values():
+    assert interface_from_mapping({"actions": "discrete", "decision_ticks": 2}) == InterfaceConfig(
+        actions="discrete", decision_ticks=2
+    )
+    with pytest.raises(ConfigError, match="Did you mean 'actions'"):
+        interface_from_mapping({"action": "discrete"})
+
+
+def test_an_interface_is_given_as_it_is_by_fields_or_not_at_all():
+    numbered = InterfaceConfig(actions="discrete")
+    assert chosen_interface(numbered) is numbered
+    assert chosen_interface({"actions": "discrete"}) == numbered
+    assert chosen_interface(None) == chosen_interface({}) == InterfaceConfig()
+    with pytest.raises(ConfigError, match=r"InterfaceConfig or its fields by name, .* got 'discrete'\."):
+        chosen_interface("discrete")

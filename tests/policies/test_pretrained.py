@@ -1,0 +1,61 @@
+"""The policies that come with the package: complete, light, and worth their name."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from swarm_forage_env.policies import pretrained
+
+from swarm_forage_env.policies.network import Network
+from swarm_forage_env.scenarios.presets import warehouse_small
+from swarm_forage_env.study.run import run_one
+from swarm_forage_env.study.spec import plan_run
+from swarm_forage_env.training.plan import TrainingPlan, read_plan
+
+FOLDER = Path(pretrained.__file__).parent
+SHIPPED = sorted(path.stem for path in FOLDER.glob("*.npz"))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_shipped_policy_has_a_card_a_plan_and_a_small_file(name):
+    network = Network.load(FOLDER / f"{name}.npz")
+    assert TrainingPlan.from_mapping(network.about.card["plan"]) == read_plan(FOLDER / f"{name}.toml")
+    card = (FOLDER / f"{name}.md").read_text()
+    for word in (f"swarm-forage train --plan {name}", *network.about.card["versions"].values()):
+        assert word in card
+    assert (FOLDER / f"{name}.npz").stat().st_size < 100_000
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_shipped_policy_runs_by_name_without_torch(name):
+    code = (
+        "import sys; sys.modules['torch'] = sys.modules['stable_baselines3'] = None\n"
+        "from swarm_forage_env.scenarios.presets import warehouse_small\n"
+        "from swarm_forage_env.study.run import run_one\n"
+        "from swarm_forage_env.study.spec import plan_run\n"
+        "world = warehouse_small(n_robots=5, horizon_s=20.0, interval_s=20.0)\n"
+        f"print(run_one(plan_run(world, {name!r}, seed=1)).scenario)"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert result.stdout.strip() == "warehouse_small", result.stderr
+
+
+@pytest.mark.compiled
+def test_ppo_warehouse_small_forages_better_than_the_random_walk():
+    world = warehouse_small(horizon_s=1000.0)
+    delivered = {
+        name: run_one(plan_run(world, name, seed=5)).collected.sum() for name in ("crw", "ppo_warehouse_small")
+    }
+    assert delivered["ppo_warehouse_small"] > 2 * delivered["crw"] > 0
+
+
+def test_a_run_with_it_is_reproducible():
+    world = warehouse_small(n_robots=10, horizon_s=60.0, interval_s=20.0)
+    first, second = (run_one(plan_run(world, "ppo_warehouse_small", seed=3)) for _ in range(2))
+    assert first.same_results(second)
+
+
+def test_it_is_made_for_a_world_without_caches():
+    spec = plan_run(warehouse_small(caches="static"), "ppo_warehouse_small")
+    assert spec.scenario.caches == "none"

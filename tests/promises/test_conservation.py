@@ -1,0 +1,104 @@
+"""Objects never appear, vanish or lie in two places, whatever robots do and whoever comes and goes."""
+
+import numpy as np
+import pytest
+
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import Counter, Event
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
+from tests.support.busy import BusyPolicy, change_population
+from tests.support.crowded_runs import DENSE, RUNS, fresh, make, side
+from tests.support.foraging import quick_world
+from tests.support.stage import assert_conserved
+
+
+def run_conserved(env: ForageEnv, policy, ticks: int, *, seed: int, population: bool = False) -> None:
+    """Run and check the whole world after every tick."""
+    rng = np.random.default_rng(seed)
+    policy.reset(env.task, stream_rng(seed, Stream.POLICY))
+    obs = env.reset_batch(seed)
+    assert_conserved(env)
+    for tick in range(ticks):
+        if population and tick % 5 == 0:
+            change_population(env, rng)
+            assert_conserved(env)
+        obs = env.step_batch(policy.act(obs, env.active), tasks=getattr(policy, "task", None))[0]
+        assert_conserved(env)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("name", "caches", "policy"), RUNS)
+def test_objects_are_conserved(name, caches, policy):
+    run_conserved(make(name, caches), fresh(policy), 60, seed=3)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("policy", ["crw", "dpo"])
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_objects_are_conserved_while_controllers_forage(name, policy):
+    env = ForageEnv(quick_world(name))
+    run_conserved(env, fresh(policy), env.max_cycles, seed=3)
+    assert env.events.counters[Counter.COLLECTED] > 10
+    assert env.events.counters[Counter.OBJECTS_MOVED] > 100
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("side_share", [0.03, 0.2])
+@pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
+@pytest.mark.parametrize("name", DENSE)
+def test_objects_are_conserved_when_robots_come_and_go(name, caches, side_share):
+    config = scenario(
+        name,
+        n_robots=40,
+        caches=caches,
+        n_objects=DENSE[name],
+        side_share=side_share,
+        walk_probability=0.02,
+        **side(name),
+    )
+    run_conserved(ForageEnv(config), BusyPolicy(), 100, seed=8, population=True)
+
+
+@pytest.mark.parametrize("caches", ["static", "dynamic"])
+def test_objects_are_conserved_as_the_authors_program_does_it(caches):
+    config = scenario(
+        "search_and_rescue", side_m=32.0, n_robots=40, caches=caches, walk_probability=0.05, quirks=AUTHORS_PROGRAM
+    )
+    run_conserved(ForageEnv(config), BusyPolicy(), 150, seed=2, population=True)
+
+
+@pytest.mark.compiled
+def test_the_busy_runs_do_something():
+    """The checks above mean little unless caches form and dissolve, objects move and robots deliver."""
+    config = scenario(
+        "search_and_rescue",
+        side_m=32.0,
+        n_robots=60,
+        caches="dynamic",
+        n_objects=272,
+        side_share=0.03,
+        distance_share=0.05,
+        walk_probability=0.02,
+    )
+    env, policy, rng = ForageEnv(config), BusyPolicy(), np.random.default_rng(0)
+    policy.reset(env.task, rng)
+    obs = env.reset_batch(0)
+    seen = set()
+    for _ in range(2500):
+        obs = env.step_batch(policy.act(obs, env.active))[0]
+        seen.update(env.events.code.tolist())
+    assert seen == set(Event)
+    counters = env.events.counters
+    for counter in (
+        Counter.COLLECTED,
+        Counter.DISPLACED_DROPS,
+        Counter.OBJECTS_MOVED,
+        Counter.CACHES_CREATED,
+        Counter.CACHES_DEPLETED,
+        Counter.CACHE_PICKUPS,
+        Counter.CACHE_DROPS,
+    ):
+        assert counters[counter] > 0, counter
+    assert_conserved(env)

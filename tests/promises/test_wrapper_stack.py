@@ -1,0 +1,358 @@
+"""What every wrapper promises, alone and in the full stack: PettingZoo's contract, determinism, conservation."""
+
+import hashlib
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
+from pettingzoo.utils import BaseParallelWrapper
+from pettingzoo.utils.conversions import parallel_to_aec
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study.record import KNOWN_CONTRIBUTIONS, RunRecord
+from swarm_forage_env.study.run import build_stack, run_one
+from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.views.gymnasium import JointForageEnv
+from swarm_forage_env.wrappers.base import STACK_ORDER, WrapperConfig
+from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig, SensorNoise, SensorNoiseConfig
+from swarm_forage_env.wrappers.population import PopulationConfig
+from swarm_forage_env.wrappers.registry import WRAPPERS, parse_wrapper, wrapper_config_class, wrappers_from_mapping
+from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
+from swarm_forage_env.wrappers.waveform import Waveform
+from tests.support.busy import BusyPolicy
+from tests.support.stage import assert_conserved
+
+ROBOTS = 8
+
+ACTIVE: dict[str, WrapperConfig] = {
+    "sensor_noise": SensorNoiseConfig(
+        sigma=0.1, sigmas={"position": 0.5, "light": Waveform(kind="constant", amplitude=0.2)}
+    ),
+    "population": PopulationConfig(
+        death_per_tick=0.03, birth_per_tick=0.05, malfunction_per_tick=0.1, repair_per_tick=0.1, initial_robots=6
+    ),
+    "throttle": ThrottleConfig(
+        waveform=Waveform(kind="square", amplitude=0.4, offset=0.4, period_s=3.0), carriers=True
+    ),
+    "actuator_noise": ActuatorNoiseConfig(sigma=0.3, distribution="uniform"),
+}
+"""One strong example of each wrapper."""
+
+QUIET: dict[str, WrapperConfig] = {
+    "sensor_noise": SensorNoiseConfig(sigma=0.0, sigmas={"ground": Waveform(kind="sine", period_s=5.0)}),
+    "population": PopulationConfig(),
+    "throttle": ThrottleConfig(waveform=Waveform(kind="sine", amplitude=0.0, period_s=10.0)),
+    "actuator_noise": ActuatorNoiseConfig(sigma=0.0),
+}
+"""Each wrapper with amplitudes, sigmas and rates of zero."""
+
+
+def absorbing(config: WrapperConfig) -> WrapperConfig:
+    return replace(config, deaths="absorbing") if isinstance(config, PopulationConfig) else config
+
+
+STACKS = {name: (config,) for name, config in ACTIVE.items()}
+STACKS |= {"population_absorbing": (absorbing(ACTIVE["population"]),)}
+STACKS |= {"all": tuple(ACTIVE.values()), "all_absorbing": tuple(absorbing(config) for config in ACTIVE.values())}
+each_stack = pytest.mark.parametrize("wrappers", STACKS.values(), ids=STACKS)
+
+
+def world_config(**overrides):
+    options = {"n_robots": ROBOTS, "n_objects": 400, "caches": "dynamic", "walk_probability": 0.01, **overrides}
+    return scenario("warehouse_small", **options)
+
+
+def stacked(wrappers, **overrides):
+    return build_stack(world_config(interval_s=2.0, **overrides), wrappers)
+
+
+def test_there_is_an_example_of_every_wrapper():
+    assert set(ACTIVE) == set(QUIET) == set(WRAPPERS)
+
+
+@pytest.mark.parametrize("name", WRAPPERS)
+def test_names_and_places_agree(name):
+    config_class = wrapper_config_class(name)
+    wrapper = ACTIVE[name].wrap(ForageEnv(world_config()))
+    assert config_class is type(ACTIVE[name])
+    assert config_class.name == name
+    assert config_class.stack_position == type(wrapper).stack_position
+    assert STACK_ORDER[wrapper.stack_position] == type(wrapper).__name__
+
+
+# PettingZoo and Gymnasium
+
+
+@each_stack
+def test_parallel_api(wrappers):
+    parallel_api_test(stacked(wrappers), num_cycles=120)
+
+
+@each_stack
+def test_parallel_api_without_births(wrappers):
+    without = tuple(
+        replace(config, birth_per_tick=0.0, initial_robots=None) if isinstance(config, PopulationConfig) else config
+        for config in wrappers
+    )
+    parallel_api_test(stacked(without, n_robots=2), num_cycles=150)
+
+
+@each_stack
+def test_equal_seeds_give_equal_runs(wrappers):
+    parallel_seed_test(lambda: stacked(wrappers), num_cycles=40)
+
+
+@pytest.mark.filterwarnings("ignore:Observation numpy array is all zeros")  # rows of the dead and the unborn
+@each_stack
+def test_agent_by_agent(wrappers):
+    turns = parallel_to_aec(stacked(wrappers, horizon_s=4.0))
+    api_test(turns, num_cycles=200)
+
+
+@each_stack
+def test_the_joint_view_passes_the_checker_of_gymnasium(wrappers):
+    check_env(JointForageEnv(world_config(), wrappers=wrappers), skip_render_check=True)
+
+
+# Determinism and conservation
+
+
+def play(env, seed: int, ticks: int, *, check=None) -> str:
+    """Fingerprint of what a busy run shows, tick by tick."""
+    seen, policy, world = hashlib.sha256(), BusyPolicy(), env.world
+    policy.reset(world.task, stream_rng(seed, Stream.POLICY))
+    obs = env.reset_batch(seed)
+    for _ in range(ticks):
+        seen.update(obs.tobytes())
+        seen.update(env.state().tobytes())
+        obs, reward, terminated, _ = env.step_batch(policy.act(obs, world.active))
+        seen.update(reward.tobytes() + terminated.tobytes() + world.active.tobytes())
+        if check:
+            check(world)
+    return seen.hexdigest()
+
+
+@each_stack
+def test_a_seed_is_a_run(wrappers):
+    env = stacked(wrappers)
+    first = play(env, 5, 60)
+    assert play(env, 6, 25) != first
+    assert play(env, 5, 60) == first, "the same instance, after another run"
+    assert play(stacked(tuple(reversed(wrappers))), 5, 60) == first, "another instance, wrappers named in another order"
+
+
+@each_stack
+def test_objects_are_conserved(wrappers):
+    env = stacked(wrappers, n_robots=30)
+    play(env, 2, 150, check=assert_conserved)
+    assert env.world.events.counters.any()
+
+
+def test_the_full_stack_does_something():
+    """The tests above mean little unless robots die, break, carry, and are born while all wrappers act."""
+    recorder = stacked(ACTIVE.values(), n_robots=30, horizon_s=60.0)
+    play(recorder, 2, 300)
+    contributed = recorder.contributed()
+    for name in ("deaths", "births", "malfunctions", "repairs", "throttle_mean"):
+        assert contributed[name].sum() > 0, name
+    assert recorder.columns()["free_pickups"].sum() > 0
+
+
+# Nothing happens unless asked for
+
+
+@pytest.mark.parametrize("names", [*((name,) for name in WRAPPERS), tuple(WRAPPERS)], ids="+".join)
+def test_wrappers_without_effect_change_nothing(names):
+    bare, wrapped = stacked((), horizon_s=20.0), stacked([QUIET[name] for name in names], horizon_s=20.0)
+    assert play(bare, 3, 100) == play(wrapped, 3, 100)
+    record, expected = wrapped.columns(), bare.columns()
+    assert record.keys() == expected.keys()
+    for name, values in expected.items():
+        np.testing.assert_array_equal(record[name], values, err_msg=name)
+    assert not any(values.any() for values in wrapped.contributed().values())
+
+
+# Streams
+
+
+def wheel_and_sensor_draws(*names: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """What actuator noise and sensor noise draw in a stack of these wrappers."""
+    env, wheels, sensors = ForageEnv(world_config()), [], []
+    actions = np.zeros((ROBOTS, 3), np.float32)
+    for config in sorted((ACTIVE[name] for name in names), key=lambda config: -config.stack_position):
+        env = config.wrap(env)
+    env.reset_batch(4)
+    for _ in range(20):
+        env.step_batch(actions)
+        wrapper = env
+        while not isinstance(wrapper, ForageEnv):
+            if isinstance(wrapper, ActuatorNoise):
+                wheels.append(wrapper._draws.copy())
+            elif isinstance(wrapper, SensorNoise):
+                sensors.append(wrapper._draws.copy())
+            wrapper = wrapper.env
+    return wheels, sensors
+
+
+def test_another_wrapper_or_a_lost_robot_shifts_nobodys_randomness():
+    wheels, sensors = wheel_and_sensor_draws(*WRAPPERS)  # robots die and break in this one
+    np.testing.assert_array_equal(wheels, wheel_and_sensor_draws("actuator_noise")[0])
+    np.testing.assert_array_equal(sensors, wheel_and_sensor_draws("sensor_noise")[1])
+    np.testing.assert_array_equal(wheels, wheel_and_sensor_draws("actuator_noise", "throttle")[0])
+
+
+# Stacks that would be wrong
+
+
+class Foreign(BaseParallelWrapper):
+    """Somebody else's wrapper."""
+
+
+@pytest.mark.parametrize("name", WRAPPERS)
+def test_a_foreign_wrapper_belongs_outside(name):
+    with pytest.raises(TypeError, match="outside of the swarm wrappers"):
+        ACTIVE[name].wrap(Foreign(ForageEnv(world_config())))  # type: ignore[arg-type]
+    parallel_api_test(Foreign(ACTIVE[name].wrap(ForageEnv(world_config()))), num_cycles=20)
+
+
+def test_any_other_order_is_refused():
+    inner = Throttle(ForageEnv(world_config()), ACTIVE["throttle"])  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="RunRecorder, SensorNoise, PopulationDynamics, Throttle, ActuatorNoise"):
+        ACTIVE["actuator_noise"].wrap(inner)
+    with pytest.raises(ValueError, match="each at most once"):
+        ACTIVE["throttle"].wrap(inner)
+
+
+# As data
+
+
+@each_stack
+def test_runs_survive_json_and_parquet(wrappers, tmp_path):
+    spec = plan_run(world_config(horizon_s=4.0, interval_s=2.0), "random", caches="dynamic", wrappers=wrappers, seed=7)
+    assert RunSpec.from_json(spec.to_json()) == spec
+    record = run_one(spec)
+    record.write(tmp_path / "run.parquet")
+    again = RunRecord.read(tmp_path / "run.parquet")
+    stored = RunSpec.from_json(again.spec)
+    assert stored.wrappers == spec.wrappers
+    assert stored.run_id == spec.run_id
+    assert run_one(stored).same_results(record)
+    assert set(record.contributed) <= set(KNOWN_CONTRIBUTIONS)
+
+
+def test_every_difference_between_wrappers_is_another_run():
+    base = plan_run(world_config(), "random")
+    variants = [
+        (),
+        *((config,) for config in (*ACTIVE.values(), *QUIET.values())),
+        (SensorNoiseConfig(sigma=0.1),),
+        (SensorNoiseConfig(sigma=0.1, groups=("light",)),),
+        (ThrottleConfig(waveform=Waveform(kind="constant", amplitude=0.1)),),
+        (ThrottleConfig(waveform=Waveform(kind="constant", amplitude=0.1), carriers=True),),
+        tuple(ACTIVE.values()),
+    ]
+    assert len({replace(base, wrappers=wrappers).run_id for wrappers in variants}) == len(variants)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            "throttle:waveform=square,amplitude=0.2,period_s=5000,carriers=true",
+            ThrottleConfig(waveform=Waveform(kind="square", amplitude=0.2, period_s=5000), carriers=True),
+        ),
+        (
+            "throttle:waveform.kind=constant,waveform.amplitude=0.1",
+            ThrottleConfig(waveform=Waveform(kind="constant", amplitude=0.1)),
+        ),
+        (
+            "throttle:waveform=table,times_s=0+100+2e3,values=0+0.5+-1",
+            ThrottleConfig(waveform=Waveform(kind="table", times_s=(0, 100, 2000.0), values=(0, 0.5, -1))),
+        ),
+        ("sensor_noise:sigma=0.03", SensorNoiseConfig(sigma=0.03)),
+        (
+            " sensor_noise: sigma=0.03, groups=light+proximity, sigmas.position=0.1 ",
+            SensorNoiseConfig(sigma=0.03, groups=("proximity", "light"), sigmas={"position": 0.1}),
+        ),
+        (
+            "actuator_noise:sigma=sine,amplitude=0.1,offset=0.1,period_s=100,distribution=uniform",
+            ActuatorNoiseConfig(
+                sigma=Waveform(kind="sine", amplitude=0.1, offset=0.1, period_s=100), distribution="uniform"
+            ),
+        ),
+        (
+            "population:death_per_tick=1e-4,initial_robots=20,deaths=absorbing",
+            PopulationConfig(death_per_tick=1e-4, initial_robots=20, deaths="absorbing"),
+        ),
+        ("population", PopulationConfig()),
+    ],
+)
+def test_wrappers_are_named_on_a_command_line(text, expected):
+    assert parse_wrapper(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("throtle:amplitude=0.1", r"Unknown wrapper 'throtle'. Did you mean 'throttle'\? Known: actuator_noise"),
+        ("throttle:amplitude", "settings of wrapper throttle as key=value, got 'amplitude'"),
+        ("throttle:waveform=", "as key=value, got 'waveform='"),
+        ("throttle:=3", "as key=value, got '=3'"),
+        ("throttle:amplitude=0.1", r"Missing key 'waveform', the kind of the waveform: one of constant, sine"),
+        ("throttle:waveform=constant,amplitud=0.1", r"Unknown key 'amplitud'. Did you mean 'amplitude'\?"),
+        ("throttle:waveform=constant,amplitude=nan", "amplitude of a waveform to be a finite number"),
+        ("throttle:waveform=constant,amplitude=0.1,amplitude=0.2", "Expected amplitude of wrapper throttle once"),
+        ("sensor_noise:sigma=0.1,sigma.kind=sine", "sigma of wrapper sensor_noise either as a value or as a table"),
+        ("sensor_noise:sigma=0.1,groups=proximty", "Unknown group of sensors 'proximty'"),
+        ("population:death_per_tick=-1", "population.death_per_tick >= 0"),
+        ("", "Unknown wrapper ''"),
+    ],
+)
+def test_command_line_errors_say_what_is_wrong(text, message):
+    with pytest.raises(ConfigError, match=message):
+        parse_wrapper(text)
+
+
+def test_wrappers_are_read_from_toml():
+    text = """
+        [throttle]
+        waveform = "sine"
+        amplitude = 0.15
+        offset = 0.15
+        period_s = 10_000
+        [sensor_noise]
+        sigma = 0.03
+        groups = ["proximity", "ground"]
+        sigmas = { light = { kind = "constant", amplitude = 0.2 } }
+        [population]
+        malfunction_per_tick = 0.001
+        repair_per_tick = 0.001022222
+    """
+    assert wrappers_from_mapping(tomllib.loads(text)) == (
+        SensorNoiseConfig(
+            sigma=0.03,
+            groups=("proximity", "ground"),
+            sigmas={"light": Waveform(kind="constant", amplitude=0.2)},
+        ),
+        PopulationConfig(malfunction_per_tick=0.001, repair_per_tick=0.001022222),
+        ThrottleConfig(waveform=Waveform(kind="sine", amplitude=0.15, offset=0.15, period_s=10_000)),
+    )
+
+
+@pytest.mark.parametrize(
+    ("tables", "message"),
+    [
+        ({"noise": {}}, "Unknown wrapper 'noise'"),
+        ({"throttle": 0.1}, "settings of wrapper throttle as a table, got 0.1"),
+        ({"population": {"deaths_per_tick": 1}}, "Unknown key 'deaths_per_tick'. Did you mean 'death_per_tick'"),
+    ],
+)
+def test_toml_errors_say_what_is_wrong(tables, message):
+    with pytest.raises(ConfigError, match=message):
+        wrappers_from_mapping(tables)

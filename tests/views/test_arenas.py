@@ -1,0 +1,261 @@
+"""Rows of arenas live, die and start anew as the story in `lives` tells."""
+
+import numpy as np
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
+from swarm_forage_env.views.learner_arena import WorldPlan, plan_world
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.support import lives
+
+
+def plan(interface: InterfaceConfig | None = None, **overrides) -> WorldPlan:
+    options = {**lives.WORLD, **overrides}
+    return plan_world(options.pop("scenario"), options, interface=interface, max_cycles=options.pop("max_cycles"))
+
+
+def told_story(batch: ArenaBatch, arena: int) -> list[ArenaStep]:
+    batch.reset([7 + a for a in range(batch.n_arenas)], [None] * batch.n_arenas)
+    actions = np.zeros((batch.n_rows, 3), np.float32)
+    return lives.live(
+        lambda **change: batch.call_method("set_population", [arena], **change), lambda: batch.step(actions)
+    )
+
+
+@pytest.mark.parametrize("arena", [0, 1])
+def test_the_story_by_hand(arena):
+    batch = ArenaBatch(plan(), 2)
+    rows = slice(arena * lives.N_ROBOTS, (arena + 1) * lives.N_ROBOTS)
+    steps = told_story(batch, arena)
+    np.testing.assert_array_equal([step.rewards[rows] for step in steps], lives.REWARDS)
+    np.testing.assert_array_equal([step.terminated[rows] for step in steps], lives.TERMINATED)
+    np.testing.assert_array_equal([step.truncated[rows] for step in steps], lives.TRUNCATED)
+    episodes = {
+        (tick, row - rows.start): (step.returns[k], step.lengths[k])
+        for tick, step in enumerate(steps)
+        for k, row in enumerate(step.ended.tolist())
+        if step.is_episode[k] and rows.start <= row < rows.stop
+    }
+    assert episodes == lives.EPISODES
+
+
+def test_active_rows_follow_the_story():
+    batch = ArenaBatch(plan(), 1)
+    steps = told_story(batch, 0)
+    column = batch.interface.active_column
+    np.testing.assert_array_equal([step.active for step in steps[:-1]], lives.ACTIVE_BEFORE[1:])
+    np.testing.assert_array_equal([step.obs[:, column] == 1.0 for step in steps[:-1]], lives.ACTIVE_BEFORE[1:])
+
+
+def test_final_observations_are_the_last_of_the_old_run_and_the_returned_ones_the_first_of_the_new():
+    batch = ArenaBatch(plan(), 1)
+    steps = told_story(batch, 0)
+    death, end = steps[2], steps[4]
+    assert death.ended.tolist() == [1]
+    np.testing.assert_array_equal(death.final_obs, np.zeros((1, batch.interface.layout.size)))
+    assert end.ended.tolist() == [0, 1, 2]
+    position = batch.interface.layout["position"]
+    # Nobody moved: robots 0 and 2 are last seen where they stood, and start somewhere else; robot 1 comes back.
+    np.testing.assert_array_equal(end.final_obs[[0, 2], position], steps[0].obs[[0, 2], position])
+    assert not end.final_obs[1].any()
+    assert np.all(end.obs[:, position] != end.final_obs[:, position])
+    assert end.obs.any(axis=1).all()
+    assert [outcome.seconds for outcome in end.outcomes] == [1.0]
+
+
+def test_the_arena_ends_with_its_last_robot():
+    batch = ArenaBatch(plan(), 1)
+    batch.reset([0], [None])
+    actions, nobody = np.zeros((3, 3), np.float32), np.zeros(3, bool)
+    batch.call_method("set_population", [0], active=~nobody, present=~nobody)
+    one = np.array([True, False, False])
+    batch.call_method("set_population", [0], active=one, present=one, terminated=~one)
+    first = batch.step(actions)
+    assert first.terminated.tolist() == [False, True, True]
+    batch.call_method("set_population", [0], active=nobody, present=nobody, terminated=~nobody)
+    last = batch.step(actions)
+    assert last.terminated.tolist() == [True, True, True]
+    assert not last.truncated.any()
+    assert last.is_episode.tolist() == [True, False, False]
+    assert last.active.all()
+
+
+def test_deaths_of_the_population_wrapper_end_rows_once_per_run():
+    wrapped = WorldPlan(
+        scenario=scenario("warehouse_small", n_robots=6, n_objects=4),
+        max_cycles=60,
+        wrappers=(parse_wrapper("population:death_per_tick=0.05"),),
+        interface=InterfaceConfig(observation="compact"),
+    )
+    batch = ArenaBatch(wrapped, 1)
+    batch.reset([3], [None])
+    actions = np.zeros((6, 3), np.float32)
+    episodes = np.zeros(6, int)
+    n_deaths = 0
+    for tick in range(60):
+        step = batch.step(actions)
+        episodes[step.ended[step.is_episode]] += 1
+        if tick < 59:
+            n_deaths += int(step.terminated.sum())
+            dead = episodes > 0
+            assert not step.obs[dead].any()
+            assert not step.active[dead].any()
+    assert 0 < n_deaths < 6
+    assert episodes.tolist() == [1] * 6
+
+
+def test_an_action_is_kept_for_the_ticks_of_a_decision_and_rewards_add_up():
+    batch = ArenaBatch(plan(InterfaceConfig(decision_ticks=3)), 1)
+    batch.reset([0], [None])
+    actions = np.zeros((3, 3), np.float32)
+    step = batch.step(actions)
+    assert step.rewards.tolist() == [3.0, 3.0, 3.0]
+    assert batch.worlds[0].base.tick == 3
+    last = batch.step(actions)
+    assert last.rewards.tolist() == [2.0, 2.0, 2.0], "the horizon of 5 ticks cuts the second decision short"
+    assert last.truncated.all()
+    assert last.lengths.tolist() == [2, 2, 2]
+
+
+def test_seeds_decide_everything_and_runs_continue_their_sequence():
+    first, second = (ArenaBatch(plan(), 2) for _ in range(2))
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1, 1, (12, 6, 3)).astype(np.float32)
+    seen = []
+    for batch in (first, second):
+        obs, _ = batch.reset([5, 6], [None, None])
+        seen.append([obs, *(batch.step(action).obs for action in actions)])
+    np.testing.assert_array_equal(*seen)
+    assert not np.array_equal(seen[0][0][:3], seen[0][0][3:]), "arenas of different seeds differ"
+    assert not np.array_equal(seen[0][0], seen[0][5]), "the next run of an arena has another seed"
+
+
+def test_a_reset_changes_the_scenario_for_all_later_runs_until_told_otherwise():
+    batch = ArenaBatch(plan(InterfaceConfig(observation="compact")), 2)
+    batch.reset([0, 1], [{"scenario": {"n_objects": 9, "width_m": 24.0}}, None])
+    assert [world.base.scenario.objects.n_objects for world in batch.worlds] == [9, 4]
+    for _ in range(lives.HORIZON_TICKS):
+        batch.step(np.zeros((6, 3), np.float32))
+    assert [world.base.scenario.arena.width_m for world in batch.worlds] == [24.0, 32.0]
+    batch.reset([0, 1], [{"scenario": {}}, None])
+    assert [world.base.scenario.objects.n_objects for world in batch.worlds] == [4, 4]
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"scenario": {"n_robots": 4}}, "n_robots to stay 3"),
+        ({"scenario": {"n_objekts": 4}}, "n_objects"),
+        ({"scenario": 4}, "fields by name"),
+        ({"scenery": {}}, "scenario"),
+        ({"width_m": 12.0}, r"inside of .* options=\{'scenario': \{'width_m': 12.0\}\}"),
+        ({"scenario": {}, "width_m": 12.0}, "'width_m' inside of the reset option 'scenario'"),
+        ({"objects": 3}, "'objects' inside of"),
+        ({"width": 12.0}, "Unknown reset option 'width'. If the scenario field 'width_m'"),
+        ({"num_robots": 12}, "'n_robots'"),
+        ({"wrappers": ["sensor_noise:sigma=0.1"]}, "Expected wrappers when the environment is made"),
+        ({"interface": {}}, "Expected interface when the environment is made"),
+    ],
+)
+def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
+    batch = ArenaBatch(plan(), 1)
+    batch.reset([0], [None])
+    with pytest.raises(ConfigError, match=reason):
+        batch.reset([0], [options])
+    with pytest.raises(RuntimeError, match="Call reset before step"):
+        batch.step(np.zeros((3, 3), np.float32))
+    batch.reset([0], [None])
+    assert batch.step(np.zeros((3, 3), np.float32)).rewards.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_options_of_others_are_left_to_them():
+    batch = ArenaBatch(plan(), 1)
+    batch.reset([0], [{"reset_mask": np.ones(1, bool), "low": -1, "high": 1, 3: "three", "record": True}])
+    assert batch.worlds[0].base.scenario.objects.n_objects == 4
+
+
+def test_closed_arenas_take_no_reset_and_no_step():
+    batch = ArenaBatch(plan(), 1)
+    batch.reset([0], [None])
+    batch.close()
+    for call in (lambda: batch.step(np.zeros((3, 3))), batch.action_masks, lambda: batch.reset([0], [None])):
+        with pytest.raises(RuntimeError, match="were closed"):
+            call()
+
+
+def test_steps_in_which_nothing_ends_share_what_is_empty_and_nothing_else():
+    batch = ArenaBatch(plan(), 1)
+    batch.reset([0], [None])
+    first, second = (batch.step(np.zeros((3, 3), np.float32)) for _ in range(2))
+    assert first.ended.shape == first.returns.shape == first.lengths.shape == first.is_episode.shape == (0,)
+    assert first.final_obs.shape == (0, batch.interface.layout.size)
+    assert first.outcomes == ()
+    for name in ("obs", "rewards", "terminated", "truncated", "active"):
+        assert not np.shares_memory(getattr(first, name), getattr(second, name))
+
+
+def test_refuses_too_few_rows_and_steps_before_a_reset():
+    batch = ArenaBatch(plan(), 2)
+    with pytest.raises(RuntimeError, match="reset"):
+        batch.step(np.zeros((6, 3), np.float32))
+    with pytest.raises(RuntimeError, match="Call reset before action_masks"):
+        batch.action_masks()
+    batch.reset([0, 1], [None, None])
+    with pytest.raises(ValueError, match=r"6 rows .* got shape \(\)"):
+        batch.step(np.float32(0.0))
+    with pytest.raises(ValueError, match="6 rows"):
+        batch.step(np.zeros((3, 3), np.float32))
+    with pytest.raises(ValueError, match="n_arenas >= 1"):
+        ArenaBatch(plan(), 0)
+
+
+@pytest.mark.parametrize("interface", [InterfaceConfig(), InterfaceConfig(automatic_gripper=True)])
+def test_actions_that_are_not_finite_are_refused_by_name(interface):
+    batch = ArenaBatch(plan(interface), 2, first_arena=4)
+    batch.reset([0, 1], [None, None])
+    actions = np.zeros((6, *batch.interface.action_space.shape), np.float32)
+    actions[4, 0] = np.nan
+    with pytest.raises(ValueError, match="robot_1") as refusal:
+        batch.step(actions)
+    assert "the world was not stepped" in str(refusal.value)
+    (note,) = refusal.value.__notes__
+    assert "in arena 5: its world was not stepped" in note
+    assert [world.base.tick for world in batch.worlds] == [1, 0], "worlds of other arenas may have been"
+    batch.reset([0, 1], [None, None])
+    assert batch.step(np.zeros_like(actions)).obs.shape[0] == 6
+
+
+def test_a_step_that_was_refused_does_not_count():
+    batch = ArenaBatch(plan(), 1)
+    batch.reset([0], [None])
+    idle = np.zeros((3, 3), np.float32)
+    with pytest.raises(ValueError, match="robot_0"):
+        batch.step(np.full_like(idle, np.nan))
+    for _ in range(lives.HORIZON_TICKS):
+        step = batch.step(idle)
+    assert step.lengths.tolist() == [lives.HORIZON_TICKS] * 3
+    assert step.returns.tolist() == [5.0] * 3
+
+
+def test_small_rewards_of_long_runs_add_up():
+    batch = ArenaBatch(plan(InterfaceConfig(decision_ticks=10), max_cycles=3000, tick=0.1), 1)
+    batch.reset([0], [None])
+    for _ in range(300):
+        step = batch.step(np.zeros((3, 3), np.float32))
+    np.testing.assert_allclose(step.returns, [300.0] * 3, rtol=3e-7)
+
+
+def test_attributes_are_set_where_they_are_also_below_wrappers():
+    wrapped = WorldPlan(
+        scenario=scenario("warehouse_small", n_robots=3, n_objects=4),
+        max_cycles=9,
+        wrappers=(parse_wrapper("sensor_noise:sigma=0.01"), parse_wrapper("actuator_noise:sigma=0.01")),
+    )
+    batch = ArenaBatch(wrapped, 1)
+    batch.reset([0], [None])
+    batch.set_attribute("max_cycles", 1, [0])
+    assert batch.worlds[0].base.max_cycles == 1
+    assert batch.step(np.zeros((3, 3), np.float32)).truncated.all()

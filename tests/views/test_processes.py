@@ -1,0 +1,112 @@
+"""Arenas in processes of their own: ends, failures and interruptions."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from swarm_forage_env.views import processes
+
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.views.arenas import ArenaBatch
+from swarm_forage_env.views.learner_arena import WorldPlan
+from swarm_forage_env.views.processes import ArenaProcessError, ArenaProcesses, open_arenas
+
+PLAN = WorldPlan(scenario=scenario("warehouse_small", n_robots=3, n_objects=4), max_cycles=50)
+IDLE = np.zeros((6, 3), np.float32)
+
+
+@pytest.fixture
+def arenas() -> Iterator[ArenaProcesses]:
+    """Two arenas in two processes, reset."""
+    opened = ArenaProcesses(PLAN, 2, 2)
+    opened.reset([0, 1], [None, None])
+    yield opened
+    opened.close()
+
+
+def test_closed_arenas_may_be_closed_again_and_say_so(arenas):
+    arenas.close()
+    arenas.close()
+    assert not any(process.is_alive() for process in arenas._processes)
+    with pytest.raises(RuntimeError, match="were closed"):
+        arenas.step(IDLE)
+
+
+def test_a_process_that_died_is_reported_with_its_exit_code(arenas):
+    arenas._processes[1].kill()
+    for _ in range(2):
+        with pytest.raises(ArenaProcessError, match=r"arenas \[1\] ended with exit code -9"):
+            arenas.step(IDLE)
+
+
+UNGUARDED = """
+from swarm_forage_env.views.gymnasium import SwarmVectorEnv
+SwarmVectorEnv(n_robots=3, n_processes=1).reset(seed=0)
+"""
+
+
+def test_a_script_without_a_guard_is_told_so(tmp_path):
+    script = tmp_path / "train.py"
+    script.write_text(UNGUARDED)
+    run = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False, timeout=120)
+    assert run.returncode == 1
+    last = run.stderr.strip().splitlines()[-1]
+    assert "ArenaProcessError: The process of arenas [0] ended with exit code 1 while it started" in last
+    assert "under `if __name__ == '__main__':`" in last
+
+
+def test_a_process_that_was_killed_before_its_first_answer_is_not_blamed_on_the_script():
+    arenas = ArenaProcesses(PLAN, 1, 1)
+    arenas._processes[0].kill()
+    with pytest.raises(ArenaProcessError, match=r"exit code -9\.$"):
+        arenas.reset([0], [None])
+    arenas.close()
+
+
+def test_ctrl_c_is_left_to_the_parent(arenas):
+    for process in arenas._processes:
+        os.kill(process.pid, signal.SIGINT)
+    time.sleep(0.2)
+    assert arenas.step(IDLE).rewards.shape == (6,)
+
+
+def test_an_answer_that_nobody_waited_for_is_not_taken_for_the_next(arenas):
+    for process in range(2):
+        arenas._ask(process, "step", IDLE[:3])  # as when Ctrl-C comes between question and answer
+    assert arenas.get_attribute("tick", [0, 1]) == [1, 1]
+    assert arenas.step(IDLE).obs.shape[0] == 6
+
+
+def test_processes_end_even_when_their_answers_were_never_read(arenas):
+    size = 200_000  # more than a pipe holds, so that the process waits for a reader
+    for process in range(2):
+        arenas._ask(process, "call_method", "__getattribute__", [0] * size, "tick")
+    arenas.close()
+    assert [process.exitcode for process in arenas._processes] == [0, 0]
+
+
+class _StrangeError(Exception):
+    def __init__(self, first: int, second: int) -> None:
+        super().__init__(f"{first} and {second}")
+
+
+def test_errors_that_cannot_travel_are_told_in_words():
+    told = processes._portable(_StrangeError(1, 2))
+    assert isinstance(told, ArenaProcessError)
+    assert str(told) == "_StrangeError: 1 and 2"
+    kept = ValueError("as it is")
+    assert processes._portable(kept) is kept
+
+
+def test_arenas_are_opened_here_or_elsewhere():
+    assert isinstance(open_arenas(PLAN, 1, 0), ArenaBatch)
+    elsewhere = open_arenas(PLAN, 1, 1)
+    assert isinstance(elsewhere, ArenaProcesses)
+    with pytest.raises(RuntimeError, match="Call reset before step"):
+        elsewhere.step(IDLE[:3])
+    elsewhere.close()

@@ -1,0 +1,222 @@
+"""The vector environment of stable-baselines3 tells the story of `lives`, and keeps that library's contract."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
+
+from gymnasium import Wrapper
+from stable_baselines3 import PPO
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.vec_env import VecEnvWrapper, VecFrameStack, VecMonitor
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.training.sb3 import SwarmVecEnv
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.support import lives
+
+IDLE = np.zeros((lives.N_ROBOTS, 3), np.float32)
+
+
+def told_story(env: SwarmVecEnv) -> list[tuple]:
+    env.seed(7)
+    env.reset()
+    return lives.live(lambda **change: env.env_method("set_population", **change), lambda: env.step(IDLE))
+
+
+def test_rewards_and_dones_by_hand():
+    steps = told_story(SwarmVecEnv(**lives.WORLD))
+    np.testing.assert_array_equal([rewards for _, rewards, _, _ in steps], lives.REWARDS)
+    np.testing.assert_array_equal([dones for _, _, dones, _ in steps], lives.TERMINATED | lives.TRUNCATED)
+
+
+def test_infos_by_hand():
+    env = SwarmVecEnv(**lives.WORLD)
+    steps = told_story(env)
+    for tick, (_, _, dones, infos) in enumerate(steps):
+        assert len(infos) == lives.N_ROBOTS
+        for robot, info in enumerate(infos):
+            assert ("terminal_observation" in info) == bool(dones[robot])
+            assert info.get("TimeLimit.truncated", False) == bool(lives.TRUNCATED[tick, robot])
+            episode = info.get("episode")
+            told = None if episode is None else (episode["r"], episode["l"])
+            assert told == lives.EPISODES.get((tick, robot))
+    assert not steps[2][3][1]["terminal_observation"].any()
+    last = steps[4][3]
+    position = env.interface.layout["position"]
+    np.testing.assert_array_equal(last[0]["terminal_observation"][position], steps[0][0][0, position])
+    assert last[0]["run"] == {"seed": 7, "seconds": 1.0, "collected": 0, "first_picked": 0}
+
+
+def test_results_of_earlier_steps_stay_valid():
+    env = SwarmVecEnv(**lives.WORLD)
+    env.seed(0)
+    first = env.reset()
+    kept = first.copy()
+    _, rewards, _, _ = env.step(IDLE)
+    env.step(np.ones_like(IDLE))
+    np.testing.assert_array_equal(first, kept)
+    assert rewards.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_seeds_count_up_by_arena_and_hold_for_one_reset():
+    env = SwarmVecEnv(**lives.WORLD, n_arenas=2)
+    assert env.seed(5) == [5, 5, 5, 6, 6, 6]
+    first = env.reset()
+    assert env.get_attr("seed_value") == [5, 5, 5, 6, 6, 6]
+    assert not np.array_equal(env.reset(), first), "without a seed the sequence goes on"
+    env.seed(5)
+    np.testing.assert_array_equal(env.reset(), first)
+    drawn = env.seed()
+    assert drawn[0] == drawn[2]
+    assert drawn[3] == drawn[0] + 1
+
+
+def test_attributes_and_methods_reach_the_arenas():
+    env = SwarmVecEnv(**lives.WORLD, n_arenas=2)
+    env.seed(0)
+    env.reset()
+    assert env.get_attr("tick") == [0] * 6
+    assert env.get_attr("tick", indices=[0, 5]) == [0, 0]
+    assert env.get_attr("seed_value", indices=4) == [1]
+    env.set_attr("max_cycles", 3, indices=[3])
+    assert env.get_attr("max_cycles") == [5, 5, 5, 3, 3, 3]
+    names = env.env_method("observation_space", "robot_0", indices=[5, 0])
+    assert [space.shape for space in names] == [env.observation_space.shape] * 2
+    assert env.env_is_wrapped(Wrapper) == [False] * 6
+    assert env.has_attr("layout")
+    assert not env.has_attr("no_such_thing")
+
+
+def test_evaluations_of_the_library_count_episodes_and_no_absences():
+    wrappers = [parse_wrapper("population:death_per_tick=0.05")]
+    env = SwarmVecEnv("warehouse_small", n_robots=4, max_cycles=20, delivery=0.0, first_pickup=0.0, tick=1.0,
+                      wrappers=wrappers)  # fmt: skip
+    model = PPO("MlpPolicy", env, n_steps=2, batch_size=8, seed=0, device="cpu")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        returns, lengths = evaluate_policy(model, env, n_eval_episodes=40, return_episode_rewards=True)
+    lost = np.array(lengths) - np.array(returns)
+    assert set(lost) == {0.0, 1.0}, "whoever dies earns nothing in the last step of its episode, and in no other"
+
+
+def test_a_method_is_called_once_per_arena():
+    env = SwarmVecEnv(**lives.WORLD, n_arenas=2)
+    env.seed(0)
+    env.reset()
+    env.env_method("step_batch", IDLE, indices=[0, 1, 4])
+    assert env.get_attr("tick", indices=[0, 3]) == [1, 1]
+
+
+def test_options_change_the_scenario_of_the_next_resets():
+    env = SwarmVecEnv(**lives.WORLD, n_arenas=2)
+    env.set_options({"scenario": {"n_objects": 9}})
+    env.reset()
+    assert env.get_attr("task", indices=[0])[0].n_objects == 9
+    env.reset()
+    assert env.get_attr("task", indices=[5])[0].n_objects == 9
+
+
+def test_masks_are_found_where_masking_algorithms_look():
+    env = SwarmVecEnv(**lives.WORLD, interface=InterfaceConfig(actions="discrete"))
+    env.reset()
+    masks = np.stack(env.env_method("action_masks"))
+    assert env.has_attr("action_masks")
+    assert masks.shape == (3, env.action_space.n)
+    np.testing.assert_array_equal(masks, env.action_masks())
+    assert not SwarmVecEnv(**lives.WORLD).has_attr("action_masks")
+
+
+def test_one_picture_per_arena():
+    pytest.importorskip("PIL", reason="needs the render extra: pillow")
+    env = SwarmVecEnv(**lives.WORLD, n_arenas=2, render_mode="rgb_array")
+    env.reset()
+    pictures = env.get_images()
+    assert len(pictures) == 2
+    assert pictures[0].dtype == np.uint8
+
+
+def test_works_inside_the_wrappers_of_the_library():
+    with pytest.warns(UserWarning, match="already wrapped with a `Monitor`"):  # rows tell their episodes themselves
+        monitored = VecMonitor(SwarmVecEnv(**lives.WORLD))
+    env: VecEnvWrapper = VecFrameStack(monitored, 2)
+    env.seed(1)
+    obs = env.reset()
+    half = obs.shape[1] // 2
+    assert not obs[:, :half].any()
+    for _ in range(lives.HORIZON_TICKS):
+        obs, _, dones, infos = env.step(IDLE)
+    assert dones.all()
+    assert not obs[:, :half].any(), "stacks start anew with the arena"
+    assert [info["episode"]["r"] for info in infos] == [5.0, 5.0, 5.0]
+
+
+def test_arenas_in_processes_give_the_same_bits():
+    options = {**lives.WORLD, "n_arenas": 3, "interface": InterfaceConfig(actions="discrete")}
+    rng = np.random.default_rng(0)
+    actions = rng.integers(0, 11, (8, 9))
+    seen = []
+    for n_processes in (0, 2):
+        env = SwarmVecEnv(**options, n_processes=n_processes)
+        try:
+            env.seed(3)
+            steps = [env.reset()]
+            for action in actions:
+                obs, rewards, dones, infos = env.step(action)
+                steps += [obs, rewards, dones, env.active, env.action_masks()]
+                steps += [info["terminal_observation"] for info in infos if "terminal_observation" in info]
+            assert env.get_attr("tick", indices=[8, 0]) == [3, 3]
+            assert env.env_method("observation_space", "robot_0", indices=[4])[0].shape == env.observation_space.shape
+            env.set_attr("max_cycles", 9, indices=[3])
+            assert env.get_attr("max_cycles", indices=[0, 3, 8]) == [5, 9, 5]
+            runs = [info["run"]["seed"] for info in infos if "run" in info]
+            seen.append((steps, runs))
+            with pytest.raises(ValueError, match="whole numbers from 0 to 10"):
+                env.step(np.full(9, 11))
+            with pytest.raises(ValueError, match="9 rows"):
+                env.step(np.zeros(3, np.int64))
+        finally:
+            env.close()
+    assert len(seen[0][0]) == len(seen[1][0])
+    for here, there in zip(*[steps for steps, _ in seen], strict=True):
+        np.testing.assert_array_equal(here, there)
+
+
+def test_refuses_more_processes_than_arenas():
+    with pytest.raises(ValueError, match="n_processes from 1 to n_arenas = 2"):
+        SwarmVecEnv(**lives.WORLD, n_arenas=2, n_processes=3)
+
+
+def test_the_number_of_rows_is_asked_for_by_arenas():
+    with pytest.raises(ConfigError, match="Expected n_arenas, not num_envs"):
+        SwarmVecEnv(num_envs=12)
+
+
+def test_takes_words_plain_values_and_lists_of_actions():
+    env = SwarmVecEnv(n_robots=3, wrappers=["sensor_noise:sigma=0.1"], interface={"actions": "discrete"})
+    env.seed(0)
+    obs = env.reset()
+    assert env.step([0, 1, 2])[1].shape == (3,)
+    clean = SwarmVecEnv(n_robots=3)
+    clean.seed(0)
+    assert not np.array_equal(clean.reset(), obs)
+    with pytest.raises(ConfigError, match="wrappers as a list"):
+        SwarmVecEnv(wrappers="sensor_noise:sigma=0.1")
+
+
+def test_options_beside_the_scenario_are_refused():
+    env = SwarmVecEnv(**lives.WORLD)
+    env.set_options({"n_objects": 9})
+    with pytest.raises(ConfigError, match="'n_objects' inside of the reset option 'scenario'"):
+        env.reset()
+
+
+def test_closed_environments_take_no_step():
+    env = SwarmVecEnv(**lives.WORLD)
+    env.reset()
+    env.close()
+    with pytest.raises(RuntimeError, match="were closed"):
+        env.step(IDLE)

@@ -1,0 +1,283 @@
+"""The vector view keeps Gymnasium's contract and tells the story of a death, a repair and a time limit."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env, data_equivalence
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
+
+import swarm_forage_env
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
+from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
+from swarm_forage_env.wrappers.noise import SensorNoise
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.support import lives
+
+IDLE = np.zeros((lives.N_ROBOTS, 3), np.float32)
+INTERFACES = (
+    InterfaceConfig(),
+    InterfaceConfig(observation="compact", automatic_gripper=True),
+    InterfaceConfig(observation="compact", actions="discrete", decision_ticks=2),
+)
+
+
+@pytest.mark.parametrize("interface", INTERFACES, ids=["full", "driven", "numbered"])
+@pytest.mark.parametrize("name", swarm_forage_env.SCENARIO_NAMES)
+def test_make_vec_gives_one_sub_environment_per_robot(name, interface):
+    env_id = f"swarm_forage/{name}-v0"
+    envs = gymnasium.make_vec(env_id, num_envs=12, n_robots=6, interface=interface, max_cycles=9)
+    assert envs.num_envs == 12
+    assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    assert envs.observation_space == batch_space(envs.single_observation_space, 12)
+    assert envs.action_space == batch_space(envs.single_action_space, 12)
+    assert envs.spec.id == env_id
+    envs.action_space.seed(0)
+    obs, infos = envs.reset(seed=1)
+    for _ in range(12):
+        assert envs.observation_space.contains(obs)
+        assert infos["active"].all()
+        obs, rewards, terminations, truncations, infos = envs.step(envs.action_space.sample())
+        assert rewards.shape == terminations.shape == truncations.shape == (12,)
+        assert terminations.dtype == truncations.dtype == np.bool_
+    envs.close()
+
+
+def test_the_number_of_sub_environments_is_a_whole_number_of_swarms():
+    env_id = "swarm_forage/warehouse_small-v0"
+    assert gymnasium.make_vec(env_id).num_envs == 50
+    assert gymnasium.make_vec(env_id, n_arenas=2, n_robots=4).num_envs == 8
+    assert gymnasium.make_vec(env_id, num_envs=8, n_arenas=2, n_robots=4).n_arenas == 2
+    for wrong in (7, 2, -4):
+        with pytest.raises(ValueError, match=f"multiple of n_robots = 4 .* got {wrong}; choose"):
+            gymnasium.make_vec(env_id, n_robots=4, num_envs=wrong)
+    with pytest.raises(ValueError, match=r"num_envs = 12 for n_arenas = 3 .* got 8"):
+        gymnasium.make_vec(env_id, n_robots=4, num_envs=8, n_arenas=3)
+    with pytest.raises(ValueError, match="n_arenas >= 1"):
+        gymnasium.make_vec(env_id, n_robots=4, n_arenas=0)
+
+
+def test_make_vec_takes_what_disturbs_the_swarm_under_a_name_of_its_own():
+    noise, slip = parse_wrapper("sensor_noise:sigma=0.1"), parse_wrapper("actuator_noise:sigma=0.1")
+    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v0", n_robots=4, swarm_wrappers=[noise])
+    clean = SwarmVectorEnv(n_robots=4)
+    assert not np.array_equal(envs.reset(seed=0)[0], clean.reset(seed=0)[0])
+    both = SwarmVectorEnv(n_robots=4, wrappers=[slip], swarm_wrappers=[noise])
+    np.testing.assert_array_equal(both.reset(seed=0)[0], envs.reset(seed=0)[0])
+
+
+def test_words_of_the_command_line_and_plain_values_are_taken_everywhere():
+    words, fields = ["sensor_noise:sigma=0.1"], {"actions": "discrete"}
+    seen = []
+    for wrappers, interface in (
+        (words, fields),
+        ([parse_wrapper(word) for word in words], InterfaceConfig(actions="discrete")),
+    ):
+        choices = {"n_robots": 4, "interface": interface}
+        envs = SwarmVectorEnv(**choices, wrappers=wrappers)
+        joint = JointForageEnv(**choices, wrappers=iter(wrappers))
+        parallel = ParallelLearnerEnv(**choices, wrappers=wrappers)
+        made = gymnasium.make_vec("swarm_forage/warehouse_small-v0", **choices, swarm_wrappers=wrappers)
+        assert envs.single_action_space == parallel.action_space("robot_0") == made.single_action_space
+        rows, _ = parallel.reset(seed=0)
+        seen += [envs.reset(seed=0)[0], joint.reset(seed=0)[0], np.stack(list(rows.values())), made.reset(seed=0)[0]]
+    assert not np.array_equal(seen[0], SwarmVectorEnv(n_robots=4).reset(seed=0)[0])
+    for other in seen[1:]:
+        np.testing.assert_array_equal(other, seen[0])
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        ({"wrappers": "throttle"}, "wrappers as a list of .* got 'throttle'"),
+        ({"wrappers": {"throttle": {}}}, "wrappers as a list"),
+        ({"wrappers": 3}, "wrappers as a list .* got 3"),
+        ({"wrappers": [SensorNoise]}, "got <class .*SensorNoise'> in it"),
+        ({"wrappers": ["trottle"]}, "Did you mean 'throttle'"),
+        ({"interface": "discrete"}, "InterfaceConfig or its fields by name.* got 'discrete'"),
+        ({"interface": {"action": "discrete"}}, "Did you mean 'actions'"),
+    ],
+)
+@pytest.mark.parametrize("view", [JointForageEnv, SwarmVectorEnv, ParallelLearnerEnv])
+def test_other_wrappers_and_interfaces_are_refused(view, given, reason):
+    with pytest.raises(ConfigError, match=reason):
+        view(n_robots=3, **given)
+
+
+@pytest.mark.parametrize("n_processes", [0, 1])
+def test_actions_may_be_lists_and_closed_environments_take_none(n_processes):
+    envs = SwarmVectorEnv(n_robots=3, interface={"actions": "discrete"}, n_processes=n_processes)
+    envs.reset(seed=0)
+    assert envs.step([0, 1, 2])[1].shape == (3,)
+    envs.close()
+    for call in (lambda: envs.step([0, 1, 2]), envs.reset):
+        with pytest.raises(RuntimeError, match="Expected open arenas, but they were closed"):
+            call()
+
+
+def test_numbers_that_are_not_whole_are_no_actions():
+    envs = SwarmVectorEnv(n_robots=3, interface=INTERFACES[2])
+    envs.reset(seed=0)
+    with pytest.raises(ValueError, match="whole numbers from 0 to 10, got float64"):
+        envs.step(np.array([0.7, 1.0, 2.0]))
+
+
+def test_other_vectorizers_take_the_joint_view():
+    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v0", num_envs=2, vectorization_mode="sync", n_robots=3)
+    obs, _ = envs.reset(seed=0)
+    assert obs.shape[:2] == (2, 3)
+
+
+def told_story() -> list[tuple]:
+    envs = SwarmVectorEnv(**lives.WORLD)
+    envs.reset(seed=7)
+    return lives.live(lambda **change: envs.call("set_population", **change), lambda: envs.step(IDLE))
+
+
+def test_rewards_and_endings_by_hand():
+    steps = told_story()
+    np.testing.assert_array_equal([rewards for _, rewards, *_ in steps], lives.REWARDS)
+    np.testing.assert_array_equal([terminated for _, _, terminated, *_ in steps], lives.TERMINATED)
+    np.testing.assert_array_equal([truncated for _, _, _, truncated, _ in steps], lives.TRUNCATED)
+    np.testing.assert_array_equal([infos["active"] for *_, infos in steps[:-1]], lives.ACTIVE_BEFORE[1:])
+
+
+def test_infos_by_hand():
+    for tick, (obs, _, terminated, truncated, infos) in enumerate(told_story()):
+        done = terminated | truncated
+        assert ("final_obs" in infos) == done.any()
+        if not done.any():
+            continue
+        np.testing.assert_array_equal(infos["_final_obs"], done)
+        assert [final is not None for final in infos["final_obs"]] == done.tolist()
+        episodes = {
+            (tick, robot): (infos["episode"]["r"][robot], infos["episode"]["l"][robot])
+            for robot in np.flatnonzero(infos["_episode"]).tolist()
+        }
+        assert episodes == {key: value for key, value in lives.EPISODES.items() if key[0] == tick}
+        for robot in np.flatnonzero(truncated).tolist():
+            assert not np.array_equal(infos["final_obs"][robot], obs[robot])
+
+
+def test_rows_are_those_of_the_joint_view():
+    envs = SwarmVectorEnv("warehouse_small", num_envs=8, n_robots=4, max_cycles=20)
+    joint = [JointForageEnv("warehouse_small", n_robots=4, max_cycles=20) for _ in range(2)]
+    obs, _ = envs.reset(seed=3)
+    rows = [env.reset(seed=3 + arena)[0] for arena, env in enumerate(joint)]
+    rng = np.random.default_rng(0)
+    for tick in range(30):
+        np.testing.assert_array_equal(obs, np.concatenate(rows))
+        actions = rng.uniform(-1, 1, (8, 3)).astype(np.float32)
+        obs, rewards, _, truncated, _ = envs.step(actions)
+        rows = []
+        for arena, env in enumerate(joint):
+            mine = slice(4 * arena, 4 * arena + 4)
+            row, reward, _, is_over, _ = env.step(actions[mine])
+            assert reward == pytest.approx(rewards[mine].sum())
+            assert truncated[mine].tolist() == [is_over] * 4
+            rows.append(env.reset()[0] if is_over else row)
+        assert truncated.all() == (tick == 19)
+
+
+def test_the_same_seed_gives_the_same_data_twice_and_nothing_is_reused():
+    def played() -> list:
+        envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3, max_cycles=8, interface=INTERFACES[2])
+        envs.action_space.seed(5)
+        envs.reset(seed=2)
+        data = [envs.step(envs.action_space.sample()) for _ in range(10)]
+        for *_, infos in data:
+            infos.get("episode", {}).pop("t", None)  # the clock on the wall
+        return data
+
+    first, second = played(), played()
+    for one, other in zip(first, second, strict=True):
+        for k in range(4):
+            assert data_equivalence(one[k], other[k], exact=True)
+        np.testing.assert_array_equal(one[4]["active"], other[4]["active"])
+        for mine, theirs in zip(one[4].get("final_obs", ()), other[4].get("final_obs", ()), strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+    assert not np.array_equal(first[0][0], first[1][0])
+
+
+def test_seeds_per_arena_and_their_number():
+    envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3)
+    one, _ = envs.reset(seed=[4, 9])
+    assert envs.get_attr("seed_value") == (4, 9)
+    other, _ = envs.reset(seed=[9, 4])
+    np.testing.assert_array_equal(one[:3], other[3:])
+    again, _ = envs.reset()
+    assert not np.array_equal(other, again)
+    with pytest.raises(ValueError, match="one seed per arena"):
+        envs.reset(seed=[1])
+
+
+@pytest.mark.parametrize("view", ["joint", "vector"])
+def test_a_reset_can_change_the_scenario(view):
+    if view == "joint":
+        env = JointForageEnv("warehouse_small", n_robots=3)
+        worlds = lambda: [env.world]  # noqa: E731 - a name for both views
+    else:
+        env = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3)
+        worlds = lambda: [env._arenas.worlds[k].base for k in range(2)]  # noqa: E731
+    space = env.observation_space
+    env.reset(seed=0, options={"scenario": {"n_objects": 77, "delivery": 5.0}})
+    assert {world.scenario.objects.n_objects for world in worlds()} == {77}
+    env.reset()
+    assert {world.scenario.reward.delivery for world in worlds()} == {5.0}
+    env.reset(options={"scenario": {}})
+    assert {world.scenario.objects.n_objects for world in worlds()} == {200}
+    assert env.observation_space == space
+    with pytest.raises(ConfigError, match="n_robots to stay 3"):
+        env.reset(options={"scenario": {"n_robots": 4}})
+    with pytest.raises(ConfigError, match="'width_m' inside of the reset option 'scenario'"):
+        env.reset(options={"width_m": 24.0})
+
+
+def test_the_checker_of_gymnasium_passes_with_wrappers_and_options():
+    wrappers = [parse_wrapper("sensor_noise:sigma=0.05"), parse_wrapper("population:death_per_tick=0.01")]
+    check_env(JointForageEnv("warehouse_small", n_robots=5, wrappers=wrappers, max_cycles=50), skip_render_check=True)
+
+
+def test_attributes_and_methods_reach_the_arenas():
+    envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3, n_processes=2)
+    try:
+        envs.reset(seed=0)
+        envs.set_attr("max_cycles", [2, 3])
+        assert envs.call("max_cycles") == (2, 3)
+        envs.set_attr("max_cycles", 4)
+        assert envs.get_attr("max_cycles") == (4, 4)
+        with pytest.raises(ValueError, match="one value per arena"):
+            envs.set_attr("max_cycles", [1])
+        with pytest.raises(AttributeError):
+            envs.call("no_such_thing")
+    finally:
+        envs.close()
+
+
+def test_pictures_are_one_per_arena():
+    pytest.importorskip("PIL", reason="needs the render extra: pillow")
+    envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3, render_mode="rgb_array")
+    envs.reset(seed=0)
+    assert [picture.ndim for picture in envs.render()] == [3, 3]
+    assert SwarmVectorEnv("warehouse_small", num_envs=3, n_robots=3).render() is None
+
+
+def test_masks_come_with_discrete_actions():
+    envs = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3, interface=INTERFACES[2])
+    envs.reset(seed=0)
+    masks = envs.action_masks()
+    assert masks.shape == (6, envs.single_action_space.n)
+    assert masks[:, :6].all()
+
+
+def test_works_inside_wrappers_of_gymnasium():
+    envs = RecordEpisodeStatistics(SwarmVectorEnv(**lives.WORLD), stats_key="counted")
+    envs = DictInfoToList(envs)
+    envs.reset(seed=0)
+    for _ in range(lives.HORIZON_TICKS):
+        _, _, _, truncated, infos = envs.step(IDLE)
+    assert truncated.all()
+    assert [info["counted"]["r"] for info in infos] == [info["episode"]["r"] for info in infos] == [5.0] * 3

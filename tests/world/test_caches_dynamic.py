@@ -1,0 +1,309 @@
+"""Dynamic caches: which objects a FOUND drop gathers, where the cache comes to stand, when there is none."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swarm_forage_env.contract.codes import Counter, Event, Grip, ObjectStatus
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.scenarios.regions import overlap_cells
+from swarm_forage_env.world.caches import MAX_PASSES, cache_box, clear_centre, founding_members, protected_boxes
+from tests.support.stage import act, assert_conserved, build_cache, clear, depot, lay, load, stand, tidy_world
+
+MIDDLE = (70, 40)
+"""A cell around which a square of 31 cells is clear of nest, source and border."""
+STRIP_CELL = (125, 60)
+
+
+def found_at(env: ForageEnv, cell: tuple[int, int], row: int = 0, grip: float = Grip.FOUND) -> list[int]:
+    """Robot 0 founds with an object at a cell; returns the slots of the caches that stand afterwards."""
+    stand(env, 0, cell)
+    load(env, 0, row)
+    act(env, {0: grip})
+    assert act(env, {0: grip})[0] == Event.DROPPED
+    assert_conserved(env)
+    return np.flatnonzero(env.caches.alive).tolist()
+
+
+def contents(env: ForageEnv, slot: int) -> list[int]:
+    return np.flatnonzero(env.objects.cache_slot == slot).tolist()
+
+
+def test_a_cache_forms_from_the_objects_around_at_their_mean():
+    env = tidy_world(caches="dynamic")
+    for row, cell in enumerate([(60, 40), (64, 40), (69, 44)], start=1):
+        lay(env, row, cell)
+    (slot,) = found_at(env, (62, 38))
+    assert contents(env, slot) == [0, 1, 2, 3]
+    # Mean of the centres: (60 + 64 + 69 + 62) / 4 + 0.5 = 64.25, (40 + 40 + 44 + 38) / 4 + 0.5 = 41.0
+    assert env.caches.cell[slot].tolist() == [64, 41]
+    assert env.caches.serial[slot] == 1
+    assert env.events.counters[Counter.CACHES_CREATED] == 1
+    assert np.all(env.objects.cell[:4] == (64, 41))
+
+
+def test_a_site_drop_founds_nothing():
+    env = tidy_world(caches="dynamic")
+    lay(env, 1, (61, 40))
+    assert found_at(env, (60, 40), grip=Grip.SITE) == []
+    assert env.objects.status[0] == ObjectStatus.FREE
+
+
+def test_a_lone_object_founds_nothing():
+    env = tidy_world(caches="dynamic")
+    assert found_at(env, MIDDLE) == []
+    assert env.objects.cell[0].tolist() == list(MIDDLE)
+
+
+@pytest.mark.parametrize(
+    ("offset", "joins"),
+    [((16, 0), True), ((0, -16), True), ((17, 0), False), ((11, 11), True), ((12, 11), False)],
+)
+def test_members_lie_within_min_dist_of_the_dropped_object(offset, joins):
+    env = tidy_world(caches="dynamic")
+    assert env.scenario.min_dist_m == pytest.approx(3.2)  # 16 cells
+    lay(env, 1, (MIDDLE[0] + offset[0], MIDDLE[1] + offset[1]))
+    slots = found_at(env, MIDDLE)
+    assert bool(slots) == joins
+
+
+def test_distance_is_to_the_dropped_object_not_between_members():
+    env = tidy_world(caches="dynamic")
+    for row, x in enumerate([MIDDLE[0] - 15, MIDDLE[0] + 15], start=1):
+        lay(env, row, (x, MIDDLE[1]))
+    (slot,) = found_at(env, MIDDLE)
+    assert contents(env, slot) == [0, 1, 2]
+
+
+def test_distances_are_compared_in_whole_cells():
+    # 48 and 64 cells make exactly min_dist = 16 m; the same sum in metres exceeds it by rounding.
+    config = scenario("search_and_rescue", side_m=80.0, caches="dynamic", n_robots=1)
+    env = ForageEnv(config)
+    env.reset_batch(0)
+    clear(env)
+    for row, cell in ((0, (100, 100)), (1, (148, 164)), (2, (149, 164))):
+        lay(env, row, cell)
+    assert founding_members(0, config, env.objects, []).tolist() == [0, 1]
+
+
+def test_objects_on_the_square_join_although_they_are_far_or_alone():
+    env = tidy_world(caches="dynamic")
+    lay(env, 1, (MIDDLE[0] + 2, MIDDLE[1]))
+    lay(env, 2, (MIDDLE[0] - 14, MIDDLE[1] + 14))  # farther than min_dist, on the square
+    lay(env, 3, (MIDDLE[0] + 17, MIDDLE[1]))  # neither
+    (slot,) = found_at(env, MIDDLE)
+    assert contents(env, slot) == [0, 1, 2]
+    assert env.objects.status[3] == ObjectStatus.FREE
+
+
+def test_the_source_strip_founds_nothing():
+    env = tidy_world(caches="dynamic")
+    lay(env, 1, (STRIP_CELL[0] - 1, STRIP_CELL[1]))
+    assert found_at(env, STRIP_CELL) == []
+
+
+def test_objects_of_the_source_strip_do_not_join():
+    env = tidy_world(caches="dynamic")
+    for row, cell in ((1, (103, 40)), (2, (120, 40))):
+        lay(env, row, cell)
+    (slot,) = found_at(env, (105, 40))
+    assert contents(env, slot) == [0, 1]
+    assert env.objects.status[2] == ObjectStatus.FREE
+
+
+def test_clusters_are_protected():
+    env = ForageEnv(scenario("search_and_rescue", side_m=48.0, n_robots=1, caches="dynamic"))
+    env.reset_batch(0)
+    row = int(np.flatnonzero(env.objects.status == ObjectStatus.FREE)[0])
+    protected = protected_boxes(env.scenario, env.arena._source)
+    assert len(protected) == 23
+    assert founding_members(row, env.scenario, env.objects, protected).size == 0
+    assert founding_members(row, env.scenario, env.objects, []).size >= 2
+
+
+def test_random_placement_protects_nothing():
+    env = ForageEnv(scenario("warehouse_medium", n_robots=1, caches="dynamic"))
+    env.reset_batch(0)
+    assert protected_boxes(env.scenario, env.arena._source) == []
+    row = int(np.argmin(np.abs(env.objects.cell - (60, 120)).sum(axis=1)))
+    cell = tuple((env.objects.cell[row] + (1, 0)).tolist())
+    other = next(row for row in range(800) if env.objects.floor[cell[1], cell[0]] != row)
+    (slot,) = found_at(env, cell, row=other)
+    assert env.caches.count[slot] > 20
+
+
+def test_the_centre_keeps_a_nominal_side_from_the_border():
+    env = tidy_world(caches="dynamic")
+    lay(env, 1, (70, 13))
+    (slot,) = found_at(env, (72, 13))
+    # D = 6.4 m = 32 cells; the mean at cell 13 is moved to cell 32.
+    assert env.caches.cell[slot].tolist() == [71, 32]
+
+
+@pytest.mark.parametrize(("x", "clear_x"), [(37, range(39, 128)), (106, range(32, 105))])
+def test_the_square_is_pushed_clear_of_nest_and_source(x, clear_x):
+    env = tidy_world(caches="dynamic")
+    lay(env, 1, (x, 42))
+    (slot,) = found_at(env, (x, 40))
+    # Nest up to cell 23, source from cell 120, 15 cells to either side of the centre.
+    assert env.caches.cell[slot, 0] in clear_x
+    assert contents(env, slot) == [0, 1]
+
+
+def test_a_second_cache_stands_clear_of_the_first():
+    # Caches this close are refused to robots; two FOUND drops that finish in the same tick can still come close.
+    env = tidy_world(n_robots=2, caches="dynamic")
+    for row, cell in ((0, (52, 40)), (1, (51, 44)), (2, (80, 40)), (3, (81, 44))):
+        if row % 2:
+            lay(env, row, cell)
+        else:
+            stand(env, row // 2, cell)
+            load(env, row // 2, row)
+    for _ in range(2):
+        act(env, {0: Grip.FOUND, 1: Grip.FOUND})
+    assert env.caches.alive.sum() == 2
+    assert_conserved(env)  # no two squares overlap
+
+
+def test_two_founders_of_one_group_make_one_cache():
+    env = tidy_world(n_robots=2, caches="dynamic")
+    for robot, cell in enumerate([(70, 40), (76, 40)]):
+        stand(env, robot, cell)
+        load(env, robot, robot)
+    for _ in range(2):
+        events = act(env, {0: Grip.FOUND, 1: Grip.FOUND})
+    assert events == [Event.DROPPED, Event.DROPPED]
+    (slot,) = np.flatnonzero(env.caches.alive).tolist()
+    assert contents(env, slot) == [0, 1]
+    assert_conserved(env)
+
+
+def test_a_found_drop_without_a_free_cell_founds_nothing():
+    env = tidy_world(caches="dynamic")
+    lay(env, 1, MIDDLE)
+    lay(env, 2, (MIDDLE[0] + 1, MIDDLE[1]))
+    stand(env, 0, MIDDLE)
+    load(env, 0, 0)
+    act(env, {0: Grip.FOUND})
+    assert act(env, {0: Grip.FOUND})[0] == Event.DROPPED_ELSEWHERE
+    assert not env.caches.alive.any()
+
+
+# Pushing a centre clear
+
+
+boxes = st.tuples(st.integers(0, 140), st.integers(0, 70), st.integers(1, 20), st.integers(1, 10)).map(
+    lambda box: (box[0], box[1], box[0] + box[2], box[1] + box[3])
+)
+
+
+@settings(max_examples=60)
+@given(
+    centre=st.tuples(st.integers(0, 159), st.integers(0, 79)),
+    obstacles=st.lists(boxes, max_size=6),
+    seed=st.integers(0, 99),
+)
+def test_an_accepted_centre_is_clear_and_a_place_for_an_object(centre, obstacles, seed):
+    config = scenario("warehouse_small", caches="dynamic", side_share=0.05)
+    accepted = clear_centre(centre, config, obstacles, np.random.default_rng(seed))
+    # Objects may lie in the cells 24 .. 136 and 12 .. 68; with D = 1.6 m = 8 cells the border is farther away.
+    clamped = min(max(centre[0], 24), 136), min(max(centre[1], 12), 68)
+    untouched = all(overlap_cells(cache_box(clamped, config.cache_side_cells), obstacle) == 0 for obstacle in obstacles)
+    if untouched:
+        assert accepted == clamped
+    if accepted is not None:
+        box = cache_box(accepted, config.cache_side_cells)
+        assert all(overlap_cells(box, obstacle) == 0 for obstacle in obstacles)
+        assert 24 <= accepted[0] <= 136
+        assert 12 <= accepted[1] <= 68
+
+
+def test_a_centre_without_room_is_given_up():
+    config = scenario("warehouse_small", caches="dynamic")
+    rng = np.random.default_rng(0)
+    assert clear_centre(MIDDLE, config, [(0, 0, 160, 80)], rng) is None
+    drawn = np.random.default_rng(0).random(2 * MAX_PASSES)
+    assert rng.random() != drawn[0], "it tried"
+
+
+def test_objects_stay_when_no_cache_finds_room():
+    # The nest in the middle leaves less than a square on every side.
+    env = ForageEnv(
+        scenario(
+            "warehouse_medium",
+            n_robots=1,
+            n_objects=2,
+            caches="dynamic",
+            nest_size_m=(20.0, 20.0),
+        )
+    )
+    env.reset_batch(0)
+    clear(env)
+    lay(env, 1, (60, 120))
+    assert found_at(env, (62, 120)) == []
+    assert env.objects.status.tolist() == [ObjectStatus.FREE, ObjectStatus.FREE]
+
+
+# As the authors' program does it (quirk)
+
+
+def quirky_world(name: str = "warehouse_small", **overrides) -> ForageEnv:
+    env = ForageEnv(
+        scenario(
+            name,
+            n_robots=2,
+            n_objects=8,
+            caches="dynamic",
+            quirks=Quirks(dynamic_cache_merges_all=True),
+            **overrides,
+        )
+    )
+    env.reset_batch(0)
+    clear(env)
+    return env
+
+
+def test_quirk_merges_all_usable_objects_wherever_they_lie():
+    env = quirky_world()
+    for row in range(8):
+        lay(env, row, depot(row))
+    for row, cell in ((1, (30, 60)), (2, (110, 20)), (3, (60, 66))):
+        lay(env, row, cell)
+    (slot,) = found_at(env, MIDDLE)
+    assert contents(env, slot) == [0, 1, 2, 3]
+
+
+def test_quirk_needs_no_usable_founder():
+    env = quirky_world()
+    for row in range(8):
+        lay(env, row, depot(row))
+    lay(env, 1, (60, 40))
+    lay(env, 2, (80, 40))
+    (slot,) = found_at(env, STRIP_CELL)
+    assert contents(env, slot) == [1, 2]
+
+
+def test_quirk_never_forms_a_cache_in_random_placement():
+    env = quirky_world("warehouse_medium")
+    for row in range(8):
+        lay(env, row, (60 + 2 * row, 120))
+    assert found_at(env, (50, 120)) == []
+
+
+def test_serials_are_never_used_again():
+    env = tidy_world(n_robots=1, caches="dynamic")
+    serials = []
+    for _ in range(4):
+        lay(env, 1, (MIDDLE[0] + 2, MIDDLE[1]))
+        (slot,) = found_at(env, MIDDLE)
+        serials.append(int(env.caches.serial[slot]))
+        assert contents(env, slot) == [0, 1]
+        act(env, {0: Grip.GRASP})
+        assert act(env, {0: Grip.GRASP})[0] == Event.PICKED_FROM_CACHE
+        env.swarm.carried_object[0] = -1
+    assert serials == [1, 2, 3, 4]
+    build_cache(env, [2, 3], (60, 40))
+    assert env.caches.serial[0] == 5

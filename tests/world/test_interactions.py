@@ -1,0 +1,389 @@
+"""Pick-ups and drops, rule by rule: what each gripper band does where."""
+
+from collections import Counter as Tally
+
+import numpy as np
+import pytest
+
+from swarm_forage_env.contract.codes import CELL_EMPTY, Counter, Event, Grip, ObjectStatus
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.world.kernels.interact import DELIVER_ONLY, FOUND, GRASP, RELEASE, SITE, band_of
+from tests.support.stage import (
+    BASE_CELL,
+    CORNER_CACHE,
+    NEST_CELL,
+    OPEN_CELL,
+    WALL_CELL,
+    act,
+    assert_conserved,
+    build_cache,
+    cell_centre,
+    clear,
+    count,
+    depot,
+    events_of,
+    lay,
+    load,
+    put,
+    stand,
+    tidy_world,
+)
+
+NONE, PICKED_UP, PICKED_FROM_CACHE = Event.NONE, Event.PICKED_UP, Event.PICKED_FROM_CACHE
+DELIVERED, DROPPED, ELSEWHERE, JOINED = Event.DELIVERED, Event.DROPPED, Event.DROPPED_ELSEWHERE, Event.JOINED_CACHE
+NOTHING_HERE, TOO_NEAR = Event.NOTHING_HERE, Event.CACHE_TOO_NEAR
+ANY_RELEASE = (Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.FOUND)
+
+
+@pytest.mark.parametrize(
+    ("grip", "band"),
+    [
+        (1.0, GRASP),
+        (1e-6, GRASP),
+        (0.0, RELEASE),
+        (-0.125, RELEASE),
+        (-0.2499, RELEASE),
+        (-0.25, DELIVER_ONLY),
+        (-0.375, DELIVER_ONLY),
+        (-0.4999, DELIVER_ONLY),
+        (-0.5, SITE),
+        (-0.625, SITE),
+        (-0.7499, SITE),
+        (-0.75, FOUND),
+        (-1.0, FOUND),
+        (-7.0, FOUND),
+        (7.0, GRASP),
+    ],
+)
+def test_bands(grip, band):
+    assert band_of(np.float32(grip)) == band
+
+
+# Empty robots
+
+
+def test_grasping_over_an_object_picks_it_up_one_tick_later():
+    env = tidy_world()
+    stand(env, 0, OPEN_CELL)
+    lay(env, 5, OPEN_CELL)
+    assert act(env, {0: Grip.GRASP}) == [NONE] * 4
+    assert env.swarm.carried_object[0] == -1, "no effect yet"
+    assert env.objects.status[5] == ObjectStatus.FREE
+    assert act(env, {0: Grip.GRASP}) == [PICKED_UP, NONE, NONE, NONE]
+    assert env.events.event_object[0] == 5
+    assert env.events.event_cache[0].tolist() == [0, 0, 0, 0]
+    assert env.swarm.carried_object[0] == 5
+    assert not env.swarm.cargo_from_cache[0]
+    assert env.objects.status[5] == ObjectStatus.CARRIED
+    assert env.objects.floor[OPEN_CELL[::-1]] == CELL_EMPTY
+    assert events_of(env, Grip.GRASP, 3) == [NONE, NONE, NONE], "a carrying robot that grasps holds"
+    assert count(env, Counter.FREE_PICKUPS) == 1
+    assert_conserved(env)
+
+
+def test_grasping_in_a_cache_takes_from_the_cache():
+    env = tidy_world(caches="static")
+    slot = build_cache(env, [1, 3, 5], BASE_CELL)
+    stand(env, 0, (BASE_CELL[0] + 12, BASE_CELL[1] - 12))
+    assert events_of(env, Grip.GRASP, 2) == [NONE, PICKED_FROM_CACHE]
+    taken = int(env.events.event_object[0])
+    assert taken in (1, 3, 5)
+    assert env.events.event_cache[0].tolist() == [env.caches.serial[slot], *BASE_CELL, 2]
+    assert env.swarm.cargo_from_cache[0]
+    assert env.caches.count[slot] == 2
+    assert count(env, Counter.CACHE_PICKUPS) == 1
+    assert count(env, Counter.FREE_PICKUPS) == 0
+    assert_conserved(env)
+
+
+@pytest.mark.parametrize("cell", [OPEN_CELL, NEST_CELL, WALL_CELL])
+def test_grasping_over_nothing_is_refused_at_once_and_every_time(cell):
+    env = tidy_world()
+    stand(env, 0, cell)
+    assert events_of(env, Grip.GRASP, 3) == [NOTHING_HERE] * 3
+    assert env.events.event_object[0] == -1
+
+
+@pytest.mark.parametrize("grip", ANY_RELEASE)
+def test_empty_robots_have_nothing_to_release(grip):
+    env = tidy_world(caches="dynamic")
+    lay(env, 0, OPEN_CELL)
+    build_cache(env, [1, 2], CORNER_CACHE)
+    for cell in (OPEN_CELL, NEST_CELL, CORNER_CACHE, WALL_CELL):
+        stand(env, 0, cell)
+        assert events_of(env, grip, 2) == [NONE, NONE]
+        assert env.swarm.pending_kind[0] == 0
+
+
+# Carrying robots
+
+
+@pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
+@pytest.mark.parametrize("grip", ANY_RELEASE)
+def test_any_release_in_the_nest_delivers_one_tick_later(grip, caches):
+    env = tidy_world(caches=caches)
+    stand(env, 0, NEST_CELL)
+    load(env, 0, 2)
+    assert act(env, {0: grip})[0] == NONE
+    assert env.swarm.carried_object[0] == 2, "no effect yet"
+    assert act(env, {0: grip})[0] == DELIVERED
+    assert env.events.event_object[0] == 2
+    assert env.swarm.carried_object[0] == -1
+    assert count(env, Counter.COLLECTED) == 1
+    # Re-placed in the same tick, in the source, as new.
+    assert env.objects.status[2] == ObjectStatus.FREE
+    x, y = env.objects.cell[2].tolist()
+    assert 120 <= x < 136
+    assert 12 <= y < 68
+    assert env.objects.carriers[2] == 0
+    assert_conserved(env)
+
+
+def test_the_nest_is_a_closed_rectangle():
+    env = tidy_world(n_robots=5)
+    x_low, y_low, x_high, y_high = env.scenario.arena.nest_box_m
+    for robot, place in enumerate([(x_low, y_low), (x_high, y_high), (x_high, 8.0), (x_high + 1e-6, 6.0)]):
+        put(env, robot, *place)
+        load(env, robot, robot)
+    act(env, dict.fromkeys(range(4), Grip.DELIVER))
+    assert act(env, dict.fromkeys(range(4), Grip.DELIVER))[:4] == [DELIVERED, DELIVERED, DELIVERED, NOTHING_HERE]
+
+
+@pytest.mark.parametrize("caches", ["static", "dynamic"])
+@pytest.mark.parametrize("grip", ANY_RELEASE)
+def test_any_release_in_a_cache_joins_it_one_tick_later(grip, caches):
+    env = tidy_world(caches=caches)
+    slot = build_cache(env, [0, 1], BASE_CELL)
+    stand(env, 0, (BASE_CELL[0] - 15, BASE_CELL[1] + 15))
+    load(env, 0, 2)
+    assert events_of(env, grip, 2) == [NONE, JOINED]
+    assert env.events.event_object[0] == 2
+    assert env.events.event_cache[0].tolist() == [env.caches.serial[slot], *BASE_CELL, 3]
+    assert env.objects.cache_slot[2] == slot
+    assert count(env, Counter.CACHE_DROPS) == 1
+    assert_conserved(env)
+
+
+def test_release_over_open_floor_acts_at_once():
+    env = tidy_world()
+    stand(env, 0, OPEN_CELL)
+    load(env, 0, 4)
+    assert act(env, {0: Grip.RELEASE})[0] == DROPPED
+    assert env.events.event_object[0] == 4
+    assert env.objects.cell[4].tolist() == list(OPEN_CELL)
+    assert env.objects.carriers[4] == 1, "laid down by a robot, not placed anew"
+    assert count(env, Counter.FLOOR_DROPS) == 1
+    assert count(env, Counter.DISPLACED_DROPS) == 0
+    assert_conserved(env)
+
+
+@pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
+def test_deliver_acts_nowhere_else(caches):
+    env = tidy_world(caches=caches)
+    load(env, 0, 4)
+    for cell in (OPEN_CELL, WALL_CELL, depot(0)):
+        stand(env, 0, cell)
+        assert events_of(env, Grip.DELIVER, 2) == [NOTHING_HERE] * 2
+    assert env.swarm.carried_object[0] == 4
+
+
+@pytest.mark.parametrize("grip", [Grip.SITE, Grip.FOUND])
+def test_site_and_found_take_a_tick_in_dynamic_worlds(grip):
+    env = tidy_world(caches="dynamic")
+    stand(env, 0, OPEN_CELL)
+    load(env, 0, 4)
+    assert events_of(env, grip, 2) == [NONE, DROPPED]
+    assert env.objects.cell[4].tolist() == list(OPEN_CELL)
+    assert count(env, Counter.CACHES_CREATED) == 0, "alone"
+    assert_conserved(env)
+
+
+@pytest.mark.parametrize("caches", ["none", "static"])
+@pytest.mark.parametrize("grip", [Grip.SITE, Grip.FOUND])
+def test_site_and_found_are_release_in_other_worlds(grip, caches):
+    env = tidy_world(caches=caches)
+    stand(env, 0, OPEN_CELL)
+    load(env, 0, 4)
+    lay(env, 3, (OPEN_CELL[0] + 1, OPEN_CELL[1]))
+    assert act(env, {0: grip})[0] == DROPPED
+    assert not env.caches.alive.any()
+
+
+@pytest.mark.parametrize("grip", [Grip.SITE, Grip.FOUND])
+def test_site_and_found_are_refused_near_a_cache(grip):
+    env = tidy_world(caches="dynamic")
+    near, far = build_cache(env, [0, 1], CORNER_CACHE), build_cache(env, [2, 3], (40, 60))
+    # Proximity distance: twice the nominal side, 12.8 m, to the centre of the nearer cache.
+    x, y = cell_centre(CORNER_CACHE)
+    put(env, 0, x + 12.79, y)
+    load(env, 0, 4)
+    assert events_of(env, grip, 2) == [TOO_NEAR] * 2
+    assert env.events.event_cache[0].tolist() == [env.caches.serial[near], *CORNER_CACHE, 2]
+    assert env.events.event_cache[0, 0] != env.caches.serial[far]
+    put(env, 0, x + 12.81, y)
+    assert events_of(env, grip, 2) == [NONE, DROPPED]
+
+
+def test_release_near_a_cache_is_never_refused():
+    env = tidy_world(caches="dynamic")
+    build_cache(env, [0, 1], CORNER_CACHE)
+    stand(env, 0, (60, 20))
+    load(env, 0, 4)
+    assert act(env, {0: Grip.RELEASE})[0] == DROPPED
+
+
+@pytest.mark.parametrize(
+    ("place", "why"),
+    [(OPEN_CELL, "another object lies there"), (WALL_CELL, "no object may lie there")],
+)
+@pytest.mark.parametrize(("grip", "ticks"), [(Grip.RELEASE, 1), (Grip.SITE, 2), (Grip.FOUND, 2)])
+def test_drops_without_a_free_cell_are_placed_elsewhere(grip, ticks, place, why):
+    env = tidy_world(caches="dynamic")
+    if place == OPEN_CELL:
+        lay(env, 7, place)
+    stand(env, 0, place)
+    load(env, 0, 4)
+    assert events_of(env, grip, ticks)[-1] == ELSEWHERE, why
+    assert env.events.event_object[0] == 4
+    assert env.objects.status[4] == ObjectStatus.FREE
+    assert 120 <= env.objects.cell[4, 0] < 136, "in the source"
+    assert env.objects.carriers[4] == 0, "placed anew"
+    assert count(env, Counter.FLOOR_DROPS) == count(env, Counter.DISPLACED_DROPS) == 1
+    assert_conserved(env)
+
+
+def full_source_world() -> tuple[ForageEnv, list[tuple[int, int]]]:
+    """A tiny warehouse whose source has 56 cells: 28 under a cache of two objects, 28 with an object each.
+
+    Objects 30 and 31 are carried by robots 0 and 1 in the nest, 32 .. 34 lie on open floor.
+    """
+    env = ForageEnv(
+        scenario(
+            "warehouse_small",
+            n_robots=3,
+            n_objects=35,
+            width_m=8.0,
+            height_m=4.0,
+            nest_centre_m=(0.8, 2.0),
+            nest_size_m=(0.8, 3.2),
+            start_margin_m=0.5,
+            caches="static",
+            respawn_scale=0.0,
+        )
+    )
+    env.reset_batch(0)
+    clear(env)
+    build_cache(env, [28, 29], (33, 10))
+    source = [(x, y) for x in range(30, 34) for y in range(3, 17) if env.objects.floor[y, x] == CELL_EMPTY]
+    for row, cell in enumerate(source):
+        lay(env, row, cell)
+    for row in (32, 33, 34):
+        lay(env, row, (row - 20, 10))
+    for robot in (0, 1):
+        stand(env, robot, (3, 6 + 6 * robot))
+        load(env, robot, 30 + robot)
+    stand(env, 2, source[0])
+    return env, source
+
+
+def test_objects_without_any_free_cell_wait_and_come_back():
+    env, source = full_source_world()
+    assert len(source) == 28
+    act(env, {0: Grip.DELIVER})
+    assert act(env, {0: Grip.DELIVER, 1: Grip.DELIVER})[:2] == [DELIVERED, NONE]
+    assert env.objects.waiting == [30], "the source is full"
+    assert act(env, {1: Grip.DELIVER, 2: Grip.GRASP})[1] == DELIVERED
+    assert env.objects.waiting == [30, 31], "longest wait first"
+    assert np.all(env.objects.status[[30, 31]] == ObjectStatus.WAITING)
+    assert_conserved(env)
+    # A robot clears a cell and brings its object away: the newest object is tried first, the others wait on.
+    assert act(env, {2: Grip.GRASP})[2] == PICKED_UP
+    taken = int(env.swarm.carried_object[2])
+    stand(env, 2, (3, 10))
+    assert events_of(env, Grip.DELIVER, 2, robot=2) == [NONE, DELIVERED]
+    assert env.objects.cell[taken].tolist() == list(source[0])
+    assert env.objects.waiting == [30, 31]
+    assert_conserved(env)
+    # Two cells at once: the newest object takes one, the one that waited longest the other.
+    for row, cell in ((1, (20, 10)), (2, (22, 10))):
+        lay(env, row, cell)
+    load(env, 2, 33)
+    events_of(env, Grip.DELIVER, 2, robot=2)
+    placed = {tuple(env.objects.cell[row].tolist()) for row in (33, 30)}
+    assert placed == {source[1], source[2]}
+    assert env.objects.waiting == [31]
+    assert_conserved(env)
+
+
+# Caches in use
+
+
+def test_the_last_pair_dissolves_the_cache_and_the_orphan_lies_on_the_centre():
+    env = tidy_world(caches="static")
+    slot = build_cache(env, [0, 1], BASE_CELL)
+    stand(env, 0, (BASE_CELL[0] + 10, BASE_CELL[1] + 10))
+    assert events_of(env, Grip.GRASP, 2)[-1] == PICKED_FROM_CACHE
+    taken = int(env.swarm.carried_object[0])
+    orphan = 1 - taken
+    assert env.events.event_cache[0].tolist() == [env.caches.serial[slot], *BASE_CELL, 1]
+    assert not env.caches.alive[slot]
+    assert env.objects.status[orphan] == ObjectStatus.FREE
+    assert env.objects.cell[orphan].tolist() == list(BASE_CELL)
+    assert env.objects.floor[BASE_CELL[::-1]] == orphan
+    assert count(env, Counter.CACHES_DEPLETED) == 1
+    assert_conserved(env)
+
+
+def test_an_object_leaves_a_cache_uniformly():
+    env = tidy_world(caches="static")
+    tally: Tally[int] = Tally()
+    rng = np.random.default_rng(0)
+    interactions = env.arena._interactions
+    slot = build_cache(env, [1, 4, 6, 7], BASE_CELL)
+    stand(env, 0, BASE_CELL)
+    rounds = 2000
+    actions = np.array([[0, 0, Grip.GRASP]] + [[0, 0, Grip.RELEASE]] * 3, np.float32)
+    for _ in range(rounds):
+        for tick in (1, 2):
+            interactions.serve(actions, tick, rng.random(4))
+        row = int(env.swarm.carried_object[0])
+        tally[row] += 1
+        env.swarm.carried_object[0] = -1
+        env.objects.status[row], env.objects.cache_slot[row] = ObjectStatus.CACHED, slot
+        env.objects.cell[row] = BASE_CELL
+        env.caches.count[slot] += 1
+    assert set(tally) == {1, 4, 6, 7}
+    chi_squared = sum((seen - rounds / 4) ** 2 / (rounds / 4) for seen in tally.values())
+    assert chi_squared < 16.3, "0.1 % quantile at 3 degrees of freedom"
+
+
+# First pick-ups
+
+
+def test_a_first_pick_up_is_one_since_the_object_was_placed():
+    env = tidy_world()
+    stand(env, 0, OPEN_CELL)
+    lay(env, 5, OPEN_CELL)
+    events_of(env, Grip.GRASP, 2)
+    assert env.events.first_picked.tolist() == [True, False, False, False]
+    act(env, {0: Grip.RELEASE})
+    events_of(env, Grip.GRASP, 2)
+    assert env.swarm.carried_object[0] == 5
+    assert not env.events.first_picked.any(), "the second carrier since placement"
+    assert env.objects.carriers[5] == 2
+    assert (count(env, Counter.FREE_PICKUPS), count(env, Counter.FIRST_PICKED)) == (2, 1)
+    stand(env, 0, NEST_CELL)
+    events_of(env, Grip.DELIVER, 2)
+    stand(env, 0, tuple(env.objects.cell[5].tolist()))
+    assert events_of(env, Grip.GRASP, 2)[-1] == PICKED_UP
+    assert count(env, Counter.FIRST_PICKED) == 2, "delivered and placed anew"
+
+
+def test_an_object_taken_from_a_cache_can_be_a_first_pick_up():
+    env = tidy_world(caches="static")
+    build_cache(env, [0, 1, 2], BASE_CELL)
+    stand(env, 0, BASE_CELL)
+    events_of(env, Grip.GRASP, 2)
+    assert env.events.first_picked[0]
+    assert count(env, Counter.FIRST_PICKED) == 1

@@ -1,0 +1,103 @@
+"""Interference: who loses time to avoidance, measured by one rule from true readings."""
+
+import numpy as np
+import pytest
+
+from swarm_forage_env.contract.codes import Counter, Grip
+from swarm_forage_env.contract.detection import sees_obstacle
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.presets import scenario
+from tests.reference import sensing
+from tests.support.stage import act, lay, load, put, stand, tidy_world
+
+PAIR = ((16.0, 8.0), (16.25, 8.0))
+
+
+def met(env: ForageEnv, *rows: int) -> None:
+    """Two robots within reach of each other, the others alone."""
+    for robot in range(len(env.active)):
+        put(env, robot, 6.0 + 2.0 * robot, 12.0)
+    for robot, place in zip(rows, PAIR, strict=True):
+        put(env, robot, *place)
+
+
+def test_robots_that_meet_interfere_and_others_do_not():
+    env = tidy_world()
+    met(env, 1, 3)
+    act(env, {})
+    assert env.events.interfering.tolist() == [False, True, False, True]
+    assert env.events.counters[Counter.INTERFERING] == 2
+    assert env.events.interference_sum[0] == pytest.approx(2 / 4)
+
+
+def test_walls_interfere_too():
+    env = tidy_world()
+    put(env, 0, 31.6 - 0.1, 8.0)
+    act(env, {})
+    assert env.events.interfering.tolist() == [True, False, False, False]
+
+
+def test_every_state_counts():
+    env = tidy_world()
+    met(env, 0, 1)
+    lay(env, 0, (80, 40))
+    stand(env, 0, (80, 40))
+    put(env, 1, 16.35, 8.1)
+    load(env, 1, 1)
+    act(env, {0: Grip.GRASP})
+    assert env.swarm.pending_kind[0] != 0
+    act(env, {0: Grip.GRASP})
+    assert env.events.interfering.tolist() == [True, True, False, False], "waiting and carrying robots as well"
+
+
+def test_robots_in_repair_are_obstacles_but_never_interfere():
+    env = tidy_world()
+    met(env, 0, 1)
+    env.set_population(active=np.array([False, True, True, True]), present=np.ones(4, np.bool_))
+    act(env, {})
+    assert env.events.interfering.tolist() == [False, True, False, False]
+    assert env.events.interference_sum[0] == pytest.approx(1 / 3)
+    assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [3, 4]
+
+
+def test_absent_robots_are_no_obstacles():
+    env = tidy_world()
+    met(env, 0, 1)
+    gone = np.array([False, True, True, True])
+    env.set_population(active=gone, present=gone)
+    act(env, {})
+    assert not env.events.interfering.any()
+    assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [3, 3]
+
+
+def test_nobody_active_is_no_interference():
+    env = tidy_world()
+    met(env, 0, 1)
+    env.set_population(active=np.zeros(4, np.bool_), present=np.ones(4, np.bool_))
+    act(env, {})
+    assert env.events.interference_sum[0] == 0.0
+    assert not env.events.interfering.any()
+
+
+def test_counters_are_sums_over_ticks():
+    env = tidy_world()
+    met(env, 0, 1)
+    for _ in range(5):
+        act(env, {})
+    assert env.events.counters[Counter.INTERFERING] == 10
+    assert env.events.counters[Counter.ACTIVE] == env.events.counters[Counter.PRESENT] == 20
+    assert env.events.interference_sum[0] == pytest.approx(5 * 2 / 4)
+
+
+def test_flags_follow_the_rule_on_slow_readings():
+    env = ForageEnv(scenario("warehouse_small", n_robots=60, n_objects=5, start_margin_m=6.5))
+    env.reset_batch(2)
+    rng = np.random.default_rng(2)
+    flagged = 0
+    for tick in range(40):
+        env.step_batch(rng.uniform(-1, 1, (60, 3)).astype(np.float32))
+        if tick % 5 == 0:
+            expected = [sees_obstacle(np.array(sensing.proximity(env, robot), np.float32)) for robot in range(60)]
+            assert env.events.interfering.tolist() == expected
+            flagged += sum(expected)
+    assert flagged > 20

@@ -1,0 +1,193 @@
+"""Bodies in Chipmunk: free motion in closed form, contacts, walls, the batch, parked bodies."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import pdist
+
+from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.world.physics import Physics
+from swarm_forage_env.world.state import SwarmState
+from tests.reference.motion import WHEEL_BASE_M, WHEEL_SCALE_MPS, free_motion, limited_wheels
+from tests.support.stage import put, tidy_world
+
+RADIUS_M = 0.085036758
+DIAMETER_M = 2 * RADIUS_M
+DEEPEST_OVERLAP = 0.05
+"""Share of a diameter that two robots may overlap when a tick ends."""
+MIDDLE = (16.0, 8.0)
+
+
+def world(position, heading, **overrides) -> tuple[Physics, SwarmState, ScenarioConfig]:
+    """Physics with robots at these poses, and a state to write to."""
+    config = with_overrides(scenario("warehouse_small", n_robots=len(heading)), **overrides)
+    swarm = SwarmState.empty(len(heading))
+    swarm.position[:], swarm.heading[:] = position, heading
+    return Physics(config, swarm.position, swarm.heading), swarm, config
+
+
+def drive_ahead(physics: Physics, swarm: SwarmState, speed: float = 0.10) -> None:
+    """One tick in which every robot drives where it faces."""
+    physics.twist[:-1, 0] = speed * np.cos(swarm.heading)
+    physics.twist[:-1, 1] = speed * np.sin(swarm.heading)
+    physics.advance(swarm)
+
+
+def deepest_overlap(swarm: SwarmState) -> float:
+    """Deepest overlap of two robots as a share of a diameter, negative when apart."""
+    return float(1.0 - pdist(swarm.position).min() / DIAMETER_M)
+
+
+# Free motion
+
+
+@pytest.mark.parametrize("substeps", [(1.0,), (0.5, 0.2, 0.15, 0.15), (0.2,) * 5])
+@pytest.mark.parametrize("command", [(0.5, 0.5), (-0.5, -0.5), (-0.5, 0.5), (0.15, 0.75), (0.4, 0.39), (0.0, 1.0)])
+def test_free_motion_is_the_closed_form(command, substeps):
+    env = tidy_world(n_robots=1, physics_substeps=substeps)
+    put(env, 0, *MIDDLE, heading=2.5)
+    wheels = limited_wheels(*(np.float32(value).item() for value in command))
+    actions = np.array([[*command, 1.0]], np.float32)
+    ticks = 100
+    for _ in range(ticks):
+        env.step_batch(actions)
+    x, y, heading = free_motion((*MIDDLE, 2.5), wheels, 0.2 * ticks)
+    path = abs(sum(wheels)) / 2 * 0.2 * ticks
+    assert env.swarm.position[0] == pytest.approx((x, y), abs=1e-9 + 1e-6 * path)
+    assert math.cos(env.swarm.heading[0] - heading) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_heading_stays_in_range_and_facing_follows():
+    env = tidy_world(n_robots=1)
+    actions = np.array([[-0.5, 0.5, 1.0]], np.float32)
+    headings = []
+    for _ in range(60):
+        env.step_batch(actions)
+        headings.append(env.swarm.heading[0])
+    assert min(headings) < -2.8
+    assert max(headings) > 2.8
+    assert all(-math.pi < heading <= math.pi for heading in headings)
+    assert env.swarm.facing[0] == pytest.approx((math.cos(headings[-1]), math.sin(headings[-1])))
+    per_tick = 0.20 / WHEEL_BASE_M * 0.2
+    assert math.remainder(headings[-1] - 60 * per_tick, 2 * math.pi) == pytest.approx(0.0, abs=1e-6)
+
+
+# Contacts
+
+
+@pytest.mark.parametrize("offset", np.linspace(0.0, 0.95, 8) * DIAMETER_M)
+@pytest.mark.parametrize("angle", [0.0, 1.1])
+def test_two_robots_pushed_together_hardly_overlap(offset, angle):
+    touching = math.sqrt(DIAMETER_M**2 - offset**2)
+    for gap in np.linspace(0.0, 0.04, 11):
+        across = np.array([touching + gap, offset])
+        turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+        physics, swarm, _ = world([MIDDLE, MIDDLE + across @ turn], [angle, angle + math.pi])
+        for _ in range(12):
+            drive_ahead(physics, swarm)
+            assert deepest_overlap(swarm) < DEEPEST_OVERLAP
+
+
+def test_a_robot_at_full_speed_is_stopped_by_one_that_pushes_back():
+    physics, swarm, _ = world([MIDDLE, (16.3, 8.0)], [0.0, math.pi])
+    for _ in range(50):
+        drive_ahead(physics, swarm)
+    assert swarm.position[:, 0].mean() == pytest.approx(16.15, abs=0.01)
+    assert np.diff(swarm.position[:, 0])[0] == pytest.approx(DIAMETER_M, rel=DEEPEST_OVERLAP)
+
+
+def test_robots_that_do_not_touch_do_not_feel_each_other():
+    physics, swarm, _ = world([MIDDLE, (16.0, 8.0 + DIAMETER_M + 0.002)], [0.0, math.pi])
+    for _ in range(20):
+        drive_ahead(physics, swarm)
+    np.testing.assert_allclose(swarm.position, [(16.4, 8.0), (15.6, 8.0 + DIAMETER_M + 0.002)], atol=1e-9)
+
+
+@pytest.mark.parametrize("heading", np.linspace(-math.pi, math.pi, 17))
+@pytest.mark.parametrize("corner", [(0.2, 0.2), (31.6, 0.2), (31.6, 15.8), (0.2, 15.8), (31.6, 8.0), (16.0, 0.2)])
+def test_walls_hold(corner, heading):
+    x_low, y_low, x_high, y_high = scenario("warehouse_small").arena.interior_m
+    start = np.clip(corner, (x_low + RADIUS_M + 0.01, y_low + RADIUS_M + 0.01), (x_high - 0.1, y_high - 0.1))
+    physics, swarm, _ = world([start], [heading])
+    for _ in range(15):
+        drive_ahead(physics, swarm)
+        x, y = swarm.position[0]
+        inside = min(x - x_low, x_high - x, y - y_low, y_high - y)
+        assert inside > RADIUS_M - DEEPEST_OVERLAP * DIAMETER_M
+
+
+def test_a_wall_stops_but_does_not_hold_back_a_sliding_robot_entirely():
+    physics, swarm, config = world([(16.0, 15.7)], [math.radians(30)])
+    for _ in range(50):
+        drive_ahead(physics, swarm)
+    assert swarm.position[0, 0] > 16.1
+    assert swarm.position[0, 1] <= config.arena.interior_m[3] - RADIUS_M + DEEPEST_OVERLAP * DIAMETER_M
+
+
+# The batch
+
+
+def test_batch_rows_are_the_bodies_in_order():
+    rng = np.random.default_rng(0)
+    cells = np.array(list(itertools.product(range(6), range(5))))
+    physics, swarm, _ = world(rng.permutation(cells) * 0.3 + (4.0, 4.0), rng.uniform(-3, 3, 30))
+    assert len(physics.twist) == 31, "the space's own static body comes last"
+    physics.park(3)
+    swarm.present[3] = False
+    for _ in range(20):
+        swarm.heading += rng.uniform(-0.5, 0.5, 30)
+        drive_ahead(physics, swarm)
+        physics.twist[:] = 0.0
+    bodies = [disc.body for disc in physics._shapes]
+    expected = np.array([(*body.position, body.angle) for body in bodies])
+    np.testing.assert_array_equal(physics.poses()[:-1], expected)
+    np.testing.assert_array_equal(swarm.position[swarm.present], expected[swarm.present, :2])
+
+
+def test_twists_reach_the_bodies_in_order():
+    physics, swarm, _ = world([(4.0 + row, 8.0) for row in range(5)], np.zeros(5))
+    physics.twist[:-1, 1] = np.arange(5) * 0.02
+    physics.twist[:-1, 2] = np.arange(5) * 0.1
+    physics.advance(swarm)
+    np.testing.assert_allclose(swarm.position[:, 1], 8.0 + 0.2 * np.arange(5) * 0.02, atol=1e-12)
+    np.testing.assert_allclose(swarm.heading, 0.2 * np.arange(5) * 0.1, atol=1e-12)
+
+
+def test_parked_bodies_are_out_of_the_way():
+    physics, swarm, _ = world([MIDDLE, (16.3, 8.0), (16.6, 8.0)], [0.0, 0.0, 0.0])
+    for row in (1, 2):
+        physics.park(row)
+        swarm.present[row] = False
+    standing = swarm.position[1:].copy()
+    for _ in range(50):
+        physics.twist[0, 0] = 0.10
+        physics.advance(swarm)
+    assert swarm.position[0] == pytest.approx((17.0, 8.0)), "drives through where the others were"
+    np.testing.assert_array_equal(swarm.position[1:], standing)
+    parked = physics.poses()[1:3, :2]
+    assert np.linalg.norm(parked[0] - parked[1]) >= 1.0 - 1e-9
+    assert np.all(parked < -5.0)
+
+
+def test_a_parked_body_can_be_placed_again():
+    physics, swarm, _ = world([MIDDLE, (16.3, 8.0)], [0.0, 0.0])
+    physics.park(1)
+    swarm.present[1] = False
+    physics.advance(swarm)
+    physics.place(1, 16.3, 8.0, math.pi)
+    swarm.present[1] = True
+    physics.twist[:] = 0.0
+    physics.advance(swarm)
+    assert swarm.position[1] == pytest.approx((16.3, 8.0))
+    assert swarm.heading[1] == pytest.approx(math.pi)
+    for _ in range(30):
+        drive_ahead(physics, swarm)
+    assert np.diff(swarm.position[:, 0])[0] == pytest.approx(DIAMETER_M, rel=DEEPEST_OVERLAP), "it collides again"
+
+
+def test_default_substeps_cover_a_tick():
+    assert sum(scenario("warehouse_small").physics_substeps) == pytest.approx(1.0)
+    assert WHEEL_SCALE_MPS * 0.2 < RADIUS_M, "the fastest wheel moves less than a radius per tick"

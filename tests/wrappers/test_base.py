@@ -1,0 +1,173 @@
+"""The stack of wrappers: order, hooks, gains, and the dict API over it."""
+
+import itertools
+
+import numpy as np
+import pytest
+from pettingzoo.test import parallel_api_test
+from pettingzoo.utils import BaseParallelWrapper
+
+from swarm_forage_env.contract.policy import ActionError
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.wrappers.base import STACK_ORDER, SwarmWrapper
+from swarm_forage_env.wrappers.recorder import RunRecorder
+from tests.support.fake_arena import FakeWorld, small_scenario
+
+
+def wrapper_at(position: int) -> type[SwarmWrapper]:
+    return type(STACK_ORDER[position], (SwarmWrapper,), {"stack_position": position})
+
+
+class Logging(SwarmWrapper):
+    """Notes every hook and scales gains and observations."""
+
+    log: list
+
+    def __init__(self, env, name, factor):
+        super().__init__(env)
+        self.name, self.factor = name, factor
+
+    def on_reset(self, seed):
+        self.log.append((self.name, "on_reset", seed))
+
+    def before_step(self):
+        self.log.append((self.name, "before_step"))
+
+    def gain(self, actions, wheel_gain):
+        self.log.append((self.name, "gain"))
+        own = np.full((4, 2), self.factor)
+        return own if wheel_gain is None else wheel_gain * own
+
+    def observe(self, obs):
+        self.log.append((self.name, "observe"))
+        return obs + np.float32(self.factor)
+
+    def after_step(self, tasks, terminated, truncated):
+        self.log.append((self.name, "after_step", tasks, truncated))
+
+
+@pytest.fixture
+def stack():
+    Logging.log = []
+    world = FakeWorld()
+    inner = type("Inner", (Logging,), {"stack_position": 4})(world, "inner", 0.5)
+    return type("Outer", (Logging,), {"stack_position": 3})(inner, "outer", 0.25)
+
+
+def test_hooks_run_inwards_before_the_step_and_outwards_after_it(stack):
+    stack.reset_batch(7)
+    assert Logging.log == [
+        ("inner", "on_reset", 7),
+        ("inner", "observe"),
+        ("outer", "on_reset", 7),
+        ("outer", "observe"),
+    ]
+    Logging.log.clear()
+    stack.step_batch(np.zeros((4, 3), np.float32))
+    assert [entry[:2] for entry in Logging.log] == [
+        ("outer", "before_step"),
+        ("outer", "gain"),
+        ("inner", "before_step"),
+        ("inner", "gain"),
+        ("inner", "observe"),
+        ("inner", "after_step"),
+        ("outer", "observe"),
+        ("outer", "after_step"),
+    ]
+
+
+@pytest.mark.parametrize("actions", [np.zeros((3, 3), np.float32), np.zeros((4, 2), np.float32), None])
+def test_actions_of_a_wrong_shape_are_refused_before_any_hook(stack, actions):
+    stack.reset_batch(7)
+    Logging.log.clear()
+    with pytest.raises(ActionError, match=r"\(n_robots, 3\) = \(4, 3\)"):
+        stack.step_batch(actions)
+    assert Logging.log == []
+    assert stack.world.calls == []
+
+
+def test_a_reset_without_seed_hands_on_the_seed_that_was_drawn(stack):
+    stack.reset_batch()
+    assert Logging.log[0] == ("inner", "on_reset", 4711)
+
+
+def test_gains_multiply_and_tasks_pass_through(stack):
+    stack.reset_batch(0)
+    tasks = np.array([1, 2, 3, 0], np.int8)
+    obs, reward, terminated, truncated = stack.step_batch(
+        np.zeros((4, 3), np.float32), wheel_gain=np.full((4, 2), 2.0), tasks=tasks
+    )
+    call = stack.world.calls[-1]
+    np.testing.assert_allclose(call["wheel_gain"], 2.0 * 0.5 * 0.25)
+    assert call["tasks"] is tasks
+    np.testing.assert_allclose(obs, 0.01 + 0.5 + 0.25)
+    assert reward.shape == terminated.shape == (4,)
+    assert truncated is False
+    assert Logging.log[-1][2] is tasks
+
+
+def test_without_overrides_a_wrapper_changes_nothing():
+    wrapped = wrapper_at(2)(FakeWorld())
+    np.testing.assert_array_equal(wrapped.reset_batch(1), FakeWorld().reset_batch(1))
+    wrapped.step_batch(np.zeros((4, 3), np.float32))
+    assert wrapped.world.calls == [{"wheel_gain": None, "tasks": None}]
+    assert wrapped.interval_columns() == {}
+
+
+@pytest.mark.parametrize(("outer", "inner"), list(itertools.product(range(5), repeat=2)))
+def test_only_the_documented_order_can_be_stacked(outer, inner):
+    base = wrapper_at(inner)(FakeWorld())
+    if outer < inner:
+        assert wrapper_at(outer)(base).world is base.world
+    else:
+        with pytest.raises(ValueError, match=", ".join(STACK_ORDER)):
+            wrapper_at(outer)(base)
+
+
+def test_the_recorder_is_outermost():
+    assert STACK_ORDER[RunRecorder.stack_position] == "RunRecorder"
+    with pytest.raises(ValueError, match="RunRecorder not inside of Throttle"):
+        wrapper_at(3)(RunRecorder(FakeWorld()))
+
+
+@pytest.mark.parametrize("foreign", [BaseParallelWrapper(FakeWorld()), object()], ids=["foreign wrapper", "no env"])
+def test_a_foreign_layer_in_between_is_refused(foreign):
+    with pytest.raises(TypeError, match="outside of the swarm wrappers"):
+        wrapper_at(1)(foreign)
+
+
+def test_dict_api_packs_once_steps_the_stack_and_unpacks_once(stack):
+    observations, infos = stack.reset(seed=3)
+    assert list(observations) == list(infos) == ["robot_0", "robot_1", "robot_2", "robot_3"]
+    Logging.log.clear()
+    actions = {agent: np.zeros(3, np.float32) for agent in stack.agents}
+    observations, rewards, terminations, truncations, infos = stack.step(actions)
+    assert len([entry for entry in Logging.log if entry[1] == "after_step"]) == 2
+    assert len(stack.world.calls) == 1
+    np.testing.assert_allclose(observations["robot_2"], 0.01 + 0.5 + 0.25)
+    for table in (observations, rewards, terminations, truncations, infos):
+        assert list(table) == ["robot_0", "robot_1", "robot_2", "robot_3"]
+
+
+def test_dict_and_array_level_give_the_same_run():
+    config = small_scenario(horizon_s=4.0)
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1, 1, (20, 4, 3)).astype(np.float32)
+    by_array, by_dict = RunRecorder(ForageEnv(config)), RunRecorder(ForageEnv(config))
+    first = by_array.reset_batch(5)
+    observations, _ = by_dict.reset(seed=5)
+    np.testing.assert_array_equal(first, np.stack(list(observations.values())))
+    for row in actions:
+        obs, reward, _, truncated = by_array.step_batch(row)
+        observations, rewards, _, truncations, _ = by_dict.step(dict(zip(by_dict.agents, row, strict=True)))
+        np.testing.assert_array_equal(obs, np.stack(list(observations.values())))
+        np.testing.assert_array_equal(reward, np.array(list(rewards.values()), np.float32))
+        assert set(truncations.values()) == {truncated}
+    assert by_array.complete
+    assert by_dict.complete
+    for name, column in by_array.columns().items():
+        np.testing.assert_array_equal(column, by_dict.columns()[name])
+
+
+def test_a_wrapped_environment_passes_pettingzoos_own_test():
+    parallel_api_test(RunRecorder(ForageEnv(small_scenario(horizon_s=10.0))), num_cycles=60)

@@ -1,0 +1,452 @@
+"""Sensor and actuator noise: sizes, clamps, what stays exact, and what the study's noise does to decisions."""
+
+import numpy as np
+import pytest
+from scipy import special, stats
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.detection import sees_cache, sees_nest, sees_object, sees_obstacle
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.kernels.gaussian import to_normal
+from swarm_forage_env.wrappers.noise import (
+    NOISE_GROUPS,
+    STUDY_NOISE_GROUPS,
+    ActuatorNoise,
+    ActuatorNoiseConfig,
+    SensorNoise,
+    SensorNoiseConfig,
+    noise_levels,
+)
+from swarm_forage_env.wrappers.waveform import Waveform
+from tests.reference.adversity import by_group, noisy_row
+from tests.support.fake_arena import FakeWorld
+from tests.support.stage import assert_same_world, snapshot, tidy_world
+
+ROBOTS = 200
+
+
+@pytest.fixture(scope="module")
+def world() -> ForageEnv:
+    env = ForageEnv(scenario("warehouse_medium", n_robots=ROBOTS, n_objects=100))
+    env.reset_batch(0)
+    return env
+
+
+def middling_obs(world: ForageEnv) -> np.ndarray:
+    """Observations in the middle of every range, heading along +x; exact columns hold whatever."""
+    rng = np.random.default_rng(0)
+    obs = rng.uniform(-1, 1, (ROBOTS, world.layout.size)).astype(np.float32)
+    for name in ("proximity", "light", "ground"):
+        obs[:, world.layout[name]] = 0.5
+    for name in ("wheel_speed", "position"):
+        obs[:, world.layout[name]] = 0.0
+    obs[:, world.layout["heading"]] = (1.0, 0.0)
+    return obs
+
+
+def noisy(world: ForageEnv, obs: np.ndarray, times: int, **fields) -> np.ndarray:
+    """Noise added to copies of the same observations, (times, N, D)."""
+    stack = SensorNoise(world, SensorNoiseConfig(**fields))
+    stack.on_reset(1)
+    return np.stack([stack.observe(obs.copy()) for _ in range(times)])
+
+
+# Sizes and clamps
+
+
+@pytest.mark.parametrize("distribution", ["gaussian", "uniform"])
+def test_units_of_sigma(world, distribution):
+    sigma, obs = 0.05, middling_obs(world)
+    seen = noisy(world, obs, 30, sigma=sigma, distribution=distribution).astype(np.float64)
+    layout = world.layout
+    expected = {
+        "proximity": sigma,
+        "light": sigma,
+        "ground": sigma,
+        "wheel_speed": sigma * 0.01 / 0.20,  # 1 cm/s
+        "position": sigma * 2 / 48.0,  # 1 m
+    }
+    for name, deviation in expected.items():
+        change = seen[:, :, layout[name]] - obs[:, layout[name]]
+        assert change.std() == pytest.approx(deviation, rel=0.04), name
+        assert abs(change.mean()) < 4 * deviation / np.sqrt(change.size), name
+        assert np.corrcoef(change.reshape(-1, change.shape[-1]).T)[0, 1] == pytest.approx(0.0, abs=0.06), name
+    angle = np.arctan2(seen[:, :, layout["heading"]][..., 1], seen[:, :, layout["heading"]][..., 0])
+    assert angle.std() == pytest.approx(sigma, rel=0.04)  # 1 rad
+    if distribution == "uniform":
+        reach = np.sqrt(3.0) * sigma
+        change = np.abs(seen[:, :, layout["proximity"]] - 0.5)
+        assert 0.999 * reach < change.max() < 1.00001 * reach
+
+
+def test_position_noise_is_in_metres_along_each_axis():
+    world = ForageEnv(scenario("warehouse_small", n_objects=100))
+    world.reset_batch(0)
+    obs = np.zeros((50, world.layout.size), np.float32)
+    change = noisy(world, obs, 200, sigma=0.5, groups=("position",))[:, :, world.layout["position"]]
+    assert change[..., 0].std() * 16.0 == pytest.approx(0.5, rel=0.04)
+    assert change[..., 1].std() * 8.0 == pytest.approx(0.5, rel=0.04)
+
+
+@pytest.mark.parametrize("sigma", [0.0043, 0.1, 3.0, 1000.0])
+@pytest.mark.parametrize("distribution", ["gaussian", "uniform"])
+def test_observations_stay_in_their_space(world, sigma, distribution):
+    space, layout = world.observation_space("robot_0"), world.layout
+    for row in noisy(world, world.reset_batch(3), 20, sigma=sigma, distribution=distribution).reshape(-1, layout.size):
+        assert space.contains(row)
+        assert row[: layout["ground"].stop].min() >= 0.0
+        assert np.hypot(*row[layout["heading"]]) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_equals_the_slow_twin(world):
+    rng = np.random.default_rng(2)
+    obs = rng.uniform(-1, 1, (ROBOTS, world.layout.size)).astype(np.float32)
+    obs[:, :52] = np.abs(obs[:, :52])
+    heading = rng.uniform(-np.pi, np.pi, ROBOTS)
+    obs[:, world.layout["heading"]] = np.column_stack((np.cos(heading), np.sin(heading)))
+    seen = noisy(world, obs, 1, sigma=0.2)[0]
+    draws = stream_rng(1, Stream.SENSOR_NOISE).random((ROBOTS, 57), dtype=np.float32)
+    to_normal(draws)
+    for robot, groups in enumerate(by_group(draws)):
+        expected = noisy_row(obs[robot].tolist(), groups, 0.2, (48.0, 48.0))
+        np.testing.assert_allclose(seen[robot], expected, rtol=0, atol=2e-6)
+
+
+# What stays exact
+
+
+def test_exact_columns_stay_exact(world):
+    obs = middling_obs(world)
+    seen = noisy(world, obs, 5, sigma=10.0)
+    for part in world.layout:
+        exact = part.noise_group == ""
+        columns = world.layout[part.name]
+        same = np.array_equal(seen[:, :, columns], np.broadcast_to(obs[:, columns], seen[:, :, columns].shape))
+        assert same == exact, part.name
+
+
+def test_there_is_a_group_for_every_noisy_slice(world):
+    assert tuple(part.noise_group for part in world.layout if part.noise_group) == NOISE_GROUPS
+
+
+@pytest.mark.parametrize("group", NOISE_GROUPS)
+def test_only_chosen_groups_are_noisy(world, group):
+    obs = middling_obs(world)
+    for fields in ({"sigma": 0.1, "groups": (group,)}, {"sigmas": {group: 0.1}}):
+        seen = noisy(world, obs, 1, **fields)[0]
+        changed = np.flatnonzero((seen != obs).any(axis=0))
+        columns = world.layout[group]
+        assert changed.tolist() == list(range(columns.start, columns.stop))
+
+
+def test_a_group_may_have_a_sigma_of_its_own(world):
+    obs = middling_obs(world)
+    seen = noisy(world, obs, 20, sigma=0.02, groups=("proximity", "ground"), sigmas={"ground": 0.1, "light": 0.04})
+    change = {name: (seen[:, :, world.layout[name]] - 0.5).std() for name in ("proximity", "light", "ground")}
+    assert change == pytest.approx({"proximity": 0.02, "light": 0.04, "ground": 0.1}, rel=0.03)
+    np.testing.assert_array_equal(seen[0][:, world.layout["position"]], 0.0)
+
+
+def test_rows_of_absent_robots_stay_zero():
+    env = tidy_world(n_robots=4)
+    stack = SensorNoise(env, SensorNoiseConfig(sigma=1.0))
+    stack.reset_batch(0)
+    present = np.array([True, False, True, False])
+    env.set_population(active=np.array([True, False, False, False]), present=present)
+    obs, *_ = stack.step_batch(np.zeros((4, 3), np.float32))
+    assert not obs[~present].any()
+    assert obs[present][:, env.layout["proximity"]].any(axis=1).all(), "robots in repair sense, with noise"
+
+
+@pytest.mark.parametrize("sigma", [0.0, Waveform(kind="constant"), Waveform(kind="constant", amplitude=-1.0)])
+def test_without_noise_observations_are_bitwise_the_same(world, sigma):
+    obs = world.reset_batch(5)
+    np.testing.assert_array_equal(noisy(world, obs.copy(), 3, sigma=sigma)[2], obs)
+
+
+def test_the_world_and_its_rules_use_the_truth():
+    config = scenario("warehouse_small", n_robots=40, caches="static")
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-0.3, 1.0, (80, 40, 3)).astype(np.float32)
+    bare, wrapped = ForageEnv(config), SensorNoise(ForageEnv(config), SensorNoiseConfig(sigma=0.5))
+    bare.reset_batch(1)
+    wrapped.reset_batch(1)
+    for row in actions:
+        bare.step_batch(row)
+        wrapped.step_batch(row)
+    assert bare.events.interference_sum[0] > 0
+    assert_same_world(snapshot(bare), snapshot(wrapped.world))
+
+
+# Random streams
+
+
+def test_what_a_policy_reads_does_not_change_what_it_sees():
+    config = scenario("warehouse_small", n_robots=6)
+    worlds = [ForageEnv(config, reads=reads) for reads in (None, ("proximity", "ground", "heading"))]
+    everything, some = (SensorNoise(world, SensorNoiseConfig(sigma=0.1)) for world in worlds)
+    one, other = everything.reset_batch(3), some.reset_batch(3)
+    for _ in range(5):
+        for name in ("proximity", "ground", "heading"):
+            np.testing.assert_array_equal(one[:, everything.layout[name]], other[:, everything.layout[name]])
+        assert not other[:, some.layout["light"]].any(), "noise must not pile up where nobody looks"
+        one, *_ = everything.step_batch(np.zeros((6, 3), np.float32))
+        other, *_ = some.step_batch(np.zeros((6, 3), np.float32))
+
+
+def test_the_loss_of_a_robot_does_not_shift_the_noise_of_others(world):
+    obs = middling_obs(world)
+    stack = SensorNoise(world, SensorNoiseConfig(sigma=0.1))
+    stack.on_reset(7)
+    complete = [stack.observe(obs.copy()) for _ in range(3)]
+    stack.on_reset(7)
+    world.swarm.present[5] = False
+    fewer = [stack.observe(obs.copy()) for _ in range(3)]
+    world.swarm.present[5] = True
+    others = np.arange(ROBOTS) != 5
+    np.testing.assert_array_equal(np.stack(complete)[:, others], np.stack(fewer)[:, others])
+    np.testing.assert_array_equal(fewer[0][5], obs[5])
+
+
+def test_levels_of_noise_are_paired(world):
+    obs = middling_obs(world)
+    weak, strong = (noisy(world, obs, 3, sigma=sigma, groups=("proximity",)) for sigma in (0.01, 0.04))
+    columns = world.layout["proximity"]
+    np.testing.assert_allclose(4 * (weak - obs)[:, :, columns], (strong - obs)[:, :, columns], atol=1e-6)
+
+
+def test_a_run_has_noise_of_its_own(world):
+    obs = middling_obs(world)
+    stack = SensorNoise(world, SensorNoiseConfig(sigma=0.1))
+    seen = []
+    for seed in (1, 2, 1):
+        stack.on_reset(seed)
+        seen.append(stack.observe(obs.copy()))
+    np.testing.assert_array_equal(seen[0], seen[2])
+    assert not np.array_equal(seen[0], seen[1])
+
+
+# Time
+
+
+def test_sigma_may_follow_a_waveform():
+    """Noise between 1 s and 2 s only: the observation after tick t has the noise of tick t."""
+    pulse = Waveform(kind="table", times_s=(0.8, 1.0, 2.0, 2.2), values=(0.0, 0.1, 0.1, 0.0))
+    clean, waved, steady = FakeWorld(), FakeWorld(), FakeWorld()
+    stacks = [
+        SensorNoiseConfig(sigma=sigma, groups=("light",)).wrap(env)
+        for sigma, env in ((0.0, clean), (pulse, waved), (0.1, steady))
+    ]
+    observed = [[stack.reset_batch(0).copy()] for stack in stacks]
+    for _ in range(12):
+        for stack, rows in zip(stacks, observed, strict=True):
+            rows.append(stack.step_batch(np.zeros((4, 3), np.float32))[0].copy())
+    for tick, (exact, wave, constant) in enumerate(zip(*observed, strict=True)):
+        assert np.array_equal(wave, constant if 5 <= tick <= 10 else exact), tick
+
+
+# The study
+
+
+STUDY_TABLE = [
+    # sigma, false obstacle per tick, all four sensors show the object, three of four show the nest or a cache
+    (0.0043, 0.16, 1.00, 1.00),
+    (0.0129, 0.16, 1.00, 1.00),
+    (0.017, 0.175, 0.99, 1.00),
+    (0.021, 0.22, 0.96, 1.00),
+    (0.030, 0.37, 0.82, 1.00),
+    (0.043, 0.57, 0.60, 1.00),
+    (0.050, 0.66, 0.50, 0.99),
+    (0.071, 0.81, 0.33, 0.88),
+    (0.100, 0.90, 0.23, 0.62),
+]
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("sigma", "obstacle", "object_seen", "area_seen"), STUDY_TABLE)
+def test_decisions_under_the_noise_of_the_study(world, sigma, obstacle, object_seen, area_seen):
+    layout, samples = world.layout, 60
+
+    def share(decision, group: str, value: float) -> float:
+        obs = np.zeros((ROBOTS, layout.size), np.float32)
+        obs[:, layout[group]] = value
+        seen = noisy(world, obs, samples, sigma=sigma)[:, :, layout[group]].reshape(samples * ROBOTS, -1)
+        return float(np.mean([decision(row) for row in seen]))
+
+    def tolerance(probability: float) -> float:
+        """Half a unit of the last printed place, and four standard errors."""
+        return 0.0051 + 4 * np.sqrt(probability * (1 - probability) / (samples * ROBOTS))
+
+    assert share(sees_obstacle, "proximity", 0.0) == pytest.approx(obstacle, abs=tolerance(obstacle))
+    assert share(sees_object, "ground", 0.0) == pytest.approx(object_seen, abs=tolerance(object_seen))
+    assert share(sees_nest, "ground", 179 / 255) == pytest.approx(area_seen, abs=tolerance(area_seen))
+    assert share(sees_cache, "ground", 102 / 255) == pytest.approx(area_seen, abs=tolerance(area_seen))
+
+
+def test_levels_of_the_study():
+    warehouses, rescue = noise_levels(), noise_levels(0.10, groups=STUDY_NOISE_GROUPS)
+    sigmas = [sensors.sigma for sensors, _ in warehouses]
+    assert sigmas == pytest.approx([0.0, 0.0043, 0.0086, 0.0129, 0.0171, 0.0214, 0.0257, 0.03], abs=5e-5)
+    assert [wheels.sigma for _, wheels in warehouses] == sigmas
+    assert {sensors.groups for sensors, _ in warehouses} == {NOISE_GROUPS}
+    assert {sensors.groups for sensors, _ in rescue} == {("proximity", "light", "ground", "wheel_speed")}
+    assert rescue[-1][0].sigma == 0.10
+
+
+# Draws
+
+
+def test_normal_draws_have_the_normal_distribution_function():
+    steps = np.concatenate((np.arange(0, 2**24, 4099), np.arange(20_000), 2**24 - 1 - np.arange(20_000)))
+    uniform = (steps.astype(np.float32) * np.float32(2.0**-24)).reshape(1, -1)
+    normal = uniform.copy()
+    to_normal(normal)
+    assert np.abs(special.ndtr(normal.astype(np.float64)) - (steps + 0.5) * 2.0**-24).max() < 2e-5
+    assert np.abs(normal).max() == pytest.approx(5.42, abs=0.005)
+    mirrored = ((2**24 - 1 - steps).astype(np.float32) * np.float32(2.0**-24)).reshape(1, -1)
+    to_normal(mirrored)
+    np.testing.assert_allclose(mirrored, -normal, atol=1e-6)
+    rising = np.argsort(steps, kind="stable")
+    assert np.all(np.diff(normal[0, rising]) >= 0.0)
+
+
+def test_normal_draws_are_normal():
+    draws = np.random.default_rng(0).random((1000, 300), dtype=np.float32)
+    to_normal(draws)
+    assert stats.kstest(draws.ravel(), "norm").pvalue > 0.01
+    assert stats.kurtosis(draws.ravel()) == pytest.approx(0.0, abs=4 * np.sqrt(24 / draws.size))
+
+
+# Actuators
+
+
+def actuator_gains(n_steps: int, *, wheel_gain=None, seed: int = 0, **fields) -> np.ndarray:
+    """Gains (steps, N, 2) that reach the world."""
+    env = FakeWorld(scenario("warehouse_medium", n_robots=ROBOTS, n_objects=50))
+    stack = ActuatorNoiseConfig(**fields).wrap(env)
+    stack.reset_batch(seed)
+    gains = []
+    for _ in range(n_steps):
+        stack.step_batch(np.zeros((ROBOTS, 3), np.float32), wheel_gain=wheel_gain)
+        gains.append(np.array(env.calls[-1]["wheel_gain"]))
+    return np.stack(gains)
+
+
+@pytest.mark.parametrize("distribution", ["gaussian", "uniform"])
+def test_each_wheel_has_a_factor_of_its_own_in_every_tick(distribution):
+    gains = actuator_gains(50, sigma=0.05, distribution=distribution)
+    assert gains.mean() == pytest.approx(1.0, abs=4 * 0.05 / np.sqrt(gains.size))
+    assert gains.std() == pytest.approx(0.05, rel=0.03)
+    assert np.corrcoef(gains[..., 0].ravel(), gains[..., 1].ravel())[0, 1] == pytest.approx(0.0, abs=0.04)
+    assert np.corrcoef(gains[0].ravel(), gains[1].ravel())[0, 1] == pytest.approx(0.0, abs=0.2)
+    if distribution == "uniform":
+        assert np.abs(gains - 1.0).max() < 0.05 * np.sqrt(3.0)
+
+
+def test_gains_from_outside_are_multiplied_and_left_alone():
+    outer = np.full((ROBOTS, 2), 0.5)
+    outer[0] = 0.0, 2.0
+    alone, both = actuator_gains(3, sigma=0.1), actuator_gains(3, sigma=0.1, wheel_gain=outer)
+    np.testing.assert_allclose(both, outer * alone)
+    assert outer[1:].tolist() == [[0.5, 0.5]] * (ROBOTS - 1)
+
+
+def test_wheel_noise_acts_after_the_limit_and_only_on_wheels_that_turn():
+    env = tidy_world(n_robots=3)
+    stack = ActuatorNoise(env, ActuatorNoiseConfig(sigma=0.5))
+    stack.reset_batch(0)
+    actions = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.3, 0.0]], np.float32)
+    speeds = np.stack([stack.step_batch(actions) and env.swarm.wheel_speed.copy() for _ in range(20)])
+    assert speeds[:, 0].max() > 0.10, "not limited again"
+    assert speeds[:, 0].std() > 0.02
+    assert not speeds[:, 1].any()
+    assert not speeds[:, 2, 0].any()
+    assert speeds[:, 2, 1].std() > 0.01
+
+
+def test_wheel_noise_never_leaves_the_space_of_observations():
+    env = tidy_world(n_robots=8)
+    stack = ActuatorNoise(env, ActuatorNoiseConfig(sigma=20.0))
+    stack.reset_batch(0)
+    for _ in range(10):
+        obs, *_ = stack.step_batch(np.full((8, 3), 0.5, np.float32))
+        assert all(env.observation_space("robot_0").contains(row) for row in obs)
+
+
+def test_without_actuator_noise_gains_pass_untouched():
+    outer = np.ones((4, 2))
+    env = FakeWorld()
+    stack = ActuatorNoiseConfig(sigma=0.0).wrap(env)
+    stack.reset_batch(0)
+    stack.step_batch(np.zeros((4, 3), np.float32), wheel_gain=outer)
+    stack.step_batch(np.zeros((4, 3), np.float32))
+    assert env.calls[0]["wheel_gain"] is outer
+    assert env.calls[1]["wheel_gain"] is None
+
+
+def test_there_is_no_wheel_noise_where_its_waveform_is_negative():
+    np.testing.assert_array_equal(actuator_gains(3, sigma=Waveform(kind="constant", amplitude=-0.1)), 1.0)
+
+
+def test_wheel_noise_may_follow_a_waveform():
+    late = Waveform(kind="step", amplitude=0.1, start_s=1.0)
+    gains, steady = actuator_gains(8, sigma=late), actuator_gains(8, sigma=0.1)
+    np.testing.assert_array_equal(gains[:4], 1.0)
+    np.testing.assert_array_equal(gains[4:], steady[4:])
+
+
+def test_wheel_noise_belongs_to_the_seed():
+    np.testing.assert_array_equal(actuator_gains(2, sigma=0.1, seed=4), actuator_gains(2, sigma=0.1, seed=4))
+    assert not np.array_equal(actuator_gains(2, sigma=0.1, seed=4), actuator_gains(2, sigma=0.1, seed=5))
+
+
+# Configuration
+
+
+def test_a_configuration_keeps_its_own_table_of_sigmas():
+    sigmas = {"light": 0.1}
+    config = SensorNoiseConfig(sigmas=sigmas)
+    sigmas["light"] = 0.2
+    assert config.sigmas == {"light": 0.1}
+
+
+def test_groups_are_kept_in_the_order_of_their_columns():
+    config = SensorNoiseConfig(sigma=0.1, groups=("ground", "proximity"))
+    assert config.groups == ("proximity", "ground")
+    assert config == SensorNoiseConfig.from_mapping({"sigma": 0.1, "groups": "ground+proximity"})
+    assert config == SensorNoiseConfig.from_mapping({"sigma": 0.1, "groups": ["ground", "proximity"]})
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"sigma": -0.1}, "sensor_noise.sigma >= 0, got -0.1"),
+        ({"sigma": np.nan}, "sensor_noise.sigma to be a finite number, got nan"),
+        ({"sigma": "high"}, "sensor_noise.sigma to be a finite number, got 'high'"),
+        ({"sigma": 0.1, "groups": ("proximty",)}, "Unknown group of sensors 'proximty'.*Did you mean 'proximity'"),
+        ({"sigma": 0.1, "groups": ()}, "one or more names of sensors"),
+        ({"sigma": 0.1, "groups": "proximity"}, "one or more names of sensors, got 'proximity'"),
+        ({"sigmas": {"lights": 0.1}}, "Unknown group of sensors 'lights'.*Did you mean 'light'"),
+        ({"sigmas": {"light": -0.1}}, "sensor_noise.sigmas.light >= 0"),
+        ({"sigmas": 0.1}, "sigmas to be a table"),
+        ({"sigma": 0.1, "distribution": "normal"}, "sensor_noise.distribution to be one of gaussian, uniform"),
+    ],
+)
+def test_nonsense_about_sensors_is_refused(fields, message):
+    with pytest.raises(ConfigError, match=message):
+        SensorNoiseConfig(**fields)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"sigma": -0.1}, "actuator_noise.sigma >= 0, got -0.1"),
+        ({"sigma": np.inf}, "actuator_noise.sigma to be a finite number"),
+        ({"sigma": 0.1, "distribution": "unifrom"}, "one of gaussian, uniform.*Did you mean 'uniform'"),
+    ],
+)
+def test_nonsense_about_actuators_is_refused(fields, message):
+    with pytest.raises(ConfigError, match=message):
+        ActuatorNoiseConfig(**fields)

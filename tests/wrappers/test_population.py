@@ -1,0 +1,438 @@
+"""PopulationDynamics in the world: the dead, the broken, the unborn, and what is recorded of them."""
+
+import numpy as np
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import Event, Grip, ObjectStatus
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.population import (
+    PopulationConfig,
+    PopulationDynamics,
+    death_levels,
+    malfunction_levels,
+)
+from swarm_forage_env.wrappers.population_process import simulate_population
+from swarm_forage_env.wrappers.recorder import RunRecorder
+from tests.support.stage import assert_same_world, cell_centre, lay, load, put, snapshot, stand, tidy_world
+
+
+def at_hand(env: ForageEnv, *, deaths: str = "terminate", **fields) -> PopulationDynamics:
+    """Population dynamics whose events a test makes due; by itself next to nothing happens."""
+    rates = dict.fromkeys(("death_per_tick", "malfunction_per_tick", "repair_per_tick"), 1e-12)
+    stack = PopulationDynamics(env, PopulationConfig(**{**rates, **fields}, deaths=deaths))
+    if env.seed_value is not None:
+        stack.on_reset(0)  # a world arranged by hand is not reset again
+    return stack
+
+
+def make_due(stack: PopulationDynamics, process: str) -> None:
+    getattr(stack._clocks, process).next_tick = stack._next_tick = stack.world.tick + 1
+
+
+def hold(env: ForageEnv, wheels: float = 0.0, grip: float = Grip.GRASP) -> np.ndarray:
+    actions = np.full((len(env.active), 3), wheels, np.float32)
+    actions[:, 2] = grip
+    return actions
+
+
+def strike(stack: PopulationDynamics, process: str, actions: np.ndarray | None = None):
+    """Make one event due and step; returns what the step returns."""
+    make_due(stack, process)
+    return stack.step_batch(hold(stack.world) if actions is None else actions)
+
+
+# Repair
+
+
+@pytest.fixture
+def lone_carrier():
+    env = tidy_world(n_robots=1)
+    stand(env, 0, (60, 40))
+    load(env, 0, 0)
+    return at_hand(env)
+
+
+def test_a_robot_in_repair_stops_but_stays(lone_carrier):
+    env = lone_carrier.world
+    lone_carrier.step_batch(hold(env, 0.5))
+    where = env.swarm.position.copy()
+    obs, _, terminated, _ = strike(lone_carrier, "malfunction", hold(env, 0.5))
+    assert not env.active[0]
+    assert env.swarm.present[0]
+    assert not terminated[0]
+    for _ in range(3):
+        np.testing.assert_array_equal(env.swarm.position, where)
+        assert env.swarm.wheel_speed[0].tolist() == [0.0, 0.0]
+        assert env.swarm.carried_object[0] == 0, "even if the policy lets go"
+        assert obs[0, env.layout["active"]] == 0.0
+        assert obs[0, env.layout["carrying"]] == 1.0
+        assert obs[0, env.layout["position"]].any(), "true sensors"
+        obs, *_ = lone_carrier.step_batch(hold(env, 0.5, Grip.RELEASE))
+    strike(lone_carrier, "repair", hold(env, 0.5))
+    assert env.active[0]
+    assert env.swarm.carried_object[0] == 0
+    assert env.swarm.position[0, 0] > where[0, 0]
+
+
+def test_a_running_interaction_completes_in_repair():
+    env = tidy_world(n_robots=1)
+    stand(env, 0, (60, 40))
+    lay(env, 0, (60, 40))
+    stack = at_hand(env)
+    stack.step_batch(hold(env))
+    assert env.swarm.pending_kind[0] != 0
+    strike(stack, "malfunction", hold(env, 0.0, Grip.RELEASE))
+    assert env.events.code[0] == Event.PICKED_UP
+    assert env.swarm.carried_object[0] == 0
+    assert not env.active[0]
+
+
+def test_a_robot_in_repair_is_seen_and_in_the_way_but_never_interferes():
+    env = tidy_world(n_robots=2)
+    put(env, 0, 16.0, 8.0)
+    put(env, 1, 16.0 + 2 * 0.085036758 + 0.02, 8.0, np.pi)
+    stack = at_hand(env)
+    stack.step_batch(hold(env))
+    assert env.events.interfering.tolist() == [True, True]
+    obs, *_ = strike(stack, "malfunction")
+    broken = int(np.flatnonzero(~env.active)[0])
+    assert env.events.interfering.tolist() == [broken != 0, broken != 1]
+    assert obs[:, env.layout["proximity"]].max(axis=1) == pytest.approx([0.5] * 2, abs=0.2), "both see each other"
+    for _ in range(20):
+        stack.step_batch(hold(env, 0.5))
+    assert np.hypot(*(env.swarm.position[0] - env.swarm.position[1])) > 2 * 0.085036758 - 0.004
+
+
+# Death
+
+
+@pytest.mark.parametrize(
+    ("place", "status", "event"),
+    [
+        (cell_centre((60, 40)), ObjectStatus.FREE, Event.DROPPED),
+        (cell_centre((60, 5)), ObjectStatus.FREE, Event.DROPPED_ELSEWHERE),
+    ],
+    ids=["open floor", "where nothing may lie"],
+)
+@pytest.mark.parametrize("deaths", ["terminate", "absorbing"])
+def test_the_dead_lose_their_cargo_and_their_body(place, status, event, deaths):
+    env = tidy_world(n_robots=1)
+    put(env, 0, *place)
+    load(env, 0, 0)
+    stack = at_hand(env, deaths=deaths)
+    obs, reward, terminated, truncated = strike(stack, "death")
+    assert env.swarm.carried_object[0] == -1
+    assert env.objects.status[0] == status
+    lies_there = env.objects.cell[0].tolist() == [int(place[0] * 5), int(place[1] * 5)]
+    assert lies_there == (event is Event.DROPPED)
+    assert not env.swarm.present[0]
+    assert not env.active[0]
+    assert not obs.any()
+    assert reward.tolist() == [0.0]
+    assert terminated.tolist() == [True], "the last one"
+    assert not truncated
+    assert np.all(env.arena._physics.poses()[0, :2] < 0.0), "parked outside"
+
+
+def test_a_dead_robot_is_out_of_the_way():
+    env = tidy_world(n_robots=2)
+    put(env, 0, 16.0, 8.0)
+    put(env, 1, 16.3, 8.0)
+    stack = at_hand(env)
+    strike(stack, "death", hold(env, 0.5))
+    survivor = int(np.flatnonzero(env.active)[0])
+    start = env.swarm.position[survivor].copy()
+    for _ in range(30):
+        obs, *_ = stack.step_batch(hold(env, 0.5))
+        assert not obs[survivor, env.layout["proximity"]].any()
+    assert env.swarm.position[survivor] - start == pytest.approx((30 * 0.02, 0.0))
+
+
+def kill_all(deaths: str) -> list[tuple[list[str], dict[str, bool]]]:
+    """Agents and terminations of each step while three robots die, one per step."""
+    env = ForageEnv(scenario("warehouse_small", n_robots=3, n_objects=20))
+    stack = at_hand(env, deaths=deaths)
+    stack.reset(seed=0)
+    seen = []
+    for _ in range(3):
+        make_due(stack, "death")
+        actions = {agent: np.zeros(3, np.float32) for agent in stack.agents}
+        _, _, terminations, truncations, infos = stack.step(actions)
+        assert not any(truncations.values())
+        assert {agent: info["active"] for agent, info in infos.items()} == {
+            agent: bool(env.active[env.possible_agents.index(agent)]) for agent in infos
+        }
+        seen.append((list(stack.agents), terminations))
+    return seen
+
+
+def test_permanent_death_terminates_the_agent():
+    agents = [f"robot_{row}" for row in range(3)]
+    seen = kill_all("terminate")
+    assert [len(left) for left, _ in seen] == [2, 1, 0]
+    for left, terminations in seen:
+        assert set(terminations) == set(agents)
+        assert {agent for agent, is_dead in terminations.items() if is_dead} == set(agents) - set(left)
+        agents = left
+
+
+def test_absorbing_deaths_keep_every_agent_until_the_last_death():
+    agents = [f"robot_{row}" for row in range(3)]
+    assert kill_all("absorbing") == [
+        (agents, dict.fromkeys(agents, False)),
+        (agents, dict.fromkeys(agents, False)),
+        ([], dict.fromkeys(agents, True)),
+    ]
+
+
+@pytest.mark.parametrize("lives_on", [False, True])
+def test_both_ways_of_death_are_the_same_world_and_record(lives_on):
+    config = scenario("warehouse_small", n_robots=6, n_objects=60, caches="static", horizon_s=60.0, interval_s=10.0)
+    rate = 0.01 if lives_on else 0.2
+    results = []
+    for deaths in ("terminate", "absorbing"):
+        population = PopulationConfig(
+            death_per_tick=rate, malfunction_per_tick=0.05, repair_per_tick=0.05, deaths=deaths
+        )
+        recorder = RunRecorder(population.wrap(ForageEnv(config)))
+        obs = [recorder.reset_batch(4).copy()]
+        rng = np.random.default_rng(0)
+        while not recorder.complete:
+            actions = rng.uniform(-1, 1, (6, 3)).astype(np.float32)
+            obs.append(recorder.step_batch(actions)[0].copy())
+        results.append((np.stack(obs), snapshot(recorder.world), recorder.columns() | recorder.contributed()))
+    (obs, world, record), (other_obs, other_world, other_record) = results
+    np.testing.assert_array_equal(obs, other_obs)
+    assert_same_world(world, other_world)
+    assert_same_world(record, other_record)
+    assert record["deaths"].sum() == 6 if not lives_on else 0 < record["deaths"].sum() < 6
+    assert (len(obs) < 301) == (not lives_on), "the run ends with the last robot"
+    if not lives_on:
+        assert record["n_caches"][0] > 0
+        assert record["n_caches"][-1] == record["n_present"][-1] == 0, "the rest of the record is zeros"
+
+
+# Birth
+
+
+def nursery(n_robots: int = 6, *, initial_robots: int = 2, **fields) -> PopulationDynamics:
+    env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, n_objects=50))
+    return at_hand(env, initial_robots=initial_robots, birth_per_tick=1e-12, **fields)
+
+
+def test_the_unborn_are_agents_without_a_body_from_the_reset_on():
+    stack = nursery()
+    env = stack.world
+    observations, infos = stack.reset(seed=3)
+    assert stack.agents == env.possible_agents
+    unborn = [f"robot_{row}" for row in range(2, 6)]
+    assert not any(observations[agent].any() for agent in unborn)
+    assert [infos[agent]["active"] for agent in stack.agents] == [True, True, False, False, False, False]
+    assert not env.state()[12:36].any()
+    _, _, terminations, _, _ = stack.step({agent: np.ones(3, np.float32) for agent in stack.agents})
+    assert not any(terminations.values())
+    assert env.swarm.present.tolist() == [True, True, False, False, False, False]
+
+
+def test_nobody_sees_the_unborn_at_reset():
+    crowded = {"n_robots": 30, "n_objects": 50, "start_margin_m": 3.5, "width_m": 8.0, "height_m": 8.0}
+    crowded |= {"nest_centre_m": (2.0, 4.0), "nest_size_m": (1.0, 1.0), "start_margin_m": 2.9}
+    config = scenario("warehouse_medium", **crowded)
+    alone, full = ForageEnv(config), ForageEnv(config)
+    stack = PopulationDynamics(alone, PopulationConfig(initial_robots=1))
+    proximity = stack.reset_batch(0)[0, alone.layout["proximity"]]
+    assert full.reset_batch(0)[0, full.layout["proximity"]].any(), "there would be somebody to see"
+    assert not proximity.any()
+
+
+def test_births_bring_working_robots_at_free_places():
+    stack = nursery(n_robots=40, initial_robots=1)
+    env = stack.world
+    stack.reset_batch(1)
+    for born in range(1, 40):
+        obs, *_ = strike(stack, "birth", hold(env))
+        assert env.active.sum() == born + 1
+        assert env.active[born]
+        x, y = env.swarm.position[born]
+        assert 2.0 <= x <= 30.0
+        assert 2.0 <= y <= 14.0
+        assert env.swarm.heading[born] == 0.0
+        assert obs[born, env.layout["heading"]].tolist() == [1.0, 0.0]
+        others = np.delete(env.swarm.position[: born + 1], born, axis=0)
+        assert np.hypot(*(others - (x, y)).T).min() > 2 * 0.085
+    before = env.swarm.position.copy()
+    free = ~obs[:, env.layout["proximity"]].any(axis=1)
+    stack.step_batch(hold(env, 0.5, Grip.RELEASE))
+    assert np.hypot(*(env.swarm.position - before)[free].T) == pytest.approx(np.full(free.sum(), 0.02))
+    make_due(stack, "birth")
+    stack.step_batch(hold(env))
+    assert env.active.all(), "nobody is left to be born"
+
+
+def test_a_birth_waits_until_there_is_a_place():
+    stack = nursery()
+    env = stack.world
+    stack.reset_batch(0)
+    stack._body_m = 100.0
+    make_due(stack, "birth")
+    for _ in range(3):
+        stack.step_batch(hold(env))
+        assert env.swarm.present.sum() == 2
+    stack._body_m = 0.2
+    stack.step_batch(hold(env))
+    assert env.swarm.present.sum() == 3
+
+
+def test_nobody_is_born_while_enough_are_here():
+    stack = nursery(max_robots=3)
+    stack.reset_batch(0)
+    for _ in range(3):
+        strike(stack, "birth", hold(stack.world))
+    assert stack.world.swarm.present.sum() == 3
+
+
+@pytest.mark.parametrize(("start_margin_m", "nearest_m"), [(1.0, 1.0), (2.5, 2.0)])
+def test_births_are_as_near_to_the_border_as_starts_but_no_farther_than_two_metres(start_margin_m, nearest_m):
+    config = scenario("warehouse_small", n_robots=200, n_objects=9, start_margin_m=start_margin_m)
+    stack = PopulationDynamics(ForageEnv(config), PopulationConfig(initial_robots=1))
+    stack.reset_batch(0)
+    rng = np.random.default_rng(0)
+    assert all(stack._find_place(row, rng) for row in range(1, 200))
+    x, y = stack.world.swarm.position[1:].T
+    for distance in (x.min(), y.min(), 32.0 - x.max(), 16.0 - y.max()):
+        assert nearest_m <= distance < nearest_m + 0.4
+
+
+# Events and record
+
+
+def test_a_run_has_the_events_of_its_simulation():
+    """The queue alone says who is at work in each tick, in full length and for any seed."""
+    population = PopulationConfig(
+        death_per_tick=0.01, birth_per_tick=0.02, malfunction_per_tick=0.05, repair_per_tick=0.04, initial_robots=10
+    )
+    stack = population.wrap(ForageEnv(scenario("warehouse_small", n_robots=20, n_objects=20)))
+    for seed in (0, 1):
+        stack.reset_batch(seed)
+        expected = simulate_population(population.rates, 20, 250, seed, initial_robots=10)
+        n_active = []
+        for _ in range(250):
+            stack.step_batch(hold(stack.world))
+            n_active.append(np.count_nonzero(stack.world.active))
+        np.testing.assert_array_equal(n_active, expected.n_active)
+
+
+def test_events_queue_and_times_are_recorded():
+    config = scenario("warehouse_small", n_robots=12, n_objects=20, horizon_s=60.0, interval_s=20.0)
+    population = PopulationConfig(
+        death_per_tick=0.01, birth_per_tick=0.01, malfunction_per_tick=0.05, repair_per_tick=0.05, initial_robots=8
+    )
+    recorder = RunRecorder(population.wrap(ForageEnv(config)))
+    recorder.reset_batch(2)
+    while not recorder.complete:
+        recorder.step_batch(hold(recorder.world))
+    record = recorder.columns() | recorder.contributed()
+    tally = simulate_population(population.rates, 12, 300, 2, initial_robots=8).tally
+    for name in ("deaths", "births", "malfunctions", "repairs"):
+        assert record[name].sum() == getattr(tally, name) > 0
+    np.testing.assert_allclose(record["n_active"] + record["n_in_repair"], record["n_present"])
+    assert record["n_present"].max() <= 12
+    # Means per interval, weighted by what ended in it, give the totals of the run; all stays end in one of two ways.
+    assert record["time_in_repair_s"] @ record["repairs"] == pytest.approx(tally.absence_ticks * 0.2)
+    assert 0 < record["time_at_work_s"].max() <= 60.0
+
+
+def test_times_at_work_are_means_over_the_stays_that_ended():
+    config = scenario("warehouse_small", n_robots=12, n_objects=20, horizon_s=60.0, interval_s=20.0)
+    population = PopulationConfig(malfunction_per_tick=0.05, repair_per_tick=0.02)
+    recorder = RunRecorder(population.wrap(ForageEnv(config)))
+    recorder.reset_batch(2)
+    while not recorder.complete:
+        recorder.step_batch(hold(recorder.world))
+    record = recorder.contributed()
+    tally = simulate_population(population.rates, 12, 300, 2).tally
+    assert tally.stays == record["malfunctions"].sum() > record["repairs"].sum() > 0
+    assert record["time_at_work_s"] @ record["malfunctions"] == pytest.approx(tally.stay_ticks * 0.2)
+
+
+def test_an_interval_in_which_nothing_ended_has_times_of_zero():
+    recorder = RunRecorder(
+        at_hand(ForageEnv(scenario("warehouse_small", n_robots=2, n_objects=9, horizon_s=2.0, interval_s=1.0)))
+    )
+    recorder.reset_batch(0)
+    while not recorder.complete:
+        recorder.step_batch(hold(recorder.world))
+    assert all(not values.any() for values in recorder.contributed().values())
+
+
+def test_a_run_that_was_broken_off_leaves_no_trace_in_the_next_record():
+    config = scenario("warehouse_small", n_robots=5, n_objects=9, horizon_s=4.0, interval_s=2.0)
+    recorder = RunRecorder(PopulationConfig(malfunction_per_tick=0.3, repair_per_tick=0.1).wrap(ForageEnv(config)))
+    records = []
+    for broken_off in (0, 7):
+        recorder.reset_batch(8)
+        for _ in range(broken_off):
+            recorder.step_batch(hold(recorder.world))
+        recorder.reset_batch(1)
+        while not recorder.complete:
+            recorder.step_batch(hold(recorder.world))
+        records.append(recorder.contributed())
+    assert records[0]["n_in_repair"].any()
+    assert_same_world(*records)
+
+
+def test_malfunctions_do_not_end_an_episode():
+    env = ForageEnv(scenario("warehouse_small", n_robots=2, n_objects=9, horizon_s=4.0, interval_s=1.0))
+    recorder = RunRecorder(PopulationConfig(malfunction_per_tick=5.0).wrap(env))
+    recorder.reset(seed=0)
+    for _ in range(20):
+        _, _, terminations, truncations, _ = recorder.step(
+            {agent: np.zeros(3, np.float32) for agent in recorder.agents}
+        )
+        assert not any(terminations.values())
+    assert all(truncations.values())
+    assert recorder.columns()["n_active"].tolist() == [0.2, 0.0, 0.0, 0.0]
+
+
+# Configuration
+
+
+def test_levels_of_the_study():
+    for n_robots, repair in ((50, 0.001022222), (200, 0.001005556)):
+        levels = malfunction_levels(n_robots)
+        assert [level.malfunction_per_tick for level in levels] == pytest.approx([0.001 * (1 + x) for x in range(8)])
+        assert [level.repair_per_tick for level in levels] == pytest.approx([repair * (1 + x) for x in range(8)])
+        assert {(level.death_per_tick, level.birth_per_tick) for level in levels} == {(0.0, 0.0)}
+    assert [level.death_per_tick for level in death_levels()] == [
+        0.0001, 0.0003, 0.0005, 0.0007, 0.0009, 0.0011, 0.0013, 0.0015,
+    ]  # fmt: skip
+    with pytest.raises(ConfigError, match="Expected 50 or 200 robots"):
+        malfunction_levels(100)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"death_per_tick": -0.1}, "population.death_per_tick >= 0, got -0.1"),
+        ({"repair_per_tick": np.nan}, "population.repair_per_tick to be a finite number"),
+        ({"malfunction_per_tick": "often"}, "population.malfunction_per_tick to be a finite number, got 'often'"),
+        ({"birth_per_tick": np.inf}, "population.birth_per_tick to be a finite number"),
+        ({"initial_robots": 0}, "population.initial_robots to be a whole number >= 1, got 0"),
+        ({"max_robots": 2.5}, "population.max_robots to be a whole number >= 1, got 2.5"),
+        ({"max_robots": True}, "population.max_robots to be a whole number >= 1, got True"),
+        ({"deaths": "absorb"}, "population.deaths to be one of terminate, absorbing.*Did you mean 'absorbing'"),
+    ],
+)
+def test_nonsense_is_refused(fields, message):
+    with pytest.raises(ConfigError, match=message):
+        PopulationConfig(**fields)
+
+
+def test_populations_that_do_not_fit_the_scenario_are_refused():
+    env = ForageEnv(scenario("warehouse_small", n_robots=4, n_objects=9))
+    with pytest.raises(ConfigError, match="initial_robots <= 4, the robots of the scenario, got 5"):
+        PopulationConfig(initial_robots=5).wrap(env)
+    with pytest.raises(ConfigError, match=r"initial_robots below 4.*somebody can be born, got None"):
+        PopulationConfig(birth_per_tick=0.1).wrap(env)

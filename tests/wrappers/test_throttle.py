@@ -1,0 +1,245 @@
+"""Throttle: what it does to wheels, whom it strikes, when, and what it records."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
+from swarm_forage_env.wrappers.recorder import RunRecorder
+from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig, sine_throttles, square_throttles
+from swarm_forage_env.wrappers.waveform import Waveform
+from tests.reference.adversity import throttle_gain
+from tests.reference.motion import limited_wheels, steered_wheels
+from tests.support.fake_arena import FakeWorld
+from tests.support.stage import lay, load, put, stand, tidy_world
+
+
+def constant(amplitude: float, *, carriers: bool = False) -> ThrottleConfig:
+    return ThrottleConfig(waveform=Waveform(kind="constant", amplitude=amplitude), carriers=carriers)
+
+
+def gain_of(config: ThrottleConfig, commands, *, carrying=(), wheel_gain=None) -> np.ndarray | None:
+    """The gain (N, 2) that the throttle hands inwards for wheel commands of four robots."""
+    world = FakeWorld()
+    stack = config.wrap(world)
+    stack.reset_batch(0)
+    world.swarm.carried_object[list(carrying)] = 0
+    actions = np.zeros((4, 3), np.float32)
+    actions[: len(commands), :2] = commands
+    stack.step_batch(actions, wheel_gain=wheel_gain)
+    return world.calls[-1]["wheel_gain"]
+
+
+def wheels_after(env: ForageEnv, config: ThrottleConfig, wheels_mps) -> list[float]:
+    """Wheel speeds in cm/s of robot 0 after one throttled step with these commanded speeds in m/s."""
+    stack = Throttle(env, config)
+    stack.on_reset(0)
+    put(env, 0, 16.0, 8.0)
+    actions = np.zeros((len(env.active), 3), np.float32)
+    actions[:, 2] = Grip.RELEASE
+    actions[0, :2] = np.array(wheels_mps) / WHEEL_SCALE_MPS
+    stack.step_batch(actions)
+    return (env.swarm.wheel_speed[0] * 100).tolist()
+
+
+@pytest.fixture(scope="module")
+def lone_robot():
+    return tidy_world(n_robots=1)
+
+
+@pytest.mark.parametrize(
+    ("strength", "force_cms", "expected_cms"),
+    [(0.8, 8.0, 1.6), (0.8, 17.0, 2.0), (0.3, 8.0, 5.6), (0.3, 17.0, 7.0), (0.0, 17.0, 10.0), (1.0, 8.0, 0.0)],
+)
+def test_driving_straight(lone_robot, strength, force_cms, expected_cms):
+    wheels = wheels_after(lone_robot, constant(strength), steered_wheels(force_cms, 0.0))
+    assert wheels == pytest.approx([expected_cms] * 2, abs=1e-6)
+    moved = np.hypot(*(lone_robot.swarm.position[0] - (16.0, 8.0)))
+    assert moved == pytest.approx(expected_cms / 100 * 0.2, abs=1e-8)
+
+
+def test_soft_turns_slow_down_by_as_much_as_straight_driving(lone_robot):
+    wheels = wheels_after(lone_robot, constant(0.8), steered_wheels(9.0, 10.0))
+    assert wheels == pytest.approx([0.6, 3.0], abs=1e-6)
+
+
+def test_turns_on_the_spot_are_free(lone_robot):
+    wheels = wheels_after(lone_robot, constant(0.8), steered_wheels(9.0, 90.0))
+    assert wheels == pytest.approx([-10.0, 10.0])
+
+
+def test_the_gain_is_taken_of_the_limited_command(lone_robot):
+    """(1, -0.5) asks for 5 cm/s and a difference of 30 cm/s; the drive gives the difference 20 cm/s."""
+    assert limited_wheels(1.0, -0.5) == pytest.approx((0.15, -0.05))
+    wheels = wheels_after(lone_robot, constant(0.8), (0.20, -0.10))
+    assert wheels == pytest.approx([15 * 0.6, -5 * 0.6], abs=1e-6)
+
+
+@given(
+    left=st.floats(-2.0, 2.0, width=32),
+    right=st.floats(-2.0, 2.0, width=32),
+    strength=st.floats(0.0, 1.0),
+)
+def test_equals_the_slow_twin(left, right, strength):
+    gain = gain_of(constant(strength), [(left, right)])
+    expected = throttle_gain((left, right), strength)
+    if strength == 0.0:
+        assert gain is None
+    else:
+        assert gain[0] == pytest.approx([expected, expected], abs=1e-12)
+
+
+def test_between_straight_and_on_the_spot_the_gain_is_continuous():
+    commands = [(0.4, right) for right in np.linspace(-0.4, 0.4, 801)]
+    gains = [throttle_gain(command, 0.5) for command in commands]
+    assert gains[0] == pytest.approx(1.0)
+    assert gains[-1] == 0.5
+    assert np.abs(np.diff(gains)).max() < 0.003
+    ours = [gain_of(constant(0.5), [command])[0, 0] for command in commands[::100]]
+    assert ours == pytest.approx(gains[::100], abs=1e-6)
+
+
+def test_straight_driving_loses_exactly_the_throttle():
+    gain = gain_of(constant(0.3), [(0.37, 0.37), (-0.2, -0.2), (0.0, 0.0), (0.1, 0.3)])
+    assert gain.tolist() == [[0.7] * 2, [0.7] * 2, [1.0] * 2, [0.7] * 2]
+
+
+def test_carriers_only():
+    config = constant(0.5, carriers=True)
+    gain = gain_of(config, [(0.4, 0.4)] * 4, carrying=(1, 3))
+    assert gain[:, 0].tolist() == [1.0, 0.5, 1.0, 0.5]
+
+
+def test_whoever_carries_at_the_start_of_a_step_is_throttled_in_it():
+    env = tidy_world(n_robots=2)
+    stack = Throttle(env, constant(0.5, carriers=True))
+    stack.on_reset(0)
+    actions = np.array([[0.4, 0.4, Grip.GRASP]] * 2, np.float32)
+    stand(env, 0, (60, 40))
+    lay(env, 0, (60, 40))
+    put(env, 1, 20.0, 4.0)
+    load(env, 1, 1)
+    speeds = []
+    for _ in range(3):
+        stack.step_batch(actions)
+        speeds.append((env.swarm.wheel_speed[:, 0] * 100).round(6).tolist())
+    # Robot 0 asks, waits with its wheels held and gets its object in the second step, and is slow from the third on.
+    assert speeds == [[8.0, 4.0], [0.0, 4.0], [4.0, 4.0]]
+    assert env.swarm.carried_object.tolist() == [0, 1]
+
+
+def test_gains_from_outside_are_multiplied_and_left_alone():
+    outer = np.array([[0.5, 0.25]] * 4)
+    gain = gain_of(constant(0.5), [(0.4, 0.4)], wheel_gain=outer)
+    assert gain[:2].tolist() == [[0.25, 0.125], [0.5, 0.25]]
+    assert outer.tolist() == [[0.5, 0.25]] * 4
+
+
+@pytest.mark.parametrize("amplitude", [0.0, -0.3])
+def test_nothing_happens_without_throttle(amplitude):
+    outer = np.ones((4, 2))
+    assert gain_of(constant(amplitude), [(0.4, 0.4)]) is None
+    assert gain_of(constant(amplitude), [(0.4, 0.4)], wheel_gain=outer) is outer
+
+
+def test_rows_that_are_not_numbers_disturb_nobody():
+    gain = gain_of(constant(0.5), [(np.nan, 0.4), (np.inf, -np.inf), (0.4, 0.4)])
+    assert gain[2].tolist() == [0.5, 0.5]
+
+
+# Time
+
+
+def ramp(n_ticks: int) -> ThrottleConfig:
+    """V(t) = t / 100 up to `n_ticks`."""
+    times = (0.0, n_ticks * 0.2)
+    return ThrottleConfig(waveform=Waveform(kind="table", times_s=times, values=(0.0, n_ticks / 100)))
+
+
+def test_the_first_tick_is_tick_1():
+    world = FakeWorld()
+    stack = ramp(50).wrap(world)
+    stack.reset_batch(0)
+    actions = np.full((4, 3), 0.4, np.float32)
+    seen = []
+    for _ in range(3):
+        stack.step_batch(actions)
+        seen.append(world.calls[-1]["wheel_gain"][0, 0])
+    assert seen == pytest.approx([0.99, 0.98, 0.97])
+
+
+@pytest.mark.parametrize("carriers", [False, True])
+def test_last_value_and_mean_are_recorded_per_interval(carriers):
+    config = ThrottleConfig(waveform=ramp(50).waveform, carriers=carriers)
+    recorder = RunRecorder(config.wrap(FakeWorld()))
+    for seed in (0, 1):  # a second run starts afresh
+        recorder.reset_batch(seed)
+        while not recorder.complete:
+            recorder.step_batch(np.zeros((4, 3), np.float32))
+        recorded = recorder.contributed()
+        assert recorded["throttle"].tolist() == pytest.approx([0.05, 0.10, 0.15])
+        assert recorded["throttle_mean"].tolist() == pytest.approx([0.03, 0.08, 0.13])
+        assert recorder.columns()["adversity"].tolist() == recorded["throttle_mean"].tolist()
+
+
+def test_a_run_that_was_broken_off_leaves_no_trace_in_the_next_mean():
+    recorder = RunRecorder(ramp(50).wrap(FakeWorld()))
+    recorder.reset_batch(0)
+    for _ in range(3):
+        recorder.step_batch(np.zeros((4, 3), np.float32))
+    recorder.reset_batch(1)
+    while not recorder.complete:
+        recorder.step_batch(np.zeros((4, 3), np.float32))
+    assert recorder.contributed()["throttle_mean"].tolist() == pytest.approx([0.03, 0.08, 0.13])
+
+
+def test_the_waveform_itself_is_recorded_where_it_is_negative():
+    waveform = Waveform(kind="square", amplitude=0.5, period_s=2.0)
+    recorder = RunRecorder(ThrottleConfig(waveform=waveform).wrap(FakeWorld()))
+    recorder.reset_batch(0)
+    while not recorder.complete:
+        recorder.step_batch(np.zeros((4, 3), np.float32))
+    assert recorder.contributed()["throttle"].tolist() == [0.5, -0.5, 0.5]
+
+
+# Configuration
+
+
+def test_levels_of_the_study():
+    square, sine = square_throttles(), sine_throttles()
+    assert len(square) == 7
+    assert len(sine) == 8
+    assert all(config.carriers for config in square)
+    assert not any(config.carriers for config in sine)
+    assert [config.waveform.amplitude for config in square] == [0.10, 0.15, 0.20, 0.25, 0.30, 0.35, 0.40]
+    assert [config.waveform.amplitude for config in sine] == [0.10, 0.15, 0.20, 0.25, 0.30, 0.35, 0.40, 0.45]
+    for configs, kind, period_s, highest in ((square, "square", 5_000.0, 0.80), (sine, "sine", 10_000.0, 0.90)):
+        assert configs[0].waveform == Waveform(kind="constant", amplitude=0.10)
+        for config in configs[1:]:
+            assert (config.waveform.kind, config.waveform.period_s) == (kind, period_s)
+            assert config.waveform.offset == config.waveform.amplitude
+        assert configs[-1].waveform.peak == pytest.approx(highest)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"waveform": Waveform(kind="constant", amplitude=1.1)}, "at most 1.*reaches 1.1"),
+        (
+            {"waveform": Waveform(kind="sine", amplitude=0.6, offset=0.6, period_s=1.0)},
+            "reaches 1.2; lower its amplitude",
+        ),
+        ({"waveform": 0.3}, "throttle.waveform to be a Waveform, such as one of kind constant.*got 0.3"),
+        (
+            {"waveform": Waveform(kind="constant"), "carriers": "yes"},
+            "throttle.carriers to be True or False, got 'yes'",
+        ),
+    ],
+)
+def test_nonsense_is_refused(fields, message):
+    with pytest.raises(ConfigError, match=message):
+        ThrottleConfig(**fields)
