@@ -17,7 +17,7 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
-from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import IntArray, Row
 
 from .memory import ObjectMemory, OneMemory, forget, memory_of, new_memory, object_row_of
@@ -60,14 +60,14 @@ class OneTaskMemory(NamedTuple):
     shunned: Row
 
 
-def new_task_memory(task: SwarmTask) -> TaskMemory:
+def new_task_memory(spec: SwarmSpec) -> TaskMemory:
     """Return empty memories; twice as many caches can be remembered as fit into the arena side by side."""
-    width_m, height_m = task.arena_size_m
-    n_side_by_side = int(width_m / task.cache_side_m + 1e-9) * int(height_m / task.cache_side_m + 1e-9)
-    shape = (task.n_robots, task.n_objects)
+    width_m, height_m = spec.arena_size_m
+    n_side_by_side = int(width_m / spec.cache_side_m + 1e-9) * int(height_m / spec.cache_side_m + 1e-9)
+    shape = (spec.n_robots, spec.n_objects)
     return TaskMemory(
         objects=new_memory(*shape),
-        caches=np.zeros((task.n_robots, 2 * n_side_by_side), CACHE),
+        caches=np.zeros((spec.n_robots, 2 * n_side_by_side), CACHE),
         shunned=np.zeros(shape, np.int32),
     )
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 from .machines import (
@@ -107,21 +107,21 @@ class DPOPolicy:
 
     def __init__(self, parameters: MemoryParameters | None = None, **overrides: float) -> None:
         self.parameters = chosen_parameters(MemoryParameters(), parameters, overrides)
-        self._task: SwarmTask | None = None
+        self._spec: SwarmSpec | None = None
 
-    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+    def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot explores and remembers nothing."""
-        self._task = task
+        self._spec = spec
         self._rng = rng
-        self._constants = kernel_constants(self.parameters, task, **self.parameters.derived())
-        self._robots = new_robots(task.n_robots)
-        self._memory = new_memory(task.n_robots, task.n_objects)
-        self._draws = np.zeros((task.n_robots, DRAWS))
-        self._actions = np.zeros((task.n_robots, 3), np.float32)
+        self._constants = kernel_constants(self.parameters, spec, **self.parameters.derived())
+        self._robots = new_robots(spec.n_robots)
+        self._memory = new_memory(spec.n_robots, spec.n_objects)
+        self._draws = np.zeros((spec.n_robots, DRAWS))
+        self._actions = np.zeros((spec.n_robots, 3), np.float32)
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
-        require_inputs(obs, active, self._task)
+        require_inputs(obs, active, self._spec)
         self._rng.random(out=self._draws)
         step_dpo(obs, active, self._draws, self._constants, self._robots, self._memory, self._actions)
         return self._actions

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from swarm_forage_env._internal.spelling import suggestion
-from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 
 COLUMNS = (
@@ -94,24 +94,24 @@ class ObservationError(ValueError):
     """Observations that are not those of the swarm that the policy was reset for."""
 
 
-def require_inputs(obs: ObsArray, active: BoolArray, task: SwarmTask | None) -> None:
+def require_inputs(obs: ObsArray, active: BoolArray, spec: SwarmSpec | None) -> None:
     """Refuse what is of another shape than the swarm; compiled kernels would read and write beyond it.
 
     Args:
         obs: Observations.
         active: Which robots act.
-        task: What the policy was reset with, None = it was not.
+        spec: What the policy was reset with, None = it was not.
 
     Raises:
         ObservationError: `obs` is not (n_robots, layout.size), `active` not (n_robots,), or there was no reset.
     """
-    if task is None:
-        raise ObservationError("Expected reset before act; call reset with the task of the environment first.")
-    expected = (task.n_robots, task.layout.size)
+    if spec is None:
+        raise ObservationError("Expected reset before act; call reset with the spec of the environment first.")
+    expected = (spec.n_robots, spec.layout.size)
     if obs.shape != expected:
         raise ObservationError(
             f"Expected observations with shape (n_robots, columns) = {expected}, got {obs.shape}; "
-            "call reset with the task of this environment."
+            "call reset with the spec of this environment."
         )
     if active.shape != expected[:1]:
         raise ObservationError(
@@ -145,33 +145,33 @@ def chosen_parameters(default: P, parameters: P | None, overrides: Mapping[str, 
     return dataclasses.replace(parameters, **overrides)
 
 
-def kernel_constants(parameters: ControllerParameters, task: SwarmTask, **derived: float) -> np.ndarray:
+def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derived: float) -> np.ndarray:
     """Pack everything that stays constant during a run into one record, readable by name inside kernels.
 
     Args:
         parameters: All fields are passed on under their own names, as float64.
-        task: Observation columns, scales, drive limits, nest and quirks (0 or 1) of this run.
+        spec: Observation columns, scales, drive limits, nest and quirks (0 or 1) of this run.
         derived: Further numbers that a controller computes once; whole ones stay whole.
 
     Returns:
         (1,) record array; `constants[0].name` works compiled and uncompiled.
     """
-    layout = task.layout
+    layout = spec.layout
     scales = layout.part("position").scale
     whole: dict[str, Any] = {name: layout.part(name).start for name in COLUMNS}
-    whole["n_objects"] = task.n_objects
-    whole["exploration_lock_ticks"] = round(parameters.exploration_lock_s / task.dt_s)
-    whole["recovery_ticks"] = round(parameters.recovery_s / task.dt_s)
-    whole.update({name: int(is_on) for name, is_on in dataclasses.asdict(task.quirks).items()})
+    whole["n_objects"] = spec.n_objects
+    whole["exploration_lock_ticks"] = round(parameters.exploration_lock_s / spec.dt_s)
+    whole["recovery_ticks"] = round(parameters.recovery_s / spec.dt_s)
+    whole.update({name: int(is_on) for name, is_on in dataclasses.asdict(spec.quirks).items()})
     real: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}
     real.update(
         half_width_m=scales[0],
         half_height_m=scales[1],
-        cell_m=task.cell_m,
-        wheel_scale_mps=task.wheel_scale_mps,
-        max_speed_mps=task.max_speed_mps,
-        nest_x_m=task.nest_centre_m[0],
-        nest_y_m=task.nest_centre_m[1],
+        cell_m=spec.cell_m,
+        wheel_scale_mps=spec.wheel_scale_mps,
+        max_speed_mps=spec.max_speed_mps,
+        nest_x_m=spec.nest_centre_m[0],
+        nest_y_m=spec.nest_centre_m[1],
         soft_turn_rad=math.radians(parameters.soft_turn_deg),
     )
     for name, value in derived.items():

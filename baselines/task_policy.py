@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 from .cache_memory import new_task_memory
@@ -16,34 +16,34 @@ from .task_machines import new_task_robots, step_tasks
 from .tasks import N_TASKS, TASK_DRAWS, TaskParameters
 
 
-def site_box_m(task: SwarmTask) -> tuple[float, float, float, float]:
+def site_box_m(spec: SwarmSpec) -> tuple[float, float, float, float]:
     """Return the box of allowed cache sites, half a nominal cache side inside the arena: x low, y low, x high, y high.
 
     Under the quirk `site_box_truncated` its borders are truncated to whole metres.
     """
-    width_m, height_m = task.arena_size_m
-    margin = task.cache_side_nominal_m / 2.0
+    width_m, height_m = spec.arena_size_m
+    margin = spec.cache_side_nominal_m / 2.0
     box = (margin, margin, width_m - margin, height_m - margin)
-    if task.quirks.site_box_truncated:
+    if spec.quirks.site_box_truncated:
         x_low, y_low, x_high, y_high = (float(math.trunc(border)) for border in box)
         return x_low, y_low, x_high, y_high
     return box
 
 
-def task_constants(parameters: TaskParameters, task: SwarmTask, n_tabs: int) -> np.ndarray:
+def task_constants(parameters: TaskParameters, spec: SwarmSpec, n_tabs: int) -> np.ndarray:
     """Return `kernel_constants` with what task allocation and caches need besides."""
-    x_low, y_low, x_high, y_high = site_box_m(task)
+    x_low, y_low, x_high, y_high = site_box_m(spec)
     # Quirk finisher_tolerance_mismatch: arriving and being accepted are different distances.
-    is_loose = task.quirks.finisher_tolerance_mismatch
-    loose_m = parameters.loose_founding_share * max(task.arena_size_m)
+    is_loose = spec.quirks.finisher_tolerance_mismatch
+    loose_m = parameters.loose_founding_share * max(spec.arena_size_m)
     return kernel_constants(
         parameters,
-        task,
+        spec,
         **parameters.derived(),
         n_tabs=n_tabs,
-        cache_half_cells=round(task.cache_side_m / task.cell_m) // 2,
-        cache_side_m=task.cache_side_m,
-        proximity_m=task.cache_side_nominal_m,
+        cache_half_cells=round(spec.cache_side_m / spec.cell_m) // 2,
+        cache_side_m=spec.cache_side_m,
+        proximity_m=spec.cache_side_nominal_m,
         founding_tolerance_m=loose_m if is_loose else parameters.founding_distance_m,
         site_x_low_m=x_low,
         site_y_low_m=y_low,
@@ -87,23 +87,23 @@ class TaskPolicy:
 
     def __init__(self, parameters: TaskParameters | None = None, **overrides: float) -> None:
         self.parameters = chosen_parameters(self.default_parameters, parameters, overrides)
-        self._task: SwarmTask | None = None
+        self._spec: SwarmSpec | None = None
 
-    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+    def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: estimates are drawn, nobody has a task, and nothing is remembered."""
-        self._task = task
+        self._spec = spec
         self._rng = rng
-        self._constants = task_constants(self.parameters, task, self.n_tabs)
-        self._robots = new_task_robots(task.n_robots)
-        self._memory = new_task_memory(task)
-        self._allocation = new_allocation(task.n_robots, self.parameters, task.quirks, self.n_tabs, rng)
-        self._draws = np.zeros((task.n_robots, TASK_DRAWS))
-        self._actions = np.zeros((task.n_robots, 3), np.float32)
+        self._constants = task_constants(self.parameters, spec, self.n_tabs)
+        self._robots = new_task_robots(spec.n_robots)
+        self._memory = new_task_memory(spec)
+        self._allocation = new_allocation(spec.n_robots, self.parameters, spec.quirks, self.n_tabs, rng)
+        self._draws = np.zeros((spec.n_robots, TASK_DRAWS))
+        self._actions = np.zeros((spec.n_robots, 3), np.float32)
         self._tick = 0
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
-        require_inputs(obs, active, self._task)
+        require_inputs(obs, active, self._spec)
         self._tick += 1
         self._rng.random(out=self._draws)
         step_tasks(

@@ -101,7 +101,7 @@ DESTINATION = _by_task(
 )
 """(N_TASKS,) `Goal` code of where a task brings it."""
 DROP_GRIP = np.array([Grip.SITE if goal == Goal.SITE else Grip.DELIVER for goal in DESTINATION], np.float32)
-DROP_GRIP[Task.FINISHER] = Grip.FOUND
+DROP_GRIP[Task.FINISHER] = Grip.CREATE_CACHE
 """(N_TASKS,) gripper command of a robot that waits to drop."""
 
 

@@ -111,8 +111,8 @@ def tick_shares(scenario: ScenarioConfig, policy_name: str, ticks: int) -> dict[
     spec = run_spec(scenario, policy_name, ticks)
     policy = load_policy(policy_name)
     recorder = build_stack(spec.scenario, reads=getattr(policy, "reads", None))
-    world = recorder.world
-    policy.reset(world.task, stream_rng(0, Stream.POLICY))
+    world = recorder.unwrapped
+    policy.reset(world.swarm_spec, stream_rng(0, Stream.POLICY))
     obs = recorder.reset_batch(0)
     spent: dict[str, list[float]] = {phase: [0.0] for phase in PHASES}
     with (
@@ -267,8 +267,8 @@ def _cost_per_robot_tick(
     policy = load_policy("crw")
     spec = run_spec(scenario, "crw", ticks + 20)
     recorder = build_stack(spec.scenario, wrappers, reads=getattr(policy, "reads", None))
-    world = recorder.world
-    policy.reset(world.task, stream_rng(0, Stream.POLICY))
+    world = recorder.unwrapped
+    policy.reset(world.swarm_spec, stream_rng(0, Stream.POLICY))
     obs = recorder.reset_batch(0)
     started = 0.0
     for tick in range(ticks + 20):

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.contract.codes import Event, Grip, Task
     from swarm_forage_env.contract.layout import ObservationLayout
-    from swarm_forage_env.contract.policy import Policy, SwarmTask
+    from swarm_forage_env.contract.policy import Policy, SwarmSpec
     from swarm_forage_env.env import ForageEnv
     from swarm_forage_env.policies.registry import RandomPolicy, from_callable, load_policy, policy_names
     from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
@@ -57,7 +57,7 @@ __all__ = [
     "ScenarioConfig",
     "SensorNoise",
     "SensorNoiseConfig",
-    "SwarmTask",
+    "SwarmSpec",
     "Task",
     "Throttle",
     "ThrottleConfig",
@@ -97,7 +97,7 @@ _HOMES = {
     "ScenarioConfig": "scenarios.config",
     "SensorNoise": "wrappers.noise",
     "SensorNoiseConfig": "wrappers.noise",
-    "SwarmTask": "contract.policy",
+    "SwarmSpec": "contract.policy",
     "Task": "contract.codes",
     "Throttle": "wrappers.throttle",
     "ThrottleConfig": "wrappers.throttle",

@@ -11,7 +11,7 @@ from pettingzoo import ParallelEnv
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.policy import ActionError, SwarmTask
+from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.units import CELL_M, WHEEL_SCALE_MPS
@@ -109,13 +109,13 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         return spaces.Box(-1.0, 1.0, (size,), np.float32)
 
     @cached_property
-    def task(self) -> SwarmTask:
+    def swarm_spec(self) -> SwarmSpec:
         """What every policy may know before a run."""
         scenario = self.scenario
         arena, robots = scenario.arena, scenario.robots
         x_low, y_low, x_high, y_high = arena.nest_box_m
         area = arena.distributable_cells
-        return SwarmTask(
+        return SwarmSpec(
             n_robots=robots.n_robots,
             n_objects=scenario.objects.n_objects,
             dt_s=scenario.dt_s,

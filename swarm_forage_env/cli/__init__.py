@@ -114,10 +114,10 @@ def run(
     Runs in parallel, shows a table, stores one record per run and draws performance over time. Runs that the folder
     holds already are not repeated, so an interrupted command can simply be given again.
     """
-    from swarm_forage_env.cli.plan import WorldOptions, default_folder, plan_runs, split_names
+    from swarm_forage_env.cli.plan import ScenarioOptions, default_folder, plan_runs, split_names
     from swarm_forage_env.study.store import RunStore
 
-    options = WorldOptions(
+    options = ScenarioOptions(
         scenario=scenario,
         robots=robots,
         objects=objects,
@@ -270,13 +270,13 @@ def record(
     """Film a run."""
     from rich.progress import Progress
 
-    from swarm_forage_env.cli.plan import WorldOptions, plan_runs
+    from swarm_forage_env.cli.plan import ScenarioOptions, plan_runs
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.rendering.view import RenderError
     from swarm_forage_env.study.film import record_run
 
-    options = WorldOptions(
+    options = ScenarioOptions(
         scenario=scenario,
         robots=robots,
         objects=objects,

@@ -22,7 +22,7 @@ _TRUTH = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, slots=True)
-class WorldOptions:
+class ScenarioOptions:
     """The options that describe a world; None = the scenario's own value."""
 
     scenario: str
@@ -52,7 +52,7 @@ def split_names(text: str) -> tuple[str, ...]:
 
 
 def build_scenario(
-    options: WorldOptions, file_fields: Mapping[str, Any] | None = None
+    options: ScenarioOptions, file_fields: Mapping[str, Any] | None = None
 ) -> tuple[ScenarioConfig, str | None]:
     """Return the scenario, and which caches were asked for (None = those the policy is made for).
 
@@ -119,7 +119,7 @@ def _parse_value(name: str, text: str, kind: Any) -> Any:
         raise ConfigError(f"Expected {name} to be {wanted}, got {text!r}.") from error
 
 
-def build_wrappers(options: WorldOptions, file_wrappers: Sequence[WrapperConfig] = ()) -> tuple[WrapperConfig, ...]:
+def build_wrappers(options: ScenarioOptions, file_wrappers: Sequence[WrapperConfig] = ()) -> tuple[WrapperConfig, ...]:
     """Return the wrappers of the options and those of the file that no option names.
 
     Raises:
@@ -130,7 +130,9 @@ def build_wrappers(options: WorldOptions, file_wrappers: Sequence[WrapperConfig]
     return (*wrappers, *(wrapper for wrapper in file_wrappers if wrapper.name not in named))
 
 
-def plan_runs(options: WorldOptions, policies: Sequence[str], *, n_seeds: int, first_seed: int) -> tuple[RunSpec, ...]:
+def plan_runs(
+    options: ScenarioOptions, policies: Sequence[str], *, n_seeds: int, first_seed: int
+) -> tuple[RunSpec, ...]:
     """Return one specification per policy and seed.
 
     Raises:

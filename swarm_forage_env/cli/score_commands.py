@@ -60,7 +60,7 @@ def score(
     Swarms of several sizes, throttled, noisy and failing robots; one table with intervals and noise floors. Runs that
     the folder holds already are not repeated.
     """
-    from swarm_forage_env.cli.plan import WorldOptions, default_folder
+    from swarm_forage_env.cli.plan import ScenarioOptions, default_folder
     from swarm_forage_env.cli.scoring import ScoreOptions, build_plan, tables_of_file
 
     if (policy is None) == (curves is None):
@@ -69,7 +69,7 @@ def score(
         _refuse_options_of_runs(context)
         _show_scores(tables_of_file(curves, measures), None, as_json=as_json)
         return
-    world = WorldOptions(
+    world = ScenarioOptions(
         scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
     )
     options = ScoreOptions(policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon)
@@ -115,10 +115,10 @@ def compare(
     dry_run: DryRun = False,
 ) -> None:
     """Score policies in the same worlds, seed by seed, and say which differences are significant."""
-    from swarm_forage_env.cli.plan import WorldOptions, default_folder
+    from swarm_forage_env.cli.plan import ScenarioOptions, default_folder
     from swarm_forage_env.cli.scoring import ScoreOptions, build_plan
 
-    world = WorldOptions(
+    world = ScenarioOptions(
         scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
     )
     options = ScoreOptions(policies=policies, measures=measures, budget=budget, seeds=seeds, horizon=horizon)

@@ -11,7 +11,7 @@ from metrics.plots import draw_scores
 from metrics.score_table import ScoreTable, aligned, counted
 from metrics.scoring import ScoringPlan, plan_scores, score_curves
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.plan import WorldOptions, build_scenario, estimated_seconds, split_names
+from swarm_forage_env.cli.plan import ScenarioOptions, build_scenario, estimated_seconds, split_names
 from swarm_forage_env.cli.report import estimate
 from swarm_forage_env.study.store import RunStore
 
@@ -31,7 +31,7 @@ class ScoreOptions:
 
 
 def build_plan(
-    world: WorldOptions, options: ScoreOptions, *, at_least: int = 1, at_most: int | None = None
+    world: ScenarioOptions, options: ScoreOptions, *, at_least: int = 1, at_most: int | None = None
 ) -> ScoringPlan:
     """Return what the words ask for.
 

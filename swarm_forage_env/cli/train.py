@@ -12,7 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.cli.options import NO_PICTURE
-from swarm_forage_env.cli.plan import WorldOptions, build_scenario, build_wrappers
+from swarm_forage_env.cli.plan import ScenarioOptions, build_scenario, build_wrappers
 from swarm_forage_env.cli.report import PERFORMANCE_WORDS
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.pretrained import plan_file
@@ -76,7 +76,7 @@ class TrainOptions:
     """Words of the form key=number, for the algorithm."""
 
 
-def build_plan(world: WorldOptions, options: TrainOptions) -> TrainingPlan:
+def build_plan(world: ScenarioOptions, options: TrainOptions) -> TrainingPlan:
     """Return the plan that the options describe: one world, where deliveries count after a stage in a smaller one.
 
     Raises:

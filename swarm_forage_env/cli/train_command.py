@@ -62,7 +62,7 @@ def train(  # long: one parameter per option
     unless --set or --config do, and begins in a smaller arena: deliveries alone are too rare to learn from. plan.json
     holds all that was chosen. Ctrl-C keeps a checkpoint; --out FOLDER --resume goes on.
     """
-    from swarm_forage_env.cli.plan import WorldOptions
+    from swarm_forage_env.cli.plan import ScenarioOptions
     from swarm_forage_env.cli.train import TrainOptions, build_plan, named_plan, resumed_plan, run_training
 
     options = TrainOptions(
@@ -80,7 +80,7 @@ def train(  # long: one parameter per option
         horizon_s=horizon,
         arguments=tuple(arguments or ()),
     )
-    world = WorldOptions(
+    world = ScenarioOptions(
         scenario=scenario or "warehouse_small",
         robots=robots,
         objects=objects,
@@ -90,7 +90,11 @@ def train(  # long: one parameter per option
         wrappers=tuple(wrappers or ()),
         config_file=config,
     )
-    says_more = (scenario, options, world) != (None, TrainOptions(steps=steps), WorldOptions(scenario=world.scenario))
+    says_more = (scenario, options, world) != (
+        None,
+        TrainOptions(steps=steps),
+        ScenarioOptions(scenario=world.scenario),
+    )
     if plan is not None and (says_more or steps is not None):
         raise typer.BadParameter("Expected --plan without options that the plan decides; write them into its file.")
     chosen = build_plan(world, options) if plan is None else named_plan(plan)

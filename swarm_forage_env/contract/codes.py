@@ -18,7 +18,7 @@ class Grip:
     """Carrying: drop only into the nest or a cache."""
     SITE: ClassVar[float] = -0.625
     """Carrying: lay on the floor, unless a cache is near."""
-    FOUND: ClassVar[float] = -1.0
+    CREATE_CACHE: ClassVar[float] = -1.0
     """Carrying: as SITE, then the world tries to form a cache."""
 
 

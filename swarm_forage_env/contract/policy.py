@@ -19,7 +19,7 @@ class ActionError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class SwarmTask:
+class SwarmSpec:
     """What every policy knows before a run: constants of robot and world, no state."""
 
     n_robots: int
@@ -50,7 +50,7 @@ class SwarmTask:
     min_dist_m: float
     """0.2 min(X, Y)."""
     cache_proximity_m: float
-    """SITE and FOUND drops are refused within this distance of a cache centre."""
+    """SITE and CREATE_CACHE drops are refused within this distance of a cache centre."""
     quirks: Quirks
 
 
@@ -62,7 +62,7 @@ class Policy(Protocol):
     "dynamic": the world the policy is made for) and `reads` (names of the slices it looks at; default all).
     """
 
-    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+    def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Prepare for one run."""
         ...
 

@@ -17,7 +17,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.layout import ObservationLayout, ObservationSlice
-from swarm_forage_env.contract.policy import ActionError, SwarmTask
+from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.kernels.commands import (
     N_GRIPS,
@@ -103,18 +103,18 @@ class LearnerInterface:
         action_space: Box or Discrete of one robot's action.
     """
 
-    def __init__(self, config: InterfaceConfig, task: SwarmTask) -> None:
+    def __init__(self, config: InterfaceConfig, spec: SwarmSpec) -> None:
         """Bind the choices to a world.
 
         Args:
             config: The choices.
-            task: The world; see `ForageEnv.task`.
+            spec: The world; see `ForageEnv.swarm_spec`.
         """
         self.config = config
         self._is_compact = config.observation == "compact"
         self._is_discrete = config.actions == "discrete"
-        self._dynamic_caches = task.caches == "dynamic"
-        source = task.layout
+        self._dynamic_caches = spec.caches == "dynamic"
+        source = spec.layout
         start = {part.name: part.start for part in source}
         self._heading = source["heading"]
         self._half_x, self._half_y = (float(scale) for scale in source.part("position").scale)
@@ -129,12 +129,12 @@ class LearnerInterface:
             start["los_object"],
         )
         self._wheels = np.array(_WHEELS, np.float32)
-        self._grips = np.array([Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.FOUND], np.float32)
-        self._commands = np.zeros((task.n_robots, 3), np.float32)
+        self._grips = np.array([Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.CREATE_CACHE], np.float32)
+        self._commands = np.zeros((spec.n_robots, 3), np.float32)
         self.layout = compact_layout(self._half_x, self._half_y) if self._is_compact else source
         self.observation_space = self.new_observation_space()
         self.action_space = self.new_action_space()
-        self._actions_shape = (task.n_robots, *(self.action_space.shape or ()))
+        self._actions_shape = (spec.n_robots, *(self.action_space.shape or ()))
 
     def new_observation_space(self) -> spaces.Box:
         """Return a space of its own, with a random state of its own, for one robot's row."""

@@ -17,7 +17,7 @@ from gymnasium import spaces
 
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.interface import (
     ACTIONS,
@@ -92,13 +92,13 @@ class ModelPolicy:
             decision_ticks = self._noted.decision_ticks if self._noted else 1
         self._decision_ticks = InterfaceConfig(decision_ticks=decision_ticks).decision_ticks
 
-    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+    def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Find out how the model sees and steers this swarm.
 
         Raises:
             ModelError: it sees or does something else.
         """
-        self._interface = self._fitting_interface(task)
+        self._interface = self._fitting_interface(spec)
         self._ticks_left = 0
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
@@ -112,18 +112,18 @@ class ModelPolicy:
             return np.asarray(self._actions, np.float32)
         return self._interface.command(self._actions, obs)
 
-    def _fitting_interface(self, task: SwarmTask) -> LearnerInterface | None:
+    def _fitting_interface(self, spec: SwarmSpec) -> LearnerInterface | None:
         """Return the interface whose spaces are those of the model; None for a model of the whole swarm."""
-        n_robots, size = task.n_robots, task.layout.size
+        n_robots, size = spec.n_robots, spec.layout.size
         found = describe_spaces(self._network)
         if self._noted is not None:
-            return self._noted_interface(self._noted, task, found)
+            return self._noted_interface(self._noted, spec, found)
         if found == (f"Box({n_robots}, {size})", f"Box({n_robots}, 3)"):
             return None
         seen: list[str] = []
         for observation, actions, automatic in product(OBSERVATIONS, ACTIONS, (False, True)):
             config = InterfaceConfig(observation=observation, actions=actions, automatic_gripper=automatic)
-            interface = LearnerInterface(config, task)
+            interface = LearnerInterface(config, spec)
             fitting = describe_spaces(interface)
             if found == fitting:
                 return interface
@@ -134,8 +134,8 @@ class ModelPolicy:
             f"{' to '.join(found)}."
         )
 
-    def _noted_interface(self, noted: InterfaceConfig, task: SwarmTask, found: tuple[str, ...]) -> LearnerInterface:
-        interface = LearnerInterface(noted, task)
+    def _noted_interface(self, noted: InterfaceConfig, spec: SwarmSpec, found: tuple[str, ...]) -> LearnerInterface:
+        interface = LearnerInterface(noted, spec)
         fitting = describe_spaces(interface)
         if found != fitting:
             raise ModelError(

@@ -21,7 +21,7 @@ from gymnasium import spaces
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.spelling import suggestion
-from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.scenarios.config import CACHE_KINDS
@@ -230,11 +230,11 @@ class LearnedPolicy:
         self._config = interface
         self._choose = choose
 
-    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+    def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run."""
         self._rng = rng
-        self._interface = LearnerInterface(self._config, task)
-        self._view = np.empty((task.n_robots, self._interface.layout.size), np.float32)
+        self._interface = LearnerInterface(self._config, spec)
+        self._view = np.empty((spec.n_robots, self._interface.layout.size), np.float32)
         self._ticks_left = 0
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
@@ -255,13 +255,13 @@ class NetworkPolicy(LearnedPolicy):
         super().__init__(about.interface, network.choose, caches=about.caches)
         self._network = network
 
-    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+    def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run.
 
         Raises:
             NetworkError: the network sees or does something else than its interface in this world.
         """
-        super().reset(task, rng)
+        super().reset(spec, rng)
         space = self._interface.action_space
         n_actions = int(space.n) if isinstance(space, spaces.Discrete) else space.shape[0]
         wanted = (self._interface.layout.size, n_actions)

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swarm_forage_env._internal.spelling import suggestion
-from swarm_forage_env.contract.policy import Policy, SwarmTask
+from swarm_forage_env.contract.policy import Policy, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 
 POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
@@ -27,9 +27,9 @@ class RandomPolicy:
 
     reads: ClassVar[tuple[str, ...]] = ()
 
-    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+    def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Keep the swarm size and the generator."""
-        self._shape = (task.n_robots, 3)
+        self._shape = (spec.n_robots, 3)
         self._rng = rng
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
@@ -44,9 +44,9 @@ class CallablePolicy:
         self.function = function
         self.name = name
 
-    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+    def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Remember the expected shape of actions."""
-        self._shape = (task.n_robots, 3)
+        self._shape = (spec.n_robots, 3)
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Return the function's actions, checked for shape; raises ValueError otherwise."""

@@ -386,7 +386,7 @@ class ScenarioConfig:
 
     @property
     def cache_proximity_m(self) -> float:
-        """SITE and FOUND drops are refused when a cache centre is within this distance."""
+        """SITE and CREATE_CACHE drops are refused when a cache centre is within this distance."""
         return max(2 * self.cache_side_nominal_m, self.min_dist_m)
 
 
@@ -464,6 +464,23 @@ def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
     for section, values in per_section.items():
         top[section] = dataclasses.replace(top.get(section, getattr(config, section)), **values)
     return dataclasses.replace(config, **top)
+
+
+def scenario_of_same_size(scenario: ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
+    """Return the scenario with fields overridden by name, but for the number of robots.
+
+    Raises:
+        ConfigError: unknown fields, values that describe no world, or another number of robots.
+    """
+    changed = with_overrides(scenario, **overrides)
+    n_robots = scenario.robots.n_robots
+    if changed.robots.n_robots != n_robots:
+        raise ConfigError(
+            f"Expected n_robots to stay {n_robots}, the number of rows that spaces promise, got "
+            f"{changed.robots.n_robots}; make another environment, or let robots be born during the run (the "
+            "population wrapper with initial_robots)."
+        )
+    return changed
 
 
 def to_mapping(config: Any) -> dict[str, Any]:

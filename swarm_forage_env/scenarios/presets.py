@@ -5,6 +5,7 @@ Section numbers refer to the paper, "Improved Swarm Engineering: Aligning Intuit
 `scenario("warehouse_small", n_robots=20, n_objects=100)`.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
@@ -143,3 +144,14 @@ def scenario(name: str, /, **overrides: Any) -> ScenarioConfig:
             "other arenas change by width_m and height_m."
         )
     return builders[name](**overrides)
+
+
+def chosen_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
+    """Return a preset by name, or a complete configuration, with fields overridden by name.
+
+    Raises:
+        ConfigError: unknown preset or field, or values that describe no world.
+    """
+    if isinstance(given, ScenarioConfig):
+        return with_overrides(given, **overrides)
+    return scenario(given, **overrides)

@@ -95,8 +95,8 @@ def record_run(
 
 def _visit(stack: "SwarmWrapper", policy: Policy, seed: int, ticks: list[int]) -> "Iterator[ForageEnv]":
     """Run the policy and yield the world at each of `ticks`."""
-    world = stack.world
-    policy.reset(world.task, stream_rng(seed, Stream.POLICY))
+    world = stack.unwrapped
+    policy.reset(world.swarm_spec, stream_rng(seed, Stream.POLICY))
     obs = stack.reset_batch(seed)
     for tick in ticks:
         while world.tick < tick:

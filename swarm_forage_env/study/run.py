@@ -95,8 +95,8 @@ def warm_up(spec: RunSpec) -> None:
 
 def _drive(recorder: RunRecorder, policy: Policy, seed: int, *, max_ticks: int | None = None) -> None:
     """Run the loop of policy and world until the run ends or `max_ticks` have passed."""
-    world = recorder.world
-    policy.reset(world.task, stream_rng(seed, Stream.POLICY))
+    world = recorder.unwrapped
+    policy.reset(world.swarm_spec, stream_rng(seed, Stream.POLICY))
     obs = recorder.reset_batch(seed)
     has_tasks = hasattr(policy, "task")
     while not recorder.complete and world.tick != max_ticks:

@@ -14,11 +14,10 @@ from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
 from swarm_forage_env.policies.registry import policy_class
-from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.config import ScenarioConfig, scenario_of_same_size, with_overrides
 from swarm_forage_env.scenarios.config import from_mapping as config_from_mapping
 from swarm_forage_env.scenarios.presets import scenario as preset
 from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.views.learner_arena import same_robots
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
@@ -152,7 +151,7 @@ class TrainingPlan:
         _require_whole("seed", self.seed, least=0)
         _require_options("options", self.options)
         for stage in self.stages:
-            same_robots(self.scenario, stage.scenario)
+            scenario_of_same_size(self.scenario, stage.scenario)
         self.evaluation.specs(self.scenario, self.wrappers, self.evaluation.baseline)
 
     @property

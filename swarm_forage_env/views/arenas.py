@@ -20,7 +20,7 @@ import numpy as np
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import BoolArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.views.learner_arena import World, WorldPlan
+from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
 
@@ -129,7 +129,7 @@ class ArenaBatch:
         interface: Spaces and layout of what learners see and do.
     """
 
-    def __init__(self, plan: WorldPlan, n_arenas: int, *, first_arena: int = 0) -> None:
+    def __init__(self, plan: ArenaPlan, n_arenas: int, *, first_arena: int = 0) -> None:
         """Build the arenas; `reset` must be called before `step`.
 
         Args:
@@ -143,8 +143,8 @@ class ArenaBatch:
         if n_arenas < 1:
             raise ValueError(f"Expected n_arenas >= 1, got {n_arenas}.")
         self._first_arena = first_arena
-        self.worlds = [World(plan) for _ in range(n_arenas)]
-        self.interface = self.worlds[0].interface
+        self.arenas = [LearnerArena(plan) for _ in range(n_arenas)]
+        self.interface = self.arenas[0].interface
         self.n_arenas = n_arenas
         self.n_robots = plan.scenario.robots.n_robots
         self.n_rows = n_arenas * self.n_robots
@@ -162,8 +162,8 @@ class ArenaBatch:
         """Start a run in every arena; returns observations (R, d) and who is at work (R,).
 
         Args:
-            seeds: One per arena; see `World.reset`.
-            options: One per arena; see `World.reset`.
+            seeds: One per arena; see `LearnerArena.reset`.
+            options: One per arena; see `LearnerArena.reset`.
 
         Raises:
             RuntimeError: closed.
@@ -181,16 +181,16 @@ class ArenaBatch:
         self, arena: int, out: ObsArray, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> None:
         """Start a run in one arena; writes what learners see to `out`."""
-        world = self.worlds[arena]
+        world = self.arenas[arena]
         world.reset(seed, options)
-        self._present[arena] = world.base.swarm.present
+        self._present[arena] = world.forage_env.swarm.present
         self._absent[arena] = False
         self._returns[arena] = 0.0
         self._lengths[arena] = 0
         world.observe(out)
 
     def _active(self) -> BoolArray:
-        return np.concatenate([world.base.active for world in self.worlds])
+        return np.concatenate([world.forage_env.active for world in self.arenas])
 
     def step(self, actions: np.ndarray) -> ArenaStep:
         """Step every arena by one decision.
@@ -238,10 +238,10 @@ class ArenaBatch:
     ) -> None:
         """Step one arena; writes its rows of obs, rewards, terminated, truncated and appends to `endings`."""
         obs, rewards, terminated, truncated = out
-        world, absent = self.worlds[arena], self._absent[arena]
+        world, absent = self.arenas[arena], self._absent[arena]
         dead, all_dead, at_horizon = world.step(actions, rewards)
         self._lengths[arena] += self._present[arena]  # as last seen: who died in this step had begun it
-        self._present[arena] = world.base.swarm.present
+        self._present[arena] = world.forage_env.swarm.present
         self._returns[arena] += rewards
         world.observe(obs)
         np.greater(dead, absent, out=terminated)
@@ -263,7 +263,7 @@ class ArenaBatch:
         endings.lengths.append(self._lengths[arena, robots])
 
     def _outcome(self, arena: int) -> RunOutcome:
-        base = self.worlds[arena].base
+        base = self.arenas[arena].forage_env
         assert base.seed_value is not None, "a stepped world has a seed"
         return RunOutcome(
             arena=self._first_arena + arena,
@@ -281,7 +281,7 @@ class ArenaBatch:
             ValueError: the actions are continuous.
         """
         self._require_reset("action_masks")
-        return np.concatenate([world.mask() for world in self.worlds])
+        return np.concatenate([world.mask() for world in self.arenas])
 
     def _require_reset(self, what: str) -> None:
         if self._is_closed:
@@ -291,16 +291,16 @@ class ArenaBatch:
 
     def render(self) -> list[np.ndarray | None]:
         """Return one picture per arena."""
-        return [world.base.render() for world in self.worlds]
+        return [world.forage_env.render() for world in self.arenas]
 
     def get_attribute(self, name: str, arenas: Sequence[int]) -> list[Any]:
         """Return an attribute of the environments of some arenas; raises AttributeError for unknown names."""
-        return [getattr(self.worlds[arena].env, name) for arena in arenas]
+        return [getattr(self.arenas[arena].env, name) for arena in arenas]
 
     def set_attribute(self, name: str, value: Any, arenas: Sequence[int]) -> None:
         """Set an attribute of the environments of some arenas, where it is: in a wrapper or at the bottom."""
         for arena in arenas:
-            setattr(_owner(self.worlds[arena].env, name), name, value)
+            setattr(_owner(self.arenas[arena].env, name), name, value)
 
     def call_method(self, name: str, arenas: Sequence[int], *args: Any, **kwargs: Any) -> list[Any]:
         """Call a method of the environments of some arenas, once each; returns what they return.
@@ -313,7 +313,7 @@ class ArenaBatch:
     def close(self) -> None:
         """Close all environments; they take no reset or step any more."""
         self._is_closed = True
-        for world in self.worlds:
+        for world in self.arenas:
             world.env.close()
 
 

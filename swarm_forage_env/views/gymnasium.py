@@ -14,7 +14,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.arenas import ArenaStep
-from swarm_forage_env.views.learner_arena import World, plan_world
+from swarm_forage_env.views.learner_arena import LearnerArena, plan_arena
 from swarm_forage_env.views.processes import open_arenas
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_configs
@@ -59,10 +59,10 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         Raises:
             ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
         """
-        plan = plan_world(
+        plan = plan_arena(
             scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
         )
-        self._world = World(plan)
+        self._arena = LearnerArena(plan)
         self._is_discrete = plan.interface.actions == "discrete"
         self.render_mode = render_mode
         n_robots = plan.scenario.robots.n_robots
@@ -72,12 +72,12 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
     @property
     def interface(self) -> LearnerInterface:
         """Spaces and layout of one robot's row; another one after a reset that changed the scenario."""
-        return self._world.interface
+        return self._arena.interface
 
     @property
-    def world(self) -> ForageEnv:
+    def forage_env(self) -> ForageEnv:
         """The parallel environment at the bottom; another one after a reset that changed the scenario."""
-        return self._world.base
+        return self._arena.forage_env
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -86,11 +86,11 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
 
         Args:
             seed: Seed of this episode and of the sequence of those after it.
-            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `World.reset`.
+            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `LearnerArena.reset`.
         """
         super().reset(seed=seed)
-        self._world.reset(seed, options)
-        return self._world.observe(), self._info()
+        self._arena.reset(seed, options)
+        return self._arena.observe(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[ObsArray, float, bool, bool, dict[str, Any]]:
         """Advance by one decision.
@@ -101,22 +101,22 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         Raises:
             ActionError: wrong shape, numbers that are no actions, or an active robot's action that is not finite.
         """
-        rewards = np.zeros(self.world.scenario.robots.n_robots)  # float64: the sum shall not depend on the order
-        _, terminated, truncated = self._world.step(np.asarray(action), rewards)
-        return self._world.observe(), float(rewards.sum()), terminated, truncated, self._info()
+        rewards = np.zeros(self.forage_env.scenario.robots.n_robots)  # float64: the sum shall not depend on the order
+        _, terminated, truncated = self._arena.step(np.asarray(action), rewards)
+        return self._arena.observe(), float(rewards.sum()), terminated, truncated, self._info()
 
     def render(self) -> np.ndarray | None:
         """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
-        return self.world.render()
+        return self.forage_env.render()
 
     def close(self) -> None:
         """Close the wrapped stack."""
-        self._world.env.close()
+        self._arena.env.close()
 
     def _info(self) -> dict[str, Any]:
-        info: dict[str, Any] = {"active": self.world.active.copy()}
+        info: dict[str, Any] = {"active": self.forage_env.active.copy()}
         if self._is_discrete:
-            info["action_mask"] = self._world.mask().astype(np.int8)
+            info["action_mask"] = self._arena.mask().astype(np.int8)
         return info
 
 
@@ -174,7 +174,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
             ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
             ValueError: num_envs and n_arenas that do not fit together, or more processes than arenas.
         """
-        plan = plan_world(
+        plan = plan_arena(
             scenario,
             overrides,
             interface=interface,
@@ -204,7 +204,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
 
         Args:
             seed: Arena a runs seed + a; or one seed per arena.
-            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `World.reset`.
+            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `LearnerArena.reset`.
 
         Raises:
             ValueError: a list of seeds that is not as long as there are arenas.

@@ -12,8 +12,8 @@ from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, LearnerInterface, chosen_interface
-from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig, field_sections, with_overrides
-from swarm_forage_env.scenarios.presets import scenario as preset
+from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig, field_sections, scenario_of_same_size
+from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.registry import wrapper_configs
 
@@ -22,36 +22,8 @@ SCENARIO_OPTION = "scenario"
 put them there: both Gymnasium and PettingZoo hand options on to everything in the stack."""
 
 
-def configured(scenario: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
-    """Return a preset by name, or a complete configuration, with fields overridden by name.
-
-    Raises:
-        ConfigError: unknown preset or field, or values that describe no world.
-    """
-    if isinstance(scenario, ScenarioConfig):
-        return with_overrides(scenario, **overrides)
-    return preset(scenario, **overrides)
-
-
-def same_robots(scenario: ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
-    """Return the scenario with fields overridden by name, but for the number of robots.
-
-    Raises:
-        ConfigError: unknown fields, values that describe no world, or another number of robots.
-    """
-    changed = with_overrides(scenario, **overrides)
-    n_robots = scenario.robots.n_robots
-    if changed.robots.n_robots != n_robots:
-        raise ConfigError(
-            f"Expected n_robots to stay {n_robots}, the number of rows that spaces promise, got "
-            f"{changed.robots.n_robots}; make another environment, or let robots be born during the run (the "
-            "population wrapper with initial_robots)."
-        )
-    return changed
-
-
 @dataclass(frozen=True, kw_only=True, slots=True)
-class WorldPlan:
+class ArenaPlan:
     """What a world is made from; picklable."""
 
     scenario: ScenarioConfig
@@ -69,12 +41,12 @@ class WorldPlan:
         Raises:
             ConfigError: unknown fields, values that describe no world, or another number of robots.
         """
-        scenario = same_robots(self.scenario, overrides)
+        scenario = scenario_of_same_size(self.scenario, overrides)
         env = ForageEnv(scenario, max_cycles=self.max_cycles, render_mode=self.render_mode, reads=self.interface.reads)
         return wrap_in_order(env, self.wrappers)
 
 
-def plan_world(
+def plan_arena(
     scenario: str | ScenarioConfig,
     overrides: Mapping[str, Any],
     *,
@@ -82,7 +54,7 @@ def plan_world(
     wrappers: Iterable[WrapperConfig | str] = (),
     max_cycles: int | None = None,
     render_mode: str | None = None,
-) -> WorldPlan:
+) -> ArenaPlan:
     """Plan a world from what the constructors of environments take.
 
     Args:
@@ -96,8 +68,8 @@ def plan_world(
     Raises:
         ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
     """
-    return WorldPlan(
-        scenario=configured(scenario, overrides),
+    return ArenaPlan(
+        scenario=chosen_scenario(scenario, overrides),
         wrappers=wrapper_configs(wrappers),
         interface=chosen_interface(interface),
         max_cycles=max_cycles,
@@ -105,7 +77,7 @@ def plan_world(
     )
 
 
-class World:
+class LearnerArena:
     """One world as a learner meets it, and the sequence of its runs.
 
     Attributes:
@@ -114,7 +86,7 @@ class World:
         interface: Translates for the learner; its spaces stay the same, the object does not.
     """
 
-    def __init__(self, plan: WorldPlan) -> None:
+    def __init__(self, plan: ArenaPlan) -> None:
         """Build the world of `plan`; raises ConfigError where it cannot be."""
         self._plan = plan
         self._overrides: dict[str, Any] = {}
@@ -123,8 +95,8 @@ class World:
 
     def _adopt(self, env: ForageEnv | SwarmWrapper) -> None:
         self.env = env
-        self.base: ForageEnv = env.world if isinstance(env, SwarmWrapper) else env
-        self.interface = LearnerInterface(self._plan.interface, self.base.task)
+        self.forage_env: ForageEnv = env.unwrapped if isinstance(env, SwarmWrapper) else env
+        self.interface = LearnerInterface(self._plan.interface, self.forage_env.swarm_spec)
         self._obs: ObsArray | None = None  # of the environment, (N, D)
 
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:

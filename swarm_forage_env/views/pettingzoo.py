@@ -11,7 +11,7 @@ from pettingzoo.utils.conversions import parallel_to_aec
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.views.learner_arena import World, plan_world
+from swarm_forage_env.views.learner_arena import LearnerArena, plan_arena
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
 Infos = dict[str, dict[str, Any]]
@@ -53,13 +53,13 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         Raises:
             ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
         """
-        plan = plan_world(
+        plan = plan_arena(
             scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
         )
         self._is_discrete = plan.interface.actions == "discrete"
-        self._world = World(plan)
+        self._arena = LearnerArena(plan)
         self.render_mode = render_mode
-        self.possible_agents = list(self._world.base.possible_agents)
+        self.possible_agents = list(self._arena.forage_env.possible_agents)
         self.agents: list[str] = []
         self._row_of = {agent: row for row, agent in enumerate(self.possible_agents)}
         # One space object per agent: each has a random state of its own.
@@ -69,12 +69,12 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
     @property
     def interface(self) -> LearnerInterface:
         """Spaces and layout of what learners see and do; another one after a reset that changed the scenario."""
-        return self._world.interface
+        return self._arena.interface
 
     @property
-    def world(self) -> ForageEnv:
+    def forage_env(self) -> ForageEnv:
         """The parallel environment at the bottom; another one after a reset that changed the scenario."""
-        return self._world.base
+        return self._arena.forage_env
 
     def observation_space(self, agent: str) -> spaces.Box:
         """(d,) float32 in [-1, 1]."""
@@ -87,11 +87,11 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
     @property
     def state_space(self) -> spaces.Box:
         """Space of `state()`."""
-        return self.world.state_space
+        return self.forage_env.state_space
 
     def state(self) -> np.ndarray:
         """Return the global view, see `ForageEnv.state`."""
-        return self.world.state()
+        return self.forage_env.state()
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -100,11 +100,11 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
 
         Args:
             seed: Seed of this run and of the sequence of those after it.
-            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `World.reset`.
+            options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `LearnerArena.reset`.
         """
-        self._world.reset(seed, options)
+        self._arena.reset(seed, options)
         self.agents = list(self.possible_agents)
-        return self._per_agent(self._world.observe()), self._infos()
+        return self._per_agent(self._arena.observe()), self._infos()
 
     def step(
         self, actions: dict[str, Any]
@@ -122,9 +122,9 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
             raise ValueError(f"Expected an action for each of the {len(self.agents)} agents, missing {missing[:3]}.")
         chosen = self._chosen(actions)
         rewards = np.zeros(len(self.possible_agents))
-        dead, _, truncated = self._world.step(chosen, rewards)
+        dead, _, truncated = self._arena.step(chosen, rewards)
         results = (
-            self._per_agent(self._world.observe()),
+            self._per_agent(self._arena.observe()),
             self._per_agent(rewards.tolist()),
             self._per_agent(dead.tolist()),
             dict.fromkeys(self.agents, truncated),
@@ -152,21 +152,21 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         return {agent: rows[self._row_of[agent]] for agent in self.agents}
 
     def _infos(self) -> Infos:
-        active = self.world.active
+        active = self.forage_env.active
         infos: Infos = {agent: {"active": bool(active[self._row_of[agent]])} for agent in self.agents}
         if self._is_discrete:
-            mask = self._world.mask().astype(np.int8)
+            mask = self._arena.mask().astype(np.int8)
             for agent, info in infos.items():
                 info["action_mask"] = mask[self._row_of[agent]]
         return infos
 
     def render(self) -> np.ndarray | None:
         """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
-        return self.world.render()
+        return self.forage_env.render()
 
     def close(self) -> None:
         """Close the stack."""
-        self._world.env.close()
+        self._arena.env.close()
 
 
 @overload
@@ -225,7 +225,7 @@ def parallel_env(
             render_mode=render_mode,
             **overrides,
         )
-    plan = plan_world(scenario, overrides, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode)
+    plan = plan_arena(scenario, overrides, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode)
     return plan.build({})
 
 

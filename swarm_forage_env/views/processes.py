@@ -13,7 +13,7 @@ import numpy as np
 
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep, checked_rows, closed_error
-from swarm_forage_env.views.learner_arena import World, WorldPlan
+from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
 
 _CLOSE = "close"
 _GOODBYE_S = 10.0
@@ -24,7 +24,7 @@ class ArenaProcessError(RuntimeError):
     """A process with arenas failed or is gone; the message holds its traceback or exit code."""
 
 
-def _serve(pipe: Connection, plan: WorldPlan, n_arenas: int, first_arena: int) -> None:
+def _serve(pipe: Connection, plan: ArenaPlan, n_arenas: int, first_arena: int) -> None:
     """Answer numbered calls of `ArenaBatch` methods until told to close; the whole life of a process."""
     # Ctrl-C reaches every process of a terminal. The parent decides what it means and tells by closing.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -61,7 +61,7 @@ class ArenaProcesses:
     Results are those of one `ArenaBatch` bit for bit: arenas know nothing of each other. Attributes as there.
     """
 
-    def __init__(self, plan: WorldPlan, n_arenas: int, n_processes: int, *, context: str = "spawn") -> None:
+    def __init__(self, plan: ArenaPlan, n_arenas: int, n_processes: int, *, context: str = "spawn") -> None:
         """Start the processes.
 
         Args:
@@ -79,7 +79,7 @@ class ArenaProcesses:
         self.n_arenas = n_arenas
         self.n_robots = plan.scenario.robots.n_robots
         self.n_rows = n_arenas * self.n_robots
-        self.interface = World(plan).interface
+        self.interface = LearnerArena(plan).interface
         self._shares = [part.tolist() for part in np.array_split(np.arange(n_arenas), n_processes)]
         starter = multiprocessing.get_context(context)
         self._pipes: list[Connection] = []
@@ -214,7 +214,7 @@ class ArenaProcesses:
                 process.join()
 
 
-def open_arenas(plan: WorldPlan, n_arenas: int, n_processes: int) -> ArenaBatch | ArenaProcesses:
+def open_arenas(plan: ArenaPlan, n_arenas: int, n_processes: int) -> ArenaBatch | ArenaProcesses:
     """Build arenas in this process (n_processes = 0) or spread over so many others; raises as their classes do."""
     if n_processes:
         return ArenaProcesses(plan, n_arenas, n_processes)

@@ -15,7 +15,7 @@ from swarm_forage_env.contract.types import BoolArray
 from swarm_forage_env.policies.interface import GivenInterface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.arenas import ArenaStep
-from swarm_forage_env.views.learner_arena import plan_world
+from swarm_forage_env.views.learner_arena import plan_arena
 from swarm_forage_env.views.processes import open_arenas
 from swarm_forage_env.wrappers.base import WrapperConfig
 
@@ -73,7 +73,7 @@ class SwarmVecEnv(VecEnv):
         """
         if "num_envs" in overrides:
             raise ConfigError("Expected n_arenas, not num_envs: each arena gives one sub-environment per robot.")
-        plan = plan_world(
+        plan = plan_arena(
             scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
         )
         self._arenas = open_arenas(plan, n_arenas, n_processes)
@@ -98,7 +98,7 @@ class SwarmVecEnv(VecEnv):
     def reset(self) -> VecEnvObs:
         """Start a run in every arena; returns observations (num_envs, d).
 
-        Options that were set by `set_options` are taken from the first row of each arena; see `World.reset`.
+        Options that were set by `set_options` are taken from the first row of each arena; see `LearnerArena.reset`.
         """
         first_rows = range(0, self.num_envs, self.n_robots)
         obs, self.active = self._arenas.reset(

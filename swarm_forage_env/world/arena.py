@@ -13,7 +13,12 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, F
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.units import CELLS_PER_M
 from swarm_forage_env.world.actuators import Drive
-from swarm_forage_env.world.caches import create_static_caches, found_caches, n_cache_slots, restore_static_caches
+from swarm_forage_env.world.caches import (
+    create_dynamic_caches,
+    create_static_caches,
+    n_cache_slots,
+    restore_static_caches,
+)
 from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.interference import mark_interference
 from swarm_forage_env.world.object_motion import walk_objects
@@ -120,7 +125,7 @@ class ForagingArena:
         sense_proximity(swarm, suite)
         mark_interference(swarm, events, suite.obs, suite.near)
         if self._serve_requests(actions):
-            self._found_caches()
+            self._create_dynamic_caches()
             self._replace_displaced()
         if self._static_caches:
             self._restore_caches(tasks)
@@ -133,11 +138,11 @@ class ForagingArena:
             self._interaction_rng.random(out=self._chance)
         return self._interactions.serve(actions, self.tick, self._chance)
 
-    def _found_caches(self) -> None:
-        founders = self._interactions.founded()
-        if len(founders):
-            found_caches(
-                founders,
+    def _create_dynamic_caches(self) -> None:
+        creators = self._interactions.creators()
+        if len(creators):
+            create_dynamic_caches(
+                creators,
                 self.config,
                 self._source,
                 self._robot_cells(),

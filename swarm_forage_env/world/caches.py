@@ -145,7 +145,7 @@ def protected_boxes(config: ScenarioConfig, source: Source) -> list[Box]:
     return [(box[0], box[1], box[2], box[3]) for box in source.regions.tolist()]
 
 
-def founding_members(founder: int, config: ScenarioConfig, objects: ObjectState, protected: list[Box]) -> IntArray:
+def cache_members(founder: int, config: ScenarioConfig, objects: ObjectState, protected: list[Box]) -> IntArray:
     """Free, unprotected objects within `min_dist_m` of the object `founder`, itself included; empty if it is protected.
 
     Under the quirk `dynamic_cache_merges_all` neither the distance nor the founder itself matters: all unprotected
@@ -192,7 +192,7 @@ def clear_centre(
     return None
 
 
-def found_caches(
+def create_dynamic_caches(
     robots: IntArray,
     config: ScenarioConfig,
     source: Source,
@@ -202,7 +202,7 @@ def found_caches(
     events: StepEvents,
     rng: np.random.Generator,
 ) -> None:
-    """Try to form a dynamic cache around each object just laid down by a FOUND drop.
+    """Try to form a dynamic cache around each object just laid down by a CREATE_CACHE drop.
 
     Args:
         robots: Rows of the robots that dropped.
@@ -220,7 +220,7 @@ def found_caches(
         founder = int(objects.floor[y, x])
         if founder < 0:
             continue  # an earlier founder of this tick has already drawn the object into its cache
-        members = founding_members(founder, config, objects, protected)
+        members = cache_members(founder, config, objects, protected)
         if len(members) < 2:
             continue
         mean = np.floor(objects.cell[members].mean(axis=0) + 0.5)

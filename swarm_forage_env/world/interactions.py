@@ -26,7 +26,7 @@ class Interactions:
         """Bind the state arrays; they must not be replaced afterwards, only edited."""
         n_robots = config.robots.n_robots
         self._happened = events.happened
-        self.world = kernel.World(
+        self.state = kernel.InteractionState(
             position=swarm.position,
             carried_object=swarm.carried_object,
             cargo_from_cache=swarm.cargo_from_cache,
@@ -49,7 +49,7 @@ class Interactions:
             first_picked=events.first_picked,
             counters=events.counters,
             displaced=np.zeros(n_robots + 1, np.int32),
-            founded=np.zeros(n_robots + 1, np.int32),
+            creators=np.zeros(n_robots + 1, np.int32),
             queue=np.zeros(2 * n_robots, np.int32),
             handler_used=np.zeros(5, np.bool_),
         )
@@ -72,24 +72,24 @@ class Interactions:
             tick: Current tick, for the order of robots that want the same.
             chance: (N,) uniform in [0, 1), which object leaves a cache.
         """
-        world = self.world
+        state = self.state
         busy = kernel.clear_events(
-            actions, world.carried_object, world.pending_kind, world.active, world.code, world.first_picked
+            actions, state.carried_object, state.pending_kind, state.active, state.code, state.first_picked
         )
         self._happened[0] = busy
         if busy:
-            kernel.interact(world, self.rules, actions, tick, chance)
+            kernel.interact(state, self.rules, actions, tick, chance)
         return busy
 
     def drop_cargo(self, robot: int) -> None:
         """Let a dying robot lose its cargo where it is: into the cache, onto the floor, or re-placed."""
-        self.world.displaced[-1] = 0
-        kernel.drop_cargo(self.world, self.rules, robot)
+        self.state.displaced[-1] = 0
+        kernel.drop_cargo(self.state, self.rules, robot)
 
     def displaced(self) -> IntArray:
         """Object rows that must be re-placed after the last call: delivered, or dropped without a free cell."""
-        return self.world.displaced[: self.world.displaced[-1]]
+        return self.state.displaced[: self.state.displaced[-1]]
 
-    def founded(self) -> IntArray:
-        """Robot rows whose FOUND drop left an object lying at their cell in the last call."""
-        return self.world.founded[: self.world.founded[-1]]
+    def creators(self) -> IntArray:
+        """Robot rows whose CREATE_CACHE drop left an object lying at their cell in the last call."""
+        return self.state.creators[: self.state.creators[-1]]

@@ -25,11 +25,10 @@ class SwarmWrapper(BaseParallelWrapper):
     Hooks of one step, each called once per tick: `before_step` and `gain` from the outermost wrapper inwards, then
     the environment steps, then `observe` and `after_step` from the innermost wrapper outwards. A reset calls
     `on_reset` and `observe` from the innermost wrapper outwards. Wrappers never rewrite actions. They read truth
-    from `self.world` (`swarm`, `events`, `tick` ...) and write it only through `self.world.set_population`.
+    from `self.unwrapped` (`swarm`, `events`, `tick` ...) and write it only through `self.unwrapped.set_population`.
 
     Attributes:
         env: What is wrapped.
-        world: The ForageEnv at the bottom of the stack.
     """
 
     stack_position: ClassVar[int]
@@ -55,7 +54,12 @@ class SwarmWrapper(BaseParallelWrapper):
             )
         super().__init__(env)
         self._inner = env
-        self.world: ForageEnv = env.world if isinstance(env, SwarmWrapper) else env
+        self._unwrapped: ForageEnv = env.unwrapped if isinstance(env, SwarmWrapper) else env
+
+    @property
+    def unwrapped(self) -> ForageEnv:
+        """The ForageEnv at the bottom of the stack."""
+        return self._unwrapped  # kept, because every hook of every tick asks for it
 
     def on_reset(self, seed: int) -> None:
         """Prepare for a new run, after the world was reset.
@@ -106,7 +110,7 @@ class SwarmWrapper(BaseParallelWrapper):
     def reset_batch(self, seed: int | None = None) -> ObsArray:
         """Reset the stack and return the first observations, (N, D) float32; see `ForageEnv.reset_batch`."""
         obs = self._inner.reset_batch(seed)
-        drawn = self.world.seed_value
+        drawn = self.unwrapped.seed_value
         assert drawn is not None, "a reset world has a seed"
         self.on_reset(drawn)
         return self.observe(obs)
@@ -124,7 +128,7 @@ class SwarmWrapper(BaseParallelWrapper):
         Raises:
             ActionError: as `ForageEnv.step_batch`; for a wrong shape before any wrapper has done anything.
         """
-        actions = self.world.checked_actions(actions)
+        actions = self.unwrapped.checked_actions(actions)
         self.before_step()
         obs, reward, terminated, truncated = self._inner.step_batch(
             actions, wheel_gain=self.gain(actions, wheel_gain), tasks=tasks
@@ -137,13 +141,13 @@ class SwarmWrapper(BaseParallelWrapper):
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Reset through the dict API; returns observations and infos by agent. `options` is accepted and ignored."""
-        return self.world.reset_through(self.reset_batch, seed)
+        return self.unwrapped.reset_through(self.reset_batch, seed)
 
     def step(
         self, actions: dict[str, Any]
     ) -> tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Step through the dict API; returns observations, rewards, terminations, truncations, infos by agent."""
-        return self.world.step_through(self.step_batch, actions)
+        return self.unwrapped.step_through(self.step_batch, actions)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

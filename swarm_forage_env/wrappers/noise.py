@@ -57,11 +57,11 @@ class SensorNoise(SwarmWrapper):
         super().__init__(env)
         self._is_uniform = config.distribution == "uniform"
         self._place_groups({name: sigma for name, sigma in config.group_sigmas().items() if _is_noisy(sigma)})
-        self._draws: ObsArray = np.zeros((self.world.scenario.robots.n_robots, len(self._factors)), np.float32)
+        self._draws: ObsArray = np.zeros((self.unwrapped.scenario.robots.n_robots, len(self._factors)), np.float32)
 
     def _place_groups(self, sigmas: dict[str, Sigma]) -> None:
         """Give each noisy group its columns of the draws, in a fixed order, and the factors from draws to noise."""
-        parts = {part.noise_group: part for part in self.world.layout if part.noise_group in sigmas}
+        parts = {part.noise_group: part for part in self.unwrapped.layout if part.noise_group in sigmas}
         units: list[float] = []
         spans: list[tuple[int, int, int]] = []
         lows: list[float] = []
@@ -71,7 +71,7 @@ class SensorNoise(SwarmWrapper):
         for name in (name for name in NOISE_GROUPS if name in sigmas):
             part, sigma, first = parts[name], sigmas[name], len(units)
             # Nobody reads the other slices, and nobody rewrites them either: noise would pile up there.
-            is_read = part.name in self.world.arena.reads
+            is_read = part.name in self.unwrapped.arena.reads
             if name == "heading":
                 units.append(1.0)
                 self._heading = (part.start, first) if is_read else None
@@ -81,7 +81,7 @@ class SensorNoise(SwarmWrapper):
                     spans.append((part.start, first, part.size))
                     lows.append(0.0 if name in _READINGS else -1.0)
             if isinstance(sigma, Waveform):
-                self._varying.append((slice(first, len(units)), sigma.signal(self.world.scenario.dt_s)))
+                self._varying.append((slice(first, len(units)), sigma.signal(self.unwrapped.scenario.dt_s)))
             constant += [0.0 if isinstance(sigma, Waveform) else sigma] * (len(units) - first)
         self._units: ObsArray = np.array(units, np.float32) * np.float32(_UNIFORM_WIDTH if self._is_uniform else 1.0)
         self._factors: ObsArray = np.array(constant, np.float32) * self._units
@@ -98,8 +98,8 @@ class SensorNoise(SwarmWrapper):
             return obs
         centre = _draw(self._rng, self._draws, is_uniform=self._is_uniform)
         for columns, signal in self._varying:
-            self._factors[columns] = max(0.0, signal(self.world.tick)) * self._units[columns]
-        present = self.world.swarm.present
+            self._factors[columns] = max(0.0, signal(self.unwrapped.tick)) * self._units[columns]
+        present = self.unwrapped.swarm.present
         perturb_readings(obs, present, self._draws, centre, self._factors, self._spans, self._lows)
         if self._heading is not None:
             turn_heading(obs, present, self._draws, centre, self._factors, *self._heading)
@@ -114,7 +114,7 @@ class ActuatorNoise(SwarmWrapper):
     def __init__(self, env: ForageEnv | SwarmWrapper, config: "ActuatorNoiseConfig") -> None:
         """Wrap `env`."""
         super().__init__(env)
-        scenario, sigma = self.world.scenario, config.sigma
+        scenario, sigma = self.unwrapped.scenario, config.sigma
         self._is_uniform = config.distribution == "uniform"
         self._is_noisy = _is_noisy(sigma)
         constant = Waveform(kind="constant", amplitude=sigma) if not isinstance(sigma, Waveform) else sigma
@@ -132,7 +132,7 @@ class ActuatorNoise(SwarmWrapper):
         if not self._is_noisy:
             return wheel_gain
         centre = _draw(self._rng, self._draws, is_uniform=self._is_uniform)
-        factor = max(0.0, self._signal(self.world.tick + 1)) * (_UNIFORM_WIDTH if self._is_uniform else 1.0)
+        factor = max(0.0, self._signal(self.unwrapped.tick + 1)) * (_UNIFORM_WIDTH if self._is_uniform else 1.0)
         noisy_gain(self._draws, centre, factor, self._unit_gain if wheel_gain is None else wheel_gain, self._gain)
         return self._gain
 

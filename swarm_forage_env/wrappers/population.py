@@ -49,7 +49,7 @@ class PopulationDynamics(SwarmWrapper):
             ConfigError: more robots at the start than the scenario has, or births with nobody left to be born.
         """
         super().__init__(env)
-        scenario = self.world.scenario
+        scenario = self.unwrapped.scenario
         n_robots = scenario.robots.n_robots
         initial = n_robots if config.initial_robots is None else config.initial_robots
         if initial > n_robots:
@@ -70,7 +70,7 @@ class PopulationDynamics(SwarmWrapper):
     def on_reset(self, seed: int) -> None:
         """Start the clocks; robots that are not yet born leave the world before anybody sees them."""
         config = self._config
-        n_robots = self.world.scenario.robots.n_robots
+        n_robots = self.unwrapped.scenario.robots.n_robots
         self._state = PopulationState.start(
             n_robots, initial_robots=config.initial_robots, max_robots=config.max_robots
         )
@@ -79,11 +79,11 @@ class PopulationDynamics(SwarmWrapper):
         self._repair_ticks = 0
         if not self._state.present.all():
             self._apply()
-            self.world.arena.observe()
+            self.unwrapped.arena.observe()
 
     def before_step(self) -> None:
         """Let happen what is due in the coming tick."""
-        tick = self.world.tick + 1
+        tick = self.unwrapped.tick + 1
         if tick >= self._next_tick:
             if advance_population(self._state, self._clocks, tick, self._find_place):
                 self._apply()
@@ -92,7 +92,7 @@ class PopulationDynamics(SwarmWrapper):
 
     def interval_columns(self) -> dict[str, float]:
         """Return the events since the last call, the mean repair queue, and how long stays and absences were."""
-        scenario, tally = self.world.scenario, self._state.tally
+        scenario, tally = self.unwrapped.scenario, self._state.tally
         columns = {
             "deaths": float(tally.deaths),
             "births": float(tally.births),
@@ -112,11 +112,11 @@ class PopulationDynamics(SwarmWrapper):
         gone = state.dead
         if self._config.deaths == "absorbing":
             gone = np.full(len(state.dead), bool(state.dead.all()))
-        self.world.set_population(active=state.active, present=state.present, terminated=gone)
+        self.unwrapped.set_population(active=state.active, present=state.present, terminated=gone)
 
     def _find_place(self, row: int, rng: np.random.Generator) -> bool:
         """Put a row that is to be born at a uniform position without overlap, if one is found."""
-        swarm = self.world.swarm
+        swarm = self.unwrapped.swarm
         others = swarm.position[swarm.present]
         for x, y in rng.uniform(self._birth_low, self._birth_high, (BIRTH_TRIALS, 2)).tolist():
             if np.all(np.hypot(others[:, 0] - x, others[:, 1] - y) > self._body_m):

@@ -47,8 +47,8 @@ class RunRecorder(SwarmWrapper):
     def __init__(self, env: ForageEnv | SwarmWrapper) -> None:
         """Wrap `env`; raises ConfigError unless its horizon is a whole number of recording intervals."""
         super().__init__(env)
-        self._interval_ticks = self.world.scenario.interval_ticks
-        self._n_intervals = whole_intervals(self.world.scenario, self.world.max_cycles)
+        self._interval_ticks = self.unwrapped.scenario.interval_ticks
+        self._n_intervals = whole_intervals(self.unwrapped.scenario, self.unwrapped.max_cycles)
         self._complete = False
 
     @property
@@ -61,8 +61,8 @@ class RunRecorder(SwarmWrapper):
         self._complete = False
         self._interval = 0
         self._ticks_left = self._interval_ticks
-        self._last_counters = self.world.events.counters.copy()
-        self._last_interference = float(self.world.events.interference_sum[0])
+        self._last_counters = self.unwrapped.events.counters.copy()
+        self._last_interference = float(self.unwrapped.events.interference_sum[0])
         self._counts = np.zeros((self._n_intervals, len(Counter)), np.int64)
         self._interference = np.zeros(self._n_intervals)
         self._contributed: dict[str, np.ndarray] = {}
@@ -72,9 +72,9 @@ class RunRecorder(SwarmWrapper):
         """Count the tick; close the interval at its end and at the end of the run."""
         if self._complete:
             return
-        if tasks is not None and not add_task_shares(tasks, self.world.active, self._task_sums):
+        if tasks is not None and not add_task_shares(tasks, self.unwrapped.active, self._task_sums):
             raise ValueError(
-                f"Expected tasks with shape (n_robots,) = {self.world.active.shape} and codes of policy.Task "
+                f"Expected tasks with shape (n_robots,) = {self.unwrapped.active.shape} and codes of policy.Task "
                 f"(0 to {len(Task) - 1}), got shape {tasks.shape} with codes {np.unique(tasks).tolist()}."
             )
         self._ticks_left -= 1
@@ -90,7 +90,7 @@ class RunRecorder(SwarmWrapper):
             RuntimeError: the run has not ended yet.
         """
         self._require_complete()
-        scenario = self.world.scenario
+        scenario = self.unwrapped.scenario
         interval = np.arange(self._n_intervals, dtype=np.int32)
         columns: dict[str, np.ndarray] = {
             "interval": interval,
@@ -116,7 +116,7 @@ class RunRecorder(SwarmWrapper):
 
     def _close_interval(self, *, has_tasks: bool) -> None:
         row = self._interval
-        counters, interference = self.world.events.counters, float(self.world.events.interference_sum[0])
+        counters, interference = self.unwrapped.events.counters, float(self.unwrapped.events.interference_sum[0])
         self._counts[row] = counters - self._last_counters
         self._interference[row] = (interference - self._last_interference) / self._interval_ticks
         self._last_counters[:] = counters

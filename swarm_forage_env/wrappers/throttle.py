@@ -34,7 +34,7 @@ class Throttle(SwarmWrapper):
     def __init__(self, env: ForageEnv | SwarmWrapper, config: "ThrottleConfig") -> None:
         """Wrap `env`."""
         super().__init__(env)
-        scenario = self.world.scenario
+        scenario = self.unwrapped.scenario
         self._only_carriers = config.carriers
         self._signal = config.waveform.signal(scenario.dt_s)
         self._limits = drive_limits(scenario)
@@ -47,13 +47,13 @@ class Throttle(SwarmWrapper):
 
     def gain(self, actions: ActionArray, wheel_gain: FloatArray | None) -> FloatArray | None:
         """Multiply the throttle of the coming tick into the gains."""
-        self._value = value = self._signal(self.world.tick + 1)
+        self._value = value = self._signal(self.unwrapped.tick + 1)
         self._sum += value
         self._ticks += 1
         if value <= 0.0:
             return wheel_gain
         np.copyto(self._gain, 1.0 if wheel_gain is None else wheel_gain)
-        carried_object = self.world.swarm.carried_object
+        carried_object = self.unwrapped.swarm.carried_object
         throttle(actions, value, self._only_carriers, carried_object, self._limits, self._gain)
         return self._gain
 

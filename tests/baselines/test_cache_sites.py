@@ -9,7 +9,7 @@ from baselines.cache_sites import is_allowed, nearest_allowed, select_site
 from baselines.task_policy import site_box_m
 from baselines.tasks import DRAW_POINT_X, DRAW_POINT_Y, TASK_DRAWS
 from swarm_forage_env.scenarios.quirks import Quirks
-from tests.support.observations import make_task
+from tests.support.observations import make_spec
 from tests.support.task_robot import TaskRobot
 
 MEDIUM = {
@@ -104,7 +104,7 @@ def test_no_offset_where_none_is_allowed():
     ],
 )
 def test_quirk_site_box_truncated(changes, box):
-    task = make_task(**changes)
+    task = make_spec(**changes)
     assert site_box_m(task) == pytest.approx(box)
     constants = TaskRobot(**changes).constants
     sides = [constants[f"site_{side}_m"] for side in ("x_low", "y_low", "x_high", "y_high")]
@@ -116,7 +116,7 @@ def test_no_allowed_point_is_nearer(seed):
     """Caches anywhere, even overlapping, as a memory of caches that are long gone may have them."""
     rng = np.random.default_rng(seed)
     robot = TaskRobot(**(MEDIUM if seed % 2 else {}))
-    width_m, height_m = robot.seen.task.arena_size_m
+    width_m, height_m = robot.seen.spec.arena_size_m
     for serial in range(1, int(rng.integers(1, 6))):
         robot.know_cache(serial, (int(rng.integers(width_m * 5)), int(rng.integers(height_m * 5))), 5)
     middle = rng.uniform((0.0, 0.0), (width_m, height_m))
@@ -127,9 +127,9 @@ def test_no_allowed_point_is_nearer(seed):
         for x in np.arange(c.site_x_low_m, c.site_x_high_m + 1e-9, step)
         for y in np.arange(c.site_y_low_m, c.site_y_high_m + 1e-9, step)
     ]
-    discs = [robot.seen.task.nest_centre_m]
+    discs = [robot.seen.spec.nest_centre_m]
     discs += [((x + 0.5) * 0.2, (y + 0.5) * 0.2) for x, y, *_ in robot.policy.remembered_caches(0).values()]
-    radius = robot.seen.task.cache_side_nominal_m
+    radius = robot.seen.spec.cache_side_nominal_m
     allowed = [point for point in grid if all(math.dist(point, disc) >= radius for disc in discs)]
     nearest = min((math.dist(point, middle) for point in allowed), default=math.inf)
     if best.distance == math.inf:

@@ -11,7 +11,7 @@ from baselines.machines import DRAWS, VectorState
 from swarm_forage_env.contract.codes import Event
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.reference.controllers import ObjectDictionary, ReferenceRobot
-from tests.support.observations import GREYS, Observations, make_task
+from tests.support.observations import GREYS, Observations, make_spec
 
 N_ROBOTS = 6
 STATES = ["acquire", "wait for pick-up", "homing", "homing in nest", "wait for drop", "leave nest"]
@@ -52,7 +52,7 @@ class Fuzz:
 @pytest.mark.parametrize("quirks", [Quirks(), AUTHORS_PROGRAM], ids=["as described", "authors' program"])
 @pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy])
 def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
-    task = make_task(N_ROBOTS, quirks=quirks)
+    task = make_spec(N_ROBOTS, quirks=quirks)
     has_memory = policy_class is DPOPolicy
     fuzz = Fuzz(task, seed=1)
     policy = policy_class()
@@ -82,7 +82,7 @@ def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
 
 @pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy])
 def test_only_declared_slices_are_read(policy_class):
-    task = make_task(N_ROBOTS)
+    task = make_spec(N_ROBOTS)
     fuzz = Fuzz(task, seed=3)
     garbage = np.random.default_rng(4)
     plain, fooled = policy_class(), policy_class()
@@ -103,7 +103,7 @@ def test_only_declared_slices_are_read(policy_class):
 
 @pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy])
 def test_actions_repeat_with_the_seed_and_stay_in_range(policy_class):
-    task = make_task(N_ROBOTS)
+    task = make_spec(N_ROBOTS)
 
     def actions(seed: int) -> np.ndarray:
         fuzz = Fuzz(task, seed=6)

@@ -9,16 +9,16 @@ from baselines.crw import CRWPolicy
 from baselines.machines import Activity
 from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.scenarios.quirks import Quirks
-from tests.support.observations import Observations, make_task
+from tests.support.observations import Observations, make_spec
 
 
 class Robot:
     """A single robot under CRW."""
 
     def __init__(self, **changes):
-        self.seen = Observations(make_task(**changes))
+        self.seen = Observations(make_spec(**changes))
         self.policy = CRWPolicy()
-        self.policy.reset(self.seen.task, np.random.default_rng(5))
+        self.policy.reset(self.seen.spec, np.random.default_rng(5))
 
     def act(self, ticks: int = 1, active: bool = True) -> np.ndarray:
         for _ in range(ticks):
@@ -125,9 +125,9 @@ def test_exploring_avoids_obstacles(robot):
 
 def test_drop_depth_is_uniform_between_a_centimetre_and_the_entry_distance():
     n_robots = 4000
-    seen = Observations(make_task(n_robots))
+    seen = Observations(make_spec(n_robots))
     policy = CRWPolicy()
-    policy.reset(seen.task, np.random.default_rng(8))
+    policy.reset(seen.spec, np.random.default_rng(8))
     active = np.ones(n_robots, bool)
     seen.carry(0)
     policy.act(seen.array, active)
@@ -225,7 +225,7 @@ def test_an_inactive_robot_is_frozen(robot):
 
 
 def test_an_inactive_robot_does_not_shift_the_chances_of_others():
-    task = make_task(3)
+    task = make_spec(3)
     actions = []
     for middle_active in (True, False):
         seen = Observations(task)

@@ -12,7 +12,7 @@ from baselines.object_choice import MemoryParameters, object_utility
 from baselines.parameters import kernel_constants
 from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.scenarios.quirks import Quirks
-from tests.support.observations import Observations, make_task
+from tests.support.observations import Observations, make_spec
 
 GOAL = (10.5, 10.1)
 """Centre of the object two cells ahead of the robot, which stands at (10.1, 10.1)."""
@@ -22,10 +22,10 @@ class Robot:
     """A single robot under DPO that faces +x, at (10.1, 10.1)."""
 
     def __init__(self, **changes):
-        self.seen = Observations(make_task(**changes))
+        self.seen = Observations(make_spec(**changes))
         self.seen.pose(10.1, 10.1)
         self.policy = DPOPolicy()
-        self.policy.reset(self.seen.task, np.random.default_rng(5))
+        self.policy.reset(self.seen.spec, np.random.default_rng(5))
 
     def act(self, ticks: int = 1, active: bool = True) -> np.ndarray:
         for _ in range(ticks):
@@ -62,7 +62,7 @@ def robot() -> Robot:
 
 def utility(anchor_x: float, pheromone: float = 1.0) -> float:
     parameters = MemoryParameters()
-    c = kernel_constants(parameters, make_task(), **parameters.derived())[0]
+    c = kernel_constants(parameters, make_spec(), **parameters.derived())[0]
     return object_utility(anchor_x, 8.0, 24.0, 8.0, pheromone, c)
 
 
@@ -277,7 +277,7 @@ def test_starting_within_tolerance_is_an_arrival_unless_the_quirk_is_on():
     for quirk, activity in ((False, Activity.WAIT_PICKUP), (True, Activity.ACQUIRE)):
         robot = Robot(quirks=Quirks(finisher_tolerance_mismatch=quirk))
         robot.policy = DPOPolicy(object_tolerance_m=0.5)
-        robot.policy.reset(robot.seen.task, np.random.default_rng(5))
+        robot.policy.reset(robot.seen.spec, np.random.default_rng(5))
         robot.seen.window({(2, 0): 7})
         robot.seen.ground("object")
         robot.act()

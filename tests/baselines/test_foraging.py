@@ -15,7 +15,7 @@ def counts(scenario_name: str, policy_name: str, ticks: int, seed: int, **overri
     env = ForageEnv(scenario(scenario_name, **overrides))
     obs = env.reset_batch(seed)
     policy = load_policy(policy_name)
-    policy.reset(env.task, stream_rng(seed, Stream.POLICY))
+    policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
     for _ in range(ticks):
         obs, *_ = env.step_batch(policy.act(obs, env.active))
     return env.events.counters.copy()

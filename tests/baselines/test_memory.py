@@ -6,7 +6,7 @@ import pytest
 from baselines.dpo import DPOPolicy
 from baselines.memory import density
 from tests.reference.controllers import ObjectDictionary, visible_objects
-from tests.support.observations import Observations, make_task
+from tests.support.observations import Observations, make_spec
 
 ACTIVE = np.ones(1, bool)
 
@@ -31,8 +31,8 @@ def test_density_of_an_object_seen_now_and_long_ago():
 
 
 def test_objects_are_remembered_with_cell_and_decaying_density():
-    observations = Observations(make_task())
-    policy = new_policy(observations.task)
+    observations = Observations(make_spec())
+    policy = new_policy(observations.spec)
     known = look(policy, observations, 10.1, 8.1, {(0, 0): 7, (2, -2): 199})  # own cell (50, 40)
     assert {row: entry[:2] for row, entry in known.items()} == {7: (50, 40), 199: (52, 38)}
     for _ in range(3):
@@ -43,23 +43,23 @@ def test_objects_are_remembered_with_cell_and_decaying_density():
 
 
 def test_what_should_be_visible_but_is_not_is_forgotten():
-    observations = Observations(make_task())
-    policy = new_policy(observations.task)
+    observations = Observations(make_spec())
+    policy = new_policy(observations.spec)
     look(policy, observations, 10.1, 8.1, {(2, 0): 7, (-2, 0): 8})
     assert set(look(policy, observations, 10.3, 8.1, {(1, 0): 7})) == {7, 8}  # (-3, 0) is out of view
     assert set(look(policy, observations, 10.1, 8.1, {(2, 0): 7})) == {7}
 
 
 def test_an_object_that_vanishes_from_an_unmoved_window_is_forgotten():
-    observations = Observations(make_task())
-    policy = new_policy(observations.task)
+    observations = Observations(make_spec())
+    policy = new_policy(observations.spec)
     look(policy, observations, 10.1, 8.1, {(2, 0): 7, (1, 1): 8})
     assert set(look(policy, observations, 10.1, 8.1, {(1, 1): 8})) == {8}
 
 
 def test_another_object_at_a_remembered_cell_replaces_it():
-    observations = Observations(make_task())
-    policy = new_policy(observations.task)
+    observations = Observations(make_spec())
+    policy = new_policy(observations.spec)
     look(policy, observations, 10.1, 8.1, {(1, 1): 7})
     assert {row: entry[:2] for row, entry in look(policy, observations, 10.1, 8.1, {(1, 1): 8}).items()} == {
         8: (51, 41)
@@ -67,24 +67,24 @@ def test_another_object_at_a_remembered_cell_replaces_it():
 
 
 def test_a_moved_object_is_remembered_where_it_is_now():
-    observations = Observations(make_task())
-    policy = new_policy(observations.task)
+    observations = Observations(make_spec())
+    policy = new_policy(observations.spec)
     look(policy, observations, 10.1, 8.1, {(1, 1): 7})
     assert look(policy, observations, 10.1, 8.1, {(1, 2): 7})[7][:2] == (51, 42)
     assert look(policy, observations, 20.1, 8.1, {(0, 0): 7})[7][:2] == (100, 40)
 
 
 def test_a_picked_up_object_is_forgotten_whatever_the_target_was():
-    observations = Observations(make_task())
-    policy = new_policy(observations.task)
+    observations = Observations(make_spec())
+    policy = new_policy(observations.spec)
     look(policy, observations, 10.1, 8.1, {(1, 1): 7, (0, 1): 8})
     observations.carry(7)
     assert set(look(policy, observations, 20.1, 8.1, {})) == {8}
 
 
 def test_an_inactive_robot_neither_sees_nor_ages():
-    observations = Observations(make_task())
-    policy = new_policy(observations.task)
+    observations = Observations(make_spec())
+    policy = new_policy(observations.spec)
     before = look(policy, observations, 10.1, 8.1, {(1, 1): 7})
     observations.window({(0, 0): 3})
     for _ in range(5):
@@ -93,8 +93,8 @@ def test_an_inactive_robot_neither_sees_nor_ages():
 
 
 def test_positions_come_from_the_exact_cell_not_from_the_noisy_position():
-    observations = Observations(make_task())
-    policy = new_policy(observations.task)
+    observations = Observations(make_spec())
+    policy = new_policy(observations.spec)
     observations.pose(10.1, 8.1)
     observations.believed_position(10.9, 7.3)
     observations.window({(0, 0): 7})
@@ -107,7 +107,7 @@ def test_memory_equals_the_naive_rule(seed):
     """Robots walk over a patch on which objects move, vanish, come back; some ticks are slept through."""
     rng = np.random.default_rng(seed)
     n_robots, n_objects, side, ticks = 4, 40, 14, 700
-    task = make_task(n_robots, n_objects=n_objects)
+    task = make_spec(n_robots, n_objects=n_objects)
     observations = Observations(task)
     policy = new_policy(task)
     twins = [ObjectDictionary() for _ in range(n_robots)]

@@ -10,9 +10,9 @@ from baselines.machines import new_robots
 from baselines.motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander
 from baselines.parameters import ControllerParameters, kernel_constants
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
-from tests.support.observations import Observations, make_task
+from tests.support.observations import Observations, make_spec
 
-TASK = make_task()
+TASK = make_spec()
 C = kernel_constants(ControllerParameters(), TASK)[0]
 
 
@@ -126,7 +126,7 @@ def test_wander_force_is_9_cm_per_second_a_little_wider_than_its_angle():
 def turns_deg() -> np.ndarray:
     """Heading changes (ticks, robots) of free random walkers, each an exact arc of one tick."""
     n_robots, ticks = 2000, 900
-    task = make_task(n_robots)
+    task = make_spec(n_robots)
     observations = Observations(task)
     policy = CRWPolicy()
     policy.reset(task, np.random.default_rng(11))

@@ -14,7 +14,7 @@ from baselines.stochx import STOCHXPolicy
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.quirks import Quirks
-from tests.support.observations import make_task
+from tests.support.observations import make_spec
 
 
 @pytest.mark.parametrize("name", ["crw", "dpo"])
@@ -58,17 +58,17 @@ def test_values_that_make_no_sense_are_refused(values):
 
 
 def test_durations_become_ticks_and_quirks_reach_the_kernels():
-    constants = kernel_constants(ControllerParameters(), make_task(dt_s=0.1))[0]
+    constants = kernel_constants(ControllerParameters(), make_spec(dt_s=0.1))[0]
     assert (constants.exploration_lock_ticks, constants.recovery_ticks) == (100, 20)
     assert constants.explore_double_start == 0
-    task = make_task(quirks=Quirks(explore_double_start=True))
+    task = make_spec(quirks=Quirks(explore_double_start=True))
     assert kernel_constants(ControllerParameters(), task)[0].explore_double_start == 1
 
 
 @pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, STOCHMPolicy, STOCHXPolicy])
 def test_observations_of_another_swarm_are_refused(policy_class):
     policy = policy_class()
-    policy.reset(make_task(4), np.random.default_rng(0))
+    policy.reset(make_spec(4), np.random.default_rng(0))
     for rows, columns in ((3, policy._task.layout.size), (4, 10)):
         with pytest.raises(ObservationError, match=rf"\(n_robots, columns\) = \(4, .*got \({rows}, {columns}\)"):
             policy.act(np.zeros((rows, columns), np.float32), np.ones(rows, np.bool_))

@@ -9,14 +9,14 @@ from baselines.cache_memory import CACHE
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
 from baselines.stochx import STOCHXPolicy
-from tests.support.observations import make_task
+from tests.support.observations import make_spec
 
 
 def test_no_record_passes_for_a_shorter_one():
     """Otherwise numba takes a function compiled for the one for the other as well, with a warning at every call."""
     robots, constants = [], []
     for policy in (CRWPolicy(), DPOPolicy(), STOCHXPolicy()):
-        policy.reset(make_task(), np.random.default_rng(0))
+        policy.reset(make_spec(), np.random.default_rng(0))
         robots.append(from_dtype(policy._robots.dtype))
         constants.append(from_dtype(policy._constants.dtype))
     assert robots[0] == robots[1] != robots[2]

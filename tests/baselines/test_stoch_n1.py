@@ -14,7 +14,7 @@ from baselines.tasks import STOCHM_PARAMETERS, STOCHX_PARAMETERS, Tab
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.reference import task_chain
-from tests.support.observations import make_task
+from tests.support.observations import make_spec
 
 M_PARTITION = (4.0, 1.25, 1.75)
 X_PARTITION = (1.0, 1.25, 1.0)
@@ -151,7 +151,7 @@ class Robot:
 
     def __init__(self, policy_class=STOCHXPolicy, quirks: Quirks = Quirks(), **overrides) -> None:  # noqa: B008
         policy = policy_class(**overrides)
-        self.c = task_constants(policy.parameters, make_task(quirks=quirks), policy.n_tabs)[0]
+        self.c = task_constants(policy.parameters, make_spec(quirks=quirks), policy.n_tabs)[0]
         rng = np.random.default_rng(1)
         self.a = stoch_n1.new_allocation(1, policy.parameters, quirks, policy.n_tabs, rng)
 

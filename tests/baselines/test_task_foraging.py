@@ -23,7 +23,7 @@ class Run:
         reads = self.policy.reads if declared_only else None
         self.env = ForageEnv(scenario(scenario_name, caches=CACHES[policy_name]), reads=reads)
         obs = self.env.reset_batch(seed)
-        self.policy.reset(self.env.task, stream_rng(seed, Stream.POLICY))
+        self.policy.reset(self.env.swarm_spec, stream_rng(seed, Stream.POLICY))
         self.seen: set[int] = set()
         self.fifths: list[np.ndarray] = []
         before = self.counters

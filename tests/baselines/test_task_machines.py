@@ -222,7 +222,7 @@ def test_a_robot_that_has_picked_up_sets_out_for_its_destination_holding(robot, 
 
 @pytest.mark.parametrize("task", [*HARVESTS, *COLLECTS])
 def test_every_task_asks_to_drop_with_its_own_word(robot, task):
-    expected = {Task.STARTER: Grip.SITE, Task.FINISHER: Grip.FOUND}.get(task, Grip.DELIVER)
+    expected = {Task.STARTER: Grip.SITE, Task.FINISHER: Grip.CREATE_CACHE}.get(task, Grip.DELIVER)
     assert wait_for_drop(robot, task)[2] == np.float32(expected)
 
 

@@ -14,7 +14,7 @@ from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.reference import task_chain
 from tests.reference.controllers import ObjectDictionary
 from tests.reference.task_controllers import TASKS, ReferenceTaskRobot
-from tests.support.observations import GREYS, Observations, make_task
+from tests.support.observations import GREYS, Observations, make_spec
 
 N_ROBOTS = 6
 STATES = [
@@ -34,7 +34,7 @@ PLACES = [(38, 38), (38, 46), (46, 38), (48, 46), (43, 43)]
 
 def crowded_task(**changes):
     """A world of small caches, five cells wide, and short distances."""
-    return make_task(
+    return make_spec(
         N_ROBOTS,
         caches="dynamic",
         cache_side_m=1.0,

@@ -46,7 +46,7 @@ def test_only_tasks_that_make_caches_lay_objects_on_the_floor():
     laying = {Task(code) for code in np.flatnonzero(np.float32(Grip.DELIVER) != DROP_GRIP)}
     assert laying == {Task.STARTER, Task.FINISHER}
     assert DROP_GRIP[Task.STARTER] == np.float32(Grip.SITE)
-    assert DROP_GRIP[Task.FINISHER] == np.float32(Grip.FOUND)
+    assert DROP_GRIP[Task.FINISHER] == np.float32(Grip.CREATE_CACHE)
 
 
 def test_numbers_that_the_two_controllers_do_not_share():

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from swarm_forage_env.policies import pretrained
 
 from swarm_forage_env import cli
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import RandomPolicy, policy_names

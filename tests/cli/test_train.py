@@ -12,7 +12,7 @@ import pytest
 from swarm_forage_env import cli
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.plan import WorldOptions
+from swarm_forage_env.cli.plan import ScenarioOptions
 from swarm_forage_env.cli.train import TrainOptions, build_plan, small_arena
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.config import with_overrides
@@ -175,7 +175,7 @@ def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
 
 
 def test_defaults_are_what_a_driver_needs():
-    plan = build_plan(WorldOptions(scenario="warehouse_small"), TrainOptions())
+    plan = build_plan(ScenarioOptions(scenario="warehouse_small"), TrainOptions())
     assert plan.interface == InterfaceConfig(
         observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5
     )
@@ -183,16 +183,16 @@ def test_defaults_are_what_a_driver_needs():
     assert plan.options["batch_size"] == 3200
     assert plan.hidden == (64, 64)
     sac = build_plan(
-        WorldOptions(scenario="warehouse_small"), TrainOptions(algorithm="sac", automatic_gripper=False)
+        ScenarioOptions(scenario="warehouse_small"), TrainOptions(algorithm="sac", automatic_gripper=False)
     ).interface
     assert sac.actions == "continuous"
     assert not sac.automatic_gripper
 
 
 def test_defaults_are_the_recipe_that_learns():
-    plan = build_plan(WorldOptions(scenario="warehouse_small"), TrainOptions())
+    plan = build_plan(ScenarioOptions(scenario="warehouse_small"), TrainOptions())
     assert plan == build_plan(
-        WorldOptions(scenario="warehouse_small", settings=("nest_progress=0.05", "first_pickup=1")),
+        ScenarioOptions(scenario="warehouse_small", settings=("nest_progress=0.05", "first_pickup=1")),
         TrainOptions(small_start=True),
     )
     assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.05, 1.0)
@@ -203,7 +203,7 @@ def test_defaults_are_the_recipe_that_learns():
 def test_what_people_set_goes_before_the_recipe(tmp_path):
     path = tmp_path / "world.toml"
     path.write_text("[scenario]\nnest_progress = 0.0\n")
-    world = WorldOptions(scenario="warehouse_small", settings=("first_pickup=0.5",), config_file=path)
+    world = ScenarioOptions(scenario="warehouse_small", settings=("first_pickup=0.5",), config_file=path)
     plan = build_plan(world, TrainOptions(small_start=False, hidden="128,32"))
     assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.0, 0.5)
     assert len(plan.stages) == 1
@@ -211,7 +211,7 @@ def test_what_people_set_goes_before_the_recipe(tmp_path):
 
 
 def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
-    plan = build_plan(WorldOptions(scenario="search_and_rescue"), TrainOptions())
+    plan = build_plan(ScenarioOptions(scenario="search_and_rescue"), TrainOptions())
     assert plan.scenario.reward == scenario("search_and_rescue").reward
     assert len(plan.stages) == 1
 
@@ -228,7 +228,7 @@ def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
     ],
 )
 def test_the_default_minibatch_fits_the_rollout(robots, arenas, words, expected):
-    world = WorldOptions(scenario="warehouse_small", robots=robots)
+    world = ScenarioOptions(scenario="warehouse_small", robots=robots)
     plan = build_plan(world, TrainOptions(n_arenas=arenas, arguments=words))
     assert plan.options["batch_size"] == expected
 
@@ -244,7 +244,7 @@ def test_small_runs_come_without_warnings(command, recwarn):
 def test_the_files_of_a_world_reach_the_plan(tmp_path):
     path = tmp_path / "world.toml"
     path.write_text("[scenario]\nn_robots = 7\n[actuator_noise]\nsigma = 0.1\n")
-    world = WorldOptions(scenario="warehouse_small", config_file=path, wrappers=("sensor_noise:sigma=0.02",))
+    world = ScenarioOptions(scenario="warehouse_small", config_file=path, wrappers=("sensor_noise:sigma=0.02",))
     plan = build_plan(world, TrainOptions(seed=3))
     assert plan.scenario.robots.n_robots == 7
     assert sorted(config.name for config in plan.wrappers) == ["actuator_noise", "sensor_noise"]
@@ -254,7 +254,7 @@ def test_the_files_of_a_world_reach_the_plan(tmp_path):
 def test_a_wrapper_option_goes_before_the_same_wrapper_in_the_file(tmp_path):
     path = tmp_path / "world.toml"
     path.write_text("[sensor_noise]\nsigma = 0.01\n")
-    world = WorldOptions(scenario="warehouse_small", config_file=path, wrappers=("sensor_noise:sigma=0.02",))
+    world = ScenarioOptions(scenario="warehouse_small", config_file=path, wrappers=("sensor_noise:sigma=0.02",))
     (config,) = build_plan(world, TrainOptions()).wrappers
     assert config.to_mapping()["sigma"] == 0.02
 
@@ -277,4 +277,4 @@ def test_a_small_start_keeps_proportions(name, expected):
 
 def test_a_small_start_that_cannot_hold_the_objects_is_refused():
     with pytest.raises(ConfigError, match="objects for placement"):
-        build_plan(WorldOptions(scenario="warehouse_small", objects=800), TrainOptions(small_start=True))
+        build_plan(ScenarioOptions(scenario="warehouse_small", objects=800), TrainOptions(small_start=True))

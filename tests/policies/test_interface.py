@@ -27,7 +27,7 @@ GRASP, RELEASE, DELIVER, SITE, FOUND = (len(MOTIONS) + k for k in range(len(GRIP
 
 
 def bound(env: ForageEnv, **choices) -> LearnerInterface:
-    return LearnerInterface(InterfaceConfig(**choices), env.task)
+    return LearnerInterface(InterfaceConfig(**choices), env.swarm_spec)
 
 
 @pytest.mark.compiled
@@ -38,7 +38,7 @@ def test_the_compact_view_matches_its_twin_along_runs(caches, noise):
                              nest_size_m=(1.6, 12.8), caches=caches))  # fmt: skip
     stack = parse_wrapper(f"sensor_noise:sigma={noise}").wrap(env) if noise else env
     policy = load_policy({"none": "dpo", "static": "stochm", "dynamic": "stochx"}[caches])
-    policy.reset(env.task, stream_rng(0, Stream.POLICY))
+    policy.reset(env.swarm_spec, stream_rng(0, Stream.POLICY))
     interface = bound(env, observation="compact")
     obs = stack.reset_batch(4)
     kinds_seen = np.zeros(interface.layout.size)
@@ -142,7 +142,7 @@ def test_gripper_actions_by_number():
     commands = bound(env, actions="discrete").command(np.array([GRASP, RELEASE, DELIVER, SITE, FOUND]),
                                                       env.arena.observe())  # fmt: skip
     assert not commands[:, :2].any()
-    np.testing.assert_allclose(commands[:, 2], [Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.FOUND])
+    np.testing.assert_allclose(commands[:, 2], [Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.CREATE_CACHE])
 
 
 def test_the_automatic_gripper_carries_an_object_from_the_floor_to_the_nest():

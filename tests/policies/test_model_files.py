@@ -50,7 +50,7 @@ def model(algorithm, path: Path, *, seen=None, done=None, **options):
 
 def started(path, **parameters) -> ModelPolicy:
     policy = load_policy(str(path), parameters)
-    policy.reset(ENV.task, np.random.default_rng(0))
+    policy.reset(ENV.swarm_spec, np.random.default_rng(0))
     return policy
 
 
@@ -84,7 +84,7 @@ def test_actions_are_those_of_the_algorithm_itself(tmp_path, algorithm, options)
     ],
 )
 def test_the_interface_of_a_model_is_told_from_its_spaces(tmp_path, algorithm, choices):
-    interface = LearnerInterface(InterfaceConfig(**choices), ENV.task)
+    interface = LearnerInterface(InterfaceConfig(**choices), ENV.swarm_spec)
     options = {"buffer_size": 10} if algorithm == "DQN" else {}
     made, path = model(algorithm, tmp_path, seen=interface.observation_space, done=interface.action_space, **options)
     choice, _ = made.predict(interface.observe(OBS), deterministic=True)
@@ -96,7 +96,7 @@ def test_a_model_of_the_whole_swarm_sees_all_rows_at_once(tmp_path):
     np.testing.assert_array_equal(started(path).act(OBS, ACTIVE), made.predict(OBS, deterministic=True)[0])
     other = parallel_env("warehouse_small", n_robots=5, n_objects=20)
     with pytest.raises(ModelError, match="these 5 robots together"):
-        load_policy(str(path)).reset(other.task, np.random.default_rng(0))
+        load_policy(str(path)).reset(other.swarm_spec, np.random.default_rng(0))
 
 
 def test_actions_are_kept_for_the_ticks_of_a_decision(tmp_path):
@@ -117,7 +117,7 @@ NOTED = {
 
 def noted_model(folder: Path, note):
     """Save an untrained model that carries a note; returns it, its file, and the interface of NOTED."""
-    interface = LearnerInterface(InterfaceConfig(**NOTED["interface"]), ENV.task)
+    interface = LearnerInterface(InterfaceConfig(**NOTED["interface"]), ENV.swarm_spec)
     made, path = model("A2C", folder, seen=interface.observation_space, done=interface.action_space)
     setattr(made, MODEL_NOTE, note)
     made.save(path)
@@ -221,7 +221,7 @@ def network_file(tmp_path) -> Path:
 
 def test_networks_are_policies_by_their_path(network_file):
     policy = load_policy(str(network_file), {"digest": file_digest(network_file)})
-    policy.reset(ENV.task, np.random.default_rng(0))
+    policy.reset(ENV.swarm_spec, np.random.default_rng(0))
     np.testing.assert_array_equal(policy.act(OBS, ACTIVE)[:, :2], 0.5)
     with pytest.raises(ModelError, match="changed since"):
         load_policy(str(network_file), {"digest": "0"})

@@ -162,7 +162,7 @@ def test_a_policy_keeps_its_choice_for_the_ticks_of_a_decision(actions):
     network = compact_network(6 if actions == "discrete" else 2, np.random.default_rng(1), interface=interface)
     policy = NetworkPolicy(network)
     assert isinstance(policy, Policy)
-    policy.reset(env.task, np.random.default_rng(0))
+    policy.reset(env.swarm_spec, np.random.default_rng(0))
     obs = env.reset_batch(0)
     wheels = []
     for _ in range(12):
@@ -177,14 +177,14 @@ def test_a_policy_keeps_its_choice_for_the_ticks_of_a_decision(actions):
 def test_a_network_that_does_not_fit_its_interface_is_refused_at_the_start_of_a_run():
     env = parallel_env("warehouse_small", n_robots=2, n_objects=20)
     with pytest.raises(NetworkError, match="from 111 columns to 2 actions in this world, got one from 2 to 2"):
-        NetworkPolicy(small_network()).reset(env.task, np.random.default_rng(0))
+        NetworkPolicy(small_network()).reset(env.swarm_spec, np.random.default_rng(0))
 
 
 def test_any_function_becomes_a_policy_by_naming_its_interface():
     env = parallel_env("warehouse_small", n_robots=3, n_objects=20)
     interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
     policy = LearnedPolicy(interface, lambda rows, rng: np.ones(len(rows), np.int64), caches="static")
-    policy.reset(env.task, np.random.default_rng(0))
+    policy.reset(env.swarm_spec, np.random.default_rng(0))
     assert policy.act(env.reset_batch(0), env.active)[:, :2].tolist() == [[0.5, 0.5]] * 3
     assert policy.caches == "static"
     assert "los_object" in policy.reads

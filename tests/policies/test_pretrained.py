@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from swarm_forage_env.policies import pretrained
 
+from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.scenarios.presets import warehouse_small
 from swarm_forage_env.study.run import run_one

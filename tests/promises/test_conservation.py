@@ -17,7 +17,7 @@ from tests.support.stage import assert_conserved
 def run_conserved(env: ForageEnv, policy, ticks: int, *, seed: int, population: bool = False) -> None:
     """Run and check the whole world after every tick."""
     rng = np.random.default_rng(seed)
-    policy.reset(env.task, stream_rng(seed, Stream.POLICY))
+    policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
     obs = env.reset_batch(seed)
     assert_conserved(env)
     for tick in range(ticks):
@@ -83,7 +83,7 @@ def test_the_busy_runs_do_something():
         walk_probability=0.02,
     )
     env, policy, rng = ForageEnv(config), BusyPolicy(), np.random.default_rng(0)
-    policy.reset(env.task, rng)
+    policy.reset(env.swarm_spec, rng)
     obs = env.reset_batch(0)
     seen = set()
     for _ in range(2500):

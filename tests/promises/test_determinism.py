@@ -52,7 +52,7 @@ def test_a_reset_in_the_middle_of_a_run_leaves_nothing_behind():
     env = make("warehouse_small", "dynamic")
     expected = digest(env, BusyPolicy(), 5)
     policy = BusyPolicy()
-    policy.reset(env.task, np.random.default_rng(0))
+    policy.reset(env.swarm_spec, np.random.default_rng(0))
     obs = env.reset_batch(99)
     rng = np.random.default_rng(1)
     for _ in range(25):

@@ -126,7 +126,7 @@ def test_the_joint_view_passes_the_checker_of_gymnasium(wrappers):
 def play(env, seed: int, ticks: int, *, check=None) -> str:
     """Fingerprint of what a busy run shows, tick by tick."""
     seen, policy, world = hashlib.sha256(), BusyPolicy(), env.world
-    policy.reset(world.task, stream_rng(seed, Stream.POLICY))
+    policy.reset(world.swarm_spec, stream_rng(seed, Stream.POLICY))
     obs = env.reset_batch(seed)
     for _ in range(ticks):
         seen.update(obs.tobytes())
@@ -151,7 +151,7 @@ def test_a_seed_is_a_run(wrappers):
 def test_objects_are_conserved(wrappers):
     env = stacked(wrappers, n_robots=30)
     play(env, 2, 150, check=assert_conserved)
-    assert env.world.events.counters.any()
+    assert env.unwrapped.events.counters.any()
 
 
 def test_the_full_stack_does_something():

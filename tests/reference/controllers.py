@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from swarm_forage_env.contract.codes import Event, Grip
-from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.policy import SwarmSpec
 
 RHO = 0.00001
 LOCK_TICKS = 50
@@ -18,9 +18,9 @@ RECOVERY_TICKS = 10
 SENSOR_ANGLES = np.deg2rad(7.5 + 15.0 * np.arange(24))
 
 
-def sensed(task: SwarmTask, row: np.ndarray) -> dict[str, np.ndarray]:
+def sensed(spec: SwarmSpec, row: np.ndarray) -> dict[str, np.ndarray]:
     """One observation row as a dictionary of its slices, in double precision."""
-    return {part.name: row[part.start : part.stop].astype(float) for part in task.layout}
+    return {part.name: row[part.start : part.stop].astype(float) for part in spec.layout}
 
 
 def vector_sum(readings: np.ndarray) -> complex:
@@ -54,15 +54,15 @@ class ObjectDictionary:
             self.known[row] = (cell, max(0.0, (1.0 - RHO) * density))
 
 
-def visible_objects(task: SwarmTask, senses: dict[str, np.ndarray]) -> tuple[tuple[int, int], dict]:
+def visible_objects(spec: SwarmSpec, senses: dict[str, np.ndarray]) -> tuple[tuple[int, int], dict]:
     """The robot's own cell, and the objects in its window: cell -> row."""
-    size = np.array(task.arena_size_m)
-    own = np.rint((senses["los_cell"] + 1.0) / 2.0 * size / task.cell_m - 0.5).astype(int)
+    size = np.array(spec.arena_size_m)
+    own = np.rint((senses["los_cell"] + 1.0) / 2.0 * size / spec.cell_m - 0.5).astype(int)
     visible = {}
     for k, value in enumerate(senses["los_object"]):
         if value > 0:
             cell = (int(own[0]) + k % 5 - 2, int(own[1]) + k // 5 - 2)
-            visible[cell] = round(value * task.n_objects) - 1
+            visible[cell] = round(value * spec.n_objects) - 1
     return (int(own[0]), int(own[1])), visible
 
 
@@ -70,7 +70,7 @@ def visible_objects(task: SwarmTask, senses: dict[str, np.ndarray]) -> tuple[tup
 class ReferenceRobot:
     """One robot under CRW, or under DPO if it has a memory."""
 
-    task: SwarmTask
+    task: SwarmSpec
     memory: ObjectDictionary | None = None
     state: str = "acquire"
     wander_deg: float = 0.0
@@ -88,12 +88,12 @@ class ReferenceRobot:
     def act(self, row: np.ndarray, draws: np.ndarray) -> tuple[float, float, float]:
         """One tick; draws are for drop depth, wander, restart wander and free-breaking wander."""
         self.draws = draws
-        self.senses = sensed(self.task, row)
+        self.senses = sensed(self.spec, row)
         self.away = vector_sum(self.senses["proximity"])
-        size = np.array(self.task.arena_size_m)
+        size = np.array(self.spec.arena_size_m)
         self.position = (self.senses["position"] + 1.0) / 2.0 * size
         if self.memory is not None:
-            self.memory.update(*visible_objects(self.task, self.senses))
+            self.memory.update(*visible_objects(self.spec, self.senses))
         self.change_state()
         force = 0j
         if self.state == "acquire":
@@ -117,7 +117,7 @@ class ReferenceRobot:
         if carrying and self.state in ("acquire", "wait for pick-up", "leave nest"):
             self.state = "homing"
             if self.memory is not None:
-                self.memory.known.pop(round(self.senses["cargo"][0] * self.task.n_objects) - 1, None)
+                self.memory.known.pop(round(self.senses["cargo"][0] * self.spec.n_objects) - 1, None)
         elif carrying and self.state == "wait for drop" and failed:
             self.state = "homing"
         elif not carrying and (self.state.startswith("homing") or (self.state == "wait for pick-up" and failed)):
@@ -157,7 +157,7 @@ class ReferenceRobot:
         force = 0j
         if self.timer is None:
             self.timer = 0
-            if self.task.quirks.explore_double_start:
+            if self.spec.quirks.explore_double_start:
                 force += self.wander(2) + self.avoid()
         if self.timer >= LOCK_TICKS and self.sees_object():
             self.timer = None
@@ -189,7 +189,7 @@ class ReferenceRobot:
 
     def choose(self) -> bool:
         """Best remembered object further than 0.2 m."""
-        nest, cell_m = self.task.nest_centre_m, self.task.cell_m
+        nest, cell_m = self.spec.nest_centre_m, self.spec.cell_m
         utilities = {}
         for row, (cell, density) in self.memory.known.items():
             anchor = (cell[0] * cell_m, cell[1] * cell_m)
@@ -239,7 +239,7 @@ class ReferenceRobot:
         return with_length(offset, max(1.0, 8.0 * distance / 0.2) if self.slowing else 8.0)
 
     def home(self) -> complex:
-        distance = math.dist(self.position, self.task.nest_centre_m)
+        distance = math.dist(self.position, self.spec.nest_centre_m)
         in_nest = self.sees(0.6, 0.8, 3)
         if self.state == "homing" and in_nest:
             self.depth = 0.01 + (distance - 0.01) * self.draws[0]

@@ -47,7 +47,7 @@ class SlowWorld:
     events: dict[int, tuple[Event, int, tuple[int, int, int, int]]] = field(default_factory=dict)
     first_picked: set[int] = field(default_factory=set)
     displaced: list[int] = field(default_factory=list)
-    founded: list[int] = field(default_factory=list)
+    creators: list[int] = field(default_factory=list)
     finished: set[str] = field(default_factory=set)
 
     def cell(self, robot: int) -> tuple[int, int]:
@@ -100,7 +100,7 @@ class SlowWorld:
 
     def serve(self, grips: list[float], tick: int, chance: list[float]) -> None:
         """One interaction phase."""
-        self.events, self.first_picked, self.displaced, self.founded = {}, set(), [], []
+        self.events, self.first_picked, self.displaced, self.creators = {}, set(), [], []
         self.finished = set()
         n_robots = len(self.position)
         order = sorted(range(n_robots), key=lambda robot: (robot - tick) % n_robots)
@@ -180,7 +180,7 @@ class SlowWorld:
                 self.floor[cache.centre] = cache.contents.pop()
                 del self.caches[target]
         elif self.lay_down(robot) and kind == FOUND:
-            self.founded.append(robot)
+            self.creators.append(robot)
 
     def take(self, robot: int, row: int) -> None:
         """A robot takes an object into its gripper."""

@@ -70,11 +70,11 @@ class ReferenceTaskRobot(ReferenceRobot):
     def tick(self, row: np.ndarray, draws: np.ndarray, now: int) -> tuple[float, float, float]:
         """One tick; the first four draws are those of `act`."""
         self.draws, self.now = draws, now
-        self.senses = sensed(self.task, row)
+        self.senses = sensed(self.spec, row)
         self.away = vector_sum(self.senses["proximity"])
-        self.position = (self.senses["position"] + 1.0) / 2.0 * np.array(self.task.arena_size_m)
+        self.position = (self.senses["position"] + 1.0) / 2.0 * np.array(self.spec.arena_size_m)
         self.carrying = self.senses["carrying"][0] == 1.0
-        own_cell, visible = visible_objects(self.task, self.senses)
+        own_cell, visible = visible_objects(self.spec, self.senses)
         self.memory.update(own_cell, visible)
         self.update_caches(own_cell)
         self.follow_events()
@@ -90,20 +90,20 @@ class ReferenceTaskRobot(ReferenceRobot):
 
     def grip(self) -> float:
         if self.state == "wait for drop":
-            return {"starter": Grip.SITE, "finisher": Grip.FOUND}.get(self.job, Grip.DELIVER)
+            return {"starter": Grip.SITE, "finisher": Grip.CREATE_CACHE}.get(self.job, Grip.DELIVER)
         return Grip.RELEASE if self.state in ("acquire", "let go") else Grip.GRASP
 
     # Memory
 
     def decode(self, fields: np.ndarray) -> tuple[int, Cell, int]:
         """Serial, centre cell and count of four cache fields."""
-        metres = (fields[1:3] + 1.0) / 2.0 * np.array(self.task.arena_size_m)
-        x, y = np.floor(metres / self.task.cell_m).astype(int).tolist()
-        return round(fields[0] * 2**24), (x, y), round(fields[3] * self.task.n_objects)
+        metres = (fields[1:3] + 1.0) / 2.0 * np.array(self.spec.arena_size_m)
+        x, y = np.floor(metres / self.spec.cell_m).astype(int).tolist()
+        return round(fields[0] * 2**24), (x, y), round(fields[3] * self.spec.n_objects)
 
     def covered(self, cell: Cell, point: tuple[float, float]) -> bool:
         centre = ((cell[0] + 0.5) * 0.2, (cell[1] + 0.5) * 0.2)
-        return max(abs(centre[0] - point[0]), abs(centre[1] - point[1])) <= self.task.cache_side_m / 2
+        return max(abs(centre[0] - point[0]), abs(centre[1] - point[1])) <= self.spec.cache_side_m / 2
 
     def update_caches(self, own_cell: Cell) -> None:
         seen = [self.decode(fields) for fields in self.senses["los_cache"].reshape(4, 4) if fields[0] > 0]
@@ -119,8 +119,8 @@ class ReferenceTaskRobot(ReferenceRobot):
             cache.density *= 1.0 - RHO
 
     def should_show(self, cell: Cell, own_cell: Cell) -> bool:
-        side = self.task.cache_side_m
-        if self.task.quirks.cache_forget_unit_mismatch:
+        side = self.spec.cache_side_m
+        if self.spec.quirks.cache_forget_unit_mismatch:
             reach = [abs((cell[k] + 0.5) * 0.2 - (own_cell[k] + 0.5)) < side / 2 + 2.5 for k in range(2)]
             return any(reach)
         half = round(side / 0.2) // 2
@@ -145,7 +145,7 @@ class ReferenceTaskRobot(ReferenceRobot):
         known = self.caches.get(cell) if serial else None
         if self.carrying and self.state in ("acquire", "wait for pick-up"):
             self.set_out(onward)
-            self.memory.known.pop(round(self.senses["cargo"][0] * self.task.n_objects) - 1, None)
+            self.memory.known.pop(round(self.senses["cargo"][0] * self.spec.n_objects) - 1, None)
             if self.job == "transferer" and known:
                 known.no_drop = self.shunned_cache_now = True
             return
@@ -158,7 +158,7 @@ class ReferenceTaskRobot(ReferenceRobot):
             self.restart()
         elif not self.carrying and self.state == "wait for drop":
             self.state = "finished"
-            row = round(self.senses["event_object"][0] * self.task.n_objects) - 1
+            row = round(self.senses["event_object"][0] * self.spec.n_objects) - 1
             if self.job in ("starter", "finisher") and row >= 0:
                 self.shunned.add(row)
                 self.shunned_now = True
@@ -197,7 +197,7 @@ class ReferenceTaskRobot(ReferenceRobot):
         self.restart()
         if self.carrying:
             self.state = "let go"
-        quirks = self.task.quirks
+        quirks = self.spec.quirks
         if not quirks.exec_time_since_last_completion:
             self.started[self.job], self.lasted[self.job], self.p_abort[self.job] = self.now, 0, 0.0
         if not quirks.interface_flag_survives_abort:
@@ -205,7 +205,7 @@ class ReferenceTaskRobot(ReferenceRobot):
         return True
 
     def end(self) -> None:
-        integer = self.task.quirks.integer_estimates
+        integer = self.spec.quirks.integer_estimates
         mean = (self.estimates[self.job] + self.lasted.get(self.job, 0)) / 2
         self.estimates[self.job] = task_chain.whole(mean, integer)
         self.started[self.job] = self.now
@@ -219,7 +219,7 @@ class ReferenceTaskRobot(ReferenceRobot):
         elif self.block == "generalist" and self.job in ("harvester", "collector") and len(self.partition) == 3:
             there = self.job
         if there != self.block:
-            p = task_chain.move(self.estimates, self.block, there, self.task.quirks.integer_estimates)
+            p = task_chain.move(self.estimates, self.block, there, self.spec.quirks.integer_estimates)
             if self.draws[5] < p:
                 self.block = there
 
@@ -248,7 +248,7 @@ class ReferenceTaskRobot(ReferenceRobot):
         if destination != "nest":
             enters.add("transport")
             leaves.add("wait for drop")
-        if job == "transferer" and self.task.quirks.transferer_interface_never_leaves:
+        if job == "transferer" and self.spec.quirks.transferer_interface_never_leaves:
             enters, leaves = {"transport"}, set()
         if self.state in enters:
             self.interface[job] = True
@@ -283,7 +283,7 @@ class ReferenceTaskRobot(ReferenceRobot):
         if not arrived and not given_up:
             return False, force
         self.vector, self.recovery = "idle", 0
-        counts = not (starts and self.task.quirks.finisher_tolerance_mismatch)
+        counts = not (starts and self.spec.quirks.finisher_tolerance_mismatch)
         if not given_up and counts and self.reached():
             return True, 0j
         found, more = self.look()
@@ -312,31 +312,31 @@ class ReferenceTaskRobot(ReferenceRobot):
             taking = self.state == "acquire"
             unwanted = cache.no_pickup or cache.count < self.smallest_cache if taking else cache.no_drop
             if not unwanted and not self.covered(cell, tuple(self.position)):
-                away = math.dist(centre, self.position) * math.dist(centre, self.task.nest_centre_m)
+                away = math.dist(centre, self.position) * math.dist(centre, self.spec.nest_centre_m)
                 utilities[centre] = math.exp(cache.density) * cache.count / away
         if not utilities:
             return False
         centre = max(utilities, key=lambda key: utilities[key])
-        spread = self.task.cache_side_m - 0.4
+        spread = self.spec.cache_side_m - 0.4
         self.goal = (centre[0] + spread * (self.draws[8] - 0.5), centre[1] + spread * (self.draws[9] - 0.5))
         self.tolerance = 0.02
         return True
 
     def choose_isolated(self) -> bool:
-        near = self.task.cache_side_nominal_m
+        near = self.spec.cache_side_nominal_m
         places = {row: ((x + 0.5) * 0.2, (y + 0.5) * 0.2) for row, ((x, y), _) in self.memory.known.items()}
         others = [((x + 0.5) * 0.2, (y + 0.5) * 0.2) for x, y in self.caches]
         utilities = {}
         for row, place in places.items():
             company = [*others, *(other for key, other in places.items() if key != row)]
             if all(math.dist(place, other) > near for other in company):
-                away = math.dist(place, self.position) * math.dist(place, self.task.nest_centre_m)
+                away = math.dist(place, self.position) * math.dist(place, self.spec.nest_centre_m)
                 utilities[place] = math.exp(self.memory.known[row][1]) / away
         if not utilities:
             return False
         self.goal = max(utilities, key=lambda key: utilities[key])
-        loose = 0.15 * max(self.task.arena_size_m)
-        self.tolerance = loose if self.task.quirks.finisher_tolerance_mismatch else 0.8
+        loose = 0.15 * max(self.spec.arena_size_m)
+        self.tolerance = loose if self.spec.quirks.finisher_tolerance_mismatch else 0.8
         return True
 
     def valid(self) -> bool:
@@ -367,7 +367,7 @@ class ReferenceTaskRobot(ReferenceRobot):
             if self.kind == "cache" and self.last_cache is not None:
                 self.goal = ((self.last_cache[0] + 0.5) * 0.2, (self.last_cache[1] + 0.5) * 0.2)
                 self.tolerance, self.vector, self.recovery, self.searching = 0.02, "vector", 0, True
-            if self.task.quirks.explore_double_start:
+            if self.spec.quirks.explore_double_start:
                 force += self.look_step(2)
         self.timer += 1
         return False, force + self.look_step(1)

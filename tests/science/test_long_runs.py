@@ -34,7 +34,7 @@ def assert_inside(env: ForageEnv) -> None:
 
 def run(env: ForageEnv, policy, seed: int, *, ticks: int = TICKS, population: bool = False) -> list[np.ndarray]:
     """Run to the end with looks at the world on the way; returns the counters at each look."""
-    policy.reset(env.task, stream_rng(seed, Stream.POLICY))
+    policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
     obs = env.reset_batch(seed)
     crowd = np.random.default_rng(seed)
     counters = []

@@ -3,7 +3,7 @@
 import numpy as np
 
 from swarm_forage_env.contract.codes import Grip
-from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 
@@ -11,12 +11,12 @@ from swarm_forage_env.env import ForageEnv
 class BusyPolicy:
     """Drives about at random, grasps when empty, and lets go in a random way after a random while."""
 
-    def reset(self, task: SwarmTask, rng: np.random.Generator) -> None:
+    def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start with all robots grasping."""
         self._rng = rng
-        self._carrying = task.layout["carrying"]
-        self._wheels = np.full((task.n_robots, 2), 0.5)
-        self._release = np.full(task.n_robots, Grip.GRASP)
+        self._carrying = spec.layout["carrying"]
+        self._wheels = np.full((spec.n_robots, 2), 0.5)
+        self._release = np.full(spec.n_robots, Grip.GRASP)
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Return (N, 3) actions."""
@@ -25,7 +25,7 @@ class BusyPolicy:
         turn = np.where(rng.random(n_robots) < 0.2, 0.4, 0.02) * rng.uniform(-1, 1, n_robots)
         self._wheels[steered] = np.column_stack((0.5 - turn, 0.5 + turn))[steered]
         changed = rng.random(n_robots) < 0.03
-        bands = (Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.FOUND, Grip.FOUND)
+        bands = (Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.CREATE_CACHE, Grip.CREATE_CACHE)
         self._release[changed] = rng.choice(bands, n_robots)[changed]
         carrying = obs[:, self._carrying].ravel() > 0.5
         return np.column_stack((self._wheels, np.where(carrying, self._release, Grip.GRASP))).astype(np.float32)

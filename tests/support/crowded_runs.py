@@ -48,7 +48,7 @@ def side(name: str) -> dict[str, float]:
 def digest(env: ForageEnv, policy: Policy, seed: int) -> str:
     """Fingerprint of everything that a run shows: observations, rewards, terminations, state, counters."""
     seen = hashlib.sha256()
-    policy.reset(env.task, stream_rng(seed, Stream.POLICY))
+    policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
     crowd = np.random.default_rng(seed)
     obs = env.reset_batch(seed)
     for tick in range(TICKS):
@@ -69,8 +69,8 @@ def fresh(policy: str) -> Policy:
 def episode_digest(name: str, policy_name: str) -> str:
     """Fingerprint of a whole episode through all wrappers, and of its record."""
     recorder = build_stack(quick_world(name, interval_s=60.0), mild_wrappers())
-    policy, world, seen = load_policy(policy_name), recorder.world, hashlib.sha256()
-    policy.reset(world.task, stream_rng(17, Stream.POLICY))
+    policy, world, seen = load_policy(policy_name), recorder.unwrapped, hashlib.sha256()
+    policy.reset(world.swarm_spec, stream_rng(17, Stream.POLICY))
     obs, truncated = recorder.reset_batch(17), False
     while not truncated:
         seen.update(obs.tobytes() + world.active.tobytes())

@@ -17,7 +17,7 @@ def small_scenario(**overrides) -> ScenarioConfig:
     )
 
 
-class FakeWorld(ForageEnv):
+class FakeArena(ForageEnv):
     """Tick t (from 1) delivers t objects, moves one object, and has one of four robots in interference.
 
     All robots die with tick `dies_at`. What it was stepped with is kept in `calls`.

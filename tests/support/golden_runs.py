@@ -17,7 +17,7 @@ from swarm_forage_env import AUTHORS_PROGRAM, SCENARIO_NAMES, Quirks
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.arenas import ArenaBatch
-from swarm_forage_env.views.learner_arena import plan_world
+from swarm_forage_env.views.learner_arena import plan_arena
 from tests.support.foraging import mild_wrappers, quick_world
 
 FILE = Path(__file__).with_suffix(".json")
@@ -62,7 +62,7 @@ def run_fingerprint(spec: RunSpec) -> str:
 
 def batch_fingerprint(interface: dict[str, Any]) -> str:
     """Fingerprint of all that a learner meets in two arenas, deaths and new starts included."""
-    plan = plan_world(
+    plan = plan_arena(
         quick_world("warehouse_small", n_robots=20, horizon_s=40.0, interval_s=40.0),
         {},
         interface=interface,

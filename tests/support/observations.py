@@ -8,7 +8,7 @@ import numpy as np
 
 from swarm_forage_env.contract.codes import Event
 from swarm_forage_env.contract.layout import CACHE_FIELDS, EVENT_SCALE, SERIAL_SCALE, VISIBLE_CACHES, observation_layout
-from swarm_forage_env.contract.policy import SwarmTask
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.scenarios.quirks import Quirks
 
 GREYS = {"floor": 1.0, "nest": 0.7, "cache": 0.4, "object": 0.0}
@@ -17,11 +17,11 @@ Cache: TypeAlias = tuple[int, tuple[int, int], int]
 """Serial, centre cell, number of objects."""
 
 
-def make_task(n_robots: int = 1, **changes: Any) -> SwarmTask:
+def make_spec(n_robots: int = 1, **changes: Any) -> SwarmSpec:
     """The task of a 32 x 16 m warehouse with 200 objects, or a variation of it."""
     width_m, height_m = changes.get("arena_size_m", (32.0, 16.0))
     n_objects = changes.get("n_objects", 200)
-    task = SwarmTask(
+    task = SwarmSpec(
         n_robots=n_robots,
         n_objects=n_objects,
         dt_s=0.2,
@@ -50,10 +50,10 @@ def make_task(n_robots: int = 1, **changes: Any) -> SwarmTask:
 class Observations:
     """An (N, D) observation array with setters in the units of the world; each acts on all robots unless told."""
 
-    def __init__(self, task: SwarmTask) -> None:
+    def __init__(self, spec: SwarmSpec) -> None:
         """Robots stand on empty floor at (10, 10) m, facing +x, carrying nothing, moving straight."""
-        self.task = task
-        self.array = np.zeros((task.n_robots, task.layout.size), np.float32)
+        self.spec = spec
+        self.array = np.zeros((spec.n_robots, spec.layout.size), np.float32)
         self.set("active", 1.0)
         self.set("wheel_speed", 0.45)
         self.ground("floor")
@@ -61,11 +61,11 @@ class Observations:
 
     def set(self, name: str, value: Any, robots: Any = slice(None)) -> None:
         """Write a slice in observation units."""
-        self.array[robots, self.task.layout[name]] = value
+        self.array[robots, self.spec.layout[name]] = value
 
     def get(self, name: str, robot: int = 0) -> np.ndarray:
         """Read a slice of one robot."""
-        return self.array[robot, self.task.layout[name]]
+        return self.array[robot, self.spec.layout[name]]
 
     def pose(self, x: float, y: float, heading: float = 0.0, robots: Any = slice(None)) -> None:
         """Set position and heading, and the cell that goes with them."""
@@ -79,7 +79,7 @@ class Observations:
         self.set("position", self._share(x, y), robots)
 
     def _share(self, x: float, y: float) -> tuple[float, float]:
-        width_m, height_m = self.task.arena_size_m
+        width_m, height_m = self.spec.arena_size_m
         return 2 * x / width_m - 1, 2 * y / height_m - 1
 
     def ground(self, kind: str, robots: Any = slice(None)) -> None:
@@ -105,14 +105,14 @@ class Observations:
     def carry(self, object_row: int | None, robots: Any = slice(None)) -> None:
         """Set cargo; None = carrying nothing."""
         self.set("carrying", 0.0 if object_row is None else 1.0, robots)
-        self.set("cargo", 0.0 if object_row is None else (object_row + 1) / self.task.n_objects, robots)
+        self.set("cargo", 0.0 if object_row is None else (object_row + 1) / self.spec.n_objects, robots)
 
     def event(
         self, event: Event, robots: Any = slice(None), object_row: int | None = None, cache: Cache | None = None
     ) -> None:
         """Set what happened in the last step, and what it was about."""
         self.set("event", int(event) / EVENT_SCALE, robots)
-        self.set("event_object", 0.0 if object_row is None else (object_row + 1) / self.task.n_objects, robots)
+        self.set("event_object", 0.0 if object_row is None else (object_row + 1) / self.spec.n_objects, robots)
         self.set("event_cache", 0.0 if cache is None else self._cache_fields(cache), robots)
 
     def caches(self, *visible: Cache, robots: Any = slice(None)) -> None:
@@ -125,11 +125,11 @@ class Observations:
     def _cache_fields(self, cache: Cache) -> tuple[float, ...]:
         serial, (x, y), count = cache
         share = self._share((x + 0.5) * CELL_M, (y + 0.5) * CELL_M)
-        return serial / SERIAL_SCALE, *share, count / self.task.n_objects
+        return serial / SERIAL_SCALE, *share, count / self.spec.n_objects
 
     def window(self, objects: dict[tuple[int, int], int], robots: Any = slice(None)) -> None:
         """Show objects: offset in cells from the robot's own cell, -2 .. 2 each -> object row."""
         view = np.zeros((5, 5))
         for (dx, dy), object_row in objects.items():
-            view[dy + 2, dx + 2] = (object_row + 1) / self.task.n_objects
+            view[dy + 2, dx + 2] = (object_row + 1) / self.spec.n_objects
         self.set("los_object", view.ravel(), robots)

@@ -12,17 +12,17 @@ from baselines.task_policy import TaskPolicy
 from baselines.tasks import ROOTED_TAB, TAB_CHILDREN
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.layout import SERIAL_SCALE
-from tests.support.observations import Observations, make_task
+from tests.support.observations import Observations, make_spec
 
 
 class TaskRobot:
     """A single robot that faces +x at (10.1, 10.1), in the 32 x 16 m warehouse with caches of 6.2 m."""
 
     def __init__(self, policy: TaskPolicy | None = None, **changes: Any) -> None:
-        self.seen = Observations(make_task(**{"caches": "dynamic", **changes}))
+        self.seen = Observations(make_spec(**{"caches": "dynamic", **changes}))
         self.seen.pose(10.1, 10.1)
         self.policy = policy or STOCHXPolicy()
-        self.policy.reset(self.seen.task, np.random.default_rng(5))
+        self.policy.reset(self.seen.spec, np.random.default_rng(5))
 
     def act(self, ticks: int = 1, active: bool = True) -> np.ndarray:
         """Act on the current observation; returns the last action."""
@@ -90,7 +90,7 @@ class TaskRobot:
 
     def know_cache(self, serial: int, cell: tuple[int, int], count: int) -> None:
         """Put a cache into memory."""
-        width_m, height_m = self.seen.task.arena_size_m
+        width_m, height_m = self.seen.spec.arena_size_m
         x, y = (cell[0] + 0.5) * 0.2, (cell[1] + 0.5) * 0.2
-        fields = [serial / SERIAL_SCALE, 2 * x / width_m - 1, 2 * y / height_m - 1, count / self.seen.task.n_objects]
+        fields = [serial / SERIAL_SCALE, 2 * x / width_m - 1, 2 * y / height_m - 1, count / self.seen.spec.n_objects]
         remember_cache(self.record, self.memory, np.array(fields, np.float32), self.constants)

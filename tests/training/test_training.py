@@ -245,8 +245,8 @@ def test_checkpoints_run_as_they_were_trained(tmp_path, algorithm):
     policy = load_policy(tmp_path / "model.zip")
     assert policy.caches == "static"
     env = parallel_env("warehouse_small", n_robots=4, n_objects=20)
-    interface = LearnerInterface(driven if algorithm == "sac" else NUMBERED, env.task)
-    policy.reset(env.task, np.random.default_rng(0))
+    interface = LearnerInterface(driven if algorithm == "sac" else NUMBERED, env.swarm_spec)
+    policy.reset(env.swarm_spec, np.random.default_rng(0))
     obs = env.reset_batch(0)
     for tick in range(12):
         if tick % interface.config.decision_ticks == 0:

@@ -7,14 +7,14 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
-from swarm_forage_env.views.learner_arena import WorldPlan, plan_world
+from swarm_forage_env.views.learner_arena import ArenaPlan, plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support import lives
 
 
-def plan(interface: InterfaceConfig | None = None, **overrides) -> WorldPlan:
+def plan(interface: InterfaceConfig | None = None, **overrides) -> ArenaPlan:
     options = {**lives.WORLD, **overrides}
-    return plan_world(options.pop("scenario"), options, interface=interface, max_cycles=options.pop("max_cycles"))
+    return plan_arena(options.pop("scenario"), options, interface=interface, max_cycles=options.pop("max_cycles"))
 
 
 def told_story(batch: ArenaBatch, arena: int) -> list[ArenaStep]:
@@ -84,7 +84,7 @@ def test_the_arena_ends_with_its_last_robot():
 
 
 def test_deaths_of_the_population_wrapper_end_rows_once_per_run():
-    wrapped = WorldPlan(
+    wrapped = ArenaPlan(
         scenario=scenario("warehouse_small", n_robots=6, n_objects=4),
         max_cycles=60,
         wrappers=(parse_wrapper("population:death_per_tick=0.05"),),
@@ -113,7 +113,7 @@ def test_an_action_is_kept_for_the_ticks_of_a_decision_and_rewards_add_up():
     actions = np.zeros((3, 3), np.float32)
     step = batch.step(actions)
     assert step.rewards.tolist() == [3.0, 3.0, 3.0]
-    assert batch.worlds[0].base.tick == 3
+    assert batch.arenas[0].base.tick == 3
     last = batch.step(actions)
     assert last.rewards.tolist() == [2.0, 2.0, 2.0], "the horizon of 5 ticks cuts the second decision short"
     assert last.truncated.all()
@@ -136,12 +136,12 @@ def test_seeds_decide_everything_and_runs_continue_their_sequence():
 def test_a_reset_changes_the_scenario_for_all_later_runs_until_told_otherwise():
     batch = ArenaBatch(plan(InterfaceConfig(observation="compact")), 2)
     batch.reset([0, 1], [{"scenario": {"n_objects": 9, "width_m": 24.0}}, None])
-    assert [world.base.scenario.objects.n_objects for world in batch.worlds] == [9, 4]
+    assert [world.forage_env.scenario.objects.n_objects for world in batch.arenas] == [9, 4]
     for _ in range(lives.HORIZON_TICKS):
         batch.step(np.zeros((6, 3), np.float32))
-    assert [world.base.scenario.arena.width_m for world in batch.worlds] == [24.0, 32.0]
+    assert [world.forage_env.scenario.arena.width_m for world in batch.arenas] == [24.0, 32.0]
     batch.reset([0, 1], [{"scenario": {}}, None])
-    assert [world.base.scenario.objects.n_objects for world in batch.worlds] == [4, 4]
+    assert [world.forage_env.scenario.objects.n_objects for world in batch.arenas] == [4, 4]
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
 def test_options_of_others_are_left_to_them():
     batch = ArenaBatch(plan(), 1)
     batch.reset([0], [{"reset_mask": np.ones(1, bool), "low": -1, "high": 1, 3: "three", "record": True}])
-    assert batch.worlds[0].base.scenario.objects.n_objects == 4
+    assert batch.arenas[0].base.scenario.objects.n_objects == 4
 
 
 def test_closed_arenas_take_no_reset_and_no_step():
@@ -223,7 +223,7 @@ def test_actions_that_are_not_finite_are_refused_by_name(interface):
     assert "the world was not stepped" in str(refusal.value)
     (note,) = refusal.value.__notes__
     assert "in arena 5: its world was not stepped" in note
-    assert [world.base.tick for world in batch.worlds] == [1, 0], "worlds of other arenas may have been"
+    assert [world.forage_env.tick for world in batch.arenas] == [1, 0], "worlds of other arenas may have been"
     batch.reset([0, 1], [None, None])
     assert batch.step(np.zeros_like(actions)).obs.shape[0] == 6
 
@@ -249,7 +249,7 @@ def test_small_rewards_of_long_runs_add_up():
 
 
 def test_attributes_are_set_where_they_are_also_below_wrappers():
-    wrapped = WorldPlan(
+    wrapped = ArenaPlan(
         scenario=scenario("warehouse_small", n_robots=3, n_objects=4),
         max_cycles=9,
         wrappers=(parse_wrapper("sensor_noise:sigma=0.01"), parse_wrapper("actuator_noise:sigma=0.01")),
@@ -257,5 +257,5 @@ def test_attributes_are_set_where_they_are_also_below_wrappers():
     batch = ArenaBatch(wrapped, 1)
     batch.reset([0], [None])
     batch.set_attribute("max_cycles", 1, [0])
-    assert batch.worlds[0].base.max_cycles == 1
+    assert batch.arenas[0].base.max_cycles == 1
     assert batch.step(np.zeros((3, 3), np.float32)).truncated.all()

@@ -23,9 +23,9 @@ def test_passes_the_checker_of_gymnasium(name):
 def test_is_made_by_its_id(name):
     env = gymnasium.make(f"swarm_forage/{name}-v0", max_cycles=2)
     obs, info = env.reset(seed=1)
-    n_robots = env.unwrapped.world.scenario.robots.n_robots
-    assert env.unwrapped.world.scenario.name == name
-    assert obs.shape == env.observation_space.shape == (n_robots, env.unwrapped.world.layout.size)
+    n_robots = env.unwrapped.forage_env.scenario.robots.n_robots
+    assert env.unwrapped.forage_env.scenario.name == name
+    assert obs.shape == env.observation_space.shape == (n_robots, env.unwrapped.forage_env.layout.size)
     assert info["active"].shape == (n_robots,)
     assert not env.step(env.action_space.sample())[3]
     assert env.step(env.action_space.sample())[3]
@@ -59,10 +59,10 @@ def test_terminates_only_when_every_robot_is_dead():
     env.reset(seed=0)
     idle = np.zeros((3, 3), np.float32)
     alive = np.array([False, False, True])
-    env.world.set_population(active=alive, present=alive, terminated=~alive)
+    env.forage_env.set_population(active=alive, present=alive, terminated=~alive)
     assert not env.step(idle)[2]
     nobody = np.zeros(3, np.bool_)
-    env.world.set_population(active=nobody, present=nobody, terminated=~nobody)
+    env.forage_env.set_population(active=nobody, present=nobody, terminated=~nobody)
     assert env.step(idle)[2]
 
 
@@ -92,7 +92,7 @@ def test_an_interface_decides_what_is_seen_and_done():
 
 def test_without_an_interface_the_spaces_are_those_of_the_parallel_environment():
     env = JointForageEnv(n_robots=4)
-    assert env.observation_space == spaces.Box(-1.0, 1.0, (4, env.world.layout.size), np.float32)
+    assert env.observation_space == spaces.Box(-1.0, 1.0, (4, env.forage_env.layout.size), np.float32)
     assert env.action_space == spaces.Box(-1.0, 1.0, (4, 3), np.float32)
     assert env.reset(seed=0)[1].keys() == {"active"}
 
@@ -117,14 +117,14 @@ def test_an_interface_shows_the_rows_of_the_vector_view_and_sums_their_rewards(i
         obs, reward, _, truncated, info = joint.step(action)
         assert reward == pytest.approx(rewards.sum())
         total += reward
-    assert joint.world.tick == 20
+    assert joint.forage_env.tick == 20
     assert total >= 20 * 4 * 0.01 * (1 - 1e-6), "0.01 per robot and tick, also of the decision cut short"
 
 
 def test_a_curriculum_keeps_the_interface():
     env = JointForageEnv(n_robots=4, interface={"observation": "compact"})
     obs, _ = env.reset(seed=0, options={"scenario": {"width_m": 24.0}})
-    assert env.world.scenario.arena.width_m == 24.0
+    assert env.forage_env.scenario.arena.width_m == 24.0
     assert env.interface.layout.part("position").scale[0] == 12.0
     assert env.observation_space.contains(obs)
 

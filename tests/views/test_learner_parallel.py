@@ -9,7 +9,7 @@ from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.views.arenas import ArenaBatch
-from swarm_forage_env.views.learner_arena import WorldPlan
+from swarm_forage_env.views.learner_arena import ArenaPlan
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.wrappers.noise import SensorNoise
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -41,7 +41,7 @@ def test_shows_the_same_as_the_rows_of_an_arena(interface):
     world = scenario("warehouse_small", n_robots=6, n_objects=40, width_m=12.0, nest_centre_m=(1.2, 8.0),
                      nest_size_m=(1.2, 12.8), tick=0.01)  # fmt: skip
     env = ParallelLearnerEnv(world, interface=interface, wrappers=wrappers, max_cycles=100)
-    batch = ArenaBatch(WorldPlan(scenario=world, wrappers=wrappers, max_cycles=100, interface=interface), 1)
+    batch = ArenaBatch(ArenaPlan(scenario=world, wrappers=wrappers, max_cycles=100, interface=interface), 1)
     observations, infos = env.reset(seed=2)
     rows, _ = batch.reset([2], [None])
     n_deaths = 0
@@ -70,10 +70,10 @@ def test_shows_the_same_as_the_rows_of_an_arena(interface):
 def test_a_reset_can_change_the_scenario():
     env = ParallelLearnerEnv("warehouse_small", n_robots=3, interface=INTERFACES["numbered"])
     env.reset(seed=0, options={"scenario": {"caches": "dynamic", "width_m": 24.0}})
-    assert env.world.scenario.caches == "dynamic"
+    assert env.forage_env.scenario.caches == "dynamic"
     assert env.state_space.contains(env.state())
     env.reset()
-    assert env.world.scenario.arena.width_m == 24.0
+    assert env.forage_env.scenario.arena.width_m == 24.0
 
 
 def test_actions_are_asked_of_everybody():

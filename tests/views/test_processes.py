@@ -9,14 +9,14 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from swarm_forage_env.views import processes
 
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.views import processes
 from swarm_forage_env.views.arenas import ArenaBatch
-from swarm_forage_env.views.learner_arena import WorldPlan
+from swarm_forage_env.views.learner_arena import ArenaPlan
 from swarm_forage_env.views.processes import ArenaProcessError, ArenaProcesses, open_arenas
 
-PLAN = WorldPlan(scenario=scenario("warehouse_small", n_robots=3, n_objects=4), max_cycles=50)
+PLAN = ArenaPlan(scenario=scenario("warehouse_small", n_robots=3, n_objects=4), max_cycles=50)
 IDLE = np.zeros((6, 3), np.float32)
 
 

@@ -192,7 +192,7 @@ def test_the_horizon_truncates():
     env = ForageEnv(scenario("warehouse_small", n_robots=4), max_cycles=3)
     env.reset_batch(0)
     assert [env.step_batch(STRAIGHT)[3] for _ in range(4)] == [False, False, True, True]
-    assert env.task.horizon_s == pytest.approx(0.6)
+    assert env.swarm_spec.horizon_s == pytest.approx(0.6)
 
 
 # Global state
@@ -225,7 +225,7 @@ def test_state_shows_robots_and_objects():
 def test_policies_are_told_the_constants_of_the_world(name, caches):
     config = scenario(name, caches=caches)
     env = ForageEnv(config)
-    task = env.task
+    task = env.swarm_spec
     assert (task.n_robots, task.n_objects) == (config.robots.n_robots, config.objects.n_objects)
     assert (task.dt_s, task.horizon_s) == (0.2, 10_000.0)
     assert (task.max_speed_mps, task.max_wheel_difference_mps, task.wheel_scale_mps) == (0.10, 0.20, 0.20)

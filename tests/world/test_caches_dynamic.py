@@ -1,4 +1,4 @@
-"""Dynamic caches: which objects a FOUND drop gathers, where the cache comes to stand, when there is none."""
+"""Dynamic caches: which objects a CREATE_CACHE drop gathers, where the cache comes to stand, when there is none."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.regions import overlap_cells
-from swarm_forage_env.world.caches import MAX_PASSES, cache_box, clear_centre, founding_members, protected_boxes
+from swarm_forage_env.world.caches import MAX_PASSES, cache_box, cache_members, clear_centre, protected_boxes
 from tests.support.stage import act, assert_conserved, build_cache, clear, depot, lay, load, stand, tidy_world
 
 MIDDLE = (70, 40)
@@ -18,7 +18,7 @@ MIDDLE = (70, 40)
 STRIP_CELL = (125, 60)
 
 
-def found_at(env: ForageEnv, cell: tuple[int, int], row: int = 0, grip: float = Grip.FOUND) -> list[int]:
+def found_at(env: ForageEnv, cell: tuple[int, int], row: int = 0, grip: float = Grip.CREATE_CACHE) -> list[int]:
     """Robot 0 founds with an object at a cell; returns the slots of the caches that stand afterwards."""
     stand(env, 0, cell)
     load(env, 0, row)
@@ -86,7 +86,7 @@ def test_distances_are_compared_in_whole_cells():
     clear(env)
     for row, cell in ((0, (100, 100)), (1, (148, 164)), (2, (149, 164))):
         lay(env, row, cell)
-    assert founding_members(0, config, env.objects, []).tolist() == [0, 1]
+    assert cache_members(0, config, env.objects, []).tolist() == [0, 1]
 
 
 def test_objects_on_the_square_join_although_they_are_far_or_alone():
@@ -120,8 +120,8 @@ def test_clusters_are_protected():
     row = int(np.flatnonzero(env.objects.status == ObjectStatus.FREE)[0])
     protected = protected_boxes(env.scenario, env.arena._source)
     assert len(protected) == 23
-    assert founding_members(row, env.scenario, env.objects, protected).size == 0
-    assert founding_members(row, env.scenario, env.objects, []).size >= 2
+    assert cache_members(row, env.scenario, env.objects, protected).size == 0
+    assert cache_members(row, env.scenario, env.objects, []).size >= 2
 
 
 def test_random_placement_protects_nothing():
@@ -163,7 +163,7 @@ def test_a_second_cache_stands_clear_of_the_first():
             stand(env, row // 2, cell)
             load(env, row // 2, row)
     for _ in range(2):
-        act(env, {0: Grip.FOUND, 1: Grip.FOUND})
+        act(env, {0: Grip.CREATE_CACHE, 1: Grip.CREATE_CACHE})
     assert env.caches.alive.sum() == 2
     assert_conserved(env)  # no two squares overlap
 
@@ -174,7 +174,7 @@ def test_two_founders_of_one_group_make_one_cache():
         stand(env, robot, cell)
         load(env, robot, robot)
     for _ in range(2):
-        events = act(env, {0: Grip.FOUND, 1: Grip.FOUND})
+        events = act(env, {0: Grip.CREATE_CACHE, 1: Grip.CREATE_CACHE})
     assert events == [Event.DROPPED, Event.DROPPED]
     (slot,) = np.flatnonzero(env.caches.alive).tolist()
     assert contents(env, slot) == [0, 1]
@@ -187,8 +187,8 @@ def test_a_found_drop_without_a_free_cell_founds_nothing():
     lay(env, 2, (MIDDLE[0] + 1, MIDDLE[1]))
     stand(env, 0, MIDDLE)
     load(env, 0, 0)
-    act(env, {0: Grip.FOUND})
-    assert act(env, {0: Grip.FOUND})[0] == Event.DROPPED_ELSEWHERE
+    act(env, {0: Grip.CREATE_CACHE})
+    assert act(env, {0: Grip.CREATE_CACHE})[0] == Event.DROPPED_ELSEWHERE
     assert not env.caches.alive.any()
 
 

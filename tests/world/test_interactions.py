@@ -33,7 +33,7 @@ from tests.support.stage import (
 NONE, PICKED_UP, PICKED_FROM_CACHE = Event.NONE, Event.PICKED_UP, Event.PICKED_FROM_CACHE
 DELIVERED, DROPPED, ELSEWHERE, JOINED = Event.DELIVERED, Event.DROPPED, Event.DROPPED_ELSEWHERE, Event.JOINED_CACHE
 NOTHING_HERE, TOO_NEAR = Event.NOTHING_HERE, Event.CACHE_TOO_NEAR
-ANY_RELEASE = (Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.FOUND)
+ANY_RELEASE = (Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.CREATE_CACHE)
 
 
 @pytest.mark.parametrize(
@@ -188,7 +188,7 @@ def test_deliver_acts_nowhere_else(caches):
     assert env.swarm.carried_object[0] == 4
 
 
-@pytest.mark.parametrize("grip", [Grip.SITE, Grip.FOUND])
+@pytest.mark.parametrize("grip", [Grip.SITE, Grip.CREATE_CACHE])
 def test_site_and_found_take_a_tick_in_dynamic_worlds(grip):
     env = tidy_world(caches="dynamic")
     stand(env, 0, OPEN_CELL)
@@ -200,7 +200,7 @@ def test_site_and_found_take_a_tick_in_dynamic_worlds(grip):
 
 
 @pytest.mark.parametrize("caches", ["none", "static"])
-@pytest.mark.parametrize("grip", [Grip.SITE, Grip.FOUND])
+@pytest.mark.parametrize("grip", [Grip.SITE, Grip.CREATE_CACHE])
 def test_site_and_found_are_release_in_other_worlds(grip, caches):
     env = tidy_world(caches=caches)
     stand(env, 0, OPEN_CELL)
@@ -210,7 +210,7 @@ def test_site_and_found_are_release_in_other_worlds(grip, caches):
     assert not env.caches.alive.any()
 
 
-@pytest.mark.parametrize("grip", [Grip.SITE, Grip.FOUND])
+@pytest.mark.parametrize("grip", [Grip.SITE, Grip.CREATE_CACHE])
 def test_site_and_found_are_refused_near_a_cache(grip):
     env = tidy_world(caches="dynamic")
     near, far = build_cache(env, [0, 1], CORNER_CACHE), build_cache(env, [2, 3], (40, 60))
@@ -237,7 +237,7 @@ def test_release_near_a_cache_is_never_refused():
     ("place", "why"),
     [(OPEN_CELL, "another object lies there"), (WALL_CELL, "no object may lie there")],
 )
-@pytest.mark.parametrize(("grip", "ticks"), [(Grip.RELEASE, 1), (Grip.SITE, 2), (Grip.FOUND, 2)])
+@pytest.mark.parametrize(("grip", "ticks"), [(Grip.RELEASE, 1), (Grip.SITE, 2), (Grip.CREATE_CACHE, 2)])
 def test_drops_without_a_free_cell_are_placed_elsewhere(grip, ticks, place, why):
     env = tidy_world(caches="dynamic")
     if place == OPEN_CELL:

@@ -29,7 +29,7 @@ KINDS = {
     kernel.DELIVER: "deliver",
     kernel.CACHE_DROP: "drop into cache",
     kernel.SITE_DROP: interacting.SITE,
-    kernel.FOUND_DROP: interacting.FOUND,
+    kernel.CREATE_DROP: interacting.FOUND,
     kernel.FLOOR_PICKUP: "take from floor",
     kernel.CACHE_PICKUP: "take from cache",
 }
@@ -92,7 +92,7 @@ def assert_same(env: ForageEnv, expected: SlowWorld) -> None:
     assert set(np.flatnonzero(env.events.first_picked).tolist()) == expected.first_picked
     interactions = env.arena._interactions
     assert interactions.displaced().tolist() == expected.displaced
-    assert interactions.founded().tolist() == expected.founded
+    assert interactions.creators().tolist() == expected.creators
 
 
 def shuffle(env: ForageEnv, rng: np.random.Generator, grips: np.ndarray) -> None:

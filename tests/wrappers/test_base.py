@@ -11,7 +11,7 @@ from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.wrappers.base import STACK_ORDER, SwarmWrapper
 from swarm_forage_env.wrappers.recorder import RunRecorder
-from tests.support.fake_arena import FakeWorld, small_scenario
+from tests.support.fake_arena import FakeArena, small_scenario
 
 
 def wrapper_at(position: int) -> type[SwarmWrapper]:
@@ -49,7 +49,7 @@ class Logging(SwarmWrapper):
 @pytest.fixture
 def stack():
     Logging.log = []
-    world = FakeWorld()
+    world = FakeArena()
     inner = type("Inner", (Logging,), {"stack_position": 4})(world, "inner", 0.5)
     return type("Outer", (Logging,), {"stack_position": 3})(inner, "outer", 0.25)
 
@@ -83,7 +83,7 @@ def test_actions_of_a_wrong_shape_are_refused_before_any_hook(stack, actions):
     with pytest.raises(ActionError, match=r"\(n_robots, 3\) = \(4, 3\)"):
         stack.step_batch(actions)
     assert Logging.log == []
-    assert stack.world.calls == []
+    assert stack.unwrapped.calls == []
 
 
 def test_a_reset_without_seed_hands_on_the_seed_that_was_drawn(stack):
@@ -97,7 +97,7 @@ def test_gains_multiply_and_tasks_pass_through(stack):
     obs, reward, terminated, truncated = stack.step_batch(
         np.zeros((4, 3), np.float32), wheel_gain=np.full((4, 2), 2.0), tasks=tasks
     )
-    call = stack.world.calls[-1]
+    call = stack.unwrapped.calls[-1]
     np.testing.assert_allclose(call["wheel_gain"], 2.0 * 0.5 * 0.25)
     assert call["tasks"] is tasks
     np.testing.assert_allclose(obs, 0.01 + 0.5 + 0.25)
@@ -107,18 +107,18 @@ def test_gains_multiply_and_tasks_pass_through(stack):
 
 
 def test_without_overrides_a_wrapper_changes_nothing():
-    wrapped = wrapper_at(2)(FakeWorld())
-    np.testing.assert_array_equal(wrapped.reset_batch(1), FakeWorld().reset_batch(1))
+    wrapped = wrapper_at(2)(FakeArena())
+    np.testing.assert_array_equal(wrapped.reset_batch(1), FakeArena().reset_batch(1))
     wrapped.step_batch(np.zeros((4, 3), np.float32))
-    assert wrapped.world.calls == [{"wheel_gain": None, "tasks": None}]
+    assert wrapped.unwrapped.calls == [{"wheel_gain": None, "tasks": None}]
     assert wrapped.interval_columns() == {}
 
 
 @pytest.mark.parametrize(("outer", "inner"), list(itertools.product(range(5), repeat=2)))
 def test_only_the_documented_order_can_be_stacked(outer, inner):
-    base = wrapper_at(inner)(FakeWorld())
+    base = wrapper_at(inner)(FakeArena())
     if outer < inner:
-        assert wrapper_at(outer)(base).world is base.world
+        assert wrapper_at(outer)(base).unwrapped is base.unwrapped
     else:
         with pytest.raises(ValueError, match=", ".join(STACK_ORDER)):
             wrapper_at(outer)(base)
@@ -127,10 +127,10 @@ def test_only_the_documented_order_can_be_stacked(outer, inner):
 def test_the_recorder_is_outermost():
     assert STACK_ORDER[RunRecorder.stack_position] == "RunRecorder"
     with pytest.raises(ValueError, match="RunRecorder not inside of Throttle"):
-        wrapper_at(3)(RunRecorder(FakeWorld()))
+        wrapper_at(3)(RunRecorder(FakeArena()))
 
 
-@pytest.mark.parametrize("foreign", [BaseParallelWrapper(FakeWorld()), object()], ids=["foreign wrapper", "no env"])
+@pytest.mark.parametrize("foreign", [BaseParallelWrapper(FakeArena()), object()], ids=["foreign wrapper", "no env"])
 def test_a_foreign_layer_in_between_is_refused(foreign):
     with pytest.raises(TypeError, match="outside of the swarm wrappers"):
         wrapper_at(1)(foreign)
@@ -143,7 +143,7 @@ def test_dict_api_packs_once_steps_the_stack_and_unpacks_once(stack):
     actions = {agent: np.zeros(3, np.float32) for agent in stack.agents}
     observations, rewards, terminations, truncations, infos = stack.step(actions)
     assert len([entry for entry in Logging.log if entry[1] == "after_step"]) == 2
-    assert len(stack.world.calls) == 1
+    assert len(stack.unwrapped.calls) == 1
     np.testing.assert_allclose(observations["robot_2"], 0.01 + 0.5 + 0.25)
     for table in (observations, rewards, terminations, truncations, infos):
         assert list(table) == ["robot_0", "robot_1", "robot_2", "robot_3"]

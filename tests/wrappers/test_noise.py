@@ -21,7 +21,7 @@ from swarm_forage_env.wrappers.noise import (
 )
 from swarm_forage_env.wrappers.waveform import Waveform
 from tests.reference.adversity import by_group, noisy_row
-from tests.support.fake_arena import FakeWorld
+from tests.support.fake_arena import FakeArena
 from tests.support.stage import assert_same_world, snapshot, tidy_world
 
 ROBOTS = 200
@@ -177,7 +177,7 @@ def test_the_world_and_its_rules_use_the_truth():
         bare.step_batch(row)
         wrapped.step_batch(row)
     assert bare.events.interference_sum[0] > 0
-    assert_same_world(snapshot(bare), snapshot(wrapped.world))
+    assert_same_world(snapshot(bare), snapshot(wrapped.unwrapped))
 
 
 # Random streams
@@ -234,7 +234,7 @@ def test_a_run_has_noise_of_its_own(world):
 def test_sigma_may_follow_a_waveform():
     """Noise between 1 s and 2 s only: the observation after tick t has the noise of tick t."""
     pulse = Waveform(kind="table", times_s=(0.8, 1.0, 2.0, 2.2), values=(0.0, 0.1, 0.1, 0.0))
-    clean, waved, steady = FakeWorld(), FakeWorld(), FakeWorld()
+    clean, waved, steady = FakeArena(), FakeArena(), FakeArena()
     stacks = [
         SensorNoiseConfig(sigma=sigma, groups=("light",)).wrap(env)
         for sigma, env in ((0.0, clean), (pulse, waved), (0.1, steady))
@@ -324,7 +324,7 @@ def test_normal_draws_are_normal():
 
 def actuator_gains(n_steps: int, *, wheel_gain=None, seed: int = 0, **fields) -> np.ndarray:
     """Gains (steps, N, 2) that reach the world."""
-    env = FakeWorld(scenario("warehouse_medium", n_robots=ROBOTS, n_objects=50))
+    env = FakeArena(scenario("warehouse_medium", n_robots=ROBOTS, n_objects=50))
     stack = ActuatorNoiseConfig(**fields).wrap(env)
     stack.reset_batch(seed)
     gains = []
@@ -377,7 +377,7 @@ def test_wheel_noise_never_leaves_the_space_of_observations():
 
 def test_without_actuator_noise_gains_pass_untouched():
     outer = np.ones((4, 2))
-    env = FakeWorld()
+    env = FakeArena()
     stack = ActuatorNoiseConfig(sigma=0.0).wrap(env)
     stack.reset_batch(0)
     stack.step_batch(np.zeros((4, 3), np.float32), wheel_gain=outer)

@@ -28,7 +28,7 @@ def at_hand(env: ForageEnv, *, deaths: str = "terminate", **fields) -> Populatio
 
 
 def make_due(stack: PopulationDynamics, process: str) -> None:
-    getattr(stack._clocks, process).next_tick = stack._next_tick = stack.world.tick + 1
+    getattr(stack._clocks, process).next_tick = stack._next_tick = stack.unwrapped.tick + 1
 
 
 def hold(env: ForageEnv, wheels: float = 0.0, grip: float = Grip.GRASP) -> np.ndarray:
@@ -40,7 +40,7 @@ def hold(env: ForageEnv, wheels: float = 0.0, grip: float = Grip.GRASP) -> np.nd
 def strike(stack: PopulationDynamics, process: str, actions: np.ndarray | None = None):
     """Make one event due and step; returns what the step returns."""
     make_due(stack, process)
-    return stack.step_batch(hold(stack.world) if actions is None else actions)
+    return stack.step_batch(hold(stack.unwrapped) if actions is None else actions)
 
 
 # Repair
@@ -55,7 +55,7 @@ def lone_carrier():
 
 
 def test_a_robot_in_repair_stops_but_stays(lone_carrier):
-    env = lone_carrier.world
+    env = lone_carrier.unwrapped
     lone_carrier.step_batch(hold(env, 0.5))
     where = env.swarm.position.copy()
     obs, _, terminated, _ = strike(lone_carrier, "malfunction", hold(env, 0.5))
@@ -202,7 +202,7 @@ def test_both_ways_of_death_are_the_same_world_and_record(lives_on):
         while not recorder.complete:
             actions = rng.uniform(-1, 1, (6, 3)).astype(np.float32)
             obs.append(recorder.step_batch(actions)[0].copy())
-        results.append((np.stack(obs), snapshot(recorder.world), recorder.columns() | recorder.contributed()))
+        results.append((np.stack(obs), snapshot(recorder.unwrapped), recorder.columns() | recorder.contributed()))
     (obs, world, record), (other_obs, other_world, other_record) = results
     np.testing.assert_array_equal(obs, other_obs)
     assert_same_world(world, other_world)
@@ -224,7 +224,7 @@ def nursery(n_robots: int = 6, *, initial_robots: int = 2, **fields) -> Populati
 
 def test_the_unborn_are_agents_without_a_body_from_the_reset_on():
     stack = nursery()
-    env = stack.world
+    env = stack.unwrapped
     observations, infos = stack.reset(seed=3)
     assert stack.agents == env.possible_agents
     unborn = [f"robot_{row}" for row in range(2, 6)]
@@ -249,7 +249,7 @@ def test_nobody_sees_the_unborn_at_reset():
 
 def test_births_bring_working_robots_at_free_places():
     stack = nursery(n_robots=40, initial_robots=1)
-    env = stack.world
+    env = stack.unwrapped
     stack.reset_batch(1)
     for born in range(1, 40):
         obs, *_ = strike(stack, "birth", hold(env))
@@ -273,7 +273,7 @@ def test_births_bring_working_robots_at_free_places():
 
 def test_a_birth_waits_until_there_is_a_place():
     stack = nursery()
-    env = stack.world
+    env = stack.unwrapped
     stack.reset_batch(0)
     stack._body_m = 100.0
     make_due(stack, "birth")
@@ -289,8 +289,8 @@ def test_nobody_is_born_while_enough_are_here():
     stack = nursery(max_robots=3)
     stack.reset_batch(0)
     for _ in range(3):
-        strike(stack, "birth", hold(stack.world))
-    assert stack.world.swarm.present.sum() == 3
+        strike(stack, "birth", hold(stack.unwrapped))
+    assert stack.unwrapped.swarm.present.sum() == 3
 
 
 @pytest.mark.parametrize(("start_margin_m", "nearest_m"), [(1.0, 1.0), (2.5, 2.0)])
@@ -300,7 +300,7 @@ def test_births_are_as_near_to_the_border_as_starts_but_no_farther_than_two_metr
     stack.reset_batch(0)
     rng = np.random.default_rng(0)
     assert all(stack._find_place(row, rng) for row in range(1, 200))
-    x, y = stack.world.swarm.position[1:].T
+    x, y = stack.unwrapped.swarm.position[1:].T
     for distance in (x.min(), y.min(), 32.0 - x.max(), 16.0 - y.max()):
         assert nearest_m <= distance < nearest_m + 0.4
 
@@ -319,8 +319,8 @@ def test_a_run_has_the_events_of_its_simulation():
         expected = simulate_population(population.rates, 20, 250, seed, initial_robots=10)
         n_active = []
         for _ in range(250):
-            stack.step_batch(hold(stack.world))
-            n_active.append(np.count_nonzero(stack.world.active))
+            stack.step_batch(hold(stack.unwrapped))
+            n_active.append(np.count_nonzero(stack.unwrapped.active))
         np.testing.assert_array_equal(n_active, expected.n_active)
 
 
@@ -332,7 +332,7 @@ def test_events_queue_and_times_are_recorded():
     recorder = RunRecorder(population.wrap(ForageEnv(config)))
     recorder.reset_batch(2)
     while not recorder.complete:
-        recorder.step_batch(hold(recorder.world))
+        recorder.step_batch(hold(recorder.unwrapped))
     record = recorder.columns() | recorder.contributed()
     tally = simulate_population(population.rates, 12, 300, 2, initial_robots=8).tally
     for name in ("deaths", "births", "malfunctions", "repairs"):
@@ -350,7 +350,7 @@ def test_times_at_work_are_means_over_the_stays_that_ended():
     recorder = RunRecorder(population.wrap(ForageEnv(config)))
     recorder.reset_batch(2)
     while not recorder.complete:
-        recorder.step_batch(hold(recorder.world))
+        recorder.step_batch(hold(recorder.unwrapped))
     record = recorder.contributed()
     tally = simulate_population(population.rates, 12, 300, 2).tally
     assert tally.stays == record["malfunctions"].sum() > record["repairs"].sum() > 0
@@ -363,7 +363,7 @@ def test_an_interval_in_which_nothing_ended_has_times_of_zero():
     )
     recorder.reset_batch(0)
     while not recorder.complete:
-        recorder.step_batch(hold(recorder.world))
+        recorder.step_batch(hold(recorder.unwrapped))
     assert all(not values.any() for values in recorder.contributed().values())
 
 
@@ -374,10 +374,10 @@ def test_a_run_that_was_broken_off_leaves_no_trace_in_the_next_record():
     for broken_off in (0, 7):
         recorder.reset_batch(8)
         for _ in range(broken_off):
-            recorder.step_batch(hold(recorder.world))
+            recorder.step_batch(hold(recorder.unwrapped))
         recorder.reset_batch(1)
         while not recorder.complete:
-            recorder.step_batch(hold(recorder.world))
+            recorder.step_batch(hold(recorder.unwrapped))
         records.append(recorder.contributed())
     assert records[0]["n_in_repair"].any()
     assert_same_world(*records)

@@ -12,7 +12,7 @@ from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.kernels.task_shares import add_task_shares
 from swarm_forage_env.wrappers.recorder import TICK_MEANS, TOTALS, RunRecorder
 from tests.reference.task_shares import task_shares
-from tests.support.fake_arena import FakeWorld, small_scenario
+from tests.support.fake_arena import FakeArena, small_scenario
 
 STILL = np.zeros((4, 3), np.float32)
 
@@ -30,11 +30,11 @@ class Contributor(SwarmWrapper):
     stack_position = 3
 
     def interval_columns(self):
-        return {"throttle": float(self.world.tick), "throttle_mean": self.world.tick / 2}
+        return {"throttle": float(self.unwrapped.tick), "throttle_mean": self.unwrapped.tick / 2}
 
 
 def test_totals_are_differences_and_means_are_over_ticks():
-    columns = drive(RunRecorder(FakeWorld())).columns()
+    columns = drive(RunRecorder(FakeArena())).columns()
     assert columns["collected"].tolist() == [1 + 2 + 3 + 4 + 5, 6 + 7 + 8 + 9 + 10, 11 + 12 + 13 + 14 + 15]
     assert columns["performance"].tolist() == [15.0, 40.0, 65.0]
     assert columns["objects_moved"].tolist() == [5, 5, 5]
@@ -51,17 +51,17 @@ def test_every_counter_of_the_world_is_recorded():
 
 
 def test_performance_is_what_the_scenario_declares():
-    columns = drive(RunRecorder(FakeWorld(small_scenario(performance="first_picked")))).columns()
+    columns = drive(RunRecorder(FakeArena(small_scenario(performance="first_picked")))).columns()
     assert columns["performance"].tolist() == columns["first_picked"].tolist() == [0, 0, 0]
     assert columns["collected"].sum() > 0
 
 
 def test_robots_that_are_away_lower_the_mean():
-    recorder = RunRecorder(FakeWorld())
+    recorder = RunRecorder(FakeArena())
     recorder.reset_batch(0)
     for tick in range(15):
         if tick == 8:
-            recorder.world.set_population(
+            recorder.unwrapped.set_population(
                 active=np.array([True, True, False, False]), present=np.array([True, True, True, False])
             )
         recorder.step_batch(STILL)
@@ -71,7 +71,7 @@ def test_robots_that_are_away_lower_the_mean():
 
 @pytest.mark.parametrize("further_ticks", [0, 8])
 def test_after_the_last_death_the_rest_is_zero_even_if_the_world_is_stepped_on(further_ticks):
-    world = FakeWorld(dies_at=7)
+    world = FakeArena(dies_at=7)
     recorder = drive(RunRecorder(Contributor(world)), ticks=7 + further_ticks)
     assert recorder.complete
     columns = recorder.columns()
@@ -83,7 +83,7 @@ def test_after_the_last_death_the_rest_is_zero_even_if_the_world_is_stepped_on(f
 
 
 def test_one_survivor_keeps_the_record_open():
-    world = FakeWorld(dies_at=1)
+    world = FakeArena(dies_at=1)
     recorder = RunRecorder(world)
     recorder.reset_batch(0)
     recorder.after_step(None, np.array([True, True, True, False]), False)
@@ -94,51 +94,51 @@ def test_one_survivor_keeps_the_record_open():
 
 def test_a_horizon_of_broken_intervals_is_refused():
     with pytest.raises(ConfigError, match=r"whole number of intervals of 1 s, got 2\.6 s"):
-        RunRecorder(FakeWorld(small_scenario(horizon_s=2.6)))
+        RunRecorder(FakeArena(small_scenario(horizon_s=2.6)))
     with pytest.raises(ConfigError, match=r"got 1\.4 s"):
-        RunRecorder(FakeWorld(max_cycles=7))
+        RunRecorder(FakeArena(max_cycles=7))
 
 
 def test_an_environment_with_fewer_cycles_is_recorded_to_its_own_end():
-    columns = drive(RunRecorder(FakeWorld(max_cycles=10)), ticks=10).columns()
+    columns = drive(RunRecorder(FakeArena(max_cycles=10)), ticks=10).columns()
     assert columns["collected"].tolist() == [15, 40]
 
 
 def test_an_unfinished_run_has_no_record():
-    recorder = drive(RunRecorder(FakeWorld()), ticks=14)
+    recorder = drive(RunRecorder(FakeArena()), ticks=14)
     for columns in (recorder.columns, recorder.contributed):
         with pytest.raises(RecordError, match="has not reached its horizon"):
             columns()
 
 
 def test_a_reset_starts_anew():
-    recorder = drive(RunRecorder(FakeWorld()), ticks=9)
+    recorder = drive(RunRecorder(FakeArena()), ticks=9)
     again = drive(recorder).columns()
-    for name, column in drive(RunRecorder(FakeWorld())).columns().items():
+    for name, column in drive(RunRecorder(FakeArena())).columns().items():
         np.testing.assert_array_equal(again[name], column)
 
 
 def test_a_reset_forgets_the_tasks_of_a_run_that_was_broken_off():
     tasks = np.array([1, 1, 2, 3], np.int8)
-    recorder = drive(RunRecorder(FakeWorld()), ticks=7, tasks=tasks)
+    recorder = drive(RunRecorder(FakeArena()), ticks=7, tasks=tasks)
     shares = drive(recorder, tasks=tasks).contributed()
     assert shares["task_share_generalist"].tolist() == [0.5, 0.5, 0.5]
     assert drive(recorder).contributed() == {}
 
 
 def test_other_wrappers_contribute_columns():
-    recorder = drive(RunRecorder(Contributor(FakeWorld())))
+    recorder = drive(RunRecorder(Contributor(FakeArena())))
     assert recorder.contributed()["throttle"].tolist() == [5.0, 10.0, 15.0]
     assert recorder.columns()["adversity"].tolist() == [2.5, 5.0, 7.5]
 
 
 def test_task_shares_are_means_over_ticks_of_active_robots():
-    recorder = RunRecorder(FakeWorld())
+    recorder = RunRecorder(FakeArena())
     recorder.reset_batch(0)
     tasks = np.array([Task.HARVESTER, Task.HARVESTER, Task.COLLECTOR, Task.GENERALIST], np.int8)
     for tick in range(15):
         if tick == 5:
-            recorder.world.set_population(active=np.array([True, False, True, False]), present=np.ones(4, np.bool_))
+            recorder.unwrapped.set_population(active=np.array([True, False, True, False]), present=np.ones(4, np.bool_))
         recorder.step_batch(STILL, tasks=tasks)
     shares = recorder.contributed()
     assert set(shares) == {f"task_share_{task.name.lower()}" for task in Task}
@@ -149,12 +149,12 @@ def test_task_shares_are_means_over_ticks_of_active_robots():
 
 
 def test_policies_without_tasks_leave_no_task_columns():
-    assert drive(RunRecorder(FakeWorld())).contributed() == {}
+    assert drive(RunRecorder(FakeArena())).contributed() == {}
 
 
 @pytest.mark.parametrize("tasks", [[1, 2, 3], [1, 2, 3, 8], [1, 2, -1, 0]], ids=["too few", "unknown", "negative"])
 def test_impossible_tasks_are_refused(tasks):
-    recorder = RunRecorder(FakeWorld())
+    recorder = RunRecorder(FakeArena())
     recorder.reset_batch(0)
     with pytest.raises(ValueError, match=r"shape \(n_robots,\) = \(4,\) and codes of policy.Task"):
         recorder.step_batch(STILL, tasks=np.array(tasks, np.int8))

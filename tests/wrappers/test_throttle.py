@@ -14,7 +14,7 @@ from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig, sine_th
 from swarm_forage_env.wrappers.waveform import Waveform
 from tests.reference.adversity import throttle_gain
 from tests.reference.motion import limited_wheels, steered_wheels
-from tests.support.fake_arena import FakeWorld
+from tests.support.fake_arena import FakeArena
 from tests.support.stage import lay, load, put, stand, tidy_world
 
 
@@ -24,7 +24,7 @@ def constant(amplitude: float, *, carriers: bool = False) -> ThrottleConfig:
 
 def gain_of(config: ThrottleConfig, commands, *, carrying=(), wheel_gain=None) -> np.ndarray | None:
     """The gain (N, 2) that the throttle hands inwards for wheel commands of four robots."""
-    world = FakeWorld()
+    world = FakeArena()
     stack = config.wrap(world)
     stack.reset_batch(0)
     world.swarm.carried_object[list(carrying)] = 0
@@ -161,7 +161,7 @@ def ramp(n_ticks: int) -> ThrottleConfig:
 
 
 def test_the_first_tick_is_tick_1():
-    world = FakeWorld()
+    world = FakeArena()
     stack = ramp(50).wrap(world)
     stack.reset_batch(0)
     actions = np.full((4, 3), 0.4, np.float32)
@@ -175,7 +175,7 @@ def test_the_first_tick_is_tick_1():
 @pytest.mark.parametrize("carriers", [False, True])
 def test_last_value_and_mean_are_recorded_per_interval(carriers):
     config = ThrottleConfig(waveform=ramp(50).waveform, carriers=carriers)
-    recorder = RunRecorder(config.wrap(FakeWorld()))
+    recorder = RunRecorder(config.wrap(FakeArena()))
     for seed in (0, 1):  # a second run starts afresh
         recorder.reset_batch(seed)
         while not recorder.complete:
@@ -187,7 +187,7 @@ def test_last_value_and_mean_are_recorded_per_interval(carriers):
 
 
 def test_a_run_that_was_broken_off_leaves_no_trace_in_the_next_mean():
-    recorder = RunRecorder(ramp(50).wrap(FakeWorld()))
+    recorder = RunRecorder(ramp(50).wrap(FakeArena()))
     recorder.reset_batch(0)
     for _ in range(3):
         recorder.step_batch(np.zeros((4, 3), np.float32))
@@ -199,7 +199,7 @@ def test_a_run_that_was_broken_off_leaves_no_trace_in_the_next_mean():
 
 def test_the_waveform_itself_is_recorded_where_it_is_negative():
     waveform = Waveform(kind="square", amplitude=0.5, period_s=2.0)
-    recorder = RunRecorder(ThrottleConfig(waveform=waveform).wrap(FakeWorld()))
+    recorder = RunRecorder(ThrottleConfig(waveform=waveform).wrap(FakeArena()))
     recorder.reset_batch(0)
     while not recorder.complete:
         recorder.step_batch(np.zeros((4, 3), np.float32))

@@ -11,7 +11,7 @@ RELEASE = float(Grip.RELEASE)
 DELIVER = float(Grip.DELIVER)
 N_MOTIONS = 6
 """Motions by number: stand, forward, arc left, arc right, turn left, turn right."""
-ACT_GRASP, ACT_RELEASE, ACT_DELIVER, ACT_SITE, ACT_FOUND = 6, 7, 8, 9, 10
+ACT_GRASP, ACT_RELEASE, ACT_DELIVER, ACT_SITE, ACT_CREATE_CACHE = 6, 7, 8, 9, 10
 """Numbers of the gripper actions; wheels stand meanwhile, as they would in the interaction."""
 N_GRIPS = 5
 
@@ -88,6 +88,6 @@ def mask_actions(obs: ObsArray, starts: tuple[int, int, int, int, int], dynamic_
             allowed[ACT_RELEASE] = True
             allowed[ACT_DELIVER] = in_nest or sees_cache(below)
             allowed[ACT_SITE] = dynamic_caches and not in_nest
-            allowed[ACT_FOUND] = allowed[ACT_SITE]
+            allowed[ACT_CREATE_CACHE] = allowed[ACT_SITE]
         else:
             allowed[ACT_GRASP] = busy or is_over_object(row, window) or sees_cache(below)

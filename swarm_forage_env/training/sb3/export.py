@@ -33,7 +33,7 @@ def export_network(
         model: The trained model.
         interface: What it saw and did in training, `SwarmVecEnv.interface.config`.
         samples: Draw discrete actions by their probabilities (PPO, A2C) instead of taking the likeliest.
-        caches: World that it was trained in.
+        caches: Kind of caches that it was trained with.
         card: How it came about, plain values.
 
     Raises:
@@ -68,7 +68,7 @@ def note_interface(model: BaseAlgorithm, interface: InterfaceConfig, *, caches: 
     Args:
         model: Any model of one robot, before it is saved.
         interface: What it sees and does in training, `SwarmVecEnv.interface.config`.
-        caches: World that it is trained in.
+        caches: Kind of caches that it is trained with.
 
     Raises:
         NetworkError: an interface that is not the model's.
@@ -89,7 +89,7 @@ def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
 def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
     """Refuse an interface with other observations or actions than the model has."""
     # Any world will do: all have the same columns and actions.
-    bound = LearnerInterface(interface, ForageEnv(scenario("warehouse_small", n_robots=1, n_objects=1)).task)
+    bound = LearnerInterface(interface, ForageEnv(scenario("warehouse_small", n_robots=1, n_objects=1)).swarm_spec)
     wanted, found = describe_spaces(bound), describe_spaces(model)
     if wanted != found:
         raise NetworkError(

@@ -18,7 +18,7 @@ DELIVER = 1
 CACHE_DROP = 2
 FLOOR_DROP = 3
 SITE_DROP = 4
-FOUND_DROP = 5
+CREATE_DROP = 5
 FLOOR_PICKUP = 6
 CACHE_PICKUP = 7
 NOTHING = 8
@@ -26,10 +26,10 @@ NOTHING = 8
 TOO_NEAR = 9
 """Asked for a cache site too near an existing cache."""
 
-GRASP, RELEASE, DELIVER_ONLY, SITE, FOUND = range(1, 6)
+GRASP, RELEASE, DELIVER_ONLY, SITE, CREATE_CACHE = range(1, 6)
 """Gripper bands (`policy.Grip`), from the top: g > 0, > -0.25, > -0.5, > -0.75, and below."""
 
-FREE_PICKUP_HANDLER, NEST_HANDLER, CACHE_HANDLER, SITE_HANDLER, FOUND_HANDLER = range(5)
+FREE_PICKUP_HANDLER, NEST_HANDLER, CACHE_HANDLER, SITE_HANDLER, CREATE_HANDLER = range(5)
 
 _PICKED_UP, _PICKED_FROM_CACHE, _DELIVERED = int(Event.PICKED_UP), int(Event.PICKED_FROM_CACHE), int(Event.DELIVERED)
 _DROPPED, _ELSEWHERE, _JOINED_CACHE = int(Event.DROPPED), int(Event.DROPPED_ELSEWHERE), int(Event.JOINED_CACHE)
@@ -43,8 +43,8 @@ _FLOOR_DROPS, _DISPLACED = int(Counter.FLOOR_DROPS), int(Counter.DISPLACED_DROPS
 _DEPLETED = int(Counter.CACHES_DEPLETED)
 
 
-class World(NamedTuple):
-    """The arrays that interactions read and write; fields as in `state`, letters N, M, K as there."""
+class InteractionState(NamedTuple):
+    """The arrays that interactions read and write; fields as in `world.state`, letters N, M, K as there."""
 
     position: FloatArray
     carried_object: IntArray
@@ -69,8 +69,8 @@ class World(NamedTuple):
     counters: np.ndarray
     displaced: IntArray
     """(N + 1,) object rows to re-place this tick; the last entry holds their number."""
-    founded: IntArray
-    """(N + 1,) robot rows whose FOUND drop left an object lying; the last entry holds their number."""
+    creators: IntArray
+    """(N + 1,) robot rows whose CREATE_CACHE drop left an object lying; the last entry holds their number."""
     queue: IntArray
     """(2 N,) scratch: robots with a request and what they ask."""
     handler_used: BoolArray
@@ -91,7 +91,7 @@ class Rules(NamedTuple):
     cache_half_side: int
     """(cache side in cells - 1) / 2."""
     cache_proximity_m: float
-    """SITE and FOUND are refused this close to a cache centre."""
+    """SITE and CREATE_CACHE are refused this close to a cache centre."""
     dynamic_caches: bool
     serialized: bool
     """At most one interaction per handler finishes in a tick (quirk `serialized_interactions`)."""
@@ -121,36 +121,36 @@ def clear_events(
 
 
 @kernel
-def _cell(world: World, i: int) -> tuple[int, int]:
-    ny, nx = world.floor.shape
+def _cell(state: InteractionState, i: int) -> tuple[int, int]:
+    ny, nx = state.floor.shape
     return (
-        min(nx - 1, max(0, int(world.position[i, 0] * CELLS_PER_M))),
-        min(ny - 1, max(0, int(world.position[i, 1] * CELLS_PER_M))),
+        min(nx - 1, max(0, int(state.position[i, 0] * CELLS_PER_M))),
+        min(ny - 1, max(0, int(state.position[i, 1] * CELLS_PER_M))),
     )
 
 
 @kernel
-def _floor_code(world: World, i: int) -> int:
-    x, y = _cell(world, i)
-    return world.floor[y, x]
+def _floor_code(state: InteractionState, i: int) -> int:
+    x, y = _cell(state, i)
+    return state.floor[y, x]
 
 
 @kernel
-def _in_nest(world: World, rules: Rules, i: int) -> bool:
-    x = world.position[i, 0]
-    y = world.position[i, 1]
+def _in_nest(state: InteractionState, rules: Rules, i: int) -> bool:
+    x = state.position[i, 0]
+    y = state.position[i, 1]
     return rules.nest_x_low <= x <= rules.nest_x_high and rules.nest_y_low <= y <= rules.nest_y_high
 
 
 @kernel
-def _cache_too_near(world: World, rules: Rules, i: int) -> int:
+def _cache_too_near(state: InteractionState, rules: Rules, i: int) -> int:
     """Slot of the nearest cache whose centre is within the proximity distance of robot i, or -1."""
     nearest = -1
     limit = rules.cache_proximity_m * rules.cache_proximity_m
-    for slot in range(world.cache_alive.shape[0]):
-        if world.cache_alive[slot]:
-            dx = (world.cache_cell[slot, 0] + 0.5) * 0.2 - world.position[i, 0]
-            dy = (world.cache_cell[slot, 1] + 0.5) * 0.2 - world.position[i, 1]
+    for slot in range(state.cache_alive.shape[0]):
+        if state.cache_alive[slot]:
+            dx = (state.cache_cell[slot, 0] + 0.5) * 0.2 - state.position[i, 0]
+            dy = (state.cache_cell[slot, 1] + 0.5) * 0.2 - state.position[i, 1]
             distance = dx * dx + dy * dy
             if distance <= limit:
                 nearest = slot
@@ -169,14 +169,14 @@ def band_of(grip: float) -> int:
         return DELIVER_ONLY
     if grip > -0.75:
         return SITE
-    return FOUND
+    return CREATE_CACHE
 
 
 @kernel
-def request_of(world: World, rules: Rules, band: int, i: int) -> tuple[int, int]:
+def request_of(state: InteractionState, rules: Rules, band: int, i: int) -> tuple[int, int]:
     """What robot i asks for, given where it is, and the object row or cache slot that it is about (-1 = none)."""
-    code = _floor_code(world, i)
-    if world.carried_object[i] < 0:
+    code = _floor_code(state, i)
+    if state.carried_object[i] < 0:
         if band != GRASP:
             return NO_REQUEST, -1
         if code <= CELL_CACHE:
@@ -186,7 +186,7 @@ def request_of(world: World, rules: Rules, band: int, i: int) -> tuple[int, int]
         return NOTHING, -1
     if band == GRASP:
         return NO_REQUEST, -1
-    if _in_nest(world, rules, i):
+    if _in_nest(state, rules, i):
         return DELIVER, -1
     if code <= CELL_CACHE:
         return CACHE_DROP, CELL_CACHE - code
@@ -194,161 +194,161 @@ def request_of(world: World, rules: Rules, band: int, i: int) -> tuple[int, int]
         return NOTHING, -1
     if band == RELEASE or not rules.dynamic_caches:
         return FLOOR_DROP, -1
-    near = _cache_too_near(world, rules, i)
+    near = _cache_too_near(state, rules, i)
     if near >= 0:
         return TOO_NEAR, near
-    return (SITE_DROP if band == SITE else FOUND_DROP), -1
+    return (SITE_DROP if band == SITE else CREATE_DROP), -1
 
 
 @kernel
-def _report(world: World, i: int, event: int, row: int, slot: int) -> None:
-    world.code[i] = event
-    world.event_object[i] = row
-    world.event_cache[i, :] = 0
+def _report(state: InteractionState, i: int, event: int, row: int, slot: int) -> None:
+    state.code[i] = event
+    state.event_object[i] = row
+    state.event_cache[i, :] = 0
     if slot >= 0:
-        world.event_cache[i, 0] = world.cache_serial[slot]
-        world.event_cache[i, 1] = world.cache_cell[slot, 0]
-        world.event_cache[i, 2] = world.cache_cell[slot, 1]
-        world.event_cache[i, 3] = world.cache_count[slot]
+        state.event_cache[i, 0] = state.cache_serial[slot]
+        state.event_cache[i, 1] = state.cache_cell[slot, 0]
+        state.event_cache[i, 2] = state.cache_cell[slot, 1]
+        state.event_cache[i, 3] = state.cache_count[slot]
 
 
 @kernel
-def _forget_pending(world: World, i: int) -> None:
-    world.pending_kind[i] = NO_REQUEST
-    world.pending_band[i] = 0
-    world.pending_target[i] = -1
+def _forget_pending(state: InteractionState, i: int) -> None:
+    state.pending_kind[i] = NO_REQUEST
+    state.pending_band[i] = 0
+    state.pending_target[i] = -1
 
 
 @kernel
-def _empty_hands(world: World, i: int) -> int:
-    row = world.carried_object[i]
-    world.carried_object[i] = -1
-    world.cargo_from_cache[i] = False
+def _empty_hands(state: InteractionState, i: int) -> int:
+    row = state.carried_object[i]
+    state.carried_object[i] = -1
+    state.cargo_from_cache[i] = False
     return row
 
 
 @kernel
-def _displace(world: World, row: int) -> None:
+def _displace(state: InteractionState, row: int) -> None:
     """Hand an object over to the distributor, which re-places it later in this tick."""
-    world.status[row] = _WAITING
-    world.object_cell[row, :] = -1
-    last = world.displaced.shape[0] - 1
-    world.displaced[world.displaced[last]] = row
-    world.displaced[last] += 1
+    state.status[row] = _WAITING
+    state.object_cell[row, :] = -1
+    last = state.displaced.shape[0] - 1
+    state.displaced[state.displaced[last]] = row
+    state.displaced[last] += 1
 
 
 @kernel
-def deliver(world: World, i: int) -> None:
-    """Robot i leaves its object in the nest; the object re-enters the world through the distributor."""
-    row = _empty_hands(world, i)
-    _displace(world, row)
-    world.counters[_COLLECTED] += 1
-    _report(world, i, _DELIVERED, row, -1)
+def deliver(state: InteractionState, i: int) -> None:
+    """Robot i leaves its object in the nest; the object re-enters the state through the distributor."""
+    row = _empty_hands(state, i)
+    _displace(state, row)
+    state.counters[_COLLECTED] += 1
+    _report(state, i, _DELIVERED, row, -1)
 
 
 @kernel
-def drop_into_cache(world: World, i: int, slot: int) -> None:
+def drop_into_cache(state: InteractionState, i: int, slot: int) -> None:
     """Robot i adds its object to the cache it stands in."""
-    row = _empty_hands(world, i)
-    world.status[row] = _CACHED
-    world.cache_slot[row] = slot
-    world.object_cell[row, 0] = world.cache_cell[slot, 0]
-    world.object_cell[row, 1] = world.cache_cell[slot, 1]
-    world.cache_count[slot] += 1
-    world.counters[_CACHE_DROPS] += 1
-    _report(world, i, _JOINED_CACHE, row, slot)
+    row = _empty_hands(state, i)
+    state.status[row] = _CACHED
+    state.cache_slot[row] = slot
+    state.object_cell[row, 0] = state.cache_cell[slot, 0]
+    state.object_cell[row, 1] = state.cache_cell[slot, 1]
+    state.cache_count[slot] += 1
+    state.counters[_CACHE_DROPS] += 1
+    _report(state, i, _JOINED_CACHE, row, slot)
 
 
 @kernel
-def lay_on_floor(world: World, rules: Rules, i: int) -> bool:
+def lay_on_floor(state: InteractionState, rules: Rules, i: int) -> bool:
     """Robot i lays its object on its cell if that is free, else the object is re-placed; returns whether it lies."""
-    row = _empty_hands(world, i)
-    x, y = _cell(world, i)
+    row = _empty_hands(state, i)
+    x, y = _cell(state, i)
     inside = rules.area_x_low <= x < rules.area_x_high and rules.area_y_low <= y < rules.area_y_high
-    world.counters[_FLOOR_DROPS] += 1
-    if inside and world.floor[y, x] == CELL_EMPTY:
-        world.floor[y, x] = row
-        world.status[row] = _FREE
-        world.object_cell[row, 0] = x
-        world.object_cell[row, 1] = y
-        _report(world, i, _DROPPED, row, -1)
+    state.counters[_FLOOR_DROPS] += 1
+    if inside and state.floor[y, x] == CELL_EMPTY:
+        state.floor[y, x] = row
+        state.status[row] = _FREE
+        state.object_cell[row, 0] = x
+        state.object_cell[row, 1] = y
+        _report(state, i, _DROPPED, row, -1)
         return True
-    world.counters[_DISPLACED] += 1
-    _displace(world, row)
-    _report(world, i, _ELSEWHERE, row, -1)
+    state.counters[_DISPLACED] += 1
+    _displace(state, row)
+    _report(state, i, _ELSEWHERE, row, -1)
     return False
 
 
 @kernel
-def _lift(world: World, i: int, row: int) -> None:
-    world.status[row] = _CARRIED
-    world.object_cell[row, :] = -1
-    world.carried_object[i] = row
-    if world.carriers[row] == 0:
-        world.first_picked[i] = True
-        world.counters[_FIRST_PICKED] += 1
-    world.carriers[row] += 1
+def _lift(state: InteractionState, i: int, row: int) -> None:
+    state.status[row] = _CARRIED
+    state.object_cell[row, :] = -1
+    state.carried_object[i] = row
+    if state.carriers[row] == 0:
+        state.first_picked[i] = True
+        state.counters[_FIRST_PICKED] += 1
+    state.carriers[row] += 1
 
 
 @kernel
-def take_from_floor(world: World, i: int, row: int) -> None:
+def take_from_floor(state: InteractionState, i: int, row: int) -> None:
     """Robot i picks up the free object under its centre."""
-    world.floor[world.object_cell[row, 1], world.object_cell[row, 0]] = CELL_EMPTY
-    _lift(world, i, row)
-    world.cargo_from_cache[i] = False
-    world.counters[_FREE_PICKUPS] += 1
-    _report(world, i, _PICKED_UP, row, -1)
+    state.floor[state.object_cell[row, 1], state.object_cell[row, 0]] = CELL_EMPTY
+    _lift(state, i, row)
+    state.cargo_from_cache[i] = False
+    state.counters[_FREE_PICKUPS] += 1
+    _report(state, i, _PICKED_UP, row, -1)
 
 
 @kernel
-def take_from_cache(world: World, rules: Rules, i: int, slot: int, chance: float) -> None:
+def take_from_cache(state: InteractionState, rules: Rules, i: int, slot: int, chance: float) -> None:
     """Robot i takes an object, uniform among the cache's contents (`chance` in [0, 1)); a last pair dissolves it."""
-    wanted = int(chance * world.cache_count[slot])
+    wanted = int(chance * state.cache_count[slot])
     taken = -1
-    for row in range(world.cache_slot.shape[0]):
-        if world.cache_slot[row] == slot:
+    for row in range(state.cache_slot.shape[0]):
+        if state.cache_slot[row] == slot:
             if wanted == 0:
                 taken = row
                 break
             wanted -= 1
-    world.cache_slot[taken] = -1
-    world.cache_count[slot] -= 1
-    _lift(world, i, taken)
-    world.cargo_from_cache[i] = True
-    world.counters[_CACHE_PICKUPS] += 1
-    _report(world, i, _PICKED_FROM_CACHE, taken, slot)
-    if world.cache_count[slot] == 1:
-        _dissolve(world, rules, slot)
+    state.cache_slot[taken] = -1
+    state.cache_count[slot] -= 1
+    _lift(state, i, taken)
+    state.cargo_from_cache[i] = True
+    state.counters[_CACHE_PICKUPS] += 1
+    _report(state, i, _PICKED_FROM_CACHE, taken, slot)
+    if state.cache_count[slot] == 1:
+        _dissolve(state, rules, slot)
 
 
 @kernel
-def _dissolve(world: World, rules: Rules, slot: int) -> None:
+def _dissolve(state: InteractionState, rules: Rules, slot: int) -> None:
     """Remove a cache with one object left; the orphan lies free on the centre cell."""
-    cx = world.cache_cell[slot, 0]
-    cy = world.cache_cell[slot, 1]
+    cx = state.cache_cell[slot, 0]
+    cy = state.cache_cell[slot, 1]
     half = rules.cache_half_side
-    world.floor[cy - half : cy + half + 1, cx - half : cx + half + 1] = CELL_EMPTY
-    for row in range(world.cache_slot.shape[0]):
-        if world.cache_slot[row] == slot:
-            world.cache_slot[row] = -1
-            world.status[row] = _FREE
-            world.floor[cy, cx] = row
-    world.cache_alive[slot] = False
-    world.cache_count[slot] = 0
-    world.counters[_DEPLETED] += 1
+    state.floor[cy - half : cy + half + 1, cx - half : cx + half + 1] = CELL_EMPTY
+    for row in range(state.cache_slot.shape[0]):
+        if state.cache_slot[row] == slot:
+            state.cache_slot[row] = -1
+            state.status[row] = _FREE
+            state.floor[cy, cx] = row
+    state.cache_alive[slot] = False
+    state.cache_count[slot] = 0
+    state.counters[_DEPLETED] += 1
 
 
 @kernel
-def drop_cargo(world: World, rules: Rules, i: int) -> None:
+def drop_cargo(state: InteractionState, rules: Rules, i: int) -> None:
     """Robot i loses its cargo here, whatever is here: the rule for dying robots (cache, floor or re-placement)."""
-    _forget_pending(world, i)
-    if world.carried_object[i] < 0:
+    _forget_pending(state, i)
+    if state.carried_object[i] < 0:
         return
-    code = _floor_code(world, i)
+    code = _floor_code(state, i)
     if code <= CELL_CACHE:
-        drop_into_cache(world, i, CELL_CACHE - code)
+        drop_into_cache(state, i, CELL_CACHE - code)
     else:
-        lay_on_floor(world, rules, i)
+        lay_on_floor(state, rules, i)
 
 
 @kernel
@@ -359,70 +359,70 @@ def _handler_of(kind: int) -> int:
         return NEST_HANDLER
     if kind == SITE_DROP:
         return SITE_HANDLER
-    if kind == FOUND_DROP:
-        return FOUND_HANDLER
+    if kind == CREATE_DROP:
+        return CREATE_HANDLER
     return CACHE_HANDLER
 
 
 @kernel
-def _target_identity(world: World, kind: int, target: int) -> int:
+def _target_identity(state: InteractionState, kind: int, target: int) -> int:
     """What must stay the same while an interaction runs: the object row, or the serial of the cache."""
     if kind == CACHE_DROP or kind == CACHE_PICKUP:
-        return world.cache_serial[target]
+        return state.cache_serial[target]
     return target
 
 
 @kernel
-def _take_effect(world: World, rules: Rules, i: int, kind: int, target: int, chance: float) -> None:
+def _take_effect(state: InteractionState, rules: Rules, i: int, kind: int, target: int, chance: float) -> None:
     if kind == DELIVER:
-        deliver(world, i)
+        deliver(state, i)
     elif kind == CACHE_DROP:
-        drop_into_cache(world, i, target)
+        drop_into_cache(state, i, target)
     elif kind == FLOOR_PICKUP:
-        take_from_floor(world, i, target)
+        take_from_floor(state, i, target)
     elif kind == CACHE_PICKUP:
-        take_from_cache(world, rules, i, target, chance)
-    elif lay_on_floor(world, rules, i) and kind == FOUND_DROP:
-        last = world.founded.shape[0] - 1
-        world.founded[world.founded[last]] = i
-        world.founded[last] += 1
+        take_from_cache(state, rules, i, target, chance)
+    elif lay_on_floor(state, rules, i) and kind == CREATE_DROP:
+        last = state.creators.shape[0] - 1
+        state.creators[state.creators[last]] = i
+        state.creators[last] += 1
 
 
 @kernel
-def _continue(world: World, rules: Rules, i: int, kind: int, target: int, chance: float) -> None:
+def _continue(state: InteractionState, rules: Rules, i: int, kind: int, target: int, chance: float) -> None:
     """Finish the interaction that robot i has in progress, or report that its condition is lost."""
-    same = kind == world.pending_kind[i] and _target_identity(world, kind, target) == world.pending_target[i]
+    same = kind == state.pending_kind[i] and _target_identity(state, kind, target) == state.pending_target[i]
     if same:
         handler = _handler_of(kind)
-        if rules.serialized and world.handler_used[handler]:
+        if rules.serialized and state.handler_used[handler]:
             return
-        world.handler_used[handler] = True
-    _forget_pending(world, i)
+        state.handler_used[handler] = True
+    _forget_pending(state, i)
     if same:
-        _take_effect(world, rules, i, kind, target, chance)
+        _take_effect(state, rules, i, kind, target, chance)
     else:
-        _report(world, i, _VANISHED, -1, -1)
+        _report(state, i, _VANISHED, -1, -1)
 
 
 @kernel
-def _serve(world: World, rules: Rules, band: int, i: int, chance: float) -> None:
-    """Start, continue, refuse or cancel what robot i asks, by the state of the world at its turn."""
-    kind, target = request_of(world, rules, band, i)
-    if world.pending_kind[i] != NO_REQUEST:
-        if band == world.pending_band[i]:
-            _continue(world, rules, i, kind, target, chance)
+def _serve(state: InteractionState, rules: Rules, band: int, i: int, chance: float) -> None:
+    """Start, continue, refuse or cancel what robot i asks, by the state of the state at its turn."""
+    kind, target = request_of(state, rules, band, i)
+    if state.pending_kind[i] != NO_REQUEST:
+        if band == state.pending_band[i]:
+            _continue(state, rules, i, kind, target, chance)
             return
-        _forget_pending(world, i)
+        _forget_pending(state, i)
     if kind == FLOOR_DROP:
-        lay_on_floor(world, rules, i)
+        lay_on_floor(state, rules, i)
     elif kind == NOTHING:
-        _report(world, i, _NOTHING_HERE, -1, -1)
+        _report(state, i, _NOTHING_HERE, -1, -1)
     elif kind == TOO_NEAR:
-        _report(world, i, _CACHE_TOO_NEAR, -1, target)
+        _report(state, i, _CACHE_TOO_NEAR, -1, target)
     elif kind != NO_REQUEST:
-        world.pending_kind[i] = kind
-        world.pending_band[i] = band
-        world.pending_target[i] = _target_identity(world, kind, target)
+        state.pending_kind[i] = kind
+        state.pending_band[i] = band
+        state.pending_target[i] = _target_identity(state, kind, target)
 
 
 @kernel
@@ -438,37 +438,37 @@ def _phase_of(kind: int, band: int) -> int:
 
 
 @kernel
-def _band_now(world: World, gripper: ActionArray, i: int) -> int:
+def _band_now(state: InteractionState, gripper: ActionArray, i: int) -> int:
     """Band that robot i sends; a robot in repair keeps sending the band of its running interaction."""
-    if world.active[i]:
+    if state.active[i]:
         return band_of(gripper[i, 2])
-    return world.pending_band[i]
+    return state.pending_band[i]
 
 
 @kernel
-def interact(world: World, rules: Rules, gripper: ActionArray, tick: int, chance: FloatArray) -> None:
+def interact(state: InteractionState, rules: Rules, gripper: ActionArray, tick: int, chance: FloatArray) -> None:
     """Serve all requests of one tick, phase by phase; within a phase lowest (row - tick) mod N first.
 
     `gripper` is the (N, 3) action array; `chance` (N,) uniform in [0, 1) decides which object leaves a cache.
     """
-    n_robots = world.code.shape[0]
-    world.displaced[-1] = 0
-    world.founded[-1] = 0
-    world.handler_used[:] = False
+    n_robots = state.code.shape[0]
+    state.displaced[-1] = 0
+    state.creators[-1] = 0
+    state.handler_used[:] = False
     n_queued = 0
     for k in range(n_robots):
         i = (tick + k) % n_robots
-        idle = not world.active[i] or (world.carried_object[i] >= 0) == (gripper[i, 2] > 0.0)
-        if world.pending_kind[i] == NO_REQUEST and idle:
+        idle = not state.active[i] or (state.carried_object[i] >= 0) == (gripper[i, 2] > 0.0)
+        if state.pending_kind[i] == NO_REQUEST and idle:
             continue  # not here, holding, or empty and not grasping: most robots in most ticks
-        band = _band_now(world, gripper, i)
-        kind, _ = request_of(world, rules, band, i)
-        if kind != NO_REQUEST or world.pending_kind[i] != NO_REQUEST:
-            world.queue[n_queued] = i
-            world.queue[n_robots + n_queued] = _phase_of(kind, band)
+        band = _band_now(state, gripper, i)
+        kind, _ = request_of(state, rules, band, i)
+        if kind != NO_REQUEST or state.pending_kind[i] != NO_REQUEST:
+            state.queue[n_queued] = i
+            state.queue[n_robots + n_queued] = _phase_of(kind, band)
             n_queued += 1
     for phase in range(4):
         for place in range(n_queued):
-            if world.queue[n_robots + place] == phase:
-                i = int(world.queue[place])
-                _serve(world, rules, _band_now(world, gripper, i), i, chance[i])
+            if state.queue[n_robots + place] == phase:
+                i = int(state.queue[place])
+                _serve(state, rules, _band_now(state, gripper, i), i, chance[i])
