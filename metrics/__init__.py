@@ -11,14 +11,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 # Not lazy: the function and its module share a name, and loading the module later would put it in the function's place.
-from .scalability import efficiency, raw_performance, scalability, skipped_intervals
+from .scaling import efficiency, raw_performance, scalability, skipped_intervals
 
 if TYPE_CHECKING:
     from .catalog import METRICS, Measure
-    from .comparison import Comparison, compare_tables
     from .curves import CurveError
     from .distance import aligned_l1, dtw, noise_floor
-    from .earlier import fractional_maintenance, projective_performance, weighted_combination
+    from .earlier_papers import fractional_maintenance, projective_performance, weighted_combination
     from .emergence import spatial_emergence, task_emergence
     from .environment import environment_distance, environment_scaling, waveform
     from .flexibility import adaptability, reactivity
@@ -26,8 +25,15 @@ if TYPE_CHECKING:
     from .population import availability, population_robustness, population_weight, ratio_for_availability
     from .queues import PopulationError, PopulationRates, QueueStats, mean_away, queue_statistics
     from .robustness import mean_signed_difference, noise_robustness
-    from .score_table import Score, ScoreTable
-    from .scoring import compare_policies, score_curves, score_policy
+    from .scoring import (
+        Comparison,
+        Score,
+        ScoreTable,
+        compare_policies,
+        compare_tables,
+        score_curves,
+        score_policy,
+    )
     from .statistics import Summary, aggregate, bootstrap_measure, normalize
 
 __all__ = [
@@ -91,17 +97,17 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Comparison": "comparison",
-    "compare_tables": "comparison",
+    "Comparison": "scoring",
+    "compare_tables": "scoring",
     "METRICS": "catalog",
     "Measure": "catalog",
     "CurveError": "curves",
     "aligned_l1": "distance",
     "dtw": "distance",
     "noise_floor": "distance",
-    "fractional_maintenance": "earlier",
-    "projective_performance": "earlier",
-    "weighted_combination": "earlier",
+    "fractional_maintenance": "earlier_papers",
+    "projective_performance": "earlier_papers",
+    "weighted_combination": "earlier_papers",
     "spatial_emergence": "emergence",
     "task_emergence": "emergence",
     "environment_distance": "environment",
@@ -123,8 +129,8 @@ _HOMES = {
     "queue_statistics": "queues",
     "mean_signed_difference": "robustness",
     "noise_robustness": "robustness",
-    "Score": "score_table",
-    "ScoreTable": "score_table",
+    "Score": "scoring",
+    "ScoreTable": "scoring",
     "compare_policies": "scoring",
     "score_curves": "scoring",
     "score_policy": "scoring",

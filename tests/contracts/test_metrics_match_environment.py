@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-import metrics.plots
+import metrics.scoring.plots
 import swarm_forage_env.plots
 from metrics import waveform
-from metrics.score_rows import MEASURE_CRITERIA
-from metrics.study_table import CRITERIA, CURVE_COLUMNS, UNDISTURBED, study_curves
+from metrics.scoring.curves_table import CRITERIA, CURVE_COLUMNS, UNDISTURBED, study_curves
+from metrics.scoring.study_scores import MEASURE_CRITERIA
 from swarm_forage_env.recording import RunRecord
 from swarm_forage_env.scenarios import scenario
 from swarm_forage_env.signals import Waveform
@@ -44,7 +44,7 @@ def test_criteria_have_the_same_names():
 
 
 def test_pictures_have_the_same_colours():
-    assert metrics.plots.COLOURS == swarm_forage_env.plots.COLOURS
+    assert metrics.scoring.plots.COLOURS == swarm_forage_env.plots.COLOURS
 
 
 @pytest.fixture(scope="module")

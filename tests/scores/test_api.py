@@ -68,7 +68,7 @@ def test_unknown_names_are_refused():
         _ = metrics.scalabilty
 
 
-@pytest.mark.parametrize("first", ["metrics.scalability", "metrics.catalog", "metrics.population", "metrics"])
+@pytest.mark.parametrize("first", ["metrics.scaling", "metrics.catalog", "metrics.population", "metrics"])
 def test_the_function_wins_over_its_module_in_any_order_of_imports(first):
     code = (
         f"import {first}; import metrics.catalog; from metrics import scalability; print(scalability([1], 1, [2], 2))"

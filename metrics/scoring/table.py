@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from .catalog import METRICS
+from metrics.catalog import METRICS
+from metrics.statistics import Summary, aggregate
+
 from .forecast import FORECAST_HEADER, FORECAST_TITLE, PopulationForecast
-from .statistics import Summary, aggregate
 
 if TYPE_CHECKING:
     import polars as pl

@@ -5,8 +5,8 @@ import polars as pl
 import pytest
 
 from metrics import CurveError, PopulationRates
-from metrics.study_table import common_runs, study_curves
-from tests.scores.curve_tables import rows, table
+from metrics.scoring.curves_table import common_runs, study_curves
+from tests.scores.scoring.curve_tables import rows, table
 
 
 def only(frame):

@@ -4,9 +4,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from .queues import PopulationRates, mean_away, queue_statistics
-from .statistics import Summary, aggregate
-from .study_table import POPULATION, RunCurves, StudyCurves
+from metrics.queues import PopulationRates, mean_away, queue_statistics
+from metrics.statistics import Summary, aggregate
+
+from .curves_table import POPULATION, RunCurves, StudyCurves
 
 FORECAST_TITLE = "Population: what the queueing model predicts for runs of this length, beside what the runs showed"
 FORECAST_HEADER = (

@@ -9,19 +9,20 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .curves import CurveError, FloatArray
-from .distance import noise_floor
-from .emergence import spatial_emergence, task_emergence
-from .environment import environment_distance
-from .flexibility import adaptability, reactivity
-from .interference import performance_lost
-from .population import availability, population_robustness, population_weight
-from .queues import PopulationRates
-from .robustness import mean_signed_difference, noise_robustness
-from .scalability import efficiency, raw_performance, scalability
-from .score_table import Score
-from .statistics import Summary, aggregate, bootstrap_measure
-from .study_table import NOISE, POPULATION, SIZE, THROTTLE, RunCurves, StudyCurves, common_runs
+from metrics.curves import CurveError, FloatArray
+from metrics.distance import noise_floor
+from metrics.emergence import spatial_emergence, task_emergence
+from metrics.environment import environment_distance
+from metrics.flexibility import adaptability, reactivity
+from metrics.interference import performance_lost
+from metrics.population import availability, population_robustness, population_weight
+from metrics.queues import PopulationRates
+from metrics.robustness import mean_signed_difference, noise_robustness
+from metrics.scaling import efficiency, raw_performance, scalability
+from metrics.statistics import Summary, aggregate, bootstrap_measure
+
+from .curves_table import NOISE, POPULATION, SIZE, THROTTLE, RunCurves, StudyCurves, common_runs
+from .table import Score
 
 MEASURE_CRITERIA: dict[str, str] = {
     "raw_performance": SIZE,

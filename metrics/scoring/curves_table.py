@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from .curves import FRACTION_TOLERANCE, CurveError, FloatArray
-from .queues import PopulationRates
+from metrics.curves import FRACTION_TOLERANCE, CurveError, FloatArray
+from metrics.queues import PopulationRates
 
 if TYPE_CHECKING:
     import polars as pl

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from metrics.curves import CurveError
+from metrics.queues import PopulationRates
+
 from .comparison import Comparison, compare_tables
-from .curves import CurveError
+from .curves_table import RunCurves, StudyCurves, read_curves, study_curves
 from .forecast import forecast_population
-from .queues import PopulationRates
-from .score_rows import MEASURE_CRITERIA, check_measures, score_study
-from .score_table import ScoreTable
-from .study_table import RunCurves, StudyCurves, read_curves, study_curves
+from .study_scores import MEASURE_CRITERIA, check_measures, score_study
+from .table import ScoreTable
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -171,7 +172,7 @@ def score_curves(path: str | Path, *, measures: Sequence[str] | None = None) -> 
     """Score curves from any simulator, one table per policy in the file.
 
     Args:
-        path: CSV or Parquet file with the columns of `study_table.CURVE_COLUMNS`.
+        path: CSV or Parquet file with the columns of `CURVE_COLUMNS`.
         measures: Default all that the columns allow; the table says which others are missing, and why.
 
     Raises:

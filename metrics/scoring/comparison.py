@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from .curves import CurveError, FloatArray
-from .score_table import (
+from metrics.curves import CurveError, FloatArray
+from metrics.statistics import Summary, aggregate
+
+from .table import (
     ROUNDING,
     Score,
     ScoreTable,
@@ -22,7 +24,6 @@ from .score_table import (
     spread,
     title,
 )
-from .statistics import Summary, aggregate
 
 FAMILY_ERROR = 0.05
 """Probability of one or more false differences within a measure."""

@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 
 from metrics import CurveError, aggregate, compare_tables
-from metrics.comparison import Comparison, holm, paired_p
-from metrics.score_table import Score, ScoreTable, spread
+from metrics.scoring.comparison import Comparison, holm, paired_p
+from metrics.scoring.table import Score, ScoreTable, spread
 
 NAN = math.nan
 

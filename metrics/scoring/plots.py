@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from .catalog import METRICS
-from .score_rows import MEASURE_CRITERIA
-from .score_table import Score, ScoreTable
-from .study_table import NOISE, POPULATION, SIZE, THROTTLE
+from metrics.catalog import METRICS
+
+from .curves_table import NOISE, POPULATION, SIZE, THROTTLE
+from .study_scores import MEASURE_CRITERIA
+from .table import Score, ScoreTable
 
 Panel: TypeAlias = Any
 """An `Axes` of matplotlib, whose types leave too much open for strict checking."""
