@@ -4,14 +4,12 @@ Every measure is a function of curves, arrays of shape (..., T) over recording i
 files or policies. `docs/metrics.md` explains inputs and variants, `docs/errata.md` what the paper's print gets wrong.
 `score_policy` is the front door: it runs a policy in all that the measures need and makes one table
 (`docs/scoring.md`).
-Names load on first use (PEP 562), so importing the package compiles nothing.
+Names load on first use (PEP 562), so importing the package compiles nothing. No name is that of a module: a module that
+loads later would take the place of the name.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
-
-# Not lazy: the function and its module share a name, and loading the module later would put it in the function's place.
-from .scaling import efficiency, raw_performance, scalability, skipped_intervals
 
 if TYPE_CHECKING:
     from .catalog import METRICS, Measure
@@ -25,6 +23,7 @@ if TYPE_CHECKING:
     from .population import availability, population_robustness, population_weight, ratio_for_availability
     from .queues import PopulationError, PopulationRates, QueueStats, mean_away, queue_statistics
     from .robustness import mean_signed_difference, noise_robustness
+    from .scaling import efficiency, raw_performance, scalability, skipped_intervals
     from .scoring import (
         Comparison,
         Score,
@@ -97,8 +96,6 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Comparison": "scoring",
-    "compare_tables": "scoring",
     "METRICS": "catalog",
     "Measure": "catalog",
     "CurveError": "curves",
@@ -129,9 +126,15 @@ _HOMES = {
     "queue_statistics": "queues",
     "mean_signed_difference": "robustness",
     "noise_robustness": "robustness",
+    "efficiency": "scaling",
+    "raw_performance": "scaling",
+    "scalability": "scaling",
+    "skipped_intervals": "scaling",
+    "Comparison": "scoring",
     "Score": "scoring",
     "ScoreTable": "scoring",
     "compare_policies": "scoring",
+    "compare_tables": "scoring",
     "score_curves": "scoring",
     "score_policy": "scoring",
     "Summary": "statistics",
