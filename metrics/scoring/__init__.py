@@ -1,15 +1,10 @@
 """From policies, runs and files of curves to tables of scores, with everything needed to read them."""
 
 from .comparison import Comparison, compare_tables
-from .front_door import (
-    ScoringPlan,
-    compare_policies,
-    plan_scores,
-    run_scores,
-    score_curves,
-    score_policy,
-)
+from .front_door import compare_policies, score_curves, score_policy
+from .plan import ScoringPlan, plan_scores
 from .plots import draw_scores
+from .runs import run_scores
 from .table import Score, ScoreTable
 
 __all__ = [

@@ -7,23 +7,13 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
 from metrics.curves import CurveError, FloatArray
+from metrics.significance import holm, paired_p
 from metrics.statistics import Summary, aggregate
 
-from .table import (
-    ROUNDING,
-    Score,
-    ScoreTable,
-    aligned,
-    forecast_lines,
-    paragraph,
-    percent,
-    plain,
-    spread,
-    title,
-)
+from .table import Score, ScoreTable, forecast_lines, title
+from .texts import aligned, paragraph, percent, plain, spread
 
 FAMILY_ERROR = 0.05
 """Probability of one or more false differences within a measure."""
@@ -231,46 +221,6 @@ def _pairs(score: Score, other: Score, first: str, second: str) -> list[_Pair]:
         for is_relative, mine, theirs in kinds
         if mine and theirs
     ]
-
-
-def paired_p(differences: FloatArray) -> float:
-    """Two-sided p value of the paired t test that the mean difference is zero.
-
-    Args:
-        differences: One per pair of runs, (R,).
-
-    Returns:
-        The p value; NaN for fewer than two pairs or a difference that is not finite. Where all differences are equal
-        (but for rounding, which would pass for a tiny spread) Student's t does not exist: 1 if they are zero, else that
-        of the sign test, 2^(1 - R).
-    """
-    n_pairs = differences.size
-    if n_pairs < 2 or not np.isfinite(differences).all():
-        return math.nan
-    std = float(differences.std(ddof=1))
-    mean = float(differences.mean())
-    if std <= ROUNDING * abs(mean):
-        return 1.0 if mean == 0.0 else 2.0 ** (1 - n_pairs)
-    t = abs(mean) * math.sqrt(n_pairs) / std
-    return 2.0 * float(stdtr(n_pairs - 1, -t))
-
-
-def holm(p_values: FloatArray) -> FloatArray:
-    """Adjust p values of one family for testing many at once (Holm 1979); NaN values are no tests and stay NaN.
-
-    Args:
-        p_values: (K,).
-
-    Returns:
-        Adjusted values (K,), at most 1: rejecting where they are at most alpha keeps the probability of any false
-        rejection at alpha.
-    """
-    adjusted = np.full(p_values.shape, math.nan)
-    tests = np.flatnonzero(~np.isnan(p_values))
-    order = tests[np.argsort(p_values[tests], kind="stable")]
-    factors = np.arange(order.size, 0, -1)
-    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(factors * p_values[order]))
-    return adjusted
 
 
 def _paired_differences(first: Mapping[int, float], second: Mapping[int, float]) -> FloatArray:

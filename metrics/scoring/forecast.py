@@ -7,7 +7,8 @@ from typing import Any
 from metrics.queues import PopulationRates, mean_away, queue_statistics
 from metrics.statistics import Summary, aggregate
 
-from .curves_table import POPULATION, RunCurves, StudyCurves
+from .columns import POPULATION
+from .studies import RunCurves, StudyCurves
 
 FORECAST_TITLE = "Population: what the queueing model predicts for runs of this length, beside what the runs showed"
 FORECAST_HEADER = (

@@ -7,8 +7,8 @@ from typing import Any, TypeAlias
 
 from metrics.catalog import METRICS
 
-from .curves_table import NOISE, POPULATION, SIZE, THROTTLE
-from .study_scores import MEASURE_CRITERIA
+from .columns import NOISE, POPULATION, SIZE, THROTTLE
+from .measures import MEASURE_CRITERIA
 from .table import Score, ScoreTable
 
 Panel: TypeAlias = Any

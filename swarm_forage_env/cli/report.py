@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from metrics.scoring.table import counted
+from metrics.scoring.texts import counted
 from metrics.statistics import aggregate
 from swarm_forage_env.plots import Curve, draw_curves
 from swarm_forage_env.recording import RunRecord

@@ -9,7 +9,8 @@ from pathlib import Path
 from metrics.scoring import ScoringPlan, plan_scores, score_curves
 from metrics.scoring.comparison import Comparison, compare_tables
 from metrics.scoring.plots import draw_scores
-from metrics.scoring.table import ScoreTable, aligned, counted
+from metrics.scoring.table import ScoreTable
+from metrics.scoring.texts import aligned, counted
 from swarm_forage_env.cli.plan import WorldOptions, build_scenario, estimated_seconds, split_names
 from swarm_forage_env.cli.report import estimate
 from swarm_forage_env.config import ConfigError

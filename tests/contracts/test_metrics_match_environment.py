@@ -6,8 +6,9 @@ import pytest
 import metrics.scoring.plots
 import swarm_forage_env.plots
 from metrics import waveform
-from metrics.scoring.curves_table import CRITERIA, CURVE_COLUMNS, UNDISTURBED, study_curves
-from metrics.scoring.study_scores import MEASURE_CRITERIA
+from metrics.scoring.columns import CRITERIA, CURVE_COLUMNS, UNDISTURBED
+from metrics.scoring.curves_table import study_curves
+from metrics.scoring.measures import MEASURE_CRITERIA
 from swarm_forage_env.recording import RunRecord
 from swarm_forage_env.scenarios import scenario
 from swarm_forage_env.signals import Waveform

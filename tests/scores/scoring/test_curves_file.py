@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from metrics import CurveError, score_curves
-from metrics.scoring.curves_table import CURVE_COLUMNS
+from metrics.scoring.columns import CURVE_COLUMNS
 from tests.scores.scoring.curve_tables import CROWDING, rows, table
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "scoring.md"

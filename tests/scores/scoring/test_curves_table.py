@@ -5,7 +5,8 @@ import polars as pl
 import pytest
 
 from metrics import CurveError, PopulationRates
-from metrics.scoring.curves_table import common_runs, study_curves
+from metrics.scoring.curves_table import study_curves
+from metrics.scoring.studies import common_runs
 from tests.scores.scoring.curve_tables import rows, table
 
 

@@ -7,8 +7,10 @@ import pytest
 
 import metrics
 from metrics import METRICS, CurveError, PopulationRates
-from metrics.scoring.curves_table import RunCurves, StudyCurves, study_curves
-from metrics.scoring.study_scores import MEASURE_CRITERIA, check_measures, score_study
+from metrics.scoring.curves_table import study_curves
+from metrics.scoring.measures import MEASURE_CRITERIA, check_measures
+from metrics.scoring.studies import RunCurves, StudyCurves
+from metrics.scoring.study_scores import score_study
 from metrics.scoring.table import HEADER, ScoreTable
 from tests.scores.scoring.curve_tables import CROWDING, rows, table
 
