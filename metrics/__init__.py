@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .catalog import METRICS, Measure
-    from .curves import CurveError
+    from .checks import CurveError, PopulationError
     from .distance import aligned_l1, dtw, noise_floor
     from .earlier_papers import fractional_maintenance, projective_performance, weighted_combination
     from .emergence import spatial_emergence, task_emergence
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .flexibility import adaptability, reactivity
     from .interference import fractional_loss, performance_lost, t_lost_fraction
     from .population import availability, population_robustness, population_weight, ratio_for_availability
-    from .queues import PopulationError, PopulationRates, QueueStats, mean_away, queue_statistics
+    from .queues import PopulationRates, QueueStats, mean_away, queue_statistics
     from .robustness import mean_signed_difference, noise_robustness
     from .scaling import efficiency, raw_performance, scalability, skipped_intervals
     from .scoring import (
@@ -98,7 +98,8 @@ __all__ = [
 _HOMES = {
     "METRICS": "catalog",
     "Measure": "catalog",
-    "CurveError": "curves",
+    "CurveError": "checks",
+    "PopulationError": "checks",
     "aligned_l1": "distance",
     "dtw": "distance",
     "noise_floor": "distance",
@@ -119,7 +120,6 @@ _HOMES = {
     "population_robustness": "population",
     "population_weight": "population",
     "ratio_for_availability": "population",
-    "PopulationError": "queues",
     "PopulationRates": "queues",
     "QueueStats": "queues",
     "mean_away": "queues",

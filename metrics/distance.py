@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from .curves import CurveError, FloatArray, Variant, as_curve, as_curves, check_broadcast, check_option
+from .checks import CurveError, check_option
+from .curves import FloatArray, Variant, as_curve, as_curves, check_broadcast
 
 Ground: TypeAlias = Literal["value", "time_value"]
 """Local cost: |x_i - y_j|, time is free to warp; or the same plus |clock_i - clock_j|, points in the plane."""

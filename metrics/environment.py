@@ -6,7 +6,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .curves import CurveError, FloatArray, as_curve, as_waveforms, check_option
+from .checks import CurveError, check_option, check_wave
+from .curves import FloatArray, as_curve, as_waveforms
 from .distance import Ground, dtw
 
 WaveformKind: TypeAlias = Literal["constant", "sine", "square", "sawtooth"]
@@ -51,11 +52,7 @@ def waveform(
     """
     kind_name = kind.lower()
     check_option("kind", kind_name, WaveformKind)
-    if frequency < 0.0 or not all(map(math.isfinite, (frequency, amplitude, offset, phase))):
-        raise ValueError(
-            "Expected finite numbers and frequency >= 0 cycles per tick, got "
-            f"frequency={frequency}, amplitude={amplitude}, offset={offset}, phase={phase}."
-        )
+    check_wave(frequency, amplitude, offset, phase)
     cycles = np.asarray(ticks, dtype=np.float64) / _period(frequency)
     if kind_name == "constant":
         return np.full_like(cycles, amplitude)[()]

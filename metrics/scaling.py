@@ -5,17 +5,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .curves import (
-    FloatArray,
-    IntArray,
-    Reduction,
-    Variant,
-    as_curves,
-    check_option,
-    check_size,
-    check_size_order,
-    reduce_intervals,
-)
+from .checks import check_option, check_size, check_size_order
+from .curves import FloatArray, IntArray, Reduction, Variant, as_curves, reduce_intervals
 
 ZeroPolicy: TypeAlias = Literal["nan", "skip"]
 """What an interval without performance does to a sum: its IEEE value counts, NaN included, or it is left out."""

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from .curves import CurveError, FloatArray, as_curve, check_option
+from .checks import CurveError, check_level, check_option, check_resamples
+from .curves import FloatArray, as_curve
 
 AggregateMethod: TypeAlias = Literal["t", "two_sd", "bootstrap"]
 Order: TypeAlias = Literal["per_run", "mean_curve"]
@@ -76,7 +77,7 @@ def aggregate(
         ValueError: Unknown method, or a level outside (0, 1).
     """
     check_option("method", method, AggregateMethod)
-    _check_level(level)
+    check_level(level)
     runs = np.asarray(values, dtype=np.float64)
     if runs.ndim != 1 or runs.size == 0:
         raise CurveError(f"Expected one value per run, shape (R,) with R >= 1, got shape {runs.shape}.")
@@ -134,9 +135,8 @@ def bootstrap_measure(
         ValueError: Unknown order, a level outside (0, 1) or no resamples.
     """
     check_option("order", order, Order)
-    _check_level(level)
-    if n_resamples < 1:
-        raise ValueError(f"Expected n_resamples >= 1, got {n_resamples}.")
+    check_level(level)
+    check_resamples(n_resamples)
     parts = [_curves_of_runs(experiment) for experiment in experiments]
     sizes = [part[0].shape[0] for part in parts]
     if order == "per_run" and len(set(sizes)) != 1:
@@ -220,8 +220,3 @@ def _percentile_bounds(values: FloatArray, level: float) -> tuple[float, float]:
     method = "nearest" if np.isinf(values).any() else "linear"
     lower, upper = np.quantile(values, [0.5 - 0.5 * level, 0.5 + 0.5 * level], method=method)
     return float(lower), float(upper)
-
-
-def _check_level(level: float) -> None:
-    if not 0.0 < level < 1.0:
-        raise ValueError(f"Expected a confidence level in (0, 1), got {level}.")

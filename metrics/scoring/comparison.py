@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from metrics.curves import CurveError, FloatArray
+from metrics.checks import CurveError
+from metrics.curves import FloatArray
 from metrics.significance import holm, paired_p
 from metrics.statistics import Summary, aggregate
 

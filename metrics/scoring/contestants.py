@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from metrics.curves import CurveError
+from metrics.checks import CurveError
 
 if TYPE_CHECKING:
     from swarm_forage_env.config import ScenarioConfig

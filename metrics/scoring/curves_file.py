@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from metrics.curves import CurveError
+from metrics.checks import CurveError
 
 from .columns import NOISE, POPULATION, THROTTLE
 from .curves_table import study_curves

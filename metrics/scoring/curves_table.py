@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from metrics.curves import FRACTION_TOLERANCE, CurveError, FloatArray
+from metrics.checks import CurveError
+from metrics.curves import FRACTION_TOLERANCE, FloatArray
 from metrics.queues import PopulationRates
 
 from .columns import CRITERIA, CURVE_COLUMNS, INTERVAL_COLUMNS, RATE_COLUMNS, SIZE

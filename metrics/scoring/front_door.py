@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from metrics.curves import CurveError
+from metrics.checks import CurveError
 
 from .comparison import Comparison, compare_tables
 from .contestants import PolicyLike

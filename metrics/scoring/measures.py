@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Sequence
 
-from metrics.curves import CurveError
+from metrics.checks import CurveError
 
 from .columns import NOISE, POPULATION, SIZE, THROTTLE
 

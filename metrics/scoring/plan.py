@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from metrics.checks import chosen_seeds
+
 from .contestants import Contestant, PolicyLike, contestants_of
 from .measures import MEASURE_CRITERIA, check_measures
 
@@ -68,21 +70,10 @@ def plan_scores(
     return ScoringPlan(
         contestants=contestants_of(policies, parameters or {}, world),
         experiments=experiments.plan_experiments(world, {MEASURE_CRITERIA[name] for name in wanted}, allowed),
-        seeds=_seeds(seeds, allowed.n_seeds),
+        seeds=chosen_seeds(seeds, allowed.n_seeds),
         measures=wanted,
         scenario=world,
         budget=allowed,
         budget_name=budget_name,
         caches=caches,
     )
-
-
-def _seeds(seeds: int | Sequence[int] | None, default: int) -> tuple[int, ...]:
-    if seeds is None or isinstance(seeds, int):
-        count = default if seeds is None else seeds
-        if count < 1:
-            raise ValueError(f"Expected one or more seeds, got {count}.")
-        return tuple(range(count))
-    if not seeds or len(set(seeds)) < len(seeds):
-        raise ValueError(f"Expected different seeds, at least one, got {list(seeds)}.")
-    return tuple(seeds)

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from metrics.curves import CurveError, FloatArray
+from metrics.checks import CurveError
+from metrics.curves import FloatArray
 from metrics.queues import PopulationRates
 
 from .columns import SIZE, UNDISTURBED
