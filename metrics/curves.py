@@ -23,7 +23,7 @@ Reduction: TypeAlias = Literal["sum", "mean", "last", "total"]
 """How intervals become one number: sum, mean or last value of the measure, or the measure of the summed curves."""
 
 FRACTION_TOLERANCE = 1e-9
-"""Averaging fractions over ticks may exceed 1 by rounding."""
+"""By so much a mean of fractions may exceed 1, from rounding."""
 
 
 def as_curve(name: str, values: ArrayLike | None, *, signed: bool = False) -> FloatArray:
@@ -114,9 +114,9 @@ def check_broadcast(arrays: Iterable[FloatArray], shapes: str) -> None:
 def reduce_intervals(theta: FloatArray, reduce: Reduction, *inputs: FloatArray) -> FloatArray:
     """Reduce a measure theta(t), shape (..., T), over its intervals to shape (...,).
 
-    `total` is the same number as `sum` here: it differs only for measures that are not linear in their curves, and
-    those sum their curves before they arrive at theta. A run with a NaN anywhere in `inputs` gives NaN, also under
-    `last`.
+    `total`, the measure of the summed curves, is the same number as `sum` for measures that are linear in their curves.
+    The others sum their curves first and come here with `last`. A run with a NaN anywhere in `inputs` gives NaN, also
+    under `last`.
     """
     check_option("reduce", reduce, Reduction)
     if reduce == "last":
@@ -131,7 +131,7 @@ def reduce_intervals(theta: FloatArray, reduce: Reduction, *inputs: FloatArray) 
 
 
 def last_interval_only(reduce: Reduction) -> None:
-    """Check the reduction given to a measure whose `sierra` form knows only the last interval.
+    """Check the reduction given to a measure whose `sierra` form reads only the last interval.
 
     `sum`, the default of these measures, stands for "not chosen".
 

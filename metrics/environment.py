@@ -33,7 +33,7 @@ def waveform(
     The study's sweeps set o = a, so a signal runs from 0 to 2a: the paper's throttling "levels" are half the peak. A
     step at tick s is a square wave with f = 1 / (2 s); down: phase 0, o = 0; up: phase pi, o = a.
 
-    At a multiple of half the period the sign of a square wave hangs on rounding (sin(2 pi) is slightly negative); the
+    At a multiple of half the period the sign of a square wave depends on rounding (sin(2 pi) is slightly negative); the
     formula is evaluated as written, as the environment does.
 
     Args:

@@ -84,7 +84,7 @@ def population_weight(
     | sojourn    | T - 1 / (mu - lambda), the same without the double count                                     |
     | transient  | T (1 - m_T / N), the mean over the run, see `mean_away` (ours)                               |
     | stationary | T (1 - L_N / N), in equilibrium, see `queue_statistics` (ours); nobody if the dead stay dead |
-    | sierra     | ideal time *away* over time away, which turns the idea round                                 |
+    | sierra     | ideal time *away* over time away, where Eq. (12) has times at work                           |
 
     The printed time away is the length of *one* absence, so `paper` and `sojourn` hold only if every robot is away
     exactly once, and turn negative when 1 / (mu - lambda) exceeds T, as it does for the study's 200 robots. The

@@ -1,4 +1,4 @@
-"""Scalability: how much of an added robot's work arrives in the result? Eq. (4)."""
+"""Performance over swarm size: scalability, Eq. (4), efficiency, and the performance itself."""
 
 from typing import Literal, TypeAlias
 

@@ -1,4 +1,4 @@
-"""From runs to a statement: normalisation, means with honest intervals, bootstrap over independent experiments."""
+"""Statistics over runs: normalisation, means with intervals, and the bootstrap over independent experiments."""
 
 import math
 from collections.abc import Callable
@@ -46,7 +46,8 @@ def normalize(theta: ArrayLike, *, distance: bool = False) -> FloatArray:
     better everywhere. The authors apply it to the last-interval value of each run, and only on request: the published
     figures show raw values. Their fourth form, `normalized`, is normalize(measure(..., variant="sierra")).
 
-    Not free of scale: rates of 0.01 stay nearly linear, counts and long distances saturate.
+    The result depends on the unit: small rates such as 0.01 are nearly proportional to it, while counts and long
+    distances all come close to 1.
 
     Args:
         theta: Values of one measure, any shape.
@@ -64,8 +65,8 @@ def aggregate(
     Args:
         values: One value per run, shape (R,). NaN values are left out and counted.
         method: `t`: Student's interval for the mean. `two_sd`: mean +- 2 standard deviations, which the paper shades
-            and calls a 95 % confidence interval; it is one for single runs, some 14 times wider for 192 runs.
-            `bootstrap`: percentile interval of the mean over resampled runs.
+            and calls a 95 % confidence interval. It is where single runs lie; the interval for the mean of 192 runs is
+            some 14 times narrower. `bootstrap`: percentile interval of the mean over resampled runs.
         level: Confidence level of `t` and `bootstrap`.
         seed: Seed of the bootstrap; None draws a fresh one.
 

@@ -24,6 +24,7 @@ ENOUGH_SHARE = 0.1
 """Share of the swarm that availability asks for: 5 of 50 and 20 of 200 robots (scenario 1 of the paper)."""
 
 _WORDS = {THROTTLE: "throttle", NOISE: "sigma", POPULATION: "population"}
+"""Criterion -> its word in `Score.at`."""
 
 
 def _levels(study: StudyCurves, criterion: str) -> tuple[tuple[RunCurves, RunCurves], ...]:

@@ -57,15 +57,17 @@ class _SizeMeasure:
     """How a measure of swarm sizes is applied."""
 
     values: Values
-    """Takes the one-robot run if `from_one`, the next smaller swarm if `of_neighbours`, and the swarm itself."""
+    """Computes it. Arguments: the runs of one robot if `from_one`, of the next smaller swarm if `of_neighbours`, and of
+    the swarm itself."""
     unit: str
-    """With {span} for the length of a run."""
+    """Of the value; {span} stands for the length of a run."""
     from_one: bool = False
     of_neighbours: bool = False
     needs_interference: bool = False
     is_gain: bool = False
-    """Whether the value is an amount of performance, to be put in relation to that of the swarm."""
+    """Whether the value is an amount of performance, which is also given relative to that of the swarm."""
     order_matters: bool = False
+    """As in `ScoreDraft.score`."""
 
 
 _SIZE_MEASURES: dict[str, _SizeMeasure] = {

@@ -35,7 +35,7 @@ PAIRS_PER_TABLE = 6
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Difference:
-    """Score of one policy minus that of another, in one row."""
+    """Score of one policy minus that of another, at one level of one measure."""
 
     measure: str
     at: str
@@ -49,13 +49,14 @@ class Difference:
     p: float
     """Of the paired t test; NaN where it cannot be made (fewer than two pairs, infinite scores)."""
     p_holm: float
-    """The same after Holm's correction over all differences of the measure of this kind."""
+    """The same after Holm's correction over all levels and pairs of policies of the measure; relative scores have a
+    correction of their own."""
     better: str
     """The better policy if the difference is significant, else empty."""
 
     @property
     def key(self) -> tuple[str, str, bool, str, str, tuple[int, ...]]:
-        """Who is compared in what."""
+        """Which policies are compared, and in which score."""
         return self.first, self.second, self.is_relative, self.measure, self.at, self.n_robots
 
     @property
@@ -198,7 +199,7 @@ def compare_tables(tables: Sequence[ScoreTable]) -> Comparison:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Pair:
-    """What is tested once."""
+    """One score of two policies, to be tested."""
 
     score: Score
     first: str

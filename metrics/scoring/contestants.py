@@ -29,11 +29,11 @@ class Contestant:
     """Name in run specifications."""
     parameters: Mapping[str, Any]
     factory: Callable[..., Any] | None = None
-    """Builds the policy in this process, for those that no worker could find by name."""
+    """Builds the policy in this process; None where workers find it by its name."""
     is_named: bool = True
     """Whether its runs may be stored: a name tells which policy a stored run belongs to."""
     caches: str | None = None
-    """World that the policy is made for, where its class does not tell."""
+    """Caches that the policy is run with unless others are asked for; None: those that its class names."""
 
 
 def contestants_of(

@@ -59,7 +59,7 @@ def score_policy(
         progress: Show progress and an estimate on stderr.
 
     Returns:
-        The table. Rows whose runs failed say so, and `failures` says why.
+        The table. Scores that lack runs say so in their note, and `failures` says why runs failed.
 
     Raises:
         CurveError: unknown measures.

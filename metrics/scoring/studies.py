@@ -54,8 +54,8 @@ class RunCurves:
 
     def at_seeds(self, seeds: Sequence[int]) -> "RunCurves":
         """Return the same experiment with some of its runs only."""
-        rows = [self.seeds.index(seed) for seed in seeds]
-        return replace(self, seeds=tuple(seeds), curves={name: curve[rows] for name, curve in self.curves.items()})
+        places = [self.seeds.index(seed) for seed in seeds]
+        return replace(self, seeds=tuple(seeds), curves={name: curve[places] for name, curve in self.curves.items()})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,14 +14,14 @@ _SCORES = BY_SIZE | BY_ADVERSITY
 
 
 def score_study(study: StudyCurves, measures: Sequence[str] | None = None) -> tuple[tuple[Score, ...], dict[str, str]]:
-    """Compute the rows of all measures that the curves of a study allow.
+    """Compute the scores of all measures that the curves of a study allow.
 
     Args:
         study: Curves of one policy.
         measures: Names out of `MEASURE_CRITERIA`; default all.
 
     Returns:
-        The rows, and for each measure that could not be computed the reason.
+        The scores, and for each measure that could not be computed the reason.
 
     Raises:
         CurveError: an unknown measure, or curves that a measure refuses.

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 HEADER = ("measure", "at", "robots", "value", "95 % interval", "noise floor", "relative", "runs", "better", "unit")
+"""Headings of `Score.cells`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,22 +33,22 @@ class Score:
     """Swarm sizes that enter, the reference run's included."""
     unit: str
     summary: Summary
-    """Mean over runs with Student's interval; a value per run, so that its runs pair experiments by seed."""
+    """Mean over seeds with Student's interval."""
     per_seed: Mapping[int, float]
-    """Value of each run by its seed."""
+    """Seed -> value of the runs with this seed, one run of each experiment that enters."""
     n_lost: int = 0
-    """Runs that failed or have no partner."""
+    """Runs that failed or have no partner of the same seed."""
     noise_floor: float | None = None
     """For distances: mean distance between two different reference runs, what a perfect swarm scores by chance."""
     relative_per_seed: Mapping[int, float] = field(default_factory=dict[int, float])
-    """For amounts and distances: value of each run over the total performance it compares with, which makes policies of
-    different performance comparable; NaN where that performance is zero."""
+    """For amounts and distances: the values over the total performance that they are compared with, which makes
+    policies of different performance comparable; NaN where that performance is zero."""
     of_mean_curves: Summary | None = None
     """For scalability and distances: the measure of the mean curves with a bootstrap interval."""
     beside: Mapping[str, float] = field(default_factory=dict[str, float])
     """Further numbers to read with the value."""
     note: str = ""
-    """What one has to know about this row, empty if nothing."""
+    """What to know before reading the value; empty if nothing."""
 
     @property
     def higher_is_better(self) -> bool:
@@ -61,11 +62,11 @@ class Score:
 
     @property
     def key(self) -> tuple[str, str, tuple[int, ...]]:
-        """What the row is about, the same for all policies."""
+        """What the score is about, the same for all policies."""
         return self.measure, self.at, self.n_robots
 
     def cells(self) -> tuple[str, ...]:
-        """Return the row as texts under `HEADER`."""
+        """Return the score as texts under `HEADER`."""
         summary = self.summary
         runs = str(summary.n_used) + (f" of {summary.n_used + summary.n_nan + self.n_lost}" if self.is_partial else "")
         enters = bool(self.per_seed) or self.is_partial  # no run enters what follows from rates alone
@@ -88,7 +89,7 @@ class Score:
         return self.summary.n_nan + self.n_lost > 0
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the row as plain values; numbers that JSON does not have are None."""
+        """Return the score as plain values; numbers that JSON does not have are None."""
         summary, means, relative = self.summary, self.of_mean_curves, self.relative
         return {
             "measure": self.measure,
@@ -134,35 +135,35 @@ class ScoreTable:
     """How the runs were made: budget, length, seeds, folder."""
 
     def __getitem__(self, measure: str) -> tuple[Score, ...]:
-        """Return the rows of one measure.
+        """Return the scores of one measure.
 
         Raises:
             KeyError: there are none; the message says why.
         """
-        rows = tuple(score for score in self.scores if score.measure == measure)
-        if not rows:
+        found = tuple(score for score in self.scores if score.measure == measure)
+        if not found:
             raise KeyError(f"No score for {measure!r}: {self.missing.get(measure, 'it was not asked for')}")
-        return rows
+        return found
 
     def notes(self) -> tuple[str, ...]:
-        """Return everything that must not be overlooked: rows with a note, missing measures, failed runs."""
-        rows = [f"{places}: {note}" for note, places in self._places_of_notes().items()]
+        """Return everything that must not be overlooked: notes of scores, missing measures, failed runs."""
+        noted = [f"{places}: {note}" for note, places in self._places_of_notes().items()]
         absent = [f"{measure} is not computed: {reason}" for measure, reason in self.missing.items()]
-        return (*rows, *absent, *(f"failed: {failure}" for failure in self.failures))
+        return (*noted, *absent, *(f"failed: {failure}" for failure in self.failures))
 
     def _places_of_notes(self) -> dict[str, str]:
-        """Note -> the rows it stands at, in words, so that what holds for many rows is told once."""
+        """Note -> the scores that have it, in words, so that what holds for many is told once."""
         levels: dict[str, dict[str, list[str]]] = {}
         for score in self.scores:
             if score.note:
                 levels.setdefault(score.note, {}).setdefault(score.measure, []).append(score.at)
         return {
-            note: "; ".join(f"{measure}, {', '.join(places)}" for measure, places in rows.items())
-            for note, rows in levels.items()
+            note: "; ".join(f"{measure}, {', '.join(places)}" for measure, places in places_of.items())
+            for note, places_of in levels.items()
         }
 
     def to_frame(self) -> "pl.DataFrame":
-        """Return the rows as a table; what a row holds more than a table can is left to `to_mapping`."""
+        """Return one row per score; `per_seed` and `beside` do not fit into a row and are only in `to_mapping`."""
         import polars as pl
 
         rows: list[dict[str, Any]] = []

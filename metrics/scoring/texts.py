@@ -1,4 +1,4 @@
-"""How numbers and tables are told: as texts for people, and as plain values for JSON."""
+"""Numbers and tables as texts for people, and as plain values for JSON."""
 
 import math
 from collections.abc import Sequence
