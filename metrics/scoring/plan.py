@@ -58,7 +58,7 @@ def plan_scores(
     caches: str | None = None,
 ) -> ScoringPlan:
     """Return what `score_policy` and `compare_policies` would run; arguments and errors as there."""
-    from swarm_forage_env import scenarios
+    from swarm_forage_env.scenarios.presets import scenario as preset
     from swarm_forage_env.study import experiments
 
     wanted = check_measures(measures)
@@ -66,7 +66,7 @@ def plan_scores(
     allowed = experiments.budget(budget) if isinstance(budget, str) else budget
     if horizon_s is not None:
         allowed = replace(allowed, horizon_s=horizon_s)
-    world = scenarios.scenario(scenario) if isinstance(scenario, str) else scenario
+    world = preset(scenario) if isinstance(scenario, str) else scenario
     return ScoringPlan(
         contestants=contestants_of(policies, parameters or {}, world),
         experiments=experiments.plan_experiments(world, {MEASURE_CRITERIA[name] for name in wanted}, allowed),

@@ -8,7 +8,7 @@ import pytest
 
 from metrics import CurveError, score_curves
 from metrics.scoring.columns import CURVE_COLUMNS
-from tests.metrics.scoring.curve_tables import CROWDING, rows, table
+from tests.support.curve_tables import CROWDING, rows, table
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "scoring.md"
 

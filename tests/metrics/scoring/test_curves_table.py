@@ -7,7 +7,7 @@ import pytest
 from metrics import CurveError, PopulationRates
 from metrics.scoring.curves_table import study_curves
 from metrics.scoring.studies import common_runs
-from tests.metrics.scoring.curve_tables import rows, table
+from tests.support.curve_tables import rows, table
 
 
 def only(frame):

@@ -8,7 +8,7 @@ from metrics.scoring.curves_table import study_curves
 from metrics.scoring.plots import draw_scores
 from metrics.scoring.study_scores import score_study
 from metrics.scoring.table import ScoreTable
-from tests.metrics.scoring.curve_tables import rows, table
+from tests.support.curve_tables import rows, table
 
 PNG = b"\x89PNG"
 

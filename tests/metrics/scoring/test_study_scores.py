@@ -12,7 +12,7 @@ from metrics.scoring.measures import MEASURE_CRITERIA, check_measures
 from metrics.scoring.studies import RunCurves, StudyCurves
 from metrics.scoring.study_scores import score_study
 from metrics.scoring.table import HEADER, ScoreTable
-from tests.metrics.scoring.curve_tables import CROWDING, rows, table
+from tests.support.curve_tables import CROWDING, rows, table
 
 IDEAL = [[4.0, 6.0, 5.0, 6.0], [5.0, 5.0, 7.0, 4.0], [6.0, 4.0, 5.0, 5.0]]
 SLOWED = [[4.0, 5.0, 2.0, 3.0], [5.0, 5.0, 3.0, 2.0], [5.0, 4.0, 2.0, 3.0]]
