@@ -244,7 +244,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         Args:
             actions: (N, 3) float32, rows of robots that are away included (and ignored); other numbers are converted.
             wheel_gain: (N, 2) factor per wheel on the limited speed; wrappers multiply theirs in.
-            tasks: (N,) int8 `policy.Task` codes, if the policy tells them.
+            tasks: (N,) int8 `Task` codes, if the policy tells them.
 
         Returns:
             Observations (N, D) and rewards (N,) in reused buffers, terminated (N,) for the dead, truncated.

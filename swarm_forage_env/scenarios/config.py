@@ -1,6 +1,6 @@
 """Frozen configurations that are complete and refuse nonsense at construction.
 
-A warehouse and a disaster zone are two configurations, never two environments. Presets live in `scenarios`.
+A warehouse and a disaster zone are two configurations, never two environments. Presets live in `presets`.
 """
 
 import dataclasses
