@@ -5,8 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError, number, one_of, whole
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.population_process import (
@@ -16,7 +15,6 @@ from swarm_forage_env.wrappers.population_process import (
     PopulationState,
     advance_population,
 )
-from swarm_forage_env.wrappers.waveform import require_number
 
 BIRTH_MARGIN_M = 2.0
 """Robots are born this far from the border of the arena (study configuration), or nearer where they start nearer."""
@@ -151,16 +149,10 @@ class PopulationConfig(WrapperConfig):
     def __post_init__(self) -> None:
         for process in ("death", "birth", "malfunction", "repair"):
             field = f"{process}_per_tick"
-            require_number(f"population.{field}", getattr(self, field), at_least=0.0)
+            number(f"population.{field}", getattr(self, field), at_least=0.0)
         for field in ("initial_robots", "max_robots"):
-            size = getattr(self, field)
-            if size is not None and (isinstance(size, bool) or not isinstance(size, int) or size < 1):
-                raise ConfigError(f"Expected population.{field} to be a whole number >= 1, got {size!r}.")
-        if self.deaths not in DEATHS:
-            raise ConfigError(
-                f"Expected population.deaths to be one of {', '.join(DEATHS)}, got {self.deaths!r}."
-                + suggestion(str(self.deaths), DEATHS)
-            )
+            whole(f"population.{field}", getattr(self, field), at_least=1, or_none=True)
+        one_of("population.deaths", self.deaths, DEATHS)
 
     @property
     def rates(self) -> EventRates:

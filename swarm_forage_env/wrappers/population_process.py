@@ -19,10 +19,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.types import BoolArray, IntArray
-from swarm_forage_env.wrappers.waveform import require_number
 
 FindPlace: TypeAlias = Callable[[int, np.random.Generator], bool]
 """Puts the row that is to be born somewhere, drawing from the generator; returns False if there is no room now."""
@@ -43,7 +42,7 @@ class EventRates:
 
     def __post_init__(self) -> None:
         for process in ("death", "birth", "malfunction", "repair"):
-            require_number(f"the rate of {process}", getattr(self, process), at_least=0.0)
+            number(f"the rate of {process}", getattr(self, process), at_least=0.0)
 
 
 class EventClock:
