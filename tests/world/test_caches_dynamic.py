@@ -154,7 +154,7 @@ def test_the_square_is_pushed_clear_of_nest_and_source(x, clear_x):
 
 
 def test_a_second_cache_stands_clear_of_the_first():
-    # Caches this close are refused to robots; two FOUND drops that finish in the same tick can still come close.
+    # Caches this close are refused to robots; two CREATE_CACHE drops that finish in the same tick can still come close.
     env = tidy_world(n_robots=2, caches="dynamic")
     for row, cell in ((0, (52, 40)), (1, (51, 44)), (2, (80, 40)), (3, (81, 44))):
         if row % 2:

@@ -23,13 +23,13 @@ BANDS = {
     kernel.RELEASE: interacting.RELEASE,
     kernel.DELIVER_ONLY: interacting.DELIVER,
     kernel.SITE: interacting.SITE,
-    kernel.FOUND: interacting.FOUND,
+    kernel.CREATE_CACHE: interacting.CREATE_CACHE,
 }
 KINDS = {
     kernel.DELIVER: "deliver",
     kernel.CACHE_DROP: "drop into cache",
     kernel.SITE_DROP: interacting.SITE,
-    kernel.CREATE_DROP: interacting.FOUND,
+    kernel.CREATE_DROP: interacting.CREATE_CACHE,
     kernel.FLOOR_PICKUP: "take from floor",
     kernel.CACHE_PICKUP: "take from cache",
 }
