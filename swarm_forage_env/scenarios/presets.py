@@ -123,7 +123,7 @@ def scenario(name: str, /, **overrides: Any) -> ScenarioConfig:
 
     Args:
         name: One of `SCENARIO_NAMES`.
-        overrides: Field names of ScenarioConfig or of its sections, see `config.with_overrides`.
+        overrides: Field names of ScenarioConfig or of its sections, see `with_overrides`.
 
     Raises:
         ConfigError: unknown name or field (with the nearest known one), or values that describe no world.

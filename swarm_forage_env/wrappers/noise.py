@@ -39,7 +39,7 @@ def _is_noisy(sigma: Sigma) -> bool:
 
 
 class SensorNoise(SwarmWrapper):
-    """Perturbs what policies see. The world, its rules and the measure of interference use the truth.
+    """Perturbs what policies see. The rules of the arena and the measure of interference use the truth.
 
     Unit of sigma: 1 for readings (proximity, light, ground; clamped to [0, 1]), 1 cm/s for wheel speeds and 1 m per
     axis for positions (both clamped to the ends of their range), 1 rad for the heading, whose angle is perturbed. All
@@ -188,7 +188,7 @@ class SensorNoiseConfig(WrapperConfig):
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "SensorNoiseConfig":
         """Build the configuration from plain values.
 
-        A waveform in place of a sigma is read as by `signals.gather_waveform`; groups may be one text, joined by "+".
+        A waveform in place of a sigma is read as by `waveform.gather_waveform`; groups may be one text, joined by "+".
         """
         values = gather_waveform(mapping, "sigma", cls)
         if isinstance(values.get("groups"), str):
@@ -228,7 +228,7 @@ class ActuatorNoiseConfig(WrapperConfig):
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "ActuatorNoiseConfig":
-        """Build the configuration from plain values; a waveform as `signals.gather_waveform` reads it."""
+        """Build the configuration from plain values; a waveform as `waveform.gather_waveform` reads it."""
         return from_mapping(cls, gather_waveform(mapping, "sigma", cls))
 
 

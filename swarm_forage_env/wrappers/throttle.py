@@ -96,7 +96,7 @@ class ThrottleConfig(WrapperConfig):
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "ThrottleConfig":
-        """Build the configuration from plain values; the waveform as `signals.gather_waveform` reads it."""
+        """Build the configuration from plain values; the waveform as `waveform.gather_waveform` reads it."""
         return from_mapping(cls, gather_waveform(mapping, "waveform", cls))
 
 

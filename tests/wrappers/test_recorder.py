@@ -156,7 +156,7 @@ def test_policies_without_tasks_leave_no_task_columns():
 def test_impossible_tasks_are_refused(tasks):
     recorder = RunRecorder(FakeArena())
     recorder.reset_batch(0)
-    with pytest.raises(ValueError, match=r"shape \(n_robots,\) = \(4,\) and codes of policy.Task"):
+    with pytest.raises(ValueError, match=r"shape \(n_robots,\) = \(4,\) and codes of Task"):
         recorder.step_batch(STILL, tasks=np.array(tasks, np.int8))
 
 
