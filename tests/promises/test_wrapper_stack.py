@@ -125,7 +125,7 @@ def test_the_joint_view_passes_the_checker_of_gymnasium(wrappers):
 
 def play(env, seed: int, ticks: int, *, check=None) -> str:
     """Fingerprint of what a busy run shows, tick by tick."""
-    seen, policy, world = hashlib.sha256(), BusyPolicy(), env.world
+    seen, policy, world = hashlib.sha256(), BusyPolicy(), env.unwrapped
     policy.reset(world.swarm_spec, stream_rng(seed, Stream.POLICY))
     obs = env.reset_batch(seed)
     for _ in range(ticks):
