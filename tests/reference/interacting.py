@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from swarm_forage_env.contract.codes import Event
 from swarm_forage_env.scenarios.regions import Box
 
-GRASP, RELEASE, DELIVER, SITE, CREATE_CACHE = "grasp", "release", "deliver", "site", "create_cache"
+GRASP, RELEASE, DELIVER, SITE, CREATE_CACHE = "grasp", "release", "deliver", "site", "create"
 Request = tuple[str, int | None]
 """What is asked, and the object row or the cache serial that it is about."""
 

@@ -116,10 +116,10 @@ def shuffle(env: ForageEnv, rng: np.random.Generator, grips: np.ndarray) -> None
             objects.floor[to_y, to_x] = row
             objects.cell[row] = to_x, to_y
     if len(env.caches.alive) and np.count_nonzero(env.caches.alive) < 2 and rng.random() < 0.5:
-        found_somewhere(env, rng)
+        create_somewhere(env, rng)
 
 
-def found_somewhere(env: ForageEnv, rng: np.random.Generator) -> None:
+def create_somewhere(env: ForageEnv, rng: np.random.Generator) -> None:
     half = env.scenario.cache_side_cells // 2
     x, y = rng.integers((PATCH[0], PATCH[1]), (PATCH[2], PATCH[3])).tolist()
     floor = env.objects.floor
