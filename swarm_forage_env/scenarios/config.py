@@ -14,7 +14,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, capacity, distributable_box
-from swarm_forage_env.scenarios.units import CELL_M, WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, WHEEL_SCALE_MPS
 
 CACHE_KINDS = ("none", "static", "dynamic")
 PERFORMANCE_MEASURES = ("collected", "first_picked")
@@ -131,7 +131,7 @@ class ArenaConfig:
     def nest_box_m(self) -> tuple[float, float, float, float]:
         """Closed nest rectangle: x low, y low, x high, y high."""
         x_low, y_low, x_high, y_high = self.nest_cells
-        return (x_low / 5, y_low / 5, x_high / 5, y_high / 5)
+        return (x_low / CELLS_PER_M, y_low / CELLS_PER_M, x_high / CELLS_PER_M, y_high / CELLS_PER_M)
 
     @property
     def distributable_cells(self) -> Box:

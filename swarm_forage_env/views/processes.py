@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import BoolArray, ObsArray
+from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep, checked_rows, closed_error
-from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
+from swarm_forage_env.views.learner_arena import ArenaPlan
 
 _CLOSE = "close"
 _GOODBYE_S = 10.0
@@ -72,14 +74,15 @@ class ArenaProcesses:
                 everywhere, but needs the usual `if __name__ == "__main__"` in the starting script.
 
         Raises:
-            ValueError: fewer arenas than processes.
+            ValueError: fewer arenas than processes, or a plan that cannot be built.
+            ArenaProcessError: the first process ended while it started.
         """
         if not 1 <= n_processes <= n_arenas:
             raise ValueError(f"Expected n_processes from 1 to n_arenas = {n_arenas}, got {n_processes}.")
         self.n_arenas = n_arenas
         self.n_robots = plan.scenario.robots.n_robots
         self.n_rows = n_arenas * self.n_robots
-        self.interface = LearnerArena(plan).interface
+        self.interface = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
         self._shares = [part.tolist() for part in np.array_split(np.arange(n_arenas), n_processes)]
         starter = multiprocessing.get_context(context)
         self._pipes: list[Connection] = []
@@ -94,6 +97,12 @@ class ArenaProcesses:
             theirs.close()
             self._pipes.append(ours)
             self._processes.append(process)
+        try:
+            # The first question makes a process build its arenas. One is enough to find out whether the plan can be.
+            self.get_attribute("tick", [0])
+        except BaseException:
+            self.close()
+            raise
 
     def _ask(self, process: int, method: str, *args: Any, **kwargs: Any) -> None:
         if not self._pipes:
