@@ -84,7 +84,7 @@ class ArenaProcesses:
         self.n_rows = n_arenas * self.n_robots
         self.interface = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
         self._shares = [part.tolist() for part in np.array_split(np.arange(n_arenas), n_processes)]
-        starter = multiprocessing.get_context(context)
+        starter: Any = multiprocessing.get_context(context)  # its declared type lacks Process, which every context has
         self._pipes: list[Connection] = []
         self._processes = []
         self._n_asked = [0] * n_processes
@@ -92,7 +92,7 @@ class ArenaProcesses:
         for share in self._shares:
             ours, theirs = starter.Pipe()
             arguments = (theirs, plan, len(share), share[0])
-            process = starter.Process(target=_serve, args=arguments, daemon=True)  # type: ignore[attr-defined]
+            process = starter.Process(target=_serve, args=arguments, daemon=True)
             process.start()
             theirs.close()
             self._pipes.append(ours)

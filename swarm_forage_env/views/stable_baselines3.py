@@ -118,7 +118,7 @@ class SwarmVecEnv(VecEnv):
         assert self._actions is not None, "step_async comes before step_wait"
         step = self._arenas.step(self._actions)
         self.active = step.active
-        return step.obs, step.rewards, step.terminated | step.truncated, self._infos(step)  # type: ignore[return-value]
+        return step.obs, step.rewards, step.terminated | step.truncated, self._infos(step)
 
     def _infos(self, step: ArenaStep) -> list[dict[str, Any]]:
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

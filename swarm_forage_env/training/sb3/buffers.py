@@ -177,10 +177,12 @@ class PresentReplayBuffer(ReplayBuffer):
             drawn = np.concatenate([drawn, pairs[present[pairs[:, 0], pairs[:, 1]]]])
         steps, rows = drawn[:batch_size].T
         done = self.dones[steps, rows] * (1.0 - self.timeouts[steps, rows])
+        obs = self._normalize_obs(self.observations[steps, rows], env)
+        next_obs = self._normalize_obs(self.next_observations[steps, rows], env)
         return ReplayBufferSamples(
-            self.to_torch(self._normalize_obs(self.observations[steps, rows], env)),  # type: ignore[arg-type]
+            self.to_torch(obs),  # type: ignore[arg-type] - a dict only where the space is one
             self.to_torch(self.actions[steps, rows]),
-            self.to_torch(self._normalize_obs(self.next_observations[steps, rows], env)),  # type: ignore[arg-type]
+            self.to_torch(next_obs),  # type: ignore[arg-type] - a dict only where the space is one
             self.to_torch(done.reshape(-1, 1)),
             self.to_torch(self._normalize_reward(self.rewards[steps, rows].reshape(-1, 1), env)),
         )

@@ -27,8 +27,8 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import Policy
-from swarm_forage_env.policies.model_files import MODEL_FAULTS
-from swarm_forage_env.policies.network import LearnedPolicy
+from swarm_forage_env.policies.learned import LearnedPolicy
+from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_choice
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.study.record import software_versions
 from swarm_forage_env.study.run import run_policy
@@ -325,7 +325,9 @@ class _Watch(BaseCallback):
         self.keep(self.model)
         if self._baseline is None:
             self._baseline, _ = self._judged(lambda: load_policy(self._plan.evaluation.baseline))
-        performance, interference = self._judged(lambda: LearnedPolicy(self._plan.interface, _acting(self.model)))
+        performance, interference = self._judged(
+            lambda: LearnedPolicy(self._plan.interface, deterministic_choice(self.model))
+        )
         evaluation = Evaluation(
             steps=self.num_timesteps,
             wall_time_s=round(self._wall_time_s(), 1),
@@ -378,16 +380,9 @@ def _read_evaluations(path: Path) -> list[Evaluation]:
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
-        return [Evaluation(**{**row, "steps": int(row["steps"])}) for row in rows]  # type: ignore[arg-type]
+        return [Evaluation(**{**row, "steps": int(row["steps"])}) for row in rows]
     except (ValueError, TypeError, KeyError, csv.Error) as error:
         raise ConfigError(f"Cannot read the evaluations in {path}: {error}; repair or remove the file.") from error
-
-
-def _acting(model: BaseAlgorithm) -> Callable[[np.ndarray, np.random.Generator], np.ndarray]:
-    def choose(rows: np.ndarray, rng: np.random.Generator) -> np.ndarray:  # noqa: ARG001 - nothing is drawn
-        return model.predict(rows, deterministic=True)[0]
-
-    return choose
 
 
 def _keep_quiet(news: TrainingStatus | Evaluation) -> None:
