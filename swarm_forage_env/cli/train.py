@@ -1,4 +1,4 @@
-"""The command `train`; what it does is in `cli.train` and `learning.sb3.training`."""
+"""The command `train`; the plan it makes is `training.recipe`, what it does is `training.sb3.training`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -63,7 +63,8 @@ def train(  # long: one parameter per option
     holds all that was chosen. Ctrl-C keeps a checkpoint; --out FOLDER --resume goes on.
     """
     from swarm_forage_env.cli.plan import ScenarioOptions
-    from swarm_forage_env.cli.train import TrainOptions, build_plan, named_plan, resumed_plan, run_training
+    from swarm_forage_env.cli.training_plan import TrainOptions, build_plan, named_plan, resumed_plan
+    from swarm_forage_env.cli.training_report import run_training
 
     options = TrainOptions(
         algorithm=algorithm,
@@ -80,7 +81,7 @@ def train(  # long: one parameter per option
         horizon_s=horizon,
         arguments=tuple(arguments or ()),
     )
-    world = ScenarioOptions(
+    words = ScenarioOptions(
         scenario=scenario or "warehouse_small",
         robots=robots,
         objects=objects,
@@ -90,14 +91,14 @@ def train(  # long: one parameter per option
         wrappers=tuple(wrappers or ()),
         config_file=config,
     )
-    says_more = (scenario, options, world) != (
+    says_more = (scenario, options, words) != (
         None,
         TrainOptions(steps=steps),
-        ScenarioOptions(scenario=world.scenario),
+        ScenarioOptions(scenario=words.scenario),
     )
     if plan is not None and (says_more or steps is not None):
         raise typer.BadParameter("Expected --plan without options that the plan decides; write them into its file.")
-    chosen = build_plan(world, options) if plan is None else named_plan(plan)
+    chosen = build_plan(words, options) if plan is None else named_plan(plan)
     name = Path(plan).stem if plan is not None else f"{chosen.scenario.name}_{chosen.algorithm}"
     folder = out or Path("results/training") / name
     if resume and plan is None:

@@ -32,9 +32,10 @@ from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_ch
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.study.record import software_versions
 from swarm_forage_env.study.run import run_policy
-from swarm_forage_env.training.plan import Evaluation, Stage, TrainingPlan, TrainingStatus, read_plan
+from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
 from swarm_forage_env.training.sb3.export import export_network, note_interface
+from swarm_forage_env.training.status import Evaluation, TrainingStatus
 from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
 ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
