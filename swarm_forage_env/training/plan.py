@@ -42,7 +42,7 @@ def _require_whole(name: str, value: Any, *, least: int = 1) -> None:
 
 
 def _require_options(name: str, options: Any) -> None:
-    """Refuse values that stable-baselines3 takes without a word and that no training survives."""
+    """Refuse values that stable-baselines3 accepts although no training can succeed with them."""
     for key, value in _require_table(name, options).items():
         if key in _COUNTS:
             _require_whole(f"{name}.{key}", value)
@@ -60,7 +60,7 @@ def _require_table(name: str, value: Any) -> Mapping[str, Any]:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Stage:
-    """A part of the training in a world of its own: a step of a curriculum."""
+    """A part of the training with a scenario of its own: a step of a curriculum."""
 
     steps: int
     """Decisions of single robots."""
@@ -103,9 +103,9 @@ class EvaluationPlan:
         Raises:
             ConfigError: a horizon that is not a whole number of recording intervals.
         """
-        world = with_overrides(scenario, horizon_s=self.horizon_s)
+        whole_run = with_overrides(scenario, horizon_s=self.horizon_s)
         seeds = range(self.first_seed, self.first_seed + self.n_runs)
-        return tuple(RunSpec(scenario=world, policy=policy, wrappers=wrappers, seed=seed) for seed in seeds)
+        return tuple(RunSpec(scenario=whole_run, policy=policy, wrappers=wrappers, seed=seed) for seed in seeds)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -113,12 +113,12 @@ class TrainingPlan:
     """Everything that decides a training run, but for the machine and the installed versions.
 
     Raises:
-        ConfigError: an unknown algorithm or baseline, sizes below 1, a stage whose world cannot be or has another
-            number of robots, or discrete actions for an algorithm that has none (and the other way round).
+        ConfigError: an unknown algorithm or baseline, sizes below 1, a stage whose scenario cannot be or has
+            another number of robots, or actions that the algorithm cannot choose.
     """
 
     scenario: ScenarioConfig
-    """The world to be mastered, rewards included; evaluations take place in it."""
+    """What is to be mastered, rewards included; evaluations take place in it."""
     wrappers: tuple[WrapperConfig, ...] = ()
     """What disturbs the swarm, in training and in evaluations."""
     algorithm: str = "ppo"
@@ -212,7 +212,7 @@ class TrainingPlan:
         fields by name. `wrappers` is a table of tables by name.
 
         Raises:
-            ConfigError: unknown keys, or values that make no plan.
+            ConfigError: unknown keys, or values that a plan cannot have.
         """
         values = _known(cls, mapping, "")
         scenario = dict(_require_table("scenario", values.get("scenario")))
@@ -243,7 +243,7 @@ def read_plan(path: Path) -> TrainingPlan:
     """Read a plan from a TOML file, or from the JSON file that a training run leaves.
 
     Raises:
-        ConfigError: the file cannot be read or holds no plan; the message names it.
+        ConfigError: the file cannot be read or does not hold a plan; the message names it.
     """
     try:
         text = path.read_text(encoding="utf-8")

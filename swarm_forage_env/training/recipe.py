@@ -81,17 +81,17 @@ def recipe(
         ConfigError: an unknown name or field, values that are refused by what they are for (see `TrainingPlan`), or
             a smaller arena that cannot be.
     """
-    world = _training_scenario(scenario, overrides)
-    counts_deliveries = world.performance == "collected"
+    config = _training_scenario(scenario, overrides)
+    counts_deliveries = config.performance == "collected"
     return TrainingPlan(
-        scenario=world,
+        scenario=config,
         wrappers=wrapper_configs(wrappers),
         algorithm=algorithm,
         interface=chosen_interface(interface, _default_interface(algorithm)),
         n_arenas=n_arenas,
         hidden=hidden,
-        options=_algorithm_options(algorithm, n_arenas * world.robots.n_robots, options or {}),
-        stages=_stages(world, steps, small_start=counts_deliveries if small_start is None else small_start),
+        options=_algorithm_options(algorithm, n_arenas * config.robots.n_robots, options or {}),
+        stages=_stages(config, steps, small_start=counts_deliveries if small_start is None else small_start),
         evaluation=evaluation or EvaluationPlan(),
         seed=seed,
     )

@@ -105,12 +105,10 @@ def test_the_interface_of_a_model_is_told_by_a_parameter(tmp_path, algorithm, ch
 def test_a_model_that_does_not_tell_its_interface_is_refused_until_somebody_does(tmp_path, choices):
     interface = LearnerInterface(InterfaceConfig(**choices), ENV.swarm_spec)
     _, path = model("A2C", tmp_path, seen=interface.observation_space, done=interface.action_space)
-    with pytest.raises(ModelError, match=r"model\.zip to tell .* has no note, .*\{\"interface\": .* note_interface"):
+    with pytest.raises(ModelError, match=r"model\.zip to tell .* has no note, .*\{\"interface\": .*note_interface"):
         started(path)
     other = {"observation": "compact", "actions": "continuous"}
-    with pytest.raises(
-        ModelError, match=r"to Box\(3\), as the parameter interface says; model\.zip goes"
-    ):
+    with pytest.raises(ModelError, match=r"to Box\(3\), as the parameter interface says; model\.zip goes"):
         started(path, interface=other)
     started(path, interface=choices)
 

@@ -136,12 +136,12 @@ def test_seeds_decide_everything_and_runs_continue_their_sequence():
 def test_a_reset_changes_the_scenario_for_all_later_runs_until_told_otherwise():
     batch = ArenaBatch(plan(InterfaceConfig(observation="compact")), 2)
     batch.reset([0, 1], [{"scenario": {"n_objects": 9, "width_m": 24.0}}, None])
-    assert [world.forage_env.scenario.objects.n_objects for world in batch.arenas] == [9, 4]
+    assert [arena.forage_env.scenario.objects.n_objects for arena in batch.arenas] == [9, 4]
     for _ in range(lives.HORIZON_TICKS):
         batch.step(np.zeros((6, 3), np.float32))
-    assert [world.forage_env.scenario.arena.width_m for world in batch.arenas] == [24.0, 32.0]
+    assert [arena.forage_env.scenario.arena.width_m for arena in batch.arenas] == [24.0, 32.0]
     batch.reset([0, 1], [{"scenario": {}}, None])
-    assert [world.forage_env.scenario.objects.n_objects for world in batch.arenas] == [4, 4]
+    assert [arena.forage_env.scenario.objects.n_objects for arena in batch.arenas] == [4, 4]
 
 
 @pytest.mark.parametrize(
@@ -222,8 +222,8 @@ def test_actions_that_are_not_finite_are_refused_by_name(interface):
         batch.step(actions)
     assert "the world was not stepped" in str(refusal.value)
     (note,) = refusal.value.__notes__
-    assert "in arena 5: its world was not stepped" in note
-    assert [world.forage_env.tick for world in batch.arenas] == [1, 0], "worlds of other arenas may have been"
+    assert "in arena 5, which was not stepped" in note
+    assert [arena.forage_env.tick for arena in batch.arenas] == [1, 0], "other arenas may have been stepped"
     batch.reset([0, 1], [None, None])
     assert batch.step(np.zeros_like(actions)).obs.shape[0] == 6
 

@@ -14,7 +14,7 @@ _SAMPLES = ("observations", "actions", "values", "log_probs", "advantages", "ret
 
 
 class EmptyRolloutError(ValueError):
-    """A rollout with nothing to learn from."""
+    """A rollout in which nobody was at work, so that there is nothing to learn from."""
 
 
 class ActiveRolloutBuffer(RolloutBuffer):
