@@ -91,7 +91,7 @@ def closed_error() -> RuntimeError:
 
 
 def _owner(env: ForageEnv | SwarmWrapper, name: str) -> ForageEnv | SwarmWrapper:
-    """Return who in a stack has the attribute: wrappers show those of the environment below without owning them."""
+    """Return the layer of a stack that has the attribute itself; wrappers also show those of the layers below."""
     while isinstance(env, SwarmWrapper) and name not in vars(env) and not hasattr(type(env), name):
         env = cast("ForageEnv | SwarmWrapper", env.env)  # which it has checked
     return env

@@ -162,11 +162,11 @@ class LearnerArena:
 
 
 _FIXED = ("interface", "wrappers")
-"""What people may expect a reset to change, and it cannot."""
+"""What a reset cannot change, although people may expect it to."""
 
 
 def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """Return the overridden fields that `options` asks for, None when it does not speak of them."""
+    """Return the overridden fields that `options` asks for, None when it has no such key."""
     if not options:
         return None
     for key in options:
@@ -181,7 +181,7 @@ def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | N
 
 
 def _refuse_misplaced(key: Any, value: Any) -> None:
-    """Raise ConfigError if a reset option was meant for the scenario: nothing would come of it."""
+    """Raise ConfigError if a reset option was probably meant for the scenario; it would have no effect."""
     if key in _FIXED:
         raise ConfigError(
             f"Expected {key} when the environment is made, not at a reset, which changes the scenario only."
@@ -195,7 +195,7 @@ def _refuse_misplaced(key: Any, value: Any) -> None:
     nearest = suggestion(str(key), (SCENARIO_OPTION,))
     if nearest:
         raise ConfigError(f"Unknown reset option {key!r}.{nearest}")
-    # Nearer than `suggestion` asks for: options of others, such as "high", are no misspelt fields.
+    # A closer match than `suggestion` asks for: options of others, such as "high", are not misspelt fields.
     for name in get_close_matches(str(key), known, n=1, cutoff=0.8):
         raise ConfigError(
             f"Unknown reset option {key!r}. If the scenario field {name!r} is meant: "

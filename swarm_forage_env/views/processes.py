@@ -206,7 +206,7 @@ class ArenaProcesses:
         return [found[arena] for arena in arenas]
 
     def close(self) -> None:
-        """End all processes; whatever they still had to say is dropped. Closed arenas may be closed again."""
+        """End all processes; answers that were not read are dropped. Closed arenas may be closed again."""
         pipes, self._pipes = self._pipes, []
         for pipe in pipes:
             with contextlib.suppress(OSError):  # it ended by itself

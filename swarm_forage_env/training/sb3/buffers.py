@@ -48,7 +48,7 @@ class ActiveRolloutBuffer(RolloutBuffer):
         """Create the buffer.
 
         Args:
-            buffer_size: As in `RolloutBuffer`, like all that is not told here.
+            buffer_size: As in `RolloutBuffer`, like everything else up to `n_envs`.
             observation_space: Observations of one row.
             action_space: Actions of one row.
             device: Where minibatches go.
@@ -60,7 +60,7 @@ class ActiveRolloutBuffer(RolloutBuffer):
                 None: observations are single frames.
 
         Raises:
-            ValueError: observations that are no whole number of frames, or no such column in a frame.
+            ValueError: the columns of an observation are not a whole number of frames, or a frame has no such column.
         """
         width = (observation_space.shape or (0,))[-1]
         frame = width if n_columns is None else n_columns
