@@ -30,8 +30,8 @@ _OF_CURVES = ("curves", "measures", "as_json")
 """Options of `score` that go with --curves."""
 
 if TYPE_CHECKING:
-    from metrics.score_table import ScoreTable
     from metrics.scoring import ScoringPlan
+    from metrics.scoring.table import ScoreTable
 
 
 def score(

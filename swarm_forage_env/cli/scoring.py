@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from metrics.comparison import Comparison, compare_tables
-from metrics.plots import draw_scores
-from metrics.score_table import ScoreTable, aligned, counted
 from metrics.scoring import ScoringPlan, plan_scores, score_curves
+from metrics.scoring.comparison import Comparison, compare_tables
+from metrics.scoring.plots import draw_scores
+from metrics.scoring.table import ScoreTable
+from metrics.scoring.texts import aligned, counted
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.plan import ScenarioOptions, build_scenario, estimated_seconds, split_names
 from swarm_forage_env.cli.report import estimate

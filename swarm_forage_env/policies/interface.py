@@ -33,7 +33,7 @@ ACTIONS = ("continuous", "discrete")
 
 MOTIONS = ("stand", "forward", "arc left", "arc right", "turn left", "turn right")
 """Discrete actions that move, in order."""
-GRIPS = ("grasp", "release", "deliver", "site", "found")
+GRIPS = ("grasp", "release", "deliver", "site", "create_cache")
 """Discrete actions of the gripper, in order after the motions; the wheels stand."""
 _WHEELS = ((0.0, 0.0), (0.5, 0.5), (0.4, 0.6), (0.6, 0.4), (-0.25, 0.25), (0.25, -0.25))
 """Wheel commands of the motions (our choice): full speed, arcs of 0.35 m radius, turns of 8 degrees per tick."""

@@ -224,7 +224,7 @@ class CacheConfig:
     side_share: float = 0.2
     """Nominal side as a share of max(X, Y)."""
     distance_share: float = 0.2
-    """min_dist as a share of min(X, Y): objects this close to a founding drop join a dynamic cache."""
+    """min_dist as a share of min(X, Y): objects this close to a CREATE_CACHE drop join a dynamic cache."""
     static_size: int = 2
     """Objects that a static cache is created with."""
     respawn_scale: float = 0.05
@@ -381,7 +381,7 @@ class ScenarioConfig:
 
     @property
     def min_dist_m(self) -> float:
-        """Objects within this distance of a founding drop join a dynamic cache."""
+        """Objects within this distance of a CREATE_CACHE drop join a dynamic cache."""
         return self.cache.distance_share * min(self.arena.width_m, self.arena.height_m)
 
     @property

@@ -123,7 +123,7 @@ class ForagingArena:
         self.tick += 1
         self._physics.advance(swarm)
         sense_proximity(swarm, suite)
-        mark_interference(swarm, events, suite.obs, suite.near)
+        mark_interference(swarm, events, suite.obs, suite.columns["proximity"], suite.near)
         if self._serve_requests(actions):
             self._create_dynamic_caches()
             self._replace_displaced()

@@ -23,7 +23,7 @@ from tests.reference.compact_view import compact_row
 from tests.support.stage import NEST_CELL, OPEN_CELL, build_cache, cell_centre, lay, load, put, stand, tidy_world
 
 STAND, FORWARD = MOTIONS.index("stand"), MOTIONS.index("forward")
-GRASP, RELEASE, DELIVER, SITE, FOUND = (len(MOTIONS) + k for k in range(len(GRIPS)))
+GRASP, RELEASE, DELIVER, SITE, CREATE_CACHE = (len(MOTIONS) + k for k in range(len(GRIPS)))
 
 
 def bound(env: ForageEnv, **choices) -> LearnerInterface:
@@ -139,7 +139,7 @@ def test_motions_drive_and_ask_for_nothing():
 
 def test_gripper_actions_by_number():
     env = tidy_world(n_robots=5)
-    commands = bound(env, actions="discrete").command(np.array([GRASP, RELEASE, DELIVER, SITE, FOUND]),
+    commands = bound(env, actions="discrete").command(np.array([GRASP, RELEASE, DELIVER, SITE, CREATE_CACHE]),
                                                       env.arena.observe())  # fmt: skip
     assert not commands[:, :2].any()
     np.testing.assert_allclose(commands[:, 2], [Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.CREATE_CACHE])
@@ -184,7 +184,7 @@ def test_masks_by_hand(caches):
     here = np.arange(8) < 7
     env.set_population(active=here & (np.arange(8) != 6), present=here)  # 6 in repair, 7 away
     moves = set(range(len(MOTIONS)))
-    site = {SITE, FOUND} if caches == "dynamic" else set()
+    site = {SITE, CREATE_CACHE} if caches == "dynamic" else set()
     expected = [
         moves | {GRASP},
         moves,
