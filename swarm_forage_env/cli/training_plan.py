@@ -6,7 +6,7 @@ from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.config_file import read_config
-from swarm_forage_env.cli.plan import ScenarioOptions, build_wrappers, scenario_overrides
+from swarm_forage_env.cli.plan import ScenarioOptions, build_scenario, build_wrappers, scenario_overrides
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.training.plan import EvaluationPlan, TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
@@ -42,7 +42,9 @@ def build_plan(words: ScenarioOptions, options: TrainOptions) -> TrainingPlan:
         ConfigError: whatever is wrong with them.
     """
     fields, file_wrappers = ({}, ()) if words.config_file is None else read_config(words.config_file)
-    overrides = scenario_overrides(replace(words, horizon=options.horizon_s), fields)
+    words = replace(words, horizon=options.horizon_s)
+    build_scenario(words, fields)  # refuses what is not a field, so that the recipe does not take it for its argument
+    overrides = scenario_overrides(words, fields)
     interface = {name: getattr(options, name) for name in _INTERFACE_FIELDS}
     chosen = {name: getattr(options, name) for name in ("algorithm", "steps", "n_arenas", "small_start", "seed")}
     if options.hidden is not None:

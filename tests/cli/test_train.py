@@ -11,6 +11,7 @@ import pytest
 
 from swarm_forage_env import cli
 from swarm_forage_env._internal.extras import install_command
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.plan import ScenarioOptions
 from swarm_forage_env.cli.training_plan import TrainOptions, build_plan
 from swarm_forage_env.training.plan import EvaluationPlan, read_plan
@@ -238,6 +239,14 @@ def test_small_runs_come_without_warnings(command, recwarn):
                            "n_steps=2", "--evaluate-every", "6")  # fmt: skip
     assert code == 0, err
     assert not [warning for warning in recwarn if "mini-batch" in str(warning.message)]
+
+
+@pytest.mark.parametrize("name", ["seed", "steps", "scenario", "n_robts"])
+def test_a_file_sets_fields_of_the_scenario_and_no_arguments_of_the_recipe(tmp_path, name):
+    path = tmp_path / "world.toml"
+    path.write_text(f"[scenario]\n{name} = 3\n")
+    with pytest.raises(ConfigError, match=f"Unknown scenario field '{name}'"):
+        build_plan(ScenarioOptions(scenario="warehouse_small", config_file=path), TrainOptions())
 
 
 def test_a_wrapper_option_goes_before_the_same_wrapper_in_the_file(tmp_path):
