@@ -113,7 +113,7 @@ def test_an_action_is_kept_for_the_ticks_of_a_decision_and_rewards_add_up():
     actions = np.zeros((3, 3), np.float32)
     step = batch.step(actions)
     assert step.rewards.tolist() == [3.0, 3.0, 3.0]
-    assert batch.arenas[0].base.tick == 3
+    assert batch.arenas[0].forage_env.tick == 3
     last = batch.step(actions)
     assert last.rewards.tolist() == [2.0, 2.0, 2.0], "the horizon of 5 ticks cuts the second decision short"
     assert last.truncated.all()
@@ -174,7 +174,7 @@ def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
 def test_options_of_others_are_left_to_them():
     batch = ArenaBatch(plan(), 1)
     batch.reset([0], [{"reset_mask": np.ones(1, bool), "low": -1, "high": 1, 3: "three", "record": True}])
-    assert batch.arenas[0].base.scenario.objects.n_objects == 4
+    assert batch.arenas[0].forage_env.scenario.objects.n_objects == 4
 
 
 def test_closed_arenas_take_no_reset_and_no_step():
@@ -257,5 +257,5 @@ def test_attributes_are_set_where_they_are_also_below_wrappers():
     batch = ArenaBatch(wrapped, 1)
     batch.reset([0], [None])
     batch.set_attribute("max_cycles", 1, [0])
-    assert batch.arenas[0].base.max_cycles == 1
+    assert batch.arenas[0].forage_env.max_cycles == 1
     assert batch.step(np.zeros((3, 3), np.float32)).truncated.all()
