@@ -133,7 +133,7 @@ class Senses(NamedTuple):
     in_nest: bool
     carrying: bool
     event: int
-    """Code of `policy.Event`."""
+    """Code of `Event`."""
     x: float
     """Believed position, m."""
     y: float

@@ -121,17 +121,17 @@ class TaskPolicy:
 
     @property
     def task(self) -> CodeArray:
-        """(N,) int8 `policy.Task` codes; a live view, read only."""
+        """(N,) int8 `Task` codes; a live view, read only."""
         return self._allocation.task
 
     @property
     def task_shares(self) -> FloatArray:
-        """(8,) share of robots in each task, by `policy.Task` code; robots that have not acted yet have none."""
+        """(8,) share of robots in each task, by `Task` code; robots that have not acted yet have none."""
         return np.bincount(self._allocation.task, minlength=N_TASKS) / len(self._allocation.task)
 
     @property
     def task_estimates(self) -> FloatArray:
-        """(N, 8) expected execution times in ticks, by `policy.Task` code, a copy."""
+        """(N, 8) expected execution times in ticks, by `Task` code, a copy."""
         return self._allocation.estimate.copy()
 
     @property

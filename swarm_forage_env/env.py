@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import as_whole, instance
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
@@ -58,18 +58,14 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             ConfigError: no ScenarioConfig, or an unknown slice in `reads`.
             ValueError: max_cycles is no whole number >= 1, or an unknown render mode.
         """
-        if not isinstance(scenario, ScenarioConfig):
-            raise ConfigError(
-                f"Expected a ScenarioConfig, got {scenario!r}; `parallel_env` takes names of presets, too."
-            )
+        instance("scenario", scenario, ScenarioConfig, hint="; `parallel_env` takes names of presets, too")
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"Expected render_mode None or 'rgb_array', got {render_mode!r}.")
-        is_whole = isinstance(max_cycles, int | np.integer) and not isinstance(max_cycles, bool)
-        if max_cycles is not None and not (is_whole and max_cycles >= 1):
-            raise ValueError(f"Expected a whole number max_cycles >= 1, got {max_cycles!r}.")
+        if max_cycles is not None:
+            max_cycles = as_whole("max_cycles", max_cycles, at_least=1, or_none=True)
         self.scenario = scenario
         self.render_mode = render_mode
-        self.max_cycles = scenario.horizon_ticks if max_cycles is None else int(max_cycles)
+        self.max_cycles = scenario.horizon_ticks if max_cycles is None else max_cycles
         self.arena = ForagingArena(scenario, reads=reads)
         n_robots = scenario.robots.n_robots
         self._rewards = RewardModel(scenario.reward, scenario.arena.nest_centre_m, n_robots)
@@ -177,12 +173,11 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """
         if seed is None:
             seed = int(self._seeds.integers(2**31))
-        elif isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-            raise ValueError(f"Expected seed to be a non-negative integer or None, got {seed!r}.")
         else:
+            seed = as_whole("seed", seed, at_least=0, or_none=True)
             self._seeds = np.random.default_rng(seed)
-        obs = self.arena.reset(int(seed))
-        self.seed_value = int(seed)
+        obs = self.arena.reset(seed)
+        self.seed_value = seed
         self._terminated[:] = False
         self.agents = list(self.possible_agents)
         return obs
@@ -218,7 +213,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         Args:
             actions: (N, 3) float32, rows of robots that are away included (and ignored); other numbers are converted.
             wheel_gain: (N, 2) factor per wheel on the limited speed; wrappers multiply theirs in.
-            tasks: (N,) int8 `policy.Task` codes, if the policy tells them.
+            tasks: (N,) int8 `Task` codes, if the policy tells them.
 
         Returns:
             Observations (N, D) and rewards (N,) in reused buffers, terminated (N,) for the dead, truncated.

@@ -13,8 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, whole
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.layout import ObservationLayout, ObservationSlice
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
@@ -72,20 +71,10 @@ class InterfaceConfig:
     """Ticks for which an action is kept; rewards add up. An automatic gripper looks in every tick."""
 
     def __post_init__(self) -> None:
-        for name, known in (("observation", OBSERVATIONS), ("actions", ACTIONS)):
-            value = getattr(self, name)
-            if value not in known:
-                raise ConfigError(
-                    f"Expected interface.{name} to be one of {', '.join(known)}, got {value!r}."
-                    + suggestion(str(value), known)
-                )
-        if not isinstance(self.automatic_gripper, bool):
-            raise ConfigError(
-                f"Expected interface.automatic_gripper to be True or False, got {self.automatic_gripper!r}."
-            )
-        ticks = self.decision_ticks
-        if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 1:
-            raise ConfigError(f"Expected interface.decision_ticks to be a whole number >= 1, got {ticks!r}.")
+        one_of("interface.observation", self.observation, OBSERVATIONS)
+        one_of("interface.actions", self.actions, ACTIONS)
+        switch("interface.automatic_gripper", self.automatic_gripper)
+        whole("interface.decision_ticks", self.decision_ticks, at_least=1)
 
     @property
     def reads(self) -> tuple[str, ...] | None:
@@ -285,8 +274,5 @@ def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
     Raises:
         ConfigError: an unknown key or value.
     """
-    known = InterfaceConfig.__dataclass_fields__
-    for key in mapping:
-        if key not in known:
-            raise ConfigError(f"Unknown interface option {key!r}.{suggestion(key, known)}")
+    known_keys(mapping, InterfaceConfig.__dataclass_fields__, "interface option")
     return InterfaceConfig(**mapping)

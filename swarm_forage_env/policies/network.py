@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, table
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
@@ -55,13 +54,13 @@ class NetworkAbout:
     """How the network came about, for people."""
 
     def __post_init__(self) -> None:
-        if self.activation not in ACTIVATIONS:
-            raise NetworkError(f"Expected an activation of {', '.join(ACTIVATIONS)}, got {self.activation!r}.")
-        if self.caches not in CACHE_KINDS:
-            raise NetworkError(f"Expected caches to be one of {', '.join(CACHE_KINDS)}, got {self.caches!r}.")
-        for name, kind, wanted in (("samples", bool, "true or false"), ("card", dict, "a table")):
-            if not isinstance(getattr(self, name), kind):  # files hold anything
-                raise NetworkError(f"Expected {name} to be {wanted}, got {getattr(self, name)!r}.")
+        try:
+            one_of("activation", self.activation, ACTIVATIONS)
+            one_of("caches", self.caches, CACHE_KINDS)
+            switch("samples", self.samples)
+            table("card", self.card)
+        except ConfigError as error:
+            raise NetworkError(str(error)) from error
 
     def to_json(self) -> str:
         """Return the text that files hold."""
@@ -80,11 +79,8 @@ class NetworkAbout:
             raise NetworkError(f"Expected a description of a network as JSON, got {text[:80]!r}.") from error
         if not isinstance(mapping, dict) or not isinstance(mapping.get("interface"), dict):
             raise NetworkError(f"Expected a description of a network with its interface, got {text[:80]!r}.")
-        known = cls.__dataclass_fields__
-        for key in mapping:
-            if key not in known:
-                raise NetworkError(f"Unknown key {key!r} about a network.{suggestion(key, known)}")
         try:
+            known_keys(mapping, cls.__dataclass_fields__, "key about a network")
             return cls(**{**mapping, "interface": interface_from_mapping(mapping["interface"])})
         except ConfigError as error:
             raise NetworkError(f"Expected a description of a network that can be used: {error}") from error

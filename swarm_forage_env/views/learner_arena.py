@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
@@ -174,10 +174,7 @@ def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | N
             _refuse_misplaced(key, options[key])
     if SCENARIO_OPTION not in options:
         return None
-    fields = options[SCENARIO_OPTION]
-    if not isinstance(fields, Mapping):
-        raise ConfigError(f"Expected the reset option 'scenario' as fields by name, got {fields!r}.")
-    return dict(fields)
+    return dict(table("the reset option 'scenario'", options[SCENARIO_OPTION]))
 
 
 def _refuse_misplaced(key: Any, value: Any) -> None:

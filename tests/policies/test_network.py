@@ -89,8 +89,8 @@ ABOUT = json.loads(small_network().about.to_json())
             {"about": np.array(json.dumps(ABOUT | {"caches": "statc"}))},
             "caches to be one of none, static, dynamic, got",
         ),
-        ({"about": np.array(json.dumps(ABOUT | {"samples": "no"}))}, "samples to be true or false, got 'no'"),
-        ({"about": np.array(json.dumps(ABOUT | {"card": [1]}))}, r"card to be a table, got \[1\]"),
+        ({"about": np.array(json.dumps(ABOUT | {"samples": "no"}))}, "samples to be True or False, got 'no'"),
+        ({"about": np.array(json.dumps(ABOUT | {"card": [1]}))}, r"card to be a table of values by name, got \[1\]"),
         ({"about": np.array(json.dumps(ABOUT))}, r"layers that follow on each other, got weights \[\]"),
     ],
 )
@@ -152,7 +152,7 @@ def test_layers_that_do_not_follow_on_each_other_are_refused():
         Network((network.weights[0], np.zeros((3, 2), np.float32)), network.biases, network.about)
     with pytest.raises(NetworkError, match="follow on each other"):
         Network((), (), network.about)
-    with pytest.raises(NetworkError, match="activation of tanh, relu"):
+    with pytest.raises(NetworkError, match="activation to be one of tanh, relu"):
         small_network(activation="elu")
 
 

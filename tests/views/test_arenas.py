@@ -149,7 +149,7 @@ def test_a_reset_changes_the_scenario_for_all_later_runs_until_told_otherwise():
     [
         ({"scenario": {"n_robots": 4}}, "n_robots to stay 3"),
         ({"scenario": {"n_objekts": 4}}, "n_objects"),
-        ({"scenario": 4}, "fields by name"),
+        ({"scenario": 4}, "reset option 'scenario' to be a table of values by name, got 4"),
         ({"scenery": {}}, "scenario"),
         ({"width_m": 12.0}, r"inside of .* options=\{'scenario': \{'width_m': 12.0\}\}"),
         ({"scenario": {}, "width_m": 12.0}, "'width_m' inside of the reset option 'scenario'"),

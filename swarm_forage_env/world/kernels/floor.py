@@ -33,7 +33,7 @@ _HALF_WINDOW = WINDOW_CELLS // 2
 
 @kernel
 def grey_of(code: int) -> float:
-    """Grey level of a floor code (`codes.CELL_...`): object 0, nest 0.70, cache 0.40, empty 1."""
+    """Grey level of a floor code of `contract.codes`: object 0, nest 0.70, cache 0.40, empty 1."""
     if code >= 0:
         return _GREY_OBJECT
     if code == CELL_EMPTY:
