@@ -14,7 +14,7 @@ from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import CELL_M, WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.rewards import RewardModel
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
@@ -107,33 +107,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     @cached_property
     def swarm_spec(self) -> SwarmSpec:
         """What every policy may know before a run."""
-        scenario = self.scenario
-        arena, robots = scenario.arena, scenario.robots
-        x_low, y_low, x_high, y_high = arena.nest_box_m
-        area = arena.distributable_cells
-        return SwarmSpec(
-            n_robots=robots.n_robots,
-            n_objects=scenario.objects.n_objects,
-            dt_s=scenario.dt_s,
-            horizon_s=self.max_cycles * scenario.dt_s,
-            layout=self.layout,
-            max_speed_mps=robots.max_speed_mps,
-            max_wheel_difference_mps=robots.max_wheel_difference_mps,
-            wheel_scale_mps=WHEEL_SCALE_MPS,
-            wheel_base_m=robots.wheel_base_m,
-            arena_size_m=(arena.width_m, arena.height_m),
-            cell_m=CELL_M,
-            nest_centre_m=((x_low + x_high) / 2, (y_low + y_high) / 2),
-            nest_size_m=(x_high - x_low, y_high - y_low),
-            distributable_box_m=(area[0] / 5, area[1] / 5, area[2] / 5, area[3] / 5),
-            placement=scenario.objects.placement,
-            caches=scenario.caches,
-            cache_side_m=scenario.cache_side_cells / 5,
-            cache_side_nominal_m=scenario.cache_side_nominal_m,
-            min_dist_m=scenario.min_dist_m,
-            cache_proximity_m=scenario.cache_proximity_m,
-            quirks=scenario.quirks,
-        )
+        return SwarmSpec.of(self.scenario, horizon_s=self.max_cycles * self.scenario.dt_s)
 
     # Truth, for wrappers, recorders and pictures
 

@@ -30,7 +30,7 @@ from swarm_forage_env.cli.options import (
     complain,
 )
 from swarm_forage_env.cli.score_commands import compare, score
-from swarm_forage_env.cli.train_command import train
+from swarm_forage_env.cli.train import train
 
 if TYPE_CHECKING:
     from swarm_forage_env.study.runner import StudyResult

@@ -6,7 +6,7 @@ so that a policy runs exactly as it was trained.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Any, TypeAlias
 
@@ -93,15 +93,16 @@ class LearnerInterface:
     """
 
     def __init__(self, config: InterfaceConfig, spec: SwarmSpec) -> None:
-        """Bind the choices to a world.
+        """Bind the choices to a swarm.
 
         Args:
             config: The choices.
-            spec: The world; see `ForageEnv.swarm_spec`.
+            spec: The swarm: `SwarmSpec.of(scenario)`, or `swarm_spec` of an environment.
         """
         self.config = config
         self._is_compact = config.observation == "compact"
         self._is_discrete = config.actions == "discrete"
+        self._n_choices = N_MOTIONS if config.automatic_gripper else N_MOTIONS + N_GRIPS
         self._dynamic_caches = spec.caches == "dynamic"
         source = spec.layout
         start = {part.name: part.start for part in source}
@@ -131,10 +132,9 @@ class LearnerInterface:
 
     def new_action_space(self) -> spaces.Box | spaces.Discrete:
         """Return a space of its own, with a random state of its own, for one robot's action."""
-        automatic = self.config.automatic_gripper
         if self._is_discrete:
-            return spaces.Discrete(N_MOTIONS if automatic else N_MOTIONS + N_GRIPS)
-        return spaces.Box(-1.0, 1.0, (2 if automatic else 3,), np.float32)
+            return spaces.Discrete(self._n_choices)
+        return spaces.Box(-1.0, 1.0, (2 if self.config.automatic_gripper else 3,), np.float32)
 
     @property
     def active_column(self) -> int:
@@ -164,7 +164,7 @@ class LearnerInterface:
             obs: (N, D) observations of the environment that the learner's choice is carried out in.
 
         Raises:
-            ActionError: another shape, or a number that is no action.
+            ActionError: another shape, or a number outside of `action_space`.
         """
         commands = self._commands
         if actions.shape != self._actions_shape:
@@ -186,7 +186,7 @@ class LearnerInterface:
         return commands
 
     def _check_numbers(self, actions: np.ndarray) -> None:
-        most = int(self.action_space.n) - 1  # type: ignore[union-attr]
+        most = self._n_choices - 1
         expected = f"Expected actions as whole numbers from 0 to {most}, got"
         if actions.dtype.kind not in "iu":
             raise ActionError(f"{expected} {actions.dtype}.")
@@ -196,8 +196,8 @@ class LearnerInterface:
     def mask(self, obs: ObsArray) -> BoolArray:
         """Return which discrete actions make sense, (N, number of actions) bool; at least one per row.
 
-        Moving is no choice during an interaction, a gripper action none where it would be refused; robots that are
-        not at work may only stand.
+        Left out are motions during an interaction and gripper actions that would be refused; robots that are not at
+        work may only stand.
 
         Args:
             obs: (N, D) observations of the environment.
@@ -206,8 +206,8 @@ class LearnerInterface:
             ValueError: the actions are continuous.
         """
         if not self._is_discrete:
-            raise ValueError("Expected discrete actions, continuous ones have no mask; set actions='discrete'.")
-        mask = np.empty((len(obs), int(self.action_space.n)), np.bool_)  # type: ignore[union-attr]
+            raise ValueError("Expected discrete actions: continuous ones have no mask. Set actions='discrete'.")
+        mask = np.empty((len(obs), self._n_choices), np.bool_)
         mask_actions(obs, self._mask_starts, self._dynamic_caches, mask)
         return mask
 
@@ -245,18 +245,23 @@ GivenInterface: TypeAlias = InterfaceConfig | Mapping[str, Any] | None
 """What environments take as their argument `interface`; see `chosen_interface`."""
 
 
-def chosen_interface(given: GivenInterface) -> InterfaceConfig:
-    """Return the choices that were given: as they are, as fields by name, or None for the defaults.
+def chosen_interface(given: GivenInterface, default: InterfaceConfig | None = None) -> InterfaceConfig:
+    """Return the choices that were given: as they are, as fields by name, or None for the default.
+
+    Args:
+        given: What the user said.
+        default: Says what fields by name leave out; None = `InterfaceConfig()`.
 
     Raises:
-        ConfigError: none of these, an unknown field or value.
+        ConfigError: `given` is none of these, or has an unknown field or value.
     """
-    if given is None:
-        return InterfaceConfig()
     if isinstance(given, InterfaceConfig):
         return given
+    default = default or InterfaceConfig()
+    if given is None:
+        return default
     if isinstance(given, Mapping):
-        return interface_from_mapping(given)
+        return interface_from_mapping({**asdict(default), **given})
     raise ConfigError(
         f"Expected interface as an InterfaceConfig or its fields by name, such as {{'actions': 'discrete'}}, "
         f"got {given!r}."

@@ -1,4 +1,4 @@
-"""TrainingPlan: a training run as frozen data, read from TOML and written beside its results; and what it reports."""
+"""TrainingPlan: a training run as frozen data, read from TOML and written beside its results."""
 
 import dataclasses
 import json
@@ -35,7 +35,7 @@ _RANGES: dict[str, dict[str, float]] = {
 
 
 def _check_options(name: str, options: Any) -> None:
-    """Refuse values that stable-baselines3 takes without a word and that no training survives."""
+    """Refuse values that stable-baselines3 accepts although no training can succeed with them."""
     for key, value in table(name, options).items():
         if key in _COUNTS:
             whole(f"{name}.{key}", value, at_least=1)
@@ -45,7 +45,7 @@ def _check_options(name: str, options: Any) -> None:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Stage:
-    """A part of the training in a world of its own: a step of a curriculum."""
+    """A part of the training with a scenario of its own: a step of a curriculum."""
 
     steps: int
     """Decisions of single robots."""
@@ -88,9 +88,9 @@ class EvaluationPlan:
         Raises:
             ConfigError: a horizon that is not a whole number of recording intervals.
         """
-        world = with_overrides(scenario, horizon_s=self.horizon_s)
+        whole_run = with_overrides(scenario, horizon_s=self.horizon_s)
         seeds = range(self.first_seed, self.first_seed + self.n_runs)
-        return tuple(RunSpec(scenario=world, policy=policy, wrappers=wrappers, seed=seed) for seed in seeds)
+        return tuple(RunSpec(scenario=whole_run, policy=policy, wrappers=wrappers, seed=seed) for seed in seeds)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -98,12 +98,12 @@ class TrainingPlan:
     """Everything that decides a training run, but for the machine and the installed versions.
 
     Raises:
-        ConfigError: an unknown algorithm or baseline, sizes below 1, a stage whose world cannot be or has another
-            number of robots, or discrete actions for an algorithm that has none (and the other way round).
+        ConfigError: an unknown algorithm or baseline, sizes below 1, a stage whose scenario cannot be or has
+            another number of robots, or actions that the algorithm cannot choose.
     """
 
     scenario: ScenarioConfig
-    """The world to be mastered, rewards included; evaluations take place in it."""
+    """What is to be mastered, rewards included; evaluations take place in it."""
     wrappers: tuple[WrapperConfig, ...] = ()
     """What disturbs the swarm, in training and in evaluations."""
     algorithm: str = "ppo"
@@ -193,7 +193,7 @@ class TrainingPlan:
         fields by name. `wrappers` is a table of tables by name.
 
         Raises:
-            ConfigError: unknown keys, or values that make no plan.
+            ConfigError: unknown keys, or values that a plan cannot have.
         """
         values = _known(cls, mapping, "")
         scenario = dict(table("scenario", values.get("scenario")))
@@ -220,39 +220,11 @@ class TrainingPlan:
         return cls(**_tuples(values))
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Evaluation:
-    """How the policy did at some point of the training, beside the baseline; means over runs."""
-
-    steps: int
-    """Decisions of single robots so far."""
-    wall_time_s: float
-    """Time spent on the training, s; a resumed one counts on from its latest evaluation."""
-    performance: float
-    """What the scenario counts, per 1,000 simulated s."""
-    baseline: float
-    """The same of the baseline."""
-    interference_fraction: float
-    """Mean fraction of active robots in interference."""
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class TrainingStatus:
-    """Where a training run stands."""
-
-    steps: int
-    """Decisions of single robots so far."""
-    wall_time_s: float
-    """Time spent on the training, s; a resumed one counts on from its latest evaluation."""
-    episode_return: float
-    """Mean return of the latest episodes, nan before the first."""
-
-
 def read_plan(path: Path) -> TrainingPlan:
     """Read a plan from a TOML file, or from the JSON file that a training run leaves.
 
     Raises:
-        ConfigError: the file cannot be read or holds no plan; the message names it.
+        ConfigError: the file cannot be read or does not hold a plan; the message names it.
     """
     try:
         text = path.read_text(encoding="utf-8")

@@ -284,7 +284,7 @@ def test_info_describes_a_network_by_its_name_or_file(command, name):
     [
         ("gone.npz", "Cannot read the policy file gone.npz: there is no such file."),
         ("gone.zip", "Cannot read the policy file gone.zip: there is no such file."),
-        ("bad.npz", "Expected bad.npz to hold a network: The file is no .npz archive."),
+        ("bad.npz", "Expected bad.npz to hold a network: The file is not an .npz archive."),
     ],
 )
 def test_info_says_what_is_wrong_with_a_file(command, file, said):
