@@ -29,7 +29,7 @@ from swarm_forage_env.cli.options import (
     Wrappers,
     complain,
 )
-from swarm_forage_env.cli.score_commands import compare, score
+from swarm_forage_env.cli.score import compare, score
 from swarm_forage_env.cli.train_command import train
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def run(
     Runs in parallel, shows a table, stores one record per run and draws performance over time. Runs that the folder
     holds already are not repeated, so an interrupted command can simply be given again.
     """
-    from swarm_forage_env.cli.plan import ScenarioOptions, default_folder, plan_runs, split_names
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder, plan_runs, split_names
     from swarm_forage_env.study.store import RunStore
 
     options = ScenarioOptions(
@@ -138,8 +138,8 @@ def run(
 
 
 def _show_plan(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None, *, as_json: bool) -> None:
-    from swarm_forage_env.cli.plan import estimated_seconds
     from swarm_forage_env.cli.report import plan_json, plan_note, plan_table
+    from swarm_forage_env.cli.scenario_options import estimated_seconds
     from swarm_forage_env.study.runner import available_cores
 
     todo = [spec for spec in specs if spec.run_id not in store]
@@ -199,7 +199,7 @@ app.command()(train)
 @app.command("list")
 def list_everything() -> None:
     """List scenarios and policies."""
-    from swarm_forage_env.cli.show import overview
+    from swarm_forage_env.cli.descriptions import overview
 
     for table in overview():
         _console().print(table)
@@ -208,7 +208,7 @@ def list_everything() -> None:
 @app.command()
 def info(name: Annotated[str, typer.Argument(help="A scenario, an environment id, a policy or its file.")]) -> None:
     """Show all fields and spaces of a scenario, or what a policy is."""
-    from swarm_forage_env.cli.show import information
+    from swarm_forage_env.cli.descriptions import information
 
     typer.echo(information(name))
 
@@ -270,7 +270,7 @@ def record(
     """Film a run."""
     from rich.progress import Progress
 
-    from swarm_forage_env.cli.plan import ScenarioOptions, plan_runs
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.rendering.view import RenderError

@@ -12,8 +12,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.cli.options import NO_PICTURE
-from swarm_forage_env.cli.plan import ScenarioOptions, build_scenario, build_wrappers
 from swarm_forage_env.cli.report import PERFORMANCE_WORDS
+from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, build_wrappers
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.rendering.plots import draw_training

@@ -12,7 +12,7 @@ import pytest
 from swarm_forage_env import cli
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.plan import ScenarioOptions
+from swarm_forage_env.cli.scenario_options import ScenarioOptions
 from swarm_forage_env.cli.train import TrainOptions, build_plan, small_arena
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.config import with_overrides

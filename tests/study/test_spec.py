@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.plan import ScenarioOptions, plan_runs
+from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs
 from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.model_files import file_digest

@@ -1,4 +1,4 @@
-"""The commands `score` and `compare`; what they do is in `cli.scoring` and `metrics.scoring`."""
+"""The commands `score` and `compare`; what they do is in `cli.score_report` and `metrics.scoring`."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -60,8 +60,8 @@ def score(
     Swarms of several sizes, throttled, noisy and failing robots; one table with intervals and noise floors. Runs that
     the folder holds already are not repeated.
     """
-    from swarm_forage_env.cli.plan import ScenarioOptions, default_folder
-    from swarm_forage_env.cli.scoring import ScoreOptions, build_plan, tables_of_file
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder
+    from swarm_forage_env.cli.score_report import ScoreOptions, build_plan, tables_of_file
 
     if (policy is None) == (curves is None):
         raise typer.BadParameter("Expected either --policy or --curves.")
@@ -115,8 +115,8 @@ def compare(
     dry_run: DryRun = False,
 ) -> None:
     """Score policies in the same worlds, seed by seed, and say which differences are significant."""
-    from swarm_forage_env.cli.plan import ScenarioOptions, default_folder
-    from swarm_forage_env.cli.scoring import ScoreOptions, build_plan
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder
+    from swarm_forage_env.cli.score_report import ScoreOptions, build_plan
 
     world = ScenarioOptions(
         scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
@@ -128,7 +128,7 @@ def compare(
 
 def _score(plan: "ScoringPlan", folder: Path, picture: str, jobs: int | None, *, as_json: bool, dry_run: bool) -> None:
     from metrics.scoring import run_scores
-    from swarm_forage_env.cli.scoring import plan_json, plan_text
+    from swarm_forage_env.cli.score_report import plan_json, plan_text
     from swarm_forage_env.study.runner import StudyInterrupted, available_cores
     from swarm_forage_env.study.store import RunStore
 
@@ -147,7 +147,7 @@ def _score(plan: "ScoringPlan", folder: Path, picture: str, jobs: int | None, *,
 
 
 def _show_scores(tables: "tuple[ScoreTable, ...]", picture: Path | None, *, as_json: bool) -> None:
-    from swarm_forage_env.cli.scoring import compared, draw, json_text
+    from swarm_forage_env.cli.score_report import compared, draw, json_text
 
     comparison = compared(tables)
     drawn = None

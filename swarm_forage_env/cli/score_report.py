@@ -11,8 +11,8 @@ from metrics.plots import draw_scores
 from metrics.score_table import ScoreTable, aligned, counted
 from metrics.scoring import ScoringPlan, plan_scores, score_curves
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.plan import ScenarioOptions, build_scenario, estimated_seconds, split_names
 from swarm_forage_env.cli.report import estimate
+from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, estimated_seconds, split_names
 from swarm_forage_env.study.store import RunStore
 
 _OF_THE_BUDGET = ("horizon_s", "interval_s")
