@@ -47,12 +47,12 @@ class Contestant:
     policy: str
     """Name in run specifications."""
     parameters: Mapping[str, Any]
+    caches: str
+    """Which caches its runs have."""
     factory: Callable[..., Any] | None = None
     """Builds the policy in this process, for those that no worker could find by name."""
     is_named: bool = True
     """Whether its runs may be stored: a name tells which policy a stored run belongs to."""
-    caches: str | None = None
-    """World that the policy is made for, where its class does not tell."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,7 +66,6 @@ class ScoringPlan:
     scenario: "ScenarioConfig"
     budget: "Budget"
     budget_name: str
-    caches: str | None
 
     def specs_of(self, contestant: Contestant) -> "tuple[RunSpec, ...]":
         """Return the runs of one policy, seed by seed."""
@@ -77,7 +76,7 @@ class ScoringPlan:
             contestant.policy,
             seeds=self.seeds,
             parameters=contestant.parameters,
-            caches=self.caches or contestant.caches,
+            caches=contestant.caches,
         )
 
     @property
@@ -219,7 +218,7 @@ def plan_scores(
         allowed = replace(allowed, horizon_s=horizon_s)
     world = preset(scenario) if isinstance(scenario, str) else scenario
     named = policies.items() if isinstance(policies, Mapping) else [(None, policy) for policy in policies]
-    contestants = tuple(_contestant(policy, name, parameters or {}, world) for name, policy in named)
+    contestants = tuple(_contestant(policy, name, parameters or {}, world, caches) for name, policy in named)
     contestants = _told_apart(contestants)
     return ScoringPlan(
         contestants=contestants,
@@ -229,7 +228,6 @@ def plan_scores(
         scenario=world,
         budget=allowed,
         budget_name=budget_name,
-        caches=caches,
     )
 
 
@@ -292,18 +290,16 @@ def _seeds(seeds: int | Sequence[int] | None, default: int) -> tuple[int, ...]:
 
 
 def _contestant(
-    policy: PolicyLike, name: str | None, parameters: Mapping[str, Any], world: "ScenarioConfig"
+    policy: PolicyLike, name: str | None, parameters: Mapping[str, Any], world: "ScenarioConfig", caches: str | None
 ) -> Contestant:
     """Find out what was given as a policy."""
-    from swarm_forage_env.policies.registry import from_callable, is_policy_file, policy_class
-    from swarm_forage_env.study.spec import pin_policy_file
+    from swarm_forage_env.policies.registry import from_callable, is_policy_file
+    from swarm_forage_env.study.spec import chosen_caches, pin_policy
 
     if isinstance(policy, (str, Path)):
-        if is_policy_file(str(policy)):
-            file, checked, caches = pin_policy_file(policy, parameters)
-            return Contestant(label=name or Path(policy).stem, policy=file, parameters=checked, caches=caches)
-        policy_class(str(policy))
-        return Contestant(label=name or str(policy), policy=str(policy), parameters=parameters)
+        found, pinned, stating = pin_policy(policy, parameters)
+        label = name or (Path(policy).stem if is_policy_file(found) else found)
+        return Contestant(label=label, policy=found, parameters=pinned, caches=chosen_caches(caches, stating, world))
     if not callable(policy) and not _is_policy(policy):
         raise TypeError(
             "Expected a policy as a registered name, the path of a trained one, an object or class with reset and act, "
@@ -317,11 +313,13 @@ def _contestant(
         raise ValueError(f"Expected parameters with a name, a file or a class only, got them with {given!r}.")
     else:
         factory = partial(copy.deepcopy, given) if _is_policy(given) else partial(from_callable, given, name=label)
-    # Workers could not look the class up by this name, so its world is settled here.
-    stated = getattr(given, "caches", None)
-    caches = stated if isinstance(stated, str) else world.caches
     return Contestant(
-        label=label, policy=label, parameters=parameters, factory=factory, is_named=name is not None, caches=caches
+        label=label,
+        policy=label,
+        parameters=parameters,
+        caches=chosen_caches(caches, given, world),
+        factory=factory,
+        is_named=name is not None,
     )
 
 
