@@ -24,7 +24,7 @@ _KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RunSpec:
-    """One run as data: the world, who controls it, what disturbs it, and the seed.
+    """One run as data: the scenario, who controls the swarm, what disturbs it, and the seed.
 
     Raises:
         ConfigError: no ScenarioConfig, parameters that JSON cannot hold, two wrappers of one kind, a bad seed, or a
