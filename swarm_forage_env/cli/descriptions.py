@@ -1,4 +1,4 @@
-"""`swarm-forage list` and `info`: what there is and what it is made of."""
+"""What `list` and `info` tell: which scenarios and policies there are, and what they are made of."""
 
 import dataclasses
 import inspect
@@ -21,17 +21,17 @@ from swarm_forage_env.scenarios.config import ScenarioConfig
 
 def overview() -> tuple[Table, Table]:
     """Return the tables of scenarios and of policies."""
-    worlds = Table("scenario", "robots", "objects", "arena", "what it is", title="scenarios")
+    scenarios = Table("scenario", "robots", "objects", "arena", "what it is", title="scenarios")
     for name in presets.SCENARIO_NAMES:
         config = presets.scenario(name)
         size = f"{config.arena.width_m:g} x {config.arena.height_m:g} m"
         counts = (str(config.robots.n_robots), str(config.objects.n_objects))
-        worlds.add_row(name, *counts, size, _first_line(getattr(presets, name)))
+        scenarios.add_row(name, *counts, size, _first_line(getattr(presets, name)))
     policies = Table("policy", "caches", "what it is", title="policies")
     for name in policy_names():
         policy = policy_class(name)
         policies.add_row(name, getattr(policy, "caches", "none"), _first_line(policy))
-    return worlds, policies
+    return scenarios, policies
 
 
 def information(name: str) -> str:

@@ -1,96 +1,84 @@
-"""The commands `swarm-forage score` and `compare`: from words to a plan, and what they have to say."""
+"""What `score` and `compare` do with a plan, and what they have to say: tables, JSON, a picture."""
 
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+
+import typer
 
 from metrics.comparison import Comparison, compare_tables
 from metrics.plots import draw_scores
 from metrics.score_table import ScoreTable, aligned, counted
-from metrics.scoring import ScoringPlan, plan_scores, score_curves
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.report import estimate
-from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, estimated_seconds, split_names
+from metrics.scoring import ScoringPlan, run_scores
+from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, NO_PICTURE, complain
+from swarm_forage_env.cli.report import estimate, estimated_seconds
+from swarm_forage_env.study.runner import StudyInterrupted, available_cores
 from swarm_forage_env.study.store import RunStore
 
-_OF_THE_BUDGET = ("horizon_s", "interval_s")
 
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class ScoreOptions:
-    """The options of both commands that are not about the world."""
-
-    policies: str
-    """Names and files, separated by commas."""
-    measures: str | None = None
-    budget: str = "standard"
-    seeds: int | None = None
-    horizon: float | None = None
-
-
-def build_plan(
-    world: ScenarioOptions, options: ScoreOptions, *, at_least: int = 1, at_most: int | None = None
-) -> ScoringPlan:
-    """Return what the words ask for.
+def run_and_show(
+    plan: ScoringPlan, folder: Path, picture: str, jobs: int | None, *, as_json: bool, dry_run: bool
+) -> None:
+    """Run a plan and show the scores; or show the plan, where nothing is to be run.
 
     Args:
-        world: Of which the horizon is left out.
-        options: The rest.
-        at_least: How many policies there must be.
-        at_most: How many there may be, None = any number.
+        plan: What to run.
+        folder: Where the records and the picture go.
+        picture: Name of the picture.
+        jobs: Processes; None = one per core.
+        as_json: Print JSON instead of tables.
+        dry_run: Run nothing.
 
     Raises:
-        ConfigError: whatever is wrong with the words.
-        ImportError: a model, and stable-baselines3 is not installed.
+        typer.Exit: Ctrl-C, or runs have failed.
     """
-    for word in world.settings:
-        if word.partition("=")[0] in _OF_THE_BUDGET:
-            raise ConfigError(f"Expected no --set {word}, which the budget sets; --horizon changes the length of runs.")
-    names = split_names(options.policies)
-    if len(names) < at_least:
-        raise ConfigError(f"Expected {at_least} or more policies to compare, separated by commas, got {names[0]!r}.")
-    if at_most is not None and len(names) > at_most:
-        raise ConfigError(f"Expected one policy to score, got {', '.join(names)}; compare scores more than one.")
-    scenario, caches = build_scenario(world)
+    if dry_run:
+        show = _plan_json if as_json else _plan_text
+        typer.echo(show(plan, RunStore(folder), jobs or available_cores()))
+        return
     try:
-        return plan_scores(
-            names,
-            scenario,
-            measures=None if options.measures is None else split_names(options.measures),
-            budget=options.budget,
-            seeds=options.seeds,
-            horizon_s=options.horizon,
-            caches=caches,
-        )
-    except ValueError as error:  # of a policy, a measure, a budget or a file
-        raise ConfigError(str(error)) from error
+        tables = run_scores(plan, out=folder, jobs=jobs, progress=True)
+    except StudyInterrupted as interrupt:
+        complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    show_scores(tables, folder / picture, as_json=as_json)
+    if any(table.failures for table in tables):
+        raise typer.Exit(EXIT_FAILURE)
 
 
-def tables_of_file(path: Path, measures: str | None) -> tuple[ScoreTable, ...]:
-    """Return the scores of a file of curves; raises ConfigError whatever is wrong with it."""
-    try:
-        return score_curves(path, measures=None if measures is None else split_names(measures))
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
+def show_scores(tables: Sequence[ScoreTable], picture: Path | None, *, as_json: bool) -> None:
+    """Show the scores of one policy, or compare those of several; draw them where `picture` says so."""
+    comparison = compare_tables(tables) if len(tables) > 1 else None
+    drawn = None
+    if picture is not None:
+        try:
+            drawn = _draw(tables, picture)
+        except ImportError:
+            typer.echo(NO_PICTURE, err=True)
+    if as_json:
+        typer.echo(_json_text(tables, comparison, drawn))
+    else:
+        typer.echo(str(tables[0] if comparison is None else comparison))
+    if drawn is not None:
+        typer.echo(f"picture {drawn}", err=True)
 
 
-def plan_text(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
+def _plan_text(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
     """Return the planned experiments as a table with an estimate."""
     todo = [spec for spec in plan.specs if spec.run_id not in store]
     left = Counter((spec.criterion, spec.criterion_value, spec.scenario.robots.n_robots) for spec in todo)
     rows: list[Sequence[str]] = [("varied", "value", "robots", "objects", "seconds", "runs", "to do")]
     for experiment in plan.experiments:
-        world = experiment.scenario
-        n_robots = world.robots.n_robots
+        scenario = experiment.scenario
+        n_robots = scenario.robots.n_robots
         rows.append(
             (
                 experiment.criterion,
                 f"{experiment.value:g}",
                 str(n_robots),
-                str(world.objects.n_objects),
-                f"{world.horizon_s:g}",
+                str(scenario.objects.n_objects),
+                f"{scenario.horizon_s:g}",
                 str(len(plan.seeds) * len(plan.contestants)),
                 str(left[experiment.criterion, experiment.value, n_robots]),
             )
@@ -106,7 +94,7 @@ def plan_text(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
     )
 
 
-def plan_json(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
+def _plan_json(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
     """Return the planned runs as a JSON document."""
     todo = [spec for spec in plan.specs if spec.run_id not in store]
     runs = [{"run_id": spec.run_id, "stored": spec.run_id in store, "spec": spec.to_mapping()} for spec in plan.specs]
@@ -120,18 +108,13 @@ def plan_json(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
     return json.dumps(document, indent=1)
 
 
-def json_text(tables: Sequence[ScoreTable], comparison: Comparison | None, picture: Path | None) -> str:
+def _json_text(tables: Sequence[ScoreTable], comparison: Comparison | None, picture: Path | None) -> str:
     """Return everything as a JSON document; numbers that do not exist are null."""
     document = {"tables": [table.to_mapping() for table in tables]} if comparison is None else comparison.to_mapping()
     return json.dumps({**document, "picture": None if picture is None else str(picture)}, indent=1)
 
 
-def compared(tables: Sequence[ScoreTable]) -> Comparison | None:
-    """Return the comparison of two or more tables."""
-    return compare_tables(tables) if len(tables) > 1 else None
-
-
-def draw(tables: Sequence[ScoreTable], path: Path) -> Path | None:
+def _draw(tables: Sequence[ScoreTable], path: Path) -> Path | None:
     """Draw the tables; None where there is nothing to draw.
 
     Raises:

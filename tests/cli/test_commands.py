@@ -358,13 +358,13 @@ def test_record_films_a_run(command):
 @pytest.mark.parametrize(("asked", "filmed"), [((), "static"), (("--caches", "none"), "none")])
 def test_record_films_the_caches_that_were_asked_for(command, monkeypatch, asked, filmed):
     pytest.importorskip("PIL")
-    build, built = film.build_stack, []
+    build, built = film.build_world, []
 
     def note(config, *args, **options):
         built.append(config.caches)
         return build(config, *args, **options)
 
-    monkeypatch.setattr(film, "build_stack", note)
+    monkeypatch.setattr(film, "build_world", note)
     assert command("record", "--policy", "stochm", *asked, *SHORT_FILM)[0] == 0
     assert built == [filmed]
 

@@ -1,0 +1,29 @@
+"""The commands `list`, `info` and `schema`."""
+
+from typing import Annotated
+
+import typer
+
+from swarm_forage_env.cli.terminal import output
+
+
+def list_everything() -> None:
+    """List scenarios and policies."""
+    from swarm_forage_env.cli.descriptions import overview
+
+    for table in overview():
+        output().print(table)
+
+
+def info(name: Annotated[str, typer.Argument(help="A scenario, an environment id, a policy or its file.")]) -> None:
+    """Show all fields and spaces of a scenario, or what a policy is."""
+    from swarm_forage_env.cli.descriptions import information
+
+    typer.echo(information(name))
+
+
+def schema() -> None:
+    """Show the columns of run records: name, type, unit, meaning."""
+    from swarm_forage_env.study.record import schema_table
+
+    typer.echo(schema_table())
