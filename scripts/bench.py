@@ -30,11 +30,10 @@ from rich.console import Console
 from rich.table import Table
 
 import swarm_forage_env.world.arena as arena_module
-from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.policies.registry import load_policy, policy_names
 from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
 from swarm_forage_env.scenarios.presets import warehouse_medium, warehouse_small
-from swarm_forage_env.study.run import build_stack, run_one
+from swarm_forage_env.study.run import LiveRun, build_stack, run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.world.physics import Physics
@@ -111,9 +110,7 @@ def tick_shares(scenario: ScenarioConfig, policy_name: str, ticks: int) -> dict[
     spec = run_spec(scenario, policy_name, ticks)
     policy = load_policy(policy_name)
     recorder = build_stack(spec.scenario, reads=getattr(policy, "reads", None))
-    world = recorder.unwrapped
-    policy.reset(world.swarm_spec, stream_rng(0, Stream.POLICY))
-    obs = recorder.reset_batch(0)
+    run = LiveRun(recorder, policy, seed=0)
     spent: dict[str, list[float]] = {phase: [0.0] for phase in PHASES}
     with (
         stopwatch(Physics, "advance", spent["physics"]),
@@ -124,9 +121,7 @@ def tick_shares(scenario: ScenarioConfig, policy_name: str, ticks: int) -> dict[
         stopwatch(recorder, "after_step", spent["recording"]),
     ):
         started = time.process_time()
-        for _ in range(ticks):
-            actions = policy.act(obs, world.active)
-            obs, _, _, _ = recorder.step_batch(actions, tasks=getattr(policy, "task", None))
+        run.advance()
         total = time.process_time() - started
     spent["rest"][0] = total - sum(seconds[0] for seconds in spent.values())
     return {phase: seconds[0] / ticks * 1e6 for phase, seconds in spent.items()}
@@ -266,17 +261,18 @@ def _cost_per_robot_tick(
     """Microseconds per robot-tick of the loop alone, after a short run-in; `beside` is called in every tick, too."""
     policy = load_policy("crw")
     spec = run_spec(scenario, "crw", ticks + 20)
-    recorder = build_stack(spec.scenario, wrappers, reads=getattr(policy, "reads", None))
-    world = recorder.unwrapped
-    policy.reset(world.swarm_spec, stream_rng(0, Stream.POLICY))
-    obs = recorder.reset_batch(0)
-    started = 0.0
-    for tick in range(ticks + 20):
-        if tick == 20:
-            started = time.process_time()
-        obs, _, _, _ = recorder.step_batch(policy.act(obs, world.active))
+    act = policy.act
+
+    def act_beside(obs: np.ndarray, active: np.ndarray) -> np.ndarray:
         if beside is not None:
             beside()
+        return act(obs, active)
+
+    policy.act = act_beside
+    run = LiveRun(build_stack(spec.scenario, wrappers, reads=getattr(policy, "reads", None)), policy, seed=0)
+    run.advance(to_tick=20)
+    started = time.process_time()
+    run.advance()
     return (time.process_time() - started) / ticks / scenario.robots.n_robots * 1e6
 
 

@@ -14,6 +14,7 @@ from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 
 if TYPE_CHECKING:
     from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.checks import CheckError, check_determinism, check_env, check_policy
     from swarm_forage_env.contract.codes import Event, Grip, Task
     from swarm_forage_env.contract.layout import ObservationLayout
     from swarm_forage_env.contract.policy import Policy, SwarmSpec
@@ -41,6 +42,7 @@ __all__ = [
     "SCENARIO_NAMES",
     "ActuatorNoise",
     "ActuatorNoiseConfig",
+    "CheckError",
     "ConfigError",
     "Event",
     "ForageEnv",
@@ -63,6 +65,9 @@ __all__ = [
     "ThrottleConfig",
     "Waveform",
     "build_stack",
+    "check_determinism",
+    "check_env",
+    "check_policy",
     "from_callable",
     "load_policy",
     "parallel_env",
@@ -81,6 +86,7 @@ _HOMES = {
     "AUTHORS_PROGRAM": "scenarios.quirks",
     "ActuatorNoise": "wrappers.noise",
     "ActuatorNoiseConfig": "wrappers.noise",
+    "CheckError": "checks",
     "ConfigError": "_internal.fields",
     "Event": "contract.codes",
     "ForageEnv": "env",
@@ -103,6 +109,9 @@ _HOMES = {
     "ThrottleConfig": "wrappers.throttle",
     "Waveform": "wrappers.waveform",
     "build_stack": "study.run",
+    "check_determinism": "checks",
+    "check_env": "checks",
+    "check_policy": "checks",
     "from_callable": "policies.registry",
     "load_policy": "policies.registry",
     "parallel_env": "views.pettingzoo",

@@ -28,30 +28,34 @@ class Contestant:
     policy: str
     """Name in run specifications."""
     parameters: Mapping[str, Any]
+    caches: str
+    """Which caches its runs have."""
     factory: Callable[..., Any] | None = None
     """Builds the policy in this process; None where workers find it by its name."""
     is_named: bool = True
     """Whether its runs may be stored: a name tells which policy a stored run belongs to."""
-    caches: str | None = None
-    """Caches that the policy is run with unless others are asked for; None: those that its class names."""
 
 
 def contestants_of(
-    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike], parameters: Mapping[str, Any], world: "ScenarioConfig"
+    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
+    parameters: Mapping[str, Any],
+    scenario: "ScenarioConfig",
+    caches: str | None,
 ) -> tuple[Contestant, ...]:
     """Return the policies as they are run, each with a name of its own.
 
     Args:
         policies: As in `compare_policies`.
         parameters: Keyword arguments of registered policies and classes.
-        world: Where they run; its caches are those of policies that ask for none.
+        scenario: Where they run.
+        caches: Which caches were asked for; default see `study.spec.chosen_caches`.
 
     Raises:
         TypeError: something that is no policy.
         ValueError: an unknown policy, parameters where none can be given, or equal names.
     """
     named = policies.items() if isinstance(policies, Mapping) else [(None, policy) for policy in policies]
-    return _told_apart(tuple(_contestant(policy, name, parameters, world) for name, policy in named))
+    return _told_apart(tuple(_contestant(policy, name, parameters, scenario, caches) for name, policy in named))
 
 
 def _told_apart(contestants: tuple[Contestant, ...]) -> tuple[Contestant, ...]:
@@ -75,18 +79,16 @@ def _told_apart(contestants: tuple[Contestant, ...]) -> tuple[Contestant, ...]:
 
 
 def _contestant(
-    policy: PolicyLike, name: str | None, parameters: Mapping[str, Any], world: "ScenarioConfig"
+    policy: PolicyLike, name: str | None, parameters: Mapping[str, Any], scenario: "ScenarioConfig", asked: str | None
 ) -> Contestant:
     """Find out what was given as a policy."""
-    from swarm_forage_env.policies.registry import from_callable, is_policy_file, policy_class
-    from swarm_forage_env.study.spec import pin_policy_file
+    from swarm_forage_env.policies.registry import from_callable, is_policy_file
+    from swarm_forage_env.study.spec import chosen_caches, pin_policy
 
     if isinstance(policy, (str, Path)):
-        if is_policy_file(str(policy)):
-            file, checked, caches = pin_policy_file(policy, parameters)
-            return Contestant(label=name or Path(policy).stem, policy=file, parameters=checked, caches=caches)
-        policy_class(str(policy))
-        return Contestant(label=name or str(policy), policy=str(policy), parameters=parameters)
+        found, pinned, stating = pin_policy(policy, parameters)
+        label = name or (Path(policy).stem if is_policy_file(found) else found)
+        return Contestant(label=label, policy=found, parameters=pinned, caches=chosen_caches(asked, stating, scenario))
     if not callable(policy) and not _is_policy(policy):
         raise TypeError(
             "Expected a policy as a registered name, the path of a trained one, an object or class with reset and act, "
@@ -100,11 +102,13 @@ def _contestant(
         raise ValueError(f"Expected parameters with a name, a file or a class only, got them with {given!r}.")
     else:
         factory = partial(copy.deepcopy, given) if _is_policy(given) else partial(from_callable, given, name=label)
-    # Workers could not look the class up by this name, so its world is settled here.
-    stated = getattr(given, "caches", None)
-    caches = stated if isinstance(stated, str) else world.caches
     return Contestant(
-        label=label, policy=label, parameters=parameters, factory=factory, is_named=name is not None, caches=caches
+        label=label,
+        policy=label,
+        parameters=parameters,
+        caches=chosen_caches(asked, given, scenario),
+        factory=factory,
+        is_named=name is not None,
     )
 
 

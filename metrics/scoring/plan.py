@@ -26,7 +26,6 @@ class ScoringPlan:
     scenario: "ScenarioConfig"
     budget: "Budget"
     budget_name: str
-    caches: str | None
 
     def specs_of(self, contestant: Contestant) -> "tuple[RunSpec, ...]":
         """Return the runs of one policy, seed by seed."""
@@ -37,7 +36,7 @@ class ScoringPlan:
             contestant.policy,
             seeds=self.seeds,
             parameters=contestant.parameters,
-            caches=self.caches or contestant.caches,
+            caches=contestant.caches,
         )
 
     @property
@@ -66,14 +65,13 @@ def plan_scores(
     allowed = experiments.budget(budget) if isinstance(budget, str) else budget
     if horizon_s is not None:
         allowed = replace(allowed, horizon_s=horizon_s)
-    world = preset(scenario) if isinstance(scenario, str) else scenario
+    chosen = preset(scenario) if isinstance(scenario, str) else scenario
     return ScoringPlan(
-        contestants=contestants_of(policies, parameters or {}, world),
-        experiments=experiments.plan_experiments(world, {MEASURE_CRITERIA[name] for name in wanted}, allowed),
+        contestants=contestants_of(policies, parameters or {}, chosen, caches),
+        experiments=experiments.plan_experiments(chosen, {MEASURE_CRITERIA[name] for name in wanted}, allowed),
         seeds=chosen_seeds(seeds, allowed.n_seeds),
         measures=wanted,
-        scenario=world,
+        scenario=chosen,
         budget=allowed,
         budget_name=budget_name,
-        caches=caches,
     )

@@ -18,7 +18,10 @@ Scenario = Annotated[str, typer.Option("--scenario", help="Preset; see 'swarm-fo
 Robots = Annotated[int | None, typer.Option("--robots", min=1, help="Swarm size.")]
 Objects = Annotated[int | None, typer.Option("--objects", min=1, help="Number of objects.")]
 Side = Annotated[float | None, typer.Option("--side", help="Side of the arena in m (search_and_rescue only).")]
-Caches = Annotated[str | None, typer.Option("--caches", help="none, static or dynamic; default: the policy's world.")]
+Caches = Annotated[
+    str | None,
+    typer.Option("--caches", help="none, static or dynamic; default: those of the policy, else of the scenario."),
+]
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Any scenario field; may be repeated.")
 ]

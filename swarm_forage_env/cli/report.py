@@ -21,6 +21,9 @@ from swarm_forage_env.study.store import RunStore
 
 LEVEL = 0.95
 """Confidence level of all intervals."""
+ASSUMED_ROBOT_TICKS_PER_S = 0.5e6
+"""Speed that estimates assume per core, in robots times ticks per second; our choice: the low end of what scripted
+controllers reach."""
 PERFORMANCE_WORDS = {"collected": "deliveries", "first_picked": "first pick-ups"}
 
 
@@ -55,14 +58,14 @@ def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[C
     """Return one summary per controller that has a record, in the order of `specs`."""
     caches = {spec.policy: spec.scenario.caches for spec in specs}
     summaries = []
-    for controller, world in caches.items():
+    for controller, kind in caches.items():
         own = [record for record in records if record.controller == controller]
         if own:
             wall_s = sum(record.wall_time_s for record in own)
             summaries.append(
                 ControllerSummary(
                     controller=controller,
-                    caches=world,
+                    caches=kind,
                     n_runs=len(own),
                     deliveries_per_1000_s=_estimate(own, "collected"),
                     first_pickups_per_1000_s=_estimate(own, "first_picked"),
@@ -76,12 +79,12 @@ def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[C
 def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummary]) -> Table:
     """Return the table of results, one row per controller."""
     first = specs[0].scenario
-    world = f"{first.name}: {first.robots.n_robots} robots, {first.objects.n_objects} objects, {first.horizon_s:g} s"
+    headline = f"{first.name}: {first.robots.n_robots} robots, {first.objects.n_objects} objects, {first.horizon_s:g} s"
     disturbed = ", ".join(config.name for config in specs[0].wrappers)
     is_spread_known = any(row.n_runs > 1 for row in summaries)
     interval = f"± {LEVEL:.0%} t interval over seeds" if is_spread_known else "one seed, so no interval"
     table = Table(
-        title=f"{world}, with {disturbed}" if disturbed else world,
+        title=f"{headline}, with {disturbed}" if disturbed else headline,
         caption=f"{interval}; interference: share of active robot time",
     )
     picks = first.performance == "first_picked"
@@ -109,10 +112,10 @@ def plan_table(specs: Sequence[RunSpec], store: RunStore) -> Table:
     for name in ("run", "controller", "caches", "robots", "seed", "seconds", "state"):
         table.add_column(name)
     for spec in specs:
-        world = spec.scenario
+        scenario = spec.scenario
         state = "stored" if spec.run_id in store else "to do"
-        numbers = (str(world.robots.n_robots), str(spec.seed), f"{world.horizon_s:g}")
-        table.add_row(spec.run_id, shown(spec.policy), world.caches, *numbers, state)
+        numbers = (str(scenario.robots.n_robots), str(spec.seed), f"{scenario.horizon_s:g}")
+        table.add_row(spec.run_id, shown(spec.policy), scenario.caches, *numbers, state)
     return table
 
 
@@ -181,13 +184,19 @@ def plan_note(specs: Sequence[RunSpec], seconds: float, jobs: int) -> str:
     return left + estimate(seconds, jobs, any_left=bool(specs))
 
 
+def estimated_seconds(specs: Sequence[RunSpec], jobs: int) -> float:
+    """Return a rough wall-clock time for `specs` on `jobs` processes, in seconds."""
+    robot_ticks = sum(spec.scenario.robots.n_robots * spec.scenario.horizon_ticks for spec in specs)
+    return robot_ticks / (ASSUMED_ROBOT_TICKS_PER_S * min(jobs, max(1, len(specs))))
+
+
 def estimate(seconds: float, jobs: int, *, any_left: bool) -> str:
     """Return how long planned runs will take, as the end of a sentence."""
     if not any_left:
         return "."
     return (
         f": roughly {duration(seconds)} on {jobs} process{'es' if jobs > 1 else ''}, "
-        "if each does half a million robot-ticks per second."
+        f"if each does {ASSUMED_ROBOT_TICKS_PER_S / 1e6:g} million robot-ticks per second."
     )
 
 

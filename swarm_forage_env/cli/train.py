@@ -62,7 +62,7 @@ def train(  # long: one parameter per option
     unless --set or --config do, and begins in a smaller arena: deliveries alone are too rare to learn from. plan.json
     holds all that was chosen. Ctrl-C keeps a checkpoint; --out FOLDER --resume goes on.
     """
-    from swarm_forage_env.cli.plan import ScenarioOptions
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions
     from swarm_forage_env.cli.training_plan import TrainOptions, build_plan, named_plan, resumed_plan
     from swarm_forage_env.cli.training_report import run_training
 

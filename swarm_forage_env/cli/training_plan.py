@@ -6,7 +6,7 @@ from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.config_file import read_config
-from swarm_forage_env.cli.plan import ScenarioOptions, build_scenario, build_wrappers, scenario_overrides
+from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, build_wrappers, scenario_overrides
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.training.plan import EvaluationPlan, TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import recipe

@@ -16,7 +16,8 @@ from typing import Any, TypeVar
 
 from swarm_forage_env._internal.fields import ConfigError, known_name, whole
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, robots_at_density, scenario, search_and_rescue
+from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, robots_at_density, search_and_rescue
+from swarm_forage_env.scenarios.presets import scenario as preset_scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
@@ -99,32 +100,32 @@ def plan_experiments(base: ScenarioConfig, criteria: Collection[str], budget: Bu
     """Return the experiments of `criteria`, reference runs included, none of them twice.
 
     Args:
-        base: The world; its horizon and recording interval are replaced by those of the budget.
+        base: The scenario; its horizon and recording interval are replaced by those of the budget.
         criteria: Some of `CRITERIA`.
         budget: How many sizes and levels, and how long a run is.
 
     Raises:
-        ConfigError: an unknown criterion, a swarm of one robot where sizes are varied, or a size that the world has no
+        ConfigError: an unknown criterion, a swarm of one robot where sizes are varied, or a size that the arena has no
             room for.
     """
     for name in criteria:
         known_name("criterion", name, CRITERIA)
-    world = replace(base, horizon_s=budget.horizon_s, interval_s=budget.interval_s)
+    scenario = replace(base, horizon_s=budget.horizon_s, interval_s=budget.interval_s)
     experiments: list[Experiment] = []
     if "population_size" in criteria:
         experiments += [
             Experiment(criterion="population_size", value=sized.robots.n_robots, scenario=sized)
-            for sized in size_ladder(world, budget.n_sizes)
+            for sized in size_ladder(scenario, budget.n_sizes)
         ]
     if "noise" in criteria or "population_dynamics" in criteria:
-        experiments.append(Experiment(criterion=UNDISTURBED, value=0.0, scenario=world))
+        experiments.append(Experiment(criterion=UNDISTURBED, value=0.0, scenario=scenario))
     levels = {"throttle": _throttle_levels, "noise": _noise_levels, "population_dynamics": _population_levels}
     for criterion, of_study in levels.items():
         if criterion in criteria:
-            reference, disturbed = of_study(world)
+            reference, disturbed = of_study(scenario)
             chosen = spread(disturbed, budget.n_levels)
             experiments += [
-                Experiment(criterion=criterion, value=value, scenario=world, wrappers=wrappers)
+                Experiment(criterion=criterion, value=value, scenario=scenario, wrappers=wrappers)
                 for value, wrappers in (*reference, *chosen)
             ]
     return tuple(experiments)
@@ -147,7 +148,7 @@ def plan_specs(
         policy: Registered name.
         seeds: Seeds of the runs; all experiments share them, which pairs their worlds.
         parameters: Of the policy.
-        caches: Which caches the world has; default those that the policy is made for.
+        caches: Which caches the world has; default see `study.spec.chosen_caches`.
 
     Raises:
         ConfigError: see `study.spec.RunSpec`.
@@ -176,66 +177,66 @@ def spread(levels: Sequence[_T], count: int | None) -> tuple[_T, ...]:
     return tuple(levels[(index + 1) * len(levels) // count - 1] for index in range(count))
 
 
-def size_ladder(world: ScenarioConfig, count: int | None) -> tuple[ScenarioConfig, ...]:
-    """Return the same world with one robot, more robots, up to the swarm it was made for (or that of the study).
+def size_ladder(scenario: ScenarioConfig, count: int | None) -> tuple[ScenarioConfig, ...]:
+    """Return the scenario with one robot, with more robots, up to the swarm it was made for (or that of the study).
 
     In search and rescue the arena grows with the swarm; the one-robot run is in the smallest arena.
 
     Args:
-        world: The world at its usual size.
+        scenario: With the usual number of robots.
         count: Number of sizes; None = powers of two up to 2.56 times the usual size (which gives the study's 128 and
             512), or all eight arenas of search and rescue.
 
     Raises:
         ConfigError: one robot has no smaller size, or there is no room for the largest.
     """
-    n_robots = world.robots.n_robots
+    n_robots = scenario.robots.n_robots
     if n_robots < 2:
         raise ConfigError("Expected a scenario of at least 2 robots where swarm sizes are compared, got 1.")
-    if world.name == "search_and_rescue":
-        return _growing_arenas(world, count)
+    if scenario.name == "search_and_rescue":
+        return _growing_arenas(scenario, count)
     if count is None:
         sizes = {2**power for power in range(64) if 2**power <= STUDY_LARGEST_SIZE * n_robots}
     else:
         # Halves of halves, so that neighbours differ by the same factor: 1, 25, 50 or 1, 6, 12, 25, 50.
         sizes = {1, *(max(2, n_robots >> halvings) for halvings in range(count - 1))}
-    if world.objects.n_objects == _preset_objects(world.name):
-        world = replace(world, objects=replace(world.objects, n_objects=SIZE_SWEEP_OBJECTS[world.name]))
-    return tuple(replace(world, robots=replace(world.robots, n_robots=size)) for size in sorted(sizes))
+    if scenario.objects.n_objects == _preset_objects(scenario.name):
+        scenario = replace(scenario, objects=replace(scenario.objects, n_objects=SIZE_SWEEP_OBJECTS[scenario.name]))
+    return tuple(replace(scenario, robots=replace(scenario.robots, n_robots=size)) for size in sorted(sizes))
 
 
 def _preset_objects(name: str) -> int | None:
     """Number of objects of a preset whose size sweep has another one."""
-    return scenario(name).objects.n_objects if name in SIZE_SWEEP_OBJECTS else None
+    return preset_scenario(name).objects.n_objects if name in SIZE_SWEEP_OBJECTS else None
 
 
-def _growing_arenas(world: ScenarioConfig, count: int | None) -> tuple[ScenarioConfig, ...]:
+def _growing_arenas(scenario: ScenarioConfig, count: int | None) -> tuple[ScenarioConfig, ...]:
     """Search and rescue at constant density, one robot in the smallest arena first."""
-    base_side = world.arena.width_m
-    density = world.robots.n_robots / (base_side * base_side)
-    if world.robots.n_robots == robots_at_density(base_side):
+    base_side = scenario.arena.width_m
+    density = scenario.robots.n_robots / (base_side * base_side)
+    if scenario.robots.n_robots == robots_at_density(base_side):
         density = robots_at_density(1000.0) / 1e6  # that of the preset, free of the truncation to whole robots
     smallest = min(SEARCH_AND_RESCUE_OBJECTS)
     sides = [float(side) for side in SEARCH_AND_RESCUE_OBJECTS if count is None or side < base_side]
     sides = sides if count is None else [*spread(sides, min(count - 2, len(sides))), base_side]
     if count == 2:
         sides = [base_side]
-    ladder = [_in_arena(world, float(smallest), 1)]
+    ladder = [_in_arena(scenario, float(smallest), 1)]
     for side in sides:
-        sized = world if side == base_side else _in_arena(world, side, robots_at_density(side, density))
+        sized = scenario if side == base_side else _in_arena(scenario, side, robots_at_density(side, density))
         if sized.robots.n_robots > ladder[-1].robots.n_robots:
             ladder.append(sized)
     return tuple(ladder)
 
 
-def _in_arena(world: ScenarioConfig, side_m: float, n_robots: int) -> ScenarioConfig:
-    """Return `world` in the search and rescue arena of that side, everything else as it is."""
+def _in_arena(scenario: ScenarioConfig, side_m: float, n_robots: int) -> ScenarioConfig:
+    """Return `scenario` in the search and rescue arena of that side, everything else as it is."""
     preset = search_and_rescue(side_m=side_m)
     return replace(
-        world,
+        scenario,
         arena=preset.arena,
-        robots=replace(world.robots, n_robots=n_robots),
-        objects=replace(world.objects, n_objects=preset.objects.n_objects),
+        robots=replace(scenario.robots, n_robots=n_robots),
+        objects=replace(scenario.objects, n_objects=preset.objects.n_objects),
     )
 
 
@@ -243,9 +244,9 @@ _Level = tuple[float, tuple[WrapperConfig, ...]]
 """Criterion value, and the wrappers that make it."""
 
 
-def _throttle_levels(world: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
-    configs = sine_throttles() if world.name == "search_and_rescue" else square_throttles()
-    ideal, *levels = (_compressed(config, world.horizon_s / STUDY_HORIZON_S) for config in configs)
+def _throttle_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    configs = sine_throttles() if scenario.name == "search_and_rescue" else square_throttles()
+    ideal, *levels = (_compressed(config, scenario.horizon_s / STUDY_HORIZON_S) for config in configs)
     return [(0.0, (ideal,))], [(config.waveform.amplitude, (config,)) for config in levels]
 
 
@@ -256,19 +257,19 @@ def _compressed(config: ThrottleConfig, factor: float) -> ThrottleConfig:
     return replace(config, waveform=replace(config.waveform, period_s=period_s * factor))
 
 
-def _noise_levels(world: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
-    groups = STUDY_NOISE_GROUPS if world.quirks == AUTHORS_PROGRAM else NOISE_GROUPS
+def _noise_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    groups = STUDY_NOISE_GROUPS if scenario.quirks == AUTHORS_PROGRAM else NOISE_GROUPS
     levels: list[_Level] = []
-    for sensor, actuator in noise_levels(SIGMA_MAX.get(world.name, max(SIGMA_MAX.values())), groups=groups):
+    for sensor, actuator in noise_levels(SIGMA_MAX.get(scenario.name, max(SIGMA_MAX.values())), groups=groups):
         assert isinstance(actuator.sigma, float), "levels are constant"
         levels.append((actuator.sigma, (sensor, actuator)))
     return [], levels[1:]  # the first is sigma = 0, the undisturbed run
 
 
-def _population_levels(world: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
-    if world.name == "search_and_rescue":
+def _population_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    if scenario.name == "search_and_rescue":
         return [], [(config.death_per_tick, (config,)) for config in death_levels()]
-    return [], [(float(factor), (config,)) for factor, config in enumerate(_malfunctions(world.robots.n_robots), 1)]
+    return [], [(float(factor), (config,)) for factor, config in enumerate(_malfunctions(scenario.robots.n_robots), 1)]
 
 
 def _malfunctions(n_robots: int) -> tuple[PopulationConfig, ...]:

@@ -1,27 +1,27 @@
 """Filming a run: `record_run` drives a policy and writes a GIF or an MP4.
 
-Drawing reads the world and never writes it: a run that is filmed and one that is not are the same run.
+A film is planned and driven like any run, by `study.spec` and `study.run`. Drawing reads the world and never writes it,
+so a run that is filmed and one that is not are the same run.
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env._internal.fields import ConfigError, number
-from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import is_policy_file, load_policy
 from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.rendering.video import Frame, check_film, write_film
 from swarm_forage_env.rendering.view import RenderError, arena_view
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.study.run import build_stack
+from swarm_forage_env.study.run import LiveRun, build_env
+from swarm_forage_env.study.spec import chosen_caches, pin_policy
 
 if TYPE_CHECKING:
-    from swarm_forage_env.env import ForageEnv
-    from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+    from swarm_forage_env.wrappers.base import WrapperConfig
 
 
 def record_run(
@@ -36,23 +36,25 @@ def record_run(
     size_px: int = 900,
     trail_s: float = 20.0,
     caches: str | None = None,
+    parameters: Mapping[str, Any] | None = None,
     wrappers: "Iterable[WrapperConfig]" = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Run a policy and film it.
 
     Args:
-        scenario: The world; see `caches`.
+        scenario: The scenario; its horizon need not be whole recording intervals.
         policy: Name of an installed policy, path of a policy file, or a fresh policy object.
         path: File to write, .gif or .mp4.
         seconds: Simulated time to film.
-        seed: Run seed; the film shows the run that any other runner makes of it.
+        seed: Seed of the run; the film shows the run that `run_one` makes of it.
         speedup: Simulated seconds per second of film.
         fps: Pictures per second of film.
         size_px: Longer side of the drawn arena.
         trail_s: Simulated time over which the robots' trails fade; 0 for none.
-        caches: Which caches the world has; default what the scenario has or, where it has none, what the policy
-            states in `caches`. Say "none" to film a policy for caches in a world without.
+        caches: "none", "static" or "dynamic"; default what the policy states in `caches`, or what the scenario has
+            where the policy states nothing (`study.spec.chosen_caches`).
+        parameters: Keyword arguments of a policy that is given by name or path.
         wrappers: Configurations of noise, throttling and population dynamics, in any order.
         progress: Called with (pictures done, pictures in all) after each picture.
 
@@ -61,6 +63,7 @@ def record_run(
 
     Raises:
         RenderError: a value out of range; nothing has been run or written then.
+        ConfigError: parameters beside a policy object.
         ImportError: Pillow, or for .mp4 imageio with ffmpeg, is not installed.
         ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the world.
     """
@@ -68,21 +71,26 @@ def record_run(
     _check_number("trail_s", trail_s, at_least=0.0)
     path = check_film(path, fps, len(ticks))
     arena_view(scenario, size_px)  # refuses a bad size before the run starts
+    stating: object = policy
     if isinstance(policy, str):
         name = Path(policy).stem if is_policy_file(policy) else policy
-        policy = load_policy(policy)
+        found, pinned, stating = pin_policy(policy, parameters or {})
+        policy = load_policy(found, pinned)
+    elif parameters:
+        raise ConfigError(f"Expected parameters with a policy's name or file only, got them with {policy!r}.")
     else:
         name = getattr(policy, "name", type(policy).__name__)
-    if caches is None:
-        caches = scenario.caches if scenario.caches != "none" else getattr(policy, "caches", "none")
-    scenario = replace(scenario, caches=caches)
+    scenario = replace(scenario, caches=chosen_caches(caches, stating, scenario))
     title = f"{scenario.name.replace('_', ' ')}, {name}, {scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
-    stack = build_stack(scenario, wrappers, reads=getattr(policy, "reads", None))
+    stack = build_env(scenario, wrappers, reads=getattr(policy, "reads", None))
     n_samples = round(trail_s * fps / speedup) + 1
     trails = Trails(scenario.robots.n_robots, n_samples) if n_samples > 1 else None
 
     def frames() -> Iterator[Frame]:
-        for done, world in enumerate(_visit(stack, policy, seed, ticks), start=1):
+        run = LiveRun(stack, policy, seed)
+        world = run.forage_env
+        for done, tick in enumerate(ticks, start=1):
+            run.advance(to_tick=tick)  # a run that is over stays as it ended
             if trails is not None:
                 trails.add(world.swarm)
             state = (world.swarm, world.objects, world.caches, world.events)
@@ -91,17 +99,6 @@ def record_run(
                 progress(done, len(ticks))
 
     return write_film(frames(), path, fps=fps, n_frames=len(ticks))
-
-
-def _visit(stack: "SwarmWrapper", policy: Policy, seed: int, ticks: list[int]) -> "Iterator[ForageEnv]":
-    """Run the policy and yield the world at each of `ticks`."""
-    world = stack.unwrapped
-    policy.reset(world.swarm_spec, stream_rng(seed, Stream.POLICY))
-    obs = stack.reset_batch(seed)
-    for tick in ticks:
-        while world.tick < tick:
-            obs, _, _, _ = stack.step_batch(policy.act(obs, world.active), tasks=getattr(policy, "task", None))
-        yield world
 
 
 def _check_number(where: str, value: float, **limits: float) -> None:

@@ -1,4 +1,7 @@
-"""One run: from a specification to its record."""
+"""One run: from a specification to its record.
+
+`LiveRun` is the loop of policy and world. Records, films and measurements of speed all drive their worlds by it.
+"""
 
 import time
 from collections.abc import Iterable
@@ -15,24 +18,68 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.study.record import RunRecord, software_versions
 from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.wrappers.base import WrapperConfig, wrap_in_order
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.recorder import RunRecorder
 
 WARM_UP_TICKS = 5
 """Ticks of a warm-up run under its policy: enough to reach every kernel that a tick always calls."""
 
 
-def build_stack(
+class LiveRun:
+    """A run between its first and its last tick; making one resets the world and the policy.
+
+    Attributes:
+        forage_env: The environment at the bottom of the stack, to look at.
+        over: Whether the run has ended: horizon reached, or every robot dead.
+    """
+
+    def __init__(self, stack: ForageEnv | SwarmWrapper, policy: Policy, seed: int) -> None:
+        """Start a run.
+
+        Args:
+            stack: The environment, with or without wrappers and recorder.
+            policy: A policy that drives no other run.
+            seed: Seed of the world, of its wrappers and of the policy.
+        """
+        self.forage_env: ForageEnv = stack if isinstance(stack, ForageEnv) else stack.unwrapped
+        self.over = False
+        self._stack = stack
+        self._policy = policy
+        policy.reset(self.forage_env.swarm_spec, stream_rng(seed, Stream.POLICY))
+        self._obs = stack.reset_batch(seed)
+        self._has_tasks = hasattr(policy, "task")
+
+    def advance(self, *, to_tick: int | None = None) -> None:
+        """Let policy and world act in turn until `to_tick` ticks have passed since the start, or the run is over."""
+        world, policy, has_tasks, obs, over = self.forage_env, self._policy, self._has_tasks, self._obs, self.over
+        act, step = policy.act, self._stack.step_batch
+        while not over and world.tick != to_tick:
+            actions = act(obs, world.active)
+            tasks = policy.task if has_tasks else None  # type: ignore[attr-defined] - optional, see Policy
+            obs, _, terminated, truncated = step(actions, tasks=tasks)
+            # The first row is looked at alone because in almost every tick it settles the question.
+            over = truncated or bool(terminated[0] and terminated.all())
+        self._obs, self.over = obs, over
+
+
+def build_env(
     scenario: ScenarioConfig, wrappers: Iterable[WrapperConfig] = (), *, reads: tuple[str, ...] | None = None
-) -> RunRecorder:
-    """Build the environment with its wrappers, in the documented order, and a recorder around them.
+) -> ForageEnv | SwarmWrapper:
+    """Build the environment with its wrappers, in the documented order.
 
     Args:
-        scenario: The world.
+        scenario: The scenario.
         wrappers: Wrapper configurations in any order, each kind at most once.
         reads: Observation slices that the policy looks at; default all.
     """
-    return RunRecorder(wrap_in_order(ForageEnv(scenario, reads=reads), wrappers))
+    return wrap_in_order(ForageEnv(scenario, reads=reads), wrappers)
+
+
+def build_stack(
+    scenario: ScenarioConfig, wrappers: Iterable[WrapperConfig] = (), *, reads: tuple[str, ...] | None = None
+) -> RunRecorder:
+    """Build what `build_env` builds and put a recorder around it; the horizon must be whole recording intervals."""
+    return RunRecorder(build_env(scenario, wrappers, reads=reads))
 
 
 def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:
@@ -47,7 +94,7 @@ def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:
     """
     started = time.perf_counter()
     recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
-    _drive(recorder, policy, spec.seed)
+    LiveRun(recorder, policy, spec.seed).advance()
     recorder.close()
     columns: dict[str, Any] = recorder.columns()
     origin = {
@@ -86,19 +133,8 @@ def warm_up(spec: RunSpec) -> None:
     """
     policy = load_policy(spec.policy, spec.parameters)
     recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
-    _drive(recorder, policy, spec.seed, max_ticks=WARM_UP_TICKS)
+    LiveRun(recorder, policy, spec.seed).advance(to_tick=WARM_UP_TICKS)
     grasping = np.zeros((spec.scenario.robots.n_robots, 3), np.float32)
     grasping[:, 2] = Grip.GRASP
     recorder.step_batch(grasping)
     recorder.close()
-
-
-def _drive(recorder: RunRecorder, policy: Policy, seed: int, *, max_ticks: int | None = None) -> None:
-    """Run the loop of policy and world until the run ends or `max_ticks` have passed."""
-    world = recorder.unwrapped
-    policy.reset(world.swarm_spec, stream_rng(seed, Stream.POLICY))
-    obs = recorder.reset_batch(seed)
-    has_tasks = hasattr(policy, "task")
-    while not recorder.complete and world.tick != max_ticks:
-        tasks = policy.task if has_tasks else None  # type: ignore[attr-defined]
-        obs, _, _, _ = recorder.step_batch(policy.act(obs, world.active), tasks=tasks)

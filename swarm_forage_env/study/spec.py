@@ -23,7 +23,7 @@ _KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RunSpec:
-    """One run as data: the world, who controls it, what disturbs it, and the seed.
+    """One run as data: the scenario, who controls the swarm, what disturbs it, and the seed.
 
     Raises:
         ConfigError: no ScenarioConfig, parameters that JSON cannot hold, two wrappers of one kind, a bad seed, or a
@@ -122,6 +122,23 @@ class RunSpec:
         return cls.from_mapping(mapping)
 
 
+def chosen_caches(asked: str | None, policy: object, scenario: ScenarioConfig) -> str:
+    """Return which caches a run has: what was asked for, else what the policy states, else what the scenario has.
+
+    Every run of the package is decided here: runs, films, scores and the command line.
+
+    Args:
+        asked: "none", "static" or "dynamic" where somebody asked for it; None where nobody did.
+        policy: A policy, or its class. It may state the caches that it is made for in the attribute `caches`.
+        scenario: The scenario that the run was given.
+    """
+    if asked is not None:
+        return asked
+    stated = getattr(policy, "caches", None)
+    # A property of a class is not a statement: only an object of the class could answer.
+    return stated if isinstance(stated, str) else scenario.caches
+
+
 def plan_run(
     scenario: ScenarioConfig,
     policy: str,
@@ -130,14 +147,13 @@ def plan_run(
     caches: str | None = None,
     **fields: Any,
 ) -> RunSpec:
-    """Plan a run of a policy in the world that the policy is made for.
+    """Plan a run of a policy.
 
     Args:
-        scenario: The world, but for its caches.
+        scenario: The scenario; its caches are those of `chosen_caches`.
         policy: Registered name, or path of a policy file.
         parameters: Keyword arguments of the policy, plain values; with a "digest" a file is pinned already.
-        caches: Which caches the world has; default what the policy states in `caches`, or what the scenario has where
-            the policy states nothing.
+        caches: Which caches the world has; default see `chosen_caches`.
         fields: Further fields of `RunSpec`.
 
     Raises:
@@ -145,30 +161,37 @@ def plan_run(
         ValueError: no installed policy has that name, or a file that cannot be opened.
     """
     chosen = dict(parameters or {})
-    if is_policy_file(policy) and "digest" not in chosen:
-        policy, chosen, stated = pin_policy_file(policy, chosen)
-        caches = caches or stated
-    elif caches is None:
-        caches = getattr(policy_class(policy), "caches", None)
-    return RunSpec(
-        scenario=replace(scenario, caches=caches or scenario.caches), policy=policy, parameters=chosen, **fields
-    )
+    stating: object = None
+    # A study plans thousands of runs of a policy that was looked up before; its plan says everything.
+    if caches is None or (is_policy_file(policy) and "digest" not in chosen):
+        policy, chosen, stating = pin_policy(policy, chosen)
+    planned = replace(scenario, caches=chosen_caches(caches, stating, scenario))
+    return RunSpec(scenario=planned, policy=policy, parameters=chosen, **fields)
 
 
-def pin_policy_file(path: str | Path, parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any], str | None]:
-    """Make the content of a policy file part of its runs' identity; opens it once, before anything is run.
+def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any], object]:
+    """Return a policy as specifications name it; the content of a file becomes part of its runs' identity.
+
+    Args:
+        policy: Registered name, or path of a policy file. A file is opened once, before anything is run.
+        parameters: Keyword arguments of the policy; a "digest" of a file is kept, and the file checked against it.
 
     Returns:
-        The whole path; the parameters and the file's digest; the caches it was made for, None where it does not tell.
+        The registered name, or the whole path of the file; the parameters, with the file's digest; and what states
+        `caches`: the class of the name, or the policy that was opened.
 
     Raises:
-        ValueError: the file cannot be opened.
+        ValueError: no installed policy has that name, or the file cannot be opened.
     """
+    if not is_policy_file(str(policy)):
+        return str(policy), dict(parameters), policy_class(str(policy))
     from swarm_forage_env.policies.model_files import file_digest  # late: most runs open no model
 
-    file = str(Path(path).resolve())
-    checked = {**parameters, "digest": file_digest(file)}
-    return file, checked, getattr(load_policy(file, checked), "caches", None)
+    file = str(Path(policy).resolve())
+    pinned = dict(parameters)
+    if "digest" not in pinned:
+        pinned["digest"] = file_digest(file)
+    return file, pinned, load_policy(file, pinned)
 
 
 def _wrapper_from_mapping(entry: Mapping[str, Any]) -> "WrapperConfig":

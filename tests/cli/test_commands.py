@@ -162,7 +162,7 @@ def test_wrappers_disturb_the_run_and_are_part_of_its_record(command):
 
 @pytest.mark.parametrize("name", sorted(field_sections()))
 def test_every_field_can_be_set_to_the_value_it_has(name):
-    from swarm_forage_env.cli.plan import parse_setting
+    from swarm_forage_env.cli.scenario_options import parse_setting
 
     config = scenario("warehouse_small")
     section = field_sections()[name]
@@ -358,13 +358,13 @@ def test_record_films_a_run(command):
 @pytest.mark.parametrize(("asked", "filmed"), [((), "static"), (("--caches", "none"), "none")])
 def test_record_films_the_caches_that_were_asked_for(command, monkeypatch, asked, filmed):
     pytest.importorskip("PIL")
-    build, built = film.build_stack, []
+    build, built = film.build_env, []
 
     def note(config, *args, **options):
         built.append(config.caches)
         return build(config, *args, **options)
 
-    monkeypatch.setattr(film, "build_stack", note)
+    monkeypatch.setattr(film, "build_env", note)
     assert command("record", "--policy", "stochm", *asked, *SHORT_FILM)[0] == 0
     assert built == [filmed]
 
@@ -465,7 +465,7 @@ def test_a_folder_that_cannot_be_made_is_one_line(command):
 
 
 def test_split_names_drops_repetitions():
-    from swarm_forage_env.cli.plan import split_names
+    from swarm_forage_env.cli.scenario_options import split_names
 
     assert split_names("crw, dpo,crw,") == ("crw", "dpo")
     with pytest.raises(ConfigError):

@@ -12,7 +12,7 @@ import pytest
 from swarm_forage_env import cli
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.plan import ScenarioOptions
+from swarm_forage_env.cli.scenario_options import ScenarioOptions
 from swarm_forage_env.cli.training_plan import TrainOptions, build_plan
 from swarm_forage_env.training.plan import EvaluationPlan, read_plan
 from swarm_forage_env.training.recipe import recipe

@@ -6,11 +6,19 @@ import sys
 import numpy as np
 import pytest
 
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.rendering.video import check_film, write_film
 from swarm_forage_env.rendering.view import PALETTE, RenderError
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study import film as film_module
 from swarm_forage_env.study.film import record_run
+from swarm_forage_env.study.run import run_one
+from swarm_forage_env.study.spec import plan_run
+from swarm_forage_env.wrappers.recorder import TOTALS
+from swarm_forage_env.wrappers.registry import parse_wrapper
 
 Image = pytest.importorskip("PIL.Image")
 
@@ -166,16 +174,96 @@ def test_pictures_are_spaced_evenly_in_ticks(small, tmp_path):
         ("none", None, None, "none"),
         ("none", "static", None, "static"),
         ("none", "static", "none", "none"),
-        ("static", "none", None, "static"),
+        ("static", "none", None, "none"),
         ("static", None, "dynamic", "dynamic"),
     ],
 )
-def test_caches_are_those_asked_for_or_of_the_scenario_or_of_the_policy(tmp_path, given, stated, asked, expected):
+def test_caches_are_those_of_a_run(tmp_path, given, stated, asked, expected):
     world, policy = scenario("warehouse_small", n_robots=4, n_objects=10, caches=given), Witness()
     if stated is not None:
         policy.caches = stated
     record_run(world, policy, tmp_path / "run.gif", seconds=2.0, size_px=300, caches=asked)
     assert policy.caches_seen == expected
+
+
+@pytest.fixture
+def filmed(monkeypatch):
+    """What the pictures of films show, one (tick, positions, headings, counters) per picture."""
+    shown = []
+
+    def look(scenario, swarm, objects, caches, events, *, tick, **_):
+        shown.append((tick, swarm.position.copy(), swarm.heading.copy(), events.counters.copy()))
+        return np.zeros((20, 20, 3), np.uint8)
+
+    monkeypatch.setattr(film_module, "render_frame", look)
+    return shown
+
+
+CROWDED = scenario(
+    "warehouse_small",
+    n_robots=12,
+    width_m=8.0,
+    height_m=8.0,
+    nest_centre_m=(1.0, 4.0),
+    nest_size_m=(1.6, 4.0),
+    n_objects=60,
+    horizon_s=80.0,
+    interval_s=20.0,
+)
+DISTURBED = (
+    parse_wrapper("population:malfunction_per_tick=0.01,repair_per_tick=0.02"),
+    parse_wrapper("throttle:waveform=constant,amplitude=0.3"),
+    parse_wrapper("sensor_noise:sigma=0.02"),
+)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("policy", "wrappers"), [("crw", ()), ("crw", DISTURBED), ("stochm", DISTURBED)])
+def test_a_film_shows_the_run_that_its_name_promises(filmed, tmp_path, monkeypatch, policy, wrappers):
+    spec = plan_run(CROWDED, policy, wrappers=wrappers, seed=5)
+    step, states = ForageEnv.step_batch, {}
+
+    def note(self, *arguments, **options):
+        result = step(self, *arguments, **options)
+        states[self.tick] = self.swarm.position.copy(), self.swarm.heading.copy(), self.events.counters.copy()
+        return result
+
+    with monkeypatch.context() as patch:
+        patch.setattr(ForageEnv, "step_batch", note)
+        record = run_one(spec)
+    options = {"seconds": 80.0, "speedup": 40.0, "fps": 20.0, "wrappers": wrappers, "seed": 5}
+    record_run(CROWDED, policy, tmp_path / "run.gif", **options)
+    assert [tick for tick, *_ in filmed] == list(range(0, 401, 10))
+    for tick, *state in filmed[1:]:
+        for mine, theirs in zip(state, states[tick], strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+    counters = filmed[-1][3] - filmed[0][3]  # a static cache is counted when the world is made
+    assert counters[Counter.FREE_PICKUPS] > 0
+    for name, counter in TOTALS.items():
+        assert counters[counter] == record.columns()[name].sum(), name
+
+
+def test_a_film_needs_no_whole_intervals(filmed, tmp_path):
+    broken = scenario("warehouse_small", n_robots=4, n_objects=10, horizon_s=300.0)
+    record_run(broken, "random", tmp_path / "run.gif", seconds=20.0)
+    assert [tick for tick, *_ in filmed] == list(range(0, 101, 5))
+
+
+def test_a_run_that_is_over_stays_as_it_ended(filmed, tmp_path):
+    deadly = (parse_wrapper("population:death_per_tick=0.9"),)
+    record_run(scenario("warehouse_small", n_robots=2), "random", tmp_path / "run.gif", seconds=40.0, wrappers=deadly)
+    ticks = [tick for tick, *_ in filmed]
+    assert len(ticks) == 41
+    assert ticks[-1] == ticks[-2] < 200
+
+
+def test_parameters_reach_the_policy_of_a_film(filmed, tmp_path):
+    world = scenario("warehouse_small", n_robots=4, n_objects=10)
+    record_run(world, "crw", tmp_path / "run.gif", seconds=10.0, parameters={"wander_speed_mps": 0.05})
+    slow, start = filmed[-1][1], filmed[0][1]
+    assert 0.0 < np.linalg.norm(slow - start, axis=1).max() <= 0.05 * 10.0 + 1e-6
+    with pytest.raises(ConfigError, match="Expected parameters with a policy's name or file only"):
+        record_run(world, Witness(), tmp_path / "run.gif", parameters={"wander_speed_mps": 0.05})
 
 
 def test_one_seed_gives_one_film(small, tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.plan import ScenarioOptions, plan_runs
+from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs
 from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.model_files import file_digest
@@ -15,7 +15,7 @@ from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import policy_class, policy_names
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
-from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.study.spec import RunSpec, chosen_caches, plan_run
 from swarm_forage_env.wrappers import registry
 from tests.support.wrapper_configs import InnerConfig, OuterConfig
 
@@ -133,6 +133,35 @@ def test_mappings_with_unknown_parts_are_refused():
         RunSpec(scenario="warehouse_small", policy="crw")
 
 
+class ForStatic:
+    caches = "static"
+
+
+class TellsLater:
+    @property
+    def caches(self):
+        return "static"
+
+
+@pytest.mark.parametrize(
+    ("asked", "policy", "of_scenario", "chosen"),
+    [
+        (None, object(), "none", "none"),
+        (None, object(), "dynamic", "dynamic"),
+        (None, ForStatic, "none", "static"),
+        (None, ForStatic(), "none", "static"),
+        (None, ForStatic, "dynamic", "static"),
+        (None, TellsLater, "dynamic", "dynamic"),
+        (None, TellsLater(), "dynamic", "static"),
+        ("none", ForStatic, "dynamic", "none"),
+        ("dynamic", ForStatic, "none", "dynamic"),
+        ("dynamic", object(), "none", "dynamic"),
+    ],
+)
+def test_caches_are_those_asked_for_or_of_the_policy_or_of_the_scenario(asked, policy, of_scenario, chosen):
+    assert chosen_caches(asked, policy, scenario("warehouse_small", caches=of_scenario)) == chosen
+
+
 @pytest.mark.parametrize("policy", policy_names())
 def test_a_planned_run_has_the_world_its_policy_is_made_for(policy):
     made_for = getattr(policy_class(policy), "caches", "none")
@@ -187,8 +216,18 @@ def test_a_missing_policy_file_is_found_before_anything_is_run(tmp_path):
 
 def test_a_file_that_is_pinned_already_stays_so(tmp_path):
     """A plan of many runs opens a file once; that the file has changed since is found by the run."""
-    spec = plan_run(scenario("warehouse_small"), str(tmp_path / "gone.npz"), parameters={"digest": "0"})
-    assert (spec.policy, spec.parameters) == (str(tmp_path / "gone.npz"), {"digest": "0"})
+    path, pinned = str(tmp_path / "gone.npz"), {"digest": "0"}
+    spec = plan_run(scenario("warehouse_small"), path, parameters=pinned, caches="none")
+    assert (spec.policy, spec.parameters) == (path, pinned)
+
+
+def test_a_pinned_file_is_opened_to_learn_what_caches_it_is_made_for(tmp_path):
+    path = str(network_file(tmp_path / "net.npz", caches="static"))
+    pinned = plan_run(scenario("warehouse_small"), path).parameters
+    assert plan_run(scenario("warehouse_small"), path, parameters=pinned).scenario.caches == "static"
+    network_file(tmp_path / "net.npz", seed=1)
+    with pytest.raises(ValueError, match="a file that has changed since"):
+        plan_run(scenario("warehouse_small"), path, parameters=pinned)
 
 
 def test_runs_of_a_file_open_it_once(tmp_path, monkeypatch):

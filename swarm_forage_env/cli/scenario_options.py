@@ -14,16 +14,12 @@ from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
-ASSUMED_ROBOT_TICKS_PER_S = 0.5e6
-"""Speed that estimates assume per core, in robots times ticks per second; our choice: the low end of what scripted
-controllers reach."""
-
 _TRUTH = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, slots=True)
 class ScenarioOptions:
-    """The options that describe a world; None = the scenario's own value."""
+    """The options that describe a scenario; None = the preset's own value."""
 
     scenario: str
     robots: int | None = None
@@ -54,7 +50,7 @@ def split_names(text: str) -> tuple[str, ...]:
 def build_scenario(
     options: ScenarioOptions, file_fields: Mapping[str, Any] | None = None
 ) -> tuple[ScenarioConfig, str | None]:
-    """Return the scenario, and which caches were asked for (None = those the policy is made for).
+    """Return the scenario, and which caches were asked for (None = nobody asked).
 
     Args:
         options: What the command line says.
@@ -158,9 +154,3 @@ def plan_runs(
 def default_folder(scenario_name: str) -> Path:
     """Return where results go unless told otherwise: one folder per scenario, so that repeated runs are found."""
     return Path("results") / scenario_name
-
-
-def estimated_seconds(specs: Sequence[RunSpec], jobs: int) -> float:
-    """Return a rough wall-clock time for `specs` on `jobs` processes, in seconds."""
-    robot_ticks = sum(spec.scenario.robots.n_robots * spec.scenario.horizon_ticks for spec in specs)
-    return robot_ticks / (ASSUMED_ROBOT_TICKS_PER_S * min(jobs, max(1, len(specs))))

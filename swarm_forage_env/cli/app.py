@@ -1,0 +1,72 @@
+"""The application: its commands, its own options, and how it ends.
+
+A command has a file of its own and imports what it needs when it runs, so that `--help` answers at once.
+"""
+
+import sys
+from typing import Annotated
+
+import typer
+
+from swarm_forage_env.cli.compare import compare
+from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE, complain
+from swarm_forage_env.cli.record import record
+from swarm_forage_env.cli.rerun import rerun
+from swarm_forage_env.cli.run import run
+from swarm_forage_env.cli.score import score
+from swarm_forage_env.cli.show import info, list_everything, schema
+from swarm_forage_env.cli.train import train
+
+_USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
+"""Base of typer's complaints about arguments; typer gives it no public name."""
+
+app = typer.Typer(
+    help="Swarm foraging: run, film, train and score policies, inspect scenarios.",
+    add_completion=False,
+    invoke_without_command=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+@app.callback()
+def _options(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+) -> None:
+    if version:
+        from importlib.metadata import version as installed_version
+
+        typer.echo(f"swarm-forage {installed_version('swarm-forage-env')}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+# `--help` lists them in this order.
+for command in (run, score, compare, train):
+    app.command()(command)
+app.command("list")(list_everything)
+for command in (info, schema, rerun, record):
+    app.command()(command)
+
+
+def main() -> None:
+    """Run the command line and exit; whatever a person got wrong is one line on stderr."""
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.study.record import RecordError
+
+    try:
+        code = app(standalone_mode=False)
+    except _USAGE_ERROR as error:
+        code = complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined]
+    except (ConfigError, RecordError) as error:
+        code = complain(str(error), EXIT_USAGE)
+    except OSError as error:
+        named = f"{error.strerror}: {error.filename}" if error.strerror and error.filename else str(error)
+        code = complain(named, EXIT_FAILURE)
+    except ImportError as error:
+        code = complain(str(error), EXIT_FAILURE)
+    except (KeyboardInterrupt, typer.Abort):
+        code = complain("interrupted", EXIT_INTERRUPTED)
+    sys.exit(code)

@@ -1,0 +1,57 @@
+"""The command `compare`."""
+
+from typing import Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import (
+    AsJson,
+    Budget,
+    Caches,
+    DryRun,
+    Jobs,
+    Measures,
+    Objects,
+    Out,
+    Robots,
+    Scenario,
+    ScoreHorizon,
+    ScoreSeeds,
+    Settings,
+    Side,
+)
+
+
+def compare(
+    policies: Annotated[
+        str,
+        typer.Option(
+            "--policy", "--policies", help="Two or more, separated by commas: names, or files of trained ones."
+        ),
+    ],
+    scenario: Scenario = "warehouse_small",
+    measures: Measures = None,
+    budget: Budget = "standard",
+    seeds: ScoreSeeds = None,
+    horizon: ScoreHorizon = None,
+    robots: Robots = None,
+    objects: Objects = None,
+    side: Side = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    out: Out = None,
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Score policies in the same worlds, seed by seed, and say which differences are significant."""
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder
+    from swarm_forage_env.cli.score_options import ScoreOptions, build_plan
+    from swarm_forage_env.cli.score_report import run_and_show
+
+    chosen = ScenarioOptions(
+        scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
+    )
+    options = ScoreOptions(policies=policies, measures=measures, budget=budget, seeds=seeds, horizon=horizon)
+    plan = build_plan(chosen, options, at_least=2)
+    run_and_show(plan, out or default_folder(scenario), "comparison.png", jobs, as_json=as_json, dry_run=dry_run)

@@ -1,0 +1,124 @@
+"""What `list` and `info` tell: which scenarios and policies there are, and what they are made of."""
+
+import dataclasses
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.network import Network
+from swarm_forage_env.policies.pretrained import network_file
+from swarm_forage_env.policies.registry import is_policy_file, policy_class, policy_names
+from swarm_forage_env.scenarios import presets
+from swarm_forage_env.scenarios.config import ScenarioConfig
+
+
+def overview() -> tuple[Table, Table]:
+    """Return the tables of scenarios and of policies."""
+    scenarios = Table("scenario", "robots", "objects", "arena", "what it is", title="scenarios")
+    for name in presets.SCENARIO_NAMES:
+        config = presets.scenario(name)
+        size = f"{config.arena.width_m:g} x {config.arena.height_m:g} m"
+        counts = (str(config.robots.n_robots), str(config.objects.n_objects))
+        scenarios.add_row(name, *counts, size, _first_line(getattr(presets, name)))
+    policies = Table("policy", "caches", "what it is", title="policies")
+    for name in policy_names():
+        policy = policy_class(name)
+        policies.add_row(name, getattr(policy, "caches", "none"), _first_line(policy))
+    return scenarios, policies
+
+
+def information(name: str) -> str:
+    """Return everything about a scenario (by name or environment id) or a policy (by name or file) as text.
+
+    Raises:
+        ConfigError: neither a scenario nor a policy has that name, or the file holds none.
+    """
+    name = re.sub(r"^swarm_forage/(\w+)-v\d+$", r"\1", name)
+    if name in presets.SCENARIO_NAMES:
+        return "\n".join(_scenario_lines(presets.scenario(name), _first_line(getattr(presets, name))))
+    if name in policy_names():
+        network = network_file(name)
+        return "\n".join([*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])])
+    if is_policy_file(name):
+        return "\n".join(_file_lines(Path(name)))
+    known = (*presets.SCENARIO_NAMES, *policy_names())
+    raise ConfigError(f"Unknown scenario or policy {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
+
+
+def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
+    env = ForageEnv(config)
+    agent = env.possible_agents[0]
+    yield f"{config.name}: {headline}"
+    yield ""
+    yield "Fields (change them with --set name=value):"
+    for item in dataclasses.fields(config):
+        value = getattr(config, item.name)
+        if dataclasses.is_dataclass(value):
+            yield f"  [{item.name}]"
+            for inner in dataclasses.fields(value):
+                yield f"    {inner.name:<34}{_plain(getattr(value, inner.name))}"
+        else:
+            yield f"  {item.name:<36}{_plain(value)}"
+    yield ""
+    yield "Spaces, per robot:"
+    yield f"  action       {env.action_space(agent)}: left wheel, right wheel, gripper"
+    yield f"  observation  {env.observation_space(agent)}"
+    yield f"  state()      {env.state_space}"
+    yield ""
+    yield "Observation:"
+    yield env.layout.describe()
+
+
+def _policy_lines(name: str) -> Iterator[str]:
+    policy = policy_class(name)
+    network = network_file(name)
+    reads = getattr(policy, "reads", None) if network is None else Network.load(network).about.interface.reads
+    yield f"{name}: {inspect.getdoc(policy) or 'no description'}"
+    yield ""
+    yield f"  defined in  {policy.__module__}"
+    yield f"  parameters  {inspect.signature(policy)}"
+    yield f"  caches      {getattr(policy, 'caches', 'none')} (the world it is made for)"
+    yield f"  reads       {'all slices' if reads is None else ', '.join(reads) or 'nothing'}"
+
+
+def _file_lines(file: Path) -> Iterator[str]:
+    if not file.is_file():
+        raise ConfigError(f"Cannot read the policy file {file}: there is no such file.")
+    if file.suffix.lower() != ".npz":
+        yield f"{file}: a model of stable-baselines3. Opening it runs code that it contains, so it is not opened here."
+        return
+    try:
+        network = Network.load(file)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    about = network.about
+    sizes = [network.weights[0].shape[0], *(weight.shape[1] for weight in network.weights)]
+    yield f"{file}: a network of {' x '.join(map(str, sizes))} units ({about.activation})"
+    yield ""
+    for name, value in dataclasses.asdict(about.interface).items():
+        yield f"  {name:<20}{_plain(value)}"
+    yield f"  {'caches':<20}{about.caches} (the world it is made for)"
+    for part, values in about.card.items():
+        if part != "plan":  # a page of its own
+            yield ""
+            yield f"  [{part}]"
+            if isinstance(values, dict):
+                for name, value in values.items():
+                    yield f"    {name:<24}{value:.6g}" if isinstance(value, float) else f"    {name:<24}{_plain(value)}"
+            else:
+                yield f"    {_plain(values)}"
+
+
+def _first_line(documented: Any) -> str:
+    return (inspect.getdoc(documented) or "no description").splitlines()[0]
+
+
+def _plain(value: Any) -> str:
+    return " x ".join(f"{part:g}" for part in value) if isinstance(value, tuple) else str(value)

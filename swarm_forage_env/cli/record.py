@@ -1,0 +1,78 @@
+"""The command `record`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from swarm_forage_env.cli.options import Caches, ConfigFile, Objects, Robots, Scenario, Settings, Side, Wrappers
+
+
+def record(
+    out: Annotated[
+        Path | None, typer.Option(help="File to write, .gif or .mp4; default results/SCENARIO_POLICY.gif.")
+    ] = None,
+    scenario: Scenario = "warehouse_small",
+    policy: Annotated[str, typer.Option("--policy", "--controller", help="Name, or file of a trained policy.")] = "crw",
+    robots: Robots = None,
+    seconds: Annotated[float, typer.Option(help="Simulated seconds to film.")] = 300.0,
+    speedup: Annotated[float, typer.Option(help="Simulated seconds per second of film.")] = 20.0,
+    fps: Annotated[float, typer.Option(help="Pictures per second.")] = 20.0,
+    size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
+    objects: Objects = None,
+    side: Side = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    wrappers: Wrappers = None,
+    config: ConfigFile = None,
+) -> None:
+    """Film a run."""
+    from rich.progress import Progress
+
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs
+    from swarm_forage_env.policies.model_files import ModelError
+    from swarm_forage_env.policies.network import NetworkError
+    from swarm_forage_env.rendering.view import RenderError
+    from swarm_forage_env.study.film import record_run
+
+    options = ScenarioOptions(
+        scenario=scenario,
+        robots=robots,
+        objects=objects,
+        side=side,
+        caches=caches,
+        settings=tuple(settings or ()),
+        wrappers=tuple(wrappers or ()),
+        config_file=config,
+    )
+    spec = plan_runs(options, (policy,), n_seeds=1, first_seed=seed)[0]
+    film = out or _film_in_results(f"{scenario}_{Path(policy).stem}.gif")
+    try:
+        screen = Console(stderr=True)
+        with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
+            task = bar.add_task("pictures")
+            written = record_run(
+                spec.scenario,
+                spec.policy,
+                film,
+                seconds=seconds,
+                seed=seed,
+                speedup=speedup,
+                fps=fps,
+                size_px=size,
+                caches=spec.scenario.caches,
+                parameters=spec.parameters,
+                wrappers=spec.wrappers,
+                progress=lambda done, total: bar.update(task, completed=done, total=total),
+            )
+    except (RenderError, ModelError, NetworkError) as error:
+        raise typer.BadParameter(str(error)) from error
+    typer.echo(f"wrote {written}")
+
+
+def _film_in_results(name: str) -> Path:
+    folder = Path("results")
+    folder.mkdir(exist_ok=True)
+    return folder / name

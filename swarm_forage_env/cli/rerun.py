@@ -1,0 +1,33 @@
+"""The command `rerun`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import EXIT_FAILURE, complain
+
+
+def rerun(file: Annotated[Path, typer.Argument(help="A record (.parquet) or a failure (.json).")]) -> None:
+    """Run a stored run again, here; a record is compared with what comes out, a failure shows its traceback."""
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.policies.registry import load_policy
+    from swarm_forage_env.study.record import RunRecord
+    from swarm_forage_env.study.run import run_one, run_policy
+    from swarm_forage_env.study.spec import RunSpec
+    from swarm_forage_env.study.store import read_failure
+
+    if file.suffix == ".json":
+        typer.echo(run_one(read_failure(file).spec).describe())
+        return
+    stored = RunRecord.read(file)
+    spec = RunSpec.from_json(stored.spec)
+    try:
+        policy = load_policy(spec.policy, spec.parameters)
+    except ValueError as error:  # not installed here, or its file has gone or changed
+        raise ConfigError(f"Cannot run {file} again: {error}") from error
+    again = run_policy(policy, spec)
+    typer.echo(again.describe())
+    if not again.same_results(stored):
+        raise typer.Exit(complain(f"the results differ from those in {file}", EXIT_FAILURE))
+    typer.echo(f"bit for bit the same as {file}")

@@ -1,0 +1,134 @@
+"""The command `run`."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import (
+    EXIT_FAILURE,
+    EXIT_INTERRUPTED,
+    NO_PICTURE,
+    AsJson,
+    Caches,
+    ConfigFile,
+    DryRun,
+    Jobs,
+    Objects,
+    Out,
+    Robots,
+    Scenario,
+    Settings,
+    Side,
+    Wrappers,
+    complain,
+)
+from swarm_forage_env.cli.terminal import notes, output
+
+if TYPE_CHECKING:
+    from swarm_forage_env.study.runner import StudyResult
+    from swarm_forage_env.study.spec import RunSpec
+    from swarm_forage_env.study.store import RunStore
+
+
+def run(
+    scenario: Scenario = "warehouse_small",
+    policy: Annotated[
+        str,
+        typer.Option(
+            "--policy", "--controller", help="One or more, separated by commas: names, or files of trained ones."
+        ),
+    ] = "crw",
+    robots: Robots = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,
+    first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first of them.")] = 0,
+    horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
+    objects: Objects = None,
+    side: Side = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    wrappers: Wrappers = None,
+    config: ConfigFile = None,
+    out: Out = None,
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Run policies in a scenario and compare how they perform.
+
+    Runs in parallel, shows a table, stores one record per run and draws performance over time. Runs that the folder
+    holds already are not repeated, so an interrupted command can simply be given again.
+    """
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder, plan_runs, split_names
+    from swarm_forage_env.study.store import RunStore
+
+    options = ScenarioOptions(
+        scenario=scenario,
+        robots=robots,
+        objects=objects,
+        side=side,
+        caches=caches,
+        horizon=horizon,
+        settings=tuple(settings or ()),
+        wrappers=tuple(wrappers or ()),
+        config_file=config,
+    )
+    specs = plan_runs(options, split_names(policy), n_seeds=seeds, first_seed=first_seed)
+    store = RunStore(out or default_folder(scenario))
+    if dry_run:
+        _show_plan(specs, store, jobs, as_json=as_json)
+    else:
+        result = _run_specs(specs, store, jobs)
+        _show_results(specs, result, store, as_json=as_json)
+
+
+def _show_plan(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None, *, as_json: bool) -> None:
+    from swarm_forage_env.cli.report import estimated_seconds, plan_json, plan_note, plan_table
+    from swarm_forage_env.study.runner import available_cores
+
+    todo = [spec for spec in specs if spec.run_id not in store]
+    processes = jobs or available_cores()
+    seconds = estimated_seconds(todo, processes)
+    if as_json:
+        typer.echo(plan_json(specs, store, seconds))
+    else:
+        console = output()
+        console.print(plan_table(specs, store))
+        console.print(plan_note(todo, seconds, processes))
+
+
+def _run_specs(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None) -> "StudyResult":
+    from swarm_forage_env.study.runner import StudyInterrupted, run_all
+
+    store.folder.mkdir(parents=True, exist_ok=True)
+    try:
+        return run_all(specs, store=store, jobs=jobs, progress=True)
+    except StudyInterrupted as interrupt:
+        complain(f"{interrupt} They are in {store.folder}; the same command does the rest.", EXIT_INTERRUPTED)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "RunStore", *, as_json: bool) -> None:
+    from metrics.scoring.texts import counted
+    from swarm_forage_env.cli.report import draw_performance, results_json, results_table, summarize
+
+    aside = notes()
+    plot = None
+    if result.records:
+        plot = store.folder / "performance.png"
+        try:
+            draw_performance(specs, result.records, plot)
+        except ImportError:
+            plot = None
+            aside.print(NO_PICTURE, markup=False)
+    if as_json:
+        typer.echo(results_json(specs, result, store, plot))
+    elif result.records:
+        output().print(results_table(specs, summarize(specs, result.records)))
+        aside.print(
+            f"{counted(len(result.records), 'record')} in {store.folder}" + (f", picture {plot}" if plot else "")
+        )
+    for failure in result.failures:
+        aside.print(f"failed: {failure.spec.describe()}: {failure.error}", markup=False)
+        aside.print(f"  again, alone: swarm-forage rerun {store.failure_path(failure.run_id)}", markup=False)
+    if result.failures:
+        raise typer.Exit(EXIT_FAILURE)

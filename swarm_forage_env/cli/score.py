@@ -1,0 +1,85 @@
+"""The command `score`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import (
+    AsJson,
+    Budget,
+    Caches,
+    DryRun,
+    Jobs,
+    Measures,
+    Objects,
+    Out,
+    Robots,
+    Scenario,
+    ScoreHorizon,
+    ScoreSeeds,
+    Settings,
+    Side,
+)
+
+_OF_CURVES = ("curves", "measures", "as_json")
+"""Options of `score` that go with --curves."""
+
+
+def score(
+    context: typer.Context,
+    policy: Annotated[str | None, typer.Option(help="Name, or file of a trained policy.")] = None,
+    curves: Annotated[
+        Path | None, typer.Option(help="Score curves from elsewhere instead: a CSV or Parquet file (docs/scoring.md).")
+    ] = None,
+    scenario: Scenario = "warehouse_small",
+    measures: Measures = None,
+    budget: Budget = "standard",
+    seeds: ScoreSeeds = None,
+    horizon: ScoreHorizon = None,
+    robots: Robots = None,
+    objects: Objects = None,
+    side: Side = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    out: Out = None,
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Run a policy in all that the measures of swarm engineering need, and score it.
+
+    Swarms of several sizes, throttled, noisy and failing robots; one table with intervals and noise floors. Runs that
+    the folder holds already are not repeated.
+    """
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder
+    from swarm_forage_env.cli.score_options import ScoreOptions, build_plan, tables_of_file
+    from swarm_forage_env.cli.score_report import run_and_show, show_scores
+
+    if (policy is None) == (curves is None):
+        raise typer.BadParameter("Expected either --policy or --curves.")
+    if curves is not None:
+        _refuse_options_of_runs(context)
+        show_scores(tables_of_file(curves, measures), None, as_json=as_json)
+        return
+    chosen = ScenarioOptions(
+        scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
+    )
+    options = ScoreOptions(policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon)
+    folder = out or default_folder(scenario)
+    run_and_show(build_plan(chosen, options, at_most=1), folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run)
+
+
+def _refuse_options_of_runs(context: typer.Context) -> None:
+    """Refuse what curves that exist already would silently ignore."""
+    sources = {option: context.get_parameter_source(str(option.name)) for option in context.command.params}
+    given = [
+        option.opts[0]
+        for option, source in sources.items()
+        if source is not None and source.name == "COMMANDLINE" and option.name not in _OF_CURVES
+    ]
+    if given:
+        raise typer.BadParameter(
+            f"Expected --curves with no other options than --measures and --json, got {', '.join(given)}, which are "
+            "about runs."
+        )

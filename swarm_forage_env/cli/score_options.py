@@ -1,0 +1,69 @@
+"""From the words after `score` and `compare` to a plan."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from metrics.scoring import ScoringPlan, plan_scores, score_curves
+from metrics.scoring.table import ScoreTable
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
+
+_OF_THE_BUDGET = ("horizon_s", "interval_s")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ScoreOptions:
+    """The options of both commands that are not about the scenario."""
+
+    policies: str
+    """Names and files, separated by commas."""
+    measures: str | None = None
+    budget: str = "standard"
+    seeds: int | None = None
+    horizon: float | None = None
+
+
+def build_plan(
+    described: ScenarioOptions, options: ScoreOptions, *, at_least: int = 1, at_most: int | None = None
+) -> ScoringPlan:
+    """Return what the words ask for.
+
+    Args:
+        described: The scenario; its horizon is that of the budget.
+        options: The rest.
+        at_least: How many policies there must be.
+        at_most: How many there may be, None = any number.
+
+    Raises:
+        ConfigError: whatever is wrong with the words.
+        ImportError: a model, and stable-baselines3 is not installed.
+    """
+    for word in described.settings:
+        if word.partition("=")[0] in _OF_THE_BUDGET:
+            raise ConfigError(f"Expected no --set {word}, which the budget sets; --horizon changes the length of runs.")
+    names = split_names(options.policies)
+    if len(names) < at_least:
+        raise ConfigError(f"Expected {at_least} or more policies to compare, separated by commas, got {names[0]!r}.")
+    if at_most is not None and len(names) > at_most:
+        raise ConfigError(f"Expected one policy to score, got {', '.join(names)}; compare scores more than one.")
+    scenario, caches = build_scenario(described)
+    try:
+        return plan_scores(
+            names,
+            scenario,
+            measures=None if options.measures is None else split_names(options.measures),
+            budget=options.budget,
+            seeds=options.seeds,
+            horizon_s=options.horizon,
+            caches=caches,
+        )
+    except ValueError as error:  # of a policy, a measure, a budget or a file
+        raise ConfigError(str(error)) from error
+
+
+def tables_of_file(path: Path, measures: str | None) -> tuple[ScoreTable, ...]:
+    """Return the scores of a file of curves; raises ConfigError whatever is wrong with it."""
+    try:
+        return score_curves(path, measures=None if measures is None else split_names(measures))
+    except ValueError as error:
+        raise ConfigError(str(error)) from error

@@ -1,0 +1,128 @@
+"""What `score` and `compare` do with a plan, and what they have to say: tables, JSON, a picture."""
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import typer
+
+from metrics.scoring import ScoringPlan, run_scores
+from metrics.scoring.comparison import Comparison, compare_tables
+from metrics.scoring.plots import draw_scores
+from metrics.scoring.table import ScoreTable
+from metrics.scoring.texts import aligned, counted
+from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, NO_PICTURE, complain
+from swarm_forage_env.cli.report import estimate, estimated_seconds
+from swarm_forage_env.study.runner import StudyInterrupted, available_cores
+from swarm_forage_env.study.store import RunStore
+
+
+def run_and_show(
+    plan: ScoringPlan, folder: Path, picture: str, jobs: int | None, *, as_json: bool, dry_run: bool
+) -> None:
+    """Run a plan and show the scores; or show the plan, where nothing is to be run.
+
+    Args:
+        plan: What to run.
+        folder: Where the records and the picture go.
+        picture: Name of the picture.
+        jobs: Processes; None = one per core.
+        as_json: Print JSON instead of tables.
+        dry_run: Run nothing.
+
+    Raises:
+        typer.Exit: Ctrl-C, or runs have failed.
+    """
+    if dry_run:
+        show = _plan_json if as_json else _plan_text
+        typer.echo(show(plan, RunStore(folder), jobs or available_cores()))
+        return
+    try:
+        tables = run_scores(plan, out=folder, jobs=jobs, progress=True)
+    except StudyInterrupted as interrupt:
+        complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    show_scores(tables, folder / picture, as_json=as_json)
+    if any(table.failures for table in tables):
+        raise typer.Exit(EXIT_FAILURE)
+
+
+def show_scores(tables: Sequence[ScoreTable], picture: Path | None, *, as_json: bool) -> None:
+    """Show the scores of one policy, or compare those of several; draw them where `picture` says so."""
+    comparison = compare_tables(tables) if len(tables) > 1 else None
+    drawn = None
+    if picture is not None:
+        try:
+            drawn = _draw(tables, picture)
+        except ImportError:
+            typer.echo(NO_PICTURE, err=True)
+    if as_json:
+        typer.echo(_json_text(tables, comparison, drawn))
+    else:
+        typer.echo(str(tables[0] if comparison is None else comparison))
+    if drawn is not None:
+        typer.echo(f"picture {drawn}", err=True)
+
+
+def _plan_text(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
+    """Return the planned experiments as a table with an estimate."""
+    todo = [spec for spec in plan.specs if spec.run_id not in store]
+    left = Counter((spec.criterion, spec.criterion_value, spec.scenario.robots.n_robots) for spec in todo)
+    rows: list[Sequence[str]] = [("varied", "value", "robots", "objects", "seconds", "runs", "to do")]
+    for experiment in plan.experiments:
+        scenario = experiment.scenario
+        n_robots = scenario.robots.n_robots
+        rows.append(
+            (
+                experiment.criterion,
+                f"{experiment.value:g}",
+                str(n_robots),
+                str(scenario.objects.n_objects),
+                f"{scenario.horizon_s:g}",
+                str(len(plan.seeds) * len(plan.contestants)),
+                str(left[experiment.criterion, experiment.value, n_robots]),
+            )
+        )
+    seconds = estimated_seconds(todo, jobs)
+    return "\n".join(
+        [
+            f"{', '.join(contestant.label for contestant in plan.contestants)} in {plan.scenario.name}, budget "
+            f"{plan.budget_name}, {counted(len(plan.seeds), 'seed')}, records go to {store.folder}",
+            *aligned(rows),
+            f"{counted(len(plan.specs), 'run')}, {len(todo):,} to do" + estimate(seconds, jobs, any_left=bool(todo)),
+        ]
+    )
+
+
+def _plan_json(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
+    """Return the planned runs as a JSON document."""
+    todo = [spec for spec in plan.specs if spec.run_id not in store]
+    runs = [{"run_id": spec.run_id, "stored": spec.run_id in store, "spec": spec.to_mapping()} for spec in plan.specs]
+    document = {
+        "policies": [contestant.label for contestant in plan.contestants],
+        "measures": list(plan.measures),
+        "out": str(store.folder),
+        "estimated_wall_s": estimated_seconds(todo, jobs),
+        "runs": runs,
+    }
+    return json.dumps(document, indent=1)
+
+
+def _json_text(tables: Sequence[ScoreTable], comparison: Comparison | None, picture: Path | None) -> str:
+    """Return everything as a JSON document; numbers that do not exist are null."""
+    document = {"tables": [table.to_mapping() for table in tables]} if comparison is None else comparison.to_mapping()
+    return json.dumps({**document, "picture": None if picture is None else str(picture)}, indent=1)
+
+
+def _draw(tables: Sequence[ScoreTable], path: Path) -> Path | None:
+    """Draw the tables; None where there is nothing to draw.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    if not any(score.per_seed for table in tables for score in table.scores):
+        return None
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draw_scores(tables, path)
+    return path

@@ -1,0 +1,398 @@
+"""check_env, check_policy, check_determinism: what is sound passes, and each fault is found."""
+
+import sys
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+from pettingzoo.utils import BaseParallelWrapper
+
+import swarm_forage_env
+from swarm_forage_env import CheckError, check_determinism, check_env, check_policy
+from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.registry import from_callable, policy_names
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.study.run import build_stack
+from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
+from swarm_forage_env.wrappers.base import SwarmWrapper
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.support.busy import BusyPolicy
+
+SMALL = scenario("warehouse_small", n_robots=5, n_objects=80)
+ADVERSE = (
+    "sensor_noise:sigma=0.05",
+    "population:malfunction_per_tick=0.02,repair_per_tick=0.05,death_per_tick=0.02",
+    "throttle:waveform=constant,amplitude=0.3",
+    "actuator_noise:sigma=0.05",
+)
+
+
+# Environments
+
+
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_our_environments_pass(name):
+    check_env(ForageEnv(scenario(name, n_robots=5, n_objects=80, caches="dynamic")))
+
+
+def test_wrapped_stacks_and_views_for_learners_pass():
+    check_env(build_stack(scenario("warehouse_small", n_robots=5, n_objects=80), map(parse_wrapper, ADVERSE)))
+    check_env(ParallelLearnerEnv(SMALL, interface={"observation": "compact", "actions": "discrete"}), ticks=20)
+
+
+def test_short_episodes_pass_and_keep_their_horizon():
+    env = ForageEnv(SMALL, max_cycles=7)
+    check_env(env)
+    assert env.max_cycles == 7
+    stack = build_stack(SMALL)
+    check_env(stack)
+    assert "max_cycles" not in vars(stack)
+
+
+class BeyondTheSpace(BaseParallelWrapper):
+    def step(self, actions):
+        obs, *rest = super().step(actions)
+        return {agent: 2.0 * row for agent, row in obs.items()}, *rest
+
+
+class RewardsNobody(BaseParallelWrapper):
+    def step(self, actions):
+        obs, _, *rest = super().step(actions)
+        return obs, {}, *rest
+
+
+class NewSpaces(BaseParallelWrapper):
+    def action_space(self, agent):
+        return spaces.Box(-1.0, 1.0, (3,), np.float32)
+
+
+class Unseeded(SwarmWrapper):
+    """Draws from a generator of its own."""
+
+    stack_position = 1
+    rng = np.random.default_rng(0)
+
+    def observe(self, obs):
+        obs[:, 0] = self.rng.random(len(obs))
+        return obs
+
+
+class DictsOnly(SwarmWrapper):
+    """Changes what `step` returns and forgets `step_batch`."""
+
+    stack_position = 1
+
+    def step(self, actions):
+        obs, rewards, *rest = super().step(actions)
+        return obs, {agent: reward - 0.5 for agent, reward in rewards.items()}, *rest
+
+
+class SometimesFour(ForageEnv):
+    """Leaves one robot out after every other reset."""
+
+    resets = 0
+
+    def reset(self, seed=None, options=None):
+        obs, infos = super().reset(seed, options)
+        self.resets += 1
+        if seed == 1 and self.resets % 2:
+            self.agents = self.agents[1:]
+            del obs["robot_0"], infos["robot_0"]
+        return obs, infos
+
+
+class Impatient(ForageEnv):
+    """Ends earlier after every reset."""
+
+    def reset_batch(self, seed=None):
+        self.max_cycles -= 1
+        return super().reset_batch(seed)
+
+
+class BadState(ForageEnv):
+    def state(self):
+        return super().state() + 2.0
+
+
+@pytest.mark.parametrize(
+    ("make", "fault"),
+    [
+        (lambda: BeyondTheSpace(ForageEnv(SMALL)), r"Expected the observation of robot_0 in its space .* at tick 1"),
+        (lambda: RewardsNobody(ForageEnv(SMALL)), "parallel_api_test, got: Live agent was not given reward"),
+        (lambda: NewSpaces(ForageEnv(SMALL)), "parallel_api_test, got: action_space should return the exact same"),
+        (lambda: Unseeded(ForageEnv(SMALL)), "equal seeds and actions to give equal runs, got another observation"),
+        (lambda: DictsOnly(ForageEnv(SMALL)), "Expected step_batch to give what step gives, got another reward"),
+        (lambda: SometimesFour(SMALL), r"give equal runs, got other agents at tick 0: \['robot_0'\]"),
+        (lambda: Impatient(SMALL, max_cycles=20), "give equal runs, got another truncation of robot_0 at tick 18"),
+        (lambda: BadState(SMALL), r"Expected state\(\) in state_space"),
+        (lambda: "warehouse_small", "Expected a parallel environment of PettingZoo, got 'warehouse_small'"),
+    ],
+    ids=["space", "reward", "new spaces", "seeds", "batch", "agents", "horizon", "state", "text"],
+)
+def test_each_fault_of_an_environment_is_found(make, fault):
+    with pytest.raises(CheckError, match=fault):
+        check_env(make())
+
+
+def test_without_pytest_it_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pettingzoo.test", None)
+    with pytest.raises(ImportError, match=r"PettingZoo's tests need pytest: pip install"):
+        check_env(ForageEnv(SMALL))
+
+
+# Policies
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", policy_names())
+def test_shipped_policies_pass(name):
+    check_policy(name, scenario("warehouse_small", n_robots=20, n_objects=300))
+    check_determinism(name, scenario("warehouse_small", n_robots=20, n_objects=300), seeds=[3], seconds=30.0)
+
+
+def drive(obs):
+    return np.full((len(obs), 3), 0.5, np.float32)
+
+
+@pytest.mark.parametrize("given", [BusyPolicy, BusyPolicy(), from_callable(drive)], ids=["class", "object", "function"])
+def test_policies_may_be_classes_objects_and_wrapped_functions(given):
+    check_policy(given, SMALL)
+    check_determinism(given, SMALL, seconds=10.0)
+
+
+def test_a_swarm_of_one_robot_can_be_checked():
+    check_policy(BusyPolicy, scenario("warehouse_small", n_robots=1))
+
+
+class Sound:
+    """Base of the faulty ones: everybody stands."""
+
+    def reset(self, task, rng):
+        self.n_robots, self.layout, self.rng = task.n_robots, task.layout, rng
+
+    def act(self, obs, active):
+        return np.zeros((len(obs), 3), np.float32)
+
+
+class NoAct:
+    def reset(self, task, rng):
+        pass
+
+
+class RaisesWhenNobodyIsActive(Sound):
+    def act(self, obs, active):
+        np.flatnonzero(active)[0]
+        return super().act(obs, active)
+
+
+class ActiveRowsOnly(Sound):
+    def act(self, obs, active):
+        return super().act(obs, active)[active]
+
+
+class Lists(Sound):
+    def act(self, obs, active):
+        return super().act(obs, active).tolist()
+
+
+class Double(Sound):
+    def act(self, obs, active):
+        return super().act(obs, active).astype(np.float64)
+
+
+class TooFast(Sound):
+    def act(self, obs, active):
+        return super().act(obs, active) + np.float32(1.5)
+
+
+class NotANumber(Sound):
+    def act(self, obs, active):
+        actions = super().act(obs, active)
+        actions[2, 1] = np.nan
+        return actions
+
+
+class WritesIntoObservations(Sound):
+    def act(self, obs, active):
+        obs[:, 0] = 0.25
+        return super().act(obs, active)
+
+
+class WritesIntoActive(Sound):
+    def act(self, obs, active):
+        active[0] = False
+        return super().act(obs, active)
+
+
+class UnknownSlice(Sound):
+    reads = ("proximty",)
+
+
+class TextForReads(Sound):
+    reads = "proximity"
+
+
+class ReadsMore(Sound):
+    reads = ("proximity",)
+
+    def act(self, obs, active):
+        actions = super().act(obs, active)
+        actions[:, 0] = obs[:, self.layout["heading"]][:, 0]
+        return actions
+
+
+class ReadsMoreButZeros(ReadsMore):
+    """Looks at a slice that is often zero anyway."""
+
+    def act(self, obs, active):
+        actions = Sound.act(self, obs, active)
+        actions[:, 0] = (obs[:, self.layout["event_cache"]] != 0.0).any(axis=1)
+        return actions
+
+
+class Remembers(Sound):
+    """Does not forget the last run."""
+
+    ticks = 0
+
+    def act(self, obs, active):
+        self.ticks += 1
+        return super().act(obs, active) + np.float32(min(1.0, self.ticks / 1000))
+
+
+class RandomNumbersOfItsOwn(Sound):
+    own = np.random.default_rng(0)
+
+    def act(self, obs, active):
+        return self.own.uniform(-1.0, 1.0, (len(obs), 3)).astype(np.float32)
+
+
+class KeepsAReference(Sound):
+    def reset(self, task, rng):
+        super().reset(task, rng)
+        self.before = None
+
+    def act(self, obs, active):
+        actions = super().act(obs, active)
+        if self.before is not None:
+            actions[:, 0] = (obs != self.before).any(axis=1)
+        actions[:, 1] = 0.5
+        self.before = obs
+        return actions
+
+
+class OneSize(Sound):
+    def reset(self, task, rng):
+        if task.n_robots != 5:
+            raise ValueError("I steer five robots")
+        super().reset(task, rng)
+
+
+class FirstSize(Sound):
+    """Keeps the size of its first swarm."""
+
+    actions = None
+
+    def act(self, obs, active):
+        if self.actions is None:
+            self.actions = np.zeros((len(obs), 3), np.float32)
+        return self.actions
+
+
+class UnknownTask(Sound):
+    def reset(self, task, rng):
+        super().reset(task, rng)
+        self.task = np.full(task.n_robots, len(Task), np.int8)
+
+
+class WideTask(Sound):
+    def reset(self, task, rng):
+        super().reset(task, rng)
+        self.task = np.zeros(task.n_robots, np.int64)
+
+
+class UnknownCaches(Sound):
+    caches = "some"
+
+
+@pytest.mark.parametrize(
+    ("policy", "fault"),
+    [
+        (NoAct, "without act; a function from observations to actions becomes a policy by from_callable"),
+        (drive, "without reset and act"),
+        (RaisesWhenNobodyIsActive, "got IndexError at tick 75, with 0 of 5 robots active"),
+        (ActiveRowsOnly, r"got shape \(3, 3\) at tick 37; return one row per robot, inactive ones included"),
+        (Lists, "got list at tick 0; return a numpy array"),
+        (Double, "got float64 at tick 0"),
+        (TooFast, r"in \[-1, 1\], got \[1.5, 1.5, 1.5\] for robot 0"),
+        (NotANumber, r"got \[0.0, nan, 0.0\] for robot 2"),
+        (WritesIntoObservations, "leave obs and active as they are"),
+        (WritesIntoActive, "leave obs and active as they are"),
+        (UnknownSlice, "got 'proximty'. Did you mean 'proximity'"),
+        (TextForReads, r"got 'proximity'; write \('proximity',\)"),
+        (ReadsMore, r"not in reads = \('proximity',\) hold zeros, got other actions at tick 0"),
+        (ReadsMoreButZeros, "hold other numbers, got other actions"),
+        (Remembers, "Expected reset to begin a new run, got other actions at tick 0"),
+        (RandomNumbersOfItsOwn, "Expected reset to begin a new run"),
+        (KeepsAReference, "keeps no reference to the observation array, got other actions at tick 1"),
+        (OneSize, "a swarm of 2 robots, got ValueError: I steer five robots"),
+        (FirstSize, r"shape \(n_robots, 3\) = \(2, 3\)"),
+        (UnknownTask, r"codes of Task \(0 to 7\), got codes \[8\]"),
+        (WideTask, r"Expected task as int8 of shape \(n_robots,\) = \(5,\)"),
+        (UnknownCaches, "caches of the policy to be one of none, static, dynamic, got 'some'"),
+    ],
+    ids=lambda value: value.__name__ if callable(value) else "",
+)
+def test_each_fault_of_a_policy_is_found(policy, fault):
+    with pytest.raises(CheckError, match=fault):
+        check_policy(policy, SMALL)
+
+
+def test_actions_of_inactive_robots_may_be_anything():
+    class Careless(Sound):
+        def act(self, obs, active):
+            actions = super().act(obs, active)
+            actions[~active] = np.nan
+            return actions
+
+    check_policy(Careless, SMALL)
+
+
+def test_names_that_nobody_has_are_refused_as_ever():
+    with pytest.raises(ValueError, match="Did you mean 'crw'"):
+        check_policy("crv")
+
+
+# Determinism
+
+
+def test_runs_that_share_random_numbers_are_found():
+    with pytest.raises(CheckError, match="two runs with seed 4 to be equal, got another position of the robots"):
+        check_determinism(RandomNumbersOfItsOwn, SMALL, seeds=[4], seconds=10.0)
+
+
+def test_a_difference_in_the_record_alone_is_found():
+    class Tasked(Sound):
+        """Counts its runs, and tells other tasks in each of them."""
+
+        runs = 0
+
+        def reset(self, task, rng):
+            super().reset(task, rng)
+            type(self).runs += 1
+            self.task = np.full(task.n_robots, type(self).runs % len(Task), np.int8)
+
+    with pytest.raises(CheckError, match="got another task_share_generalist"):
+        check_determinism(Tasked, SMALL, seeds=[0], seconds=10.0)
+
+
+def test_seeds_are_needed():
+    with pytest.raises(ValueError, match="Expected seeds to run, got none"):
+        check_determinism(BusyPolicy, SMALL, seeds=[])
+
+
+def test_checks_are_public():
+    for name in ("CheckError", "check_env", "check_policy", "check_determinism"):
+        assert name in swarm_forage_env.__all__
+    assert issubclass(CheckError, ValueError)
