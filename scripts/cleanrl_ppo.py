@@ -9,7 +9,6 @@ Differs from the textbook in two places, both because robots are sub-environment
 that ends them, so that the value of the last observation is added where an episode was cut off by time; and steps of
 robots that are not at work (`infos["active"]`) are in no minibatch.
 """
-# pyright: reportMissingImports=false
 
 import argparse
 import time
@@ -144,7 +143,8 @@ def main() -> None:
         first_pickup=1.0,
         nest_progress=0.05,
     )
-    agent = Agent(envs.single_observation_space.shape[0], int(envs.single_action_space.n))  # type: ignore[attr-defined]
+    n_actions = int(envs.single_action_space.n)  # type: ignore[attr-defined] - discrete actions were asked for
+    agent = Agent(envs.single_observation_space.shape[0], n_actions)
     optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
     started, steps = time.perf_counter(), 0
     for until, changes in ((args.total_timesteps // 2, NARROW), (args.total_timesteps, {})):

@@ -221,7 +221,7 @@ def test_a_reset_can_change_the_scenario(view):
         worlds = lambda: [env.forage_env]  # noqa: E731 - a name for both views
     else:
         env = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3)
-        worlds = lambda: [env._arenas.arenas[k].base for k in range(2)]  # noqa: E731
+        worlds = lambda: [env._arenas.arenas[k].base for k in range(2)]  # noqa: E731 - as above
     space = env.observation_space
     env.reset(seed=0, options={"scenario": {"n_objects": 77, "delivery": 5.0}})
     assert {world.scenario.objects.n_objects for world in worlds()} == {77}
