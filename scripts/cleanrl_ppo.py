@@ -17,6 +17,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import torch
+from gymnasium.spaces import flatdim
 from torch import nn
 
 import swarm_forage_env  # noqa: F401 - registers the environments
@@ -143,8 +144,7 @@ def main() -> None:
         first_pickup=1.0,
         nest_progress=0.05,
     )
-    n_actions = int(envs.single_action_space.n)  # type: ignore[attr-defined] - discrete actions were asked for
-    agent = Agent(envs.single_observation_space.shape[0], n_actions)
+    agent = Agent(flatdim(envs.single_observation_space), flatdim(envs.single_action_space))
     optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
     started, steps = time.perf_counter(), 0
     for until, changes in ((args.total_timesteps // 2, NARROW), (args.total_timesteps, {})):
