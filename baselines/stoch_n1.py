@@ -253,7 +253,7 @@ def end_task(a: Allocation, i: int, now: int, c: Row) -> None:
     a.estimate[i, task] = new_estimate(a.estimate[i, task], a.exec_time[i, task], c.estimate_weight, is_integer)
     a.exec_start[i, task] = now
     a.partition[i, tab] = partition_probability(
-        a.estimate[i, TAB_ROOT[tab]],
+        a.estimate[i, int(TAB_ROOT[tab])],
         _subtask_sum(a, i, tab),
         c.partition_reactivity,
         c.partition_offset,
@@ -278,9 +278,9 @@ def move_tab(a: Allocation, i: int, c: Row, u: float) -> None:
     else:
         return
     p = move_probability(
-        a.estimate[i, TAB_ROOT[tab]],
+        a.estimate[i, int(TAB_ROOT[tab])],
         _subtask_sum(a, i, tab),
-        a.estimate[i, TAB_ROOT[candidate]],
+        a.estimate[i, int(TAB_ROOT[candidate])],
         _subtask_sum(a, i, candidate),
         c.tab_reactivity,
         c.tab_offset,
@@ -300,8 +300,8 @@ def choose_task(a: Allocation, i: int, c: Row, u_partition: float, u_switch: flo
         return
     last = a.last_child[i, tab]
     p = switch_probability(
-        a.estimate[i, TAB_CHILDREN[tab, last]],
-        a.estimate[i, TAB_CHILDREN[tab, 1 - last]],
+        a.estimate[i, int(TAB_CHILDREN[tab, last])],
+        a.estimate[i, int(TAB_CHILDREN[tab, 1 - last])],
         c.subtask_reactivity,
         c.subtask_offset,
         c.subtask_gamma,

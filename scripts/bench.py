@@ -11,6 +11,7 @@ numbers between tables.
 
 import argparse
 import importlib.util
+import itertools
 import math
 import os
 import platform
@@ -19,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +31,7 @@ from rich.console import Console
 from rich.table import Table
 
 import swarm_forage_env.world.arena as arena_module
-from swarm_forage_env.policies.registry import load_policy, policy_names
+from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
 from swarm_forage_env.scenarios.presets import warehouse_medium, warehouse_small
 from swarm_forage_env.study.run import LiveRun, build_stack, run_one
@@ -127,8 +128,9 @@ def tick_shares(scenario: ScenarioConfig, policy_name: str, ticks: int) -> dict[
     return {phase: seconds[0] / ticks * 1e6 for phase, seconds in spent.items()}
 
 
-def agent_steps_per_second(ticks: int, repeats: int) -> float:
-    """Median agent-steps per second through the dict API, with actions drawn beforehand, 200 robots."""
+def dict_rows(ticks: int, repeats: int) -> Iterator[Row]:
+    """Agent-steps through the dict API, with actions drawn beforehand, 200 robots."""
+    ticks //= 4
     env = parallel_env("warehouse_medium")
     env.reset(seed=0)
     rng = np.random.default_rng(0)
@@ -140,18 +142,20 @@ def agent_steps_per_second(ticks: int, repeats: int) -> float:
         for tick in range(ticks):
             env.step(drawn[tick % len(drawn)])
         rates.append(ticks * env.num_agents / (time.process_time() - started))
-    return statistics.median(rates)
+    rate = statistics.median(rates)
+    yield Row("PettingZoo dict API, N = 200", rate / 1e3, "k agent-steps/s", ">= 150", rate >= 150_000)
 
 
 def learning_rows(ticks: int, repeats: int) -> Iterator[Row]:
     """The vector environment of stable-baselines3 with random actions, and what PPO adds around it, 50 robots."""
+    ticks //= 2
     if importlib.util.find_spec("stable_baselines3") is None:
         yield Row(
             "VecEnv, N = 50, random actions", math.nan, "k robot-steps/s", ">= 400", None, "needs the train extra"
         )
         return
-    import torch  # pyright: ignore[reportMissingImports]
-    from stable_baselines3 import PPO  # pyright: ignore[reportMissingImports]
+    import torch
+    from stable_baselines3 import PPO
 
     from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, SwarmVecEnv
 
@@ -312,7 +316,7 @@ def wrapper_rows(ticks: int, repeats: int) -> Iterator[Row]:
     yield Row("four wrappers beyond their draws", 100 * beyond, "%", "< 15", beyond < 0.15)
 
 
-def start_rows(repeats: int) -> Iterator[Row]:
+def start_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a case like the others; ticks are few
     """Import and first ticks, those of the first pick-up included, each in fresh interpreters."""
     seconds = statistics.median(in_fresh_process(IMPORT) for _ in range(repeats))
     yield Row("import swarm_forage_env", seconds, "s", "< 0.3", seconds < 0.3)
@@ -323,28 +327,29 @@ def start_rows(repeats: int) -> Iterator[Row]:
         yield Row("import to first ticks, later", seconds, "s", "< 2", seconds < 2)
 
 
-def rows(ticks: int, repeats: int, only: str) -> Iterator[Row]:
-    """All cases whose name contains `only`."""
-    rates: list[tuple[str, ScenarioConfig, str, float]] = [
-        ("CRW, N = 50, warehouse_small", warehouse_small(), "crw", 0.5),
-        ("CRW, N = 200, warehouse_medium", warehouse_medium(), "crw", 1.5),
-        ("DPO, N = 200, warehouse_medium", warehouse_medium(), "dpo", 0.0),
-        ("STOCHX, N = 200, warehouse_medium", warehouse_medium(caches="dynamic"), "stochx", 0.8),
-    ]
-    for case, scenario, policy, target in rates:
-        if only in case.lower() and policy in policy_names():
-            yield rate_row(case, scenario, policy, target or None, ticks, repeats)
-    if only in "scaling crw, n = 4,096 16,384":
-        yield from scaling_rows(ticks, repeats)
-    if only in "four wrappers, n = 200":
-        yield from wrapper_rows(ticks, repeats)
-    if only in "dict api":
-        rate = agent_steps_per_second(ticks // 4, repeats)
-        yield Row("PettingZoo dict API, N = 200", rate / 1e3, "k agent-steps/s", ">= 150", rate >= 150_000)
-    if only in "learning vecenv ppo":
-        yield from learning_rows(ticks // 2, repeats)
-    if only in "start import":
-        yield from start_rows(repeats)
+Case = Callable[[int, int], Iterable[Row]]
+"""Measures something in so many ticks and repeats."""
+
+
+def cases() -> dict[str, Case]:
+    """Name -> what it measures, in the order of the table."""
+
+    def rate(name: str, scenario: ScenarioConfig, policy: str, target: float | None) -> tuple[str, Case]:
+        return name, lambda ticks, repeats: [rate_row(name, scenario, policy, target, ticks, repeats)]
+
+    rates = (
+        rate("CRW, N = 50, warehouse_small", warehouse_small(), "crw", 0.5),
+        rate("CRW, N = 200, warehouse_medium", warehouse_medium(), "crw", 1.5),
+        rate("DPO, N = 200, warehouse_medium", warehouse_medium(), "dpo", None),
+        rate("STOCHX, N = 200, warehouse_medium", warehouse_medium(caches="dynamic"), "stochx", 0.8),
+    )
+    return dict(rates) | {
+        "scaling: CRW, N = 4,096 and 16,384": scaling_rows,
+        "four wrappers, N = 200": wrapper_rows,
+        "PettingZoo dict API, N = 200": dict_rows,
+        "learning: VecEnv and PPO": learning_rows,
+        "start: import and first ticks": start_rows,
+    }
 
 
 def main() -> None:
@@ -353,12 +358,19 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer repeats, shorter runs")
     parser.add_argument("--only", default="", help="cases whose name contains this text")
     arguments = parser.parse_args()
+    only = arguments.only.lower()
+    chosen = {name: case for name, case in cases().items() if only in name.lower()}
+    if not chosen:
+        parser.error(
+            f"expected --only to be part of the name of a case, got {arguments.only!r}; the cases are:\n  "
+            + "\n  ".join(cases())
+        )
     ticks, repeats = (2_000, 3) if arguments.quick else (10_000, 7)
     console = Console(width=150)
     table = Table(title=f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, one core")
     for heading in ("case", "measured", "unit", "target", "met", "where the time goes"):
         table.add_column(heading, justify="right" if heading in ("measured", "target") else "left")
-    for row in rows(ticks, repeats, arguments.only.lower()):
+    for row in itertools.chain.from_iterable(case(ticks, repeats) for case in chosen.values()):
         met = "" if row.met is None else ("yes" if row.met else "NO")
         console.print(f"{row.case}: {row.value:.3g} {row.unit}", style="dim")
         table.add_row(row.case, f"{row.value:.3g}", row.unit, row.target, met, row.note)

@@ -9,7 +9,6 @@ Differs from the textbook in two places, both because robots are sub-environment
 that ends them, so that the value of the last observation is added where an episode was cut off by time; and steps of
 robots that are not at work (`infos["active"]`) are in no minibatch.
 """
-# pyright: reportMissingImports=false
 
 import argparse
 import time
@@ -18,6 +17,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import torch
+from gymnasium.spaces import flatdim
 from torch import nn
 
 import swarm_forage_env  # noqa: F401 - registers the environments
@@ -144,7 +144,7 @@ def main() -> None:
         first_pickup=1.0,
         nest_progress=0.05,
     )
-    agent = Agent(envs.single_observation_space.shape[0], int(envs.single_action_space.n))  # type: ignore[attr-defined]
+    agent = Agent(flatdim(envs.single_observation_space), flatdim(envs.single_action_space))
     optimizer = torch.optim.Adam(agent.parameters(), lr=args.learning_rate, eps=1e-5)
     started, steps = time.perf_counter(), 0
     for until, changes in ((args.total_timesteps // 2, NARROW), (args.total_timesteps, {})):

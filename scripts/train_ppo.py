@@ -5,7 +5,6 @@ pip install ".[train]" "torch==2.13.0"  # in a checkout
 python scripts/train_ppo.py --steps 3000000 --out ppo_example.npz
 swarm-forage run --policy crw,ppo_example.npz
 """
-# pyright: reportMissingImports=false
 
 import argparse
 from pathlib import Path

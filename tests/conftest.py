@@ -1,7 +1,63 @@
-"""Settings shared by all tests."""
+"""Settings shared by all tests, and what becomes of skipped ones."""
 
+import re
+from pathlib import Path
+
+import pytest
 from hypothesis import settings
 
 # Same examples on every machine and no time limit per example: a red test means a defect, not bad luck.
 settings.register_profile("reproducible", derandomize=True, deadline=None)
 settings.load_profile("reproducible")
+
+MAY_BE_SKIPPED = {
+    r"fingerprints are for .*": "made on another kind of machine or with other versions",
+    r"needs (benchmarl|ray|torchrl): .*": "each library has an environment of its own: scripts/test_bridges",
+}
+"""Reason of a skip -> why it is no failure under --no-skips."""
+_skipped: dict[str, str] = {}
+"""Test or file -> reason."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("swarm_forage_env")
+    group.addoption("--no-skips", action="store_true", help="fail on skips that tests/conftest.py does not name")
+    group.addoption("--skips-to", type=Path, metavar="FILE", help="write tests skipped without a name, one a line")
+
+
+def _note(report: pytest.TestReport | pytest.CollectReport) -> None:
+    if report.skipped and isinstance(report.longrepr, tuple):
+        _skipped[report.nodeid] = report.longrepr[2].removeprefix("Skipped: ")
+
+
+pytest_runtest_logreport = _note
+pytest_collectreport = _note
+
+
+def _unnamed() -> dict[str, str]:
+    return {
+        test: reason
+        for test, reason in _skipped.items()
+        if not any(re.fullmatch(known, reason) for known in MAY_BE_SKIPPED)
+    }
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Write the list, and make a good end a bad one where something was skipped that should not be."""
+    config = session.config
+    if config.getoption("skips_to") is not None:
+        config.getoption("skips_to").write_text("".join(f"{test}\n" for test in _unnamed()))
+    if config.getoption("no_skips") and _unnamed() and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Say what was skipped and why, each reason once."""
+    if not config.getoption("no_skips"):
+        return
+    unnamed = _unnamed()
+    for test, reason in unnamed.items():
+        terminalreporter.write_line(f"skipped, which --no-skips forbids: {test}: {reason}")
+    for reason in sorted({*_skipped.values()} - {*unnamed.values()}):
+        n_tests = list(_skipped.values()).count(reason)
+        terminalreporter.write_line(f"skipped, and named: {n_tests} x {reason}")

@@ -172,4 +172,4 @@ def text_font(text_px: float) -> "ImageFont.FreeTypeFont":
         raise ImportError(
             f"Rendering needs Pillow, which is not installed; run {install_command('render')}."
         ) from error
-    return ImageFont.load_default(round(text_px))  # type: ignore[return-value]
+    return ImageFont.load_default(round(text_px))  # type: ignore[return-value] - no bitmap font with a size

@@ -149,7 +149,7 @@ def test_logistic_does_not_overflow():
 class Robot:
     """Allocation of one robot that has just been made, with its constants."""
 
-    def __init__(self, policy_class=STOCHXPolicy, quirks: Quirks = Quirks(), **overrides) -> None:  # noqa: B008
+    def __init__(self, policy_class=STOCHXPolicy, quirks: Quirks = Quirks(), **overrides) -> None:  # noqa: B008 - frozen
         policy = policy_class(**overrides)
         self.c = task_constants(policy.parameters, make_spec(quirks=quirks), policy.n_tabs)[0]
         rng = np.random.default_rng(1)

@@ -26,13 +26,19 @@ class Run:
         self.policy.reset(self.env.swarm_spec, stream_rng(seed, Stream.POLICY))
         self.seen: set[int] = set()
         self.fifths: list[np.ndarray] = []
+        self.cells_of_caches: dict[int, list[int]] = {}  # serial -> centre cell, of all that have ever been
         before = self.counters
         for tick in range(1, ticks + 1):
             obs, *_ = self.env.step_batch(self.policy.act(obs, self.env.active), tasks=self.policy.task)
             self.seen |= set(self.policy.task.tolist())
+            caches = self.env.caches
+            self.cells_of_caches |= dict(
+                zip(caches.serial[caches.alive].tolist(), caches.cell[caches.alive].tolist(), strict=True)
+            )
             if tick % (ticks // 5) == 0:
                 self.fifths.append(self.counters - before)
                 before = self.counters
+        self.obs = obs
 
     @property
     def counters(self) -> np.ndarray:
@@ -79,17 +85,23 @@ def test_only_declared_slices_are_needed(policy_name):
 
 
 @pytest.mark.compiled
-def test_what_robots_remember_of_caches_is_true_while_they_see_them():
+def test_what_robots_remember_of_caches_was_true_and_is_while_they_see_them():
     run = Run("warehouse_small", "stochm", ticks=3000, seed=6)
-    caches = run.env.caches
-    true = dict(zip(caches.serial[caches.alive].tolist(), caches.cell[caches.alive].tolist(), strict=True))
+    run.policy.act(run.obs, run.env.active)  # takes note of what is seen now
     remembered = [run.policy.remembered_caches(robot) for robot in range(50)]
     assert sum(len(known) for known in remembered) == run.policy.n_caches.sum() > 0
     for known in remembered:
         for serial, (x, y, count, density) in known.items():
-            assert [x, y] == true.get(serial, [x, y])
+            assert [x, y] == run.cells_of_caches[serial]
             assert count >= 2
-            assert 0.9 < density < 1.0
+            assert 0.9 < density <= 1.0
+    sees_cache = run.obs[:, run.env.layout["los_cache"]][:, 0] > 0
+    assert 5 < np.count_nonzero(sees_cache) < 50
+    caches = run.env.caches
+    (slot,) = np.flatnonzero(caches.alive)
+    present = (*caches.cell[slot].tolist(), int(caches.count[slot]))
+    for robot in np.flatnonzero(sees_cache):
+        assert remembered[robot][int(caches.serial[slot])][:3] == present
 
 
 @pytest.mark.slow

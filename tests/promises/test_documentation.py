@@ -1,5 +1,7 @@
 """What the documents show works: examples run, commands are one line, links lead somewhere."""
 
+import importlib.util
+import json
 import re
 from pathlib import Path
 
@@ -61,3 +63,34 @@ def test_readme_table_names_every_scenario():
         (c.name, f"{c.arena.width_m:.0f}", f"{c.arena.height_m:.0f}", str(c.robots.n_robots), str(c.objects.n_objects))
         for c in configs
     ]
+
+
+@pytest.fixture(scope="module")
+def update_docs():
+    spec = importlib.util.spec_from_file_location("update_docs", ROOT / "scripts/update_docs.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_numbers_of_runs_are_those_of_the_store(update_docs):
+    store = json.loads(update_docs.STORE.read_text())
+    for page in update_docs.PAGES:
+        text = page.read_text()
+        assert update_docs.written(text, store) == text, f"{page}: scripts/update_docs"
+        by_hand = update_docs.BLOCK.sub("", text)
+        numbers = {value for values in store.values() for name, value in values.items() if name != "table"}
+        assert [number for number in numbers if number in by_hand] == [], f"{page}: a number outside of a block"
+
+
+def test_a_block_is_written_from_the_store(update_docs):
+    page = "before <!-- generated: run.crw by scripts/update_docs -->1.00 ± 0.10<!-- end --> after"
+    assert update_docs.written(page, {"run": {"crw": "2.00 ± 0.20"}}) == page.replace("1.00 ± 0.10", "2.00 ± 0.20")
+
+
+def test_deliveries_are_read_from_a_printed_table(update_docs):
+    printed = json.loads(update_docs.STORE.read_text())["run"]["table"]
+    stored = update_docs.fields(f"said before\n{printed}\nsaid after\n", update_docs.FIVE)
+    assert stored == json.loads(update_docs.STORE.read_text())["run"]
+    with pytest.raises(ValueError, match="deliveries of crw"):
+        update_docs.fields(printed, ("crw",))

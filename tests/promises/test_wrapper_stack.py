@@ -217,12 +217,12 @@ class Foreign(BaseParallelWrapper):
 @pytest.mark.parametrize("name", WRAPPERS)
 def test_a_foreign_wrapper_belongs_outside(name):
     with pytest.raises(TypeError, match="outside of the swarm wrappers"):
-        ACTIVE[name].wrap(Foreign(ForageEnv(world_config())))  # type: ignore[arg-type]
+        ACTIVE[name].wrap(Foreign(ForageEnv(world_config())))  # type: ignore[arg-type] - that is the mistake
     parallel_api_test(Foreign(ACTIVE[name].wrap(ForageEnv(world_config()))), num_cycles=20)
 
 
 def test_any_other_order_is_refused():
-    inner = Throttle(ForageEnv(world_config()), ACTIVE["throttle"])  # type: ignore[arg-type]
+    inner = Throttle(ForageEnv(world_config()), ACTIVE["throttle"])  # type: ignore[arg-type] - from a dict of all kinds
     with pytest.raises(ValueError, match="RunRecorder, SensorNoise, PopulationDynamics, Throttle, ActuatorNoise"):
         ACTIVE["actuator_noise"].wrap(inner)
     with pytest.raises(ValueError, match="each at most once"):

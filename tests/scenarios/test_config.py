@@ -245,7 +245,7 @@ def test_configurations_are_frozen_and_hashable():
     config = scenario("warehouse_small")
     assert hash(config) == hash(scenario("warehouse_small"))
     with pytest.raises(dataclasses.FrozenInstanceError):
-        config.caches = "static"  # type: ignore[misc]
+        config.caches = "static"  # type: ignore[misc] - that is the mistake
 
 
 def test_nest_is_snapped_to_whole_cells():

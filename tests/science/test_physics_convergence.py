@@ -86,7 +86,7 @@ def table() -> dict[int, float]:
 def test_overlap_shrinks_with_the_number_of_substeps(table):
     print("\nequal substeps  deepest overlap head-on")  # noqa: T201 - the table that the choice rests on
     for n_substeps, overlap in table.items():
-        print(f"{n_substeps:>14}  {overlap:.1%}")  # noqa: T201
+        print(f"{n_substeps:>14}  {overlap:.1%}")  # noqa: T201 - as above
     overlaps = list(table.values())
     assert overlaps == sorted(overlaps, reverse=True)
     assert overlaps[-1] < 0.5 * overlaps[1]

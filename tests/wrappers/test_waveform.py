@@ -128,7 +128,7 @@ def test_the_measures_sample_the_study_alike(throttles):
         wave = config.waveform
         assert wave.period_s is not None
         theirs = metrics.waveform(
-            wave.kind,  # type: ignore[arg-type]
+            wave.kind,  # type: ignore[arg-type] - the kinds have the same names
             np.array(SAMPLES),
             frequency=DT_S / wave.period_s,
             amplitude=wave.amplitude,

@@ -84,10 +84,10 @@ def draw_source_cell(
         first_region = int(draws[1] * size)
         for j in range(size):
             region = start + (first_region + j) % size
-            x_low = max(regions[region, 0], area[0])
-            y_low = max(regions[region, 1], area[1])
-            x_high = min(regions[region, 2], area[2])
-            y_high = min(regions[region, 3], area[3])
+            x_low = int(max(regions[region, 0], area[0]))
+            y_low = int(max(regions[region, 1], area[1]))
+            x_high = int(min(regions[region, 2], area[2]))
+            y_high = int(min(regions[region, 3], area[3]))
             limit = capacity[region]
             if limit != UNLIMITED and count_objects(floor, x_low, y_low, x_high, y_high) >= limit:
                 continue

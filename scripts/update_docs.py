@@ -1,0 +1,135 @@
+"""Numbers of runs in README.md and docs/: made by commands, stored once, written between markers.
+
+    scripts/update_docs                  write the stored numbers into all pages
+    scripts/update_docs --check          say which pages differ from what is stored; exit 1 if any does
+    scripts/update_docs --remake         run all commands, store what they print, write the pages (half an hour)
+    scripts/update_docs --remake run     the same for one of them
+    scripts/update_docs --compare FILE   compare the deliveries that a run of README's command printed with the stored
+
+The commands are those below, the store is docs/results.json. A block looks like
+`<!-- generated: run.crw by scripts/update_docs -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
+--remake needs an installation with everything: pip install -e ".[plots,train]" "torch==2.13.0"
+"""
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+STORE = ROOT / "docs/results.json"
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")),
+         *sorted((ROOT / "swarm_forage_env/policies/pretrained").glob("*.md"))]  # fmt: skip
+BLOCK = re.compile(
+    r"(<!-- generated: (?P<source>\w+)\.(?P<field>\w+) by scripts/update_docs -->)(?P<text>.*?)(<!-- end -->)",
+    re.DOTALL,
+)
+FIVE = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
+SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "run": ((f"swarm-forage run --scenario warehouse_small --policy {','.join(FIVE)} --robots 50 --seeds 4",), FIVE),
+    "medium": (
+        ("swarm-forage run --scenario warehouse_medium --policy crw,ppo_warehouse_small --seeds 4",),
+        ("crw", "ppo_warehouse_small"),
+    ),
+    "trained": (
+        (
+            "swarm-forage train --scenario warehouse_small --algo ppo",
+            "swarm-forage run --policy crw,results/training/warehouse_small_ppo/policy.npz --seeds 4",
+        ),
+        ("crw", "policy"),
+    ),
+    "cleanrl": (
+        (
+            f"{sys.executable} {ROOT}/scripts/cleanrl_ppo.py --total-timesteps 3000000 --out cleanrl_ppo.npz",
+            "swarm-forage run --policy crw,cleanrl_ppo.npz --seeds 4",
+        ),
+        ("crw", "policy"),
+    ),
+}
+"""Name -> commands, of which the last prints the table, and what its rows are called in blocks."""
+
+
+def deliveries(table: str) -> list[str]:
+    """Return the deliveries per 1,000 s of each row of a printed table, such as "20.45 ± 0.91"."""
+    return re.findall(r"^│.*?│\s+(\d[\d,.]* ± [\d.]+) │", table, re.MULTILINE)
+
+
+def make(name: str) -> dict[str, str]:
+    """Run the commands of a source in an empty folder; returns its fields.
+
+    Raises:
+        ValueError: The table has another number of rows than expected.
+    """
+    commands, labels = SOURCES[name]
+    printed = ""
+    with tempfile.TemporaryDirectory() as folder:
+        for command in commands:
+            print(f"{name}: {command}", file=sys.stderr)
+            printed = subprocess.run(command.split(), cwd=folder, stdout=subprocess.PIPE, text=True, check=True).stdout
+    return fields(printed, labels)
+
+
+def fields(printed: str, labels: tuple[str, ...]) -> dict[str, str]:
+    """Return the table without what stands around it, and the deliveries of each row by its label.
+
+    Raises:
+        ValueError: The table has another number of rows than labels.
+    """
+    found = deliveries(printed)
+    if len(found) != len(labels):
+        raise ValueError(f"Expected a table with deliveries of {', '.join(labels)}, got:\n{printed}")
+    lines = printed.rstrip().splitlines()
+    top = next(number for number, line in enumerate(lines) if line.startswith("┏"))
+    bottom = next(number for number, line in enumerate(lines) if line.startswith("└"))
+    table = "\n".join(line.rstrip() for line in lines[top - 1 : bottom + 2])
+    return {"table": table, **dict(zip(labels, found, strict=True))}
+
+
+def written(text: str, store: dict[str, dict[str, str]]) -> str:
+    """Return a page with its blocks as they are stored."""
+
+    def block(match: re.Match[str]) -> str:
+        value = store[match["source"]][match["field"]]
+        value = f"\n```\n{value}\n```\n" if match["field"] == "table" else value
+        return f"{match[1]}{value}{match[5]}"
+
+    return BLOCK.sub(block, text)
+
+
+def main() -> int:
+    """Do what the options say; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="write nothing, exit 1 if a page differs")
+    parser.add_argument("--remake", nargs="*", choices=list(SOURCES), metavar="NAME", help=", ".join(SOURCES))
+    parser.add_argument("--compare", type=Path, metavar="FILE", help="what README's command printed")
+    arguments = parser.parse_args()
+    store = json.loads(STORE.read_text(encoding="utf-8"))
+    if arguments.compare:
+        found = fields(arguments.compare.read_text(encoding="utf-8"), SOURCES["run"][1])
+        differing = {
+            name: f"{store['run'][name]} stored, {found[name]} now"
+            for name in FIVE
+            if found[name] != store["run"][name]
+        }
+        for name, text in differing.items():
+            print(f"{name}: {text}; if that is meant to be: scripts/update_docs --remake")
+        return 1 if differing else 0
+    if arguments.remake is not None:
+        for name in arguments.remake or SOURCES:
+            store[name] = make(name)
+            STORE.write_text(json.dumps(store, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    differing_pages = [
+        page for page in PAGES if written(page.read_text(encoding="utf-8"), store) != page.read_text(encoding="utf-8")
+    ]
+    for page in differing_pages:
+        print(f"{page.relative_to(ROOT)}: {'differs from docs/results.json' if arguments.check else 'written'}")
+        if not arguments.check:
+            page.write_text(written(page.read_text(encoding="utf-8"), store), encoding="utf-8")
+    return 1 if arguments.check and differing_pages else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
