@@ -74,7 +74,7 @@ def test_a_process_that_was_killed_before_its_first_answer_is_not_blamed_on_the_
 def test_a_plan_that_cannot_be_built_is_refused_at_once_and_leaves_no_process():
     impossible = ArenaPlan(scenario=PLAN.scenario, max_cycles=0)
     before = multiprocessing.active_children()
-    with pytest.raises(ValueError, match="max_cycles >= 1, got 0"):
+    with pytest.raises(ValueError, match="max_cycles to be a whole number >= 1 or None, got 0"):
         ArenaProcesses(impossible, 2, 2)
     assert multiprocessing.active_children() == before
 
