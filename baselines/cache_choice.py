@@ -1,4 +1,4 @@
-"""Which cache to go to, and which isolated object to found a cache at."""
+"""Which cache to go to, and which isolated object to create a cache at."""
 
 import math
 
@@ -91,7 +91,7 @@ def cache_is_known(robot: np.record, c: np.record, memory: OneTaskMemory) -> boo
 def isolated_object_utility(
     object_x: float, object_y: float, x: float, y: float, pheromone: float, c: np.record
 ) -> float:
-    """Utility of an isolated object for founding a cache: U = exp(density) / (|object - robot| |object - nest|).
+    """Utility of an isolated object for creating a cache: U = exp(density) / (|object - robot| |object - nest|).
 
     Args:
         object_x: Centre of the object, m.
@@ -155,14 +155,14 @@ def select_isolated_object(robot: np.record, senses: Senses, c: np.record, memor
         return False
     robot.goal_x_m = objects.cell_x[best_entry] * c.cell_m + half
     robot.goal_y_m = objects.cell_y[best_entry] * c.cell_m + half
-    robot.goal_tolerance_m = c.founding_tolerance_m
+    robot.goal_tolerance_m = c.creation_tolerance_m
     return True
 
 
 @kernel
 def object_is_near(robot: np.record, senses: Senses, c: np.record, objects: OneMemory) -> bool:
-    """Whether an object is remembered within the founding distance of the robot."""
-    limit = c.founding_distance_m * c.founding_distance_m
+    """Whether an object is remembered within the creation distance of the robot."""
+    limit = c.creation_distance_m * c.creation_distance_m
     half = 0.5 * c.cell_m
     for entry in range(robot.n_known):
         dx = objects.cell_x[entry] * c.cell_m + half - senses.x

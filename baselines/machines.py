@@ -18,7 +18,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import inline_kernel, kernel
 from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.contract.detection import is_obstacle_vector, ring_sum, sees_nest, sees_object
-from swarm_forage_env.contract.layout import EVENT_SCALE
+from swarm_forage_env.contract.layout import EVENT_SCALE, GROUND_SENSORS, RING_SENSORS
 from swarm_forage_env.contract.types import Row
 
 from .motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander
@@ -133,7 +133,7 @@ class Senses(NamedTuple):
     in_nest: bool
     carrying: bool
     event: int
-    """Code of `policy.Event`."""
+    """Code of `Event`."""
     x: float
     """Believed position, m."""
     y: float
@@ -142,12 +142,12 @@ class Senses(NamedTuple):
 @kernel
 def sense(row: Row, c: np.record) -> Senses:
     """Read one observation row."""
-    obstacle_x, obstacle_y = ring_sum(row[c.proximity : c.proximity + 24])
+    obstacle_x, obstacle_y = ring_sum(row[c.proximity : c.proximity + RING_SENSORS])
     return Senses(
         is_obstacle_vector(obstacle_x, obstacle_y),
         obstacle_x,
         obstacle_y,
-        sees_nest(row[c.ground : c.ground + 4]),
+        sees_nest(row[c.ground : c.ground + GROUND_SENSORS]),
         row[c.carrying] > 0.5,
         int(row[c.event] * EVENT_SCALE + 0.5),
         (float(row[c.position]) + 1.0) * c.half_width_m,
@@ -251,7 +251,7 @@ def explore_for_object(
         Whether an object was found (then the robot stands still), and the force.
     """
     x, y = start_exploring(robot, senses, c, draws)
-    if robot.explore_ticks >= c.exploration_lock_ticks and sees_object(row[c.ground : c.ground + 4]):
+    if robot.explore_ticks >= c.exploration_lock_ticks and sees_object(row[c.ground : c.ground + GROUND_SENSORS]):
         return True, 0.0, 0.0
     walk_x, walk_y = explore(robot, senses, c, draws)
     return False, x + walk_x, y + walk_y
@@ -399,7 +399,7 @@ def home(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -
         robot.activity = HOMING_IN_NEST
     if robot.activity == HOMING_IN_NEST and senses.in_nest and distance <= robot.drop_depth_m:
         return True, 0.0, 0.0
-    x, y = phototaxis(row[c.light : c.light + 24], c)
+    x, y = phototaxis(row[c.light : c.light + RING_SENSORS], c)
     if robot.activity == HOMING_IN_NEST:
         walk_x, walk_y = random_walk(robot, senses, c, draws[DRAW_WANDER])
     else:

@@ -9,6 +9,7 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import inline_kernel, kernel
 from swarm_forage_env.contract.detection import sees_object
+from swarm_forage_env.contract.layout import GROUND_SENSORS
 from swarm_forage_env.contract.types import Row
 
 from .machines import Senses
@@ -122,4 +123,4 @@ def object_is_known(robot: np.record, _c: np.record, memory: OneMemory) -> bool:
 @kernel
 def object_is_reached(_robot: np.record, _senses: Senses, row: Row, c: np.record, _memory: OneMemory) -> bool:
     """Whether the ground sensors see an object."""
-    return sees_object(row[c.ground : c.ground + 4])
+    return sees_object(row[c.ground : c.ground + GROUND_SENSORS])

@@ -18,7 +18,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import inline_kernel, kernel
 from swarm_forage_env.contract.codes import Event, Task
 from swarm_forage_env.contract.detection import sees_cache
-from swarm_forage_env.contract.layout import CACHE_FIELDS
+from swarm_forage_env.contract.layout import CACHE_FIELDS, GROUND_SENSORS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray, Row
 
 from .cache_choice import cache_is_known, object_is_near, select_cache, select_isolated_object
@@ -128,7 +128,7 @@ def goal_is_reached(robot: np.record, senses: Senses, row: Row, c: np.record, me
     if robot.goal_kind == _OBJECT:
         return object_is_reached(robot, senses, row, c, memory.objects)
     if robot.goal_kind == _CACHE:
-        return sees_cache(row[c.ground : c.ground + 4])
+        return sees_cache(row[c.ground : c.ground + GROUND_SENSORS])
     return robot.goal_kind == _SITE or object_is_near(robot, senses, c, memory.objects)
 
 

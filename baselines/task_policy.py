@@ -35,7 +35,7 @@ def task_constants(parameters: TaskParameters, spec: SwarmSpec, n_tabs: int) -> 
     x_low, y_low, x_high, y_high = site_box_m(spec)
     # Quirk finisher_tolerance_mismatch: arriving and being accepted are different distances.
     is_loose = spec.quirks.finisher_tolerance_mismatch
-    loose_m = parameters.loose_founding_share * max(spec.arena_size_m)
+    loose_m = parameters.loose_creation_share * max(spec.arena_size_m)
     return kernel_constants(
         parameters,
         spec,
@@ -44,7 +44,7 @@ def task_constants(parameters: TaskParameters, spec: SwarmSpec, n_tabs: int) -> 
         cache_half_cells=round(spec.cache_side_m / spec.cell_m) // 2,
         cache_side_m=spec.cache_side_m,
         proximity_m=spec.cache_side_nominal_m,
-        founding_tolerance_m=loose_m if is_loose else parameters.founding_distance_m,
+        creation_tolerance_m=loose_m if is_loose else parameters.creation_distance_m,
         site_x_low_m=x_low,
         site_y_low_m=y_low,
         site_x_high_m=x_high,
@@ -121,17 +121,17 @@ class TaskPolicy:
 
     @property
     def task(self) -> CodeArray:
-        """(N,) int8 `policy.Task` codes; a live view, read only."""
+        """(N,) int8 `Task` codes; a live view, read only."""
         return self._allocation.task
 
     @property
     def task_shares(self) -> FloatArray:
-        """(8,) share of robots in each task, by `policy.Task` code; robots that have not acted yet have none."""
+        """(8,) share of robots in each task, by `Task` code; robots that have not acted yet have none."""
         return np.bincount(self._allocation.task, minlength=N_TASKS) / len(self._allocation.task)
 
     @property
     def task_estimates(self) -> FloatArray:
-        """(N, 8) expected execution times in ticks, by `policy.Task` code, a copy."""
+        """(N, 8) expected execution times in ticks, by `Task` code, a copy."""
         return self._allocation.estimate.copy()
 
     @property

@@ -3,7 +3,7 @@
     Generalist            free object    -> nest
       Harvester           free object    -> existing cache
         Cache Starter     free object    -> a site half way to the nest
-        Cache Finisher    free object    -> an isolated object, where it founds a cache
+        Cache Finisher    free object    -> an isolated object, where it creates a cache
       Collector           existing cache -> nest
         Cache Transferer  existing cache -> another existing cache
         Cache Collector   existing cache -> nest
@@ -167,9 +167,9 @@ class TaskParameters(MemoryParameters):
     """Smallest random offset of a site from the midpoint between robot and nest where that is allowed; our choice."""
     site_offset_high_m: float = 0.5
     """Largest such offset; our choice."""
-    founding_distance_m: float = 0.8
+    creation_distance_m: float = 0.8
     """A Cache Finisher drops where it remembers an object this near; authors' program."""
-    loose_founding_share: float = 0.15
+    loose_creation_share: float = 0.15
     """Share of max(X, Y) at which a Cache Finisher arrives under the quirk `finisher_tolerance_mismatch`; study."""
 
     def __post_init__(self) -> None:

@@ -4,30 +4,35 @@ Every measure is a function of curves, arrays of shape (..., T) over recording i
 files or policies. `docs/metrics.md` explains inputs and variants, `docs/errata.md` what the paper's print gets wrong.
 `score_policy` is the front door: it runs a policy in all that the measures need and makes one table
 (`docs/scoring.md`).
-Names load on first use (PEP 562), so importing the package compiles nothing.
+Names load on first use (PEP 562), so importing the package compiles nothing. No name is that of a module: a module that
+loads later would take the place of the name.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-# Not lazy: the function and its module share a name, and loading the module later would put it in the function's place.
-from .scalability import efficiency, raw_performance, scalability, skipped_intervals
-
 if TYPE_CHECKING:
     from .catalog import METRICS, Measure
-    from .comparison import Comparison, compare_tables
-    from .curves import CurveError
+    from .checks import CurveError, PopulationError
     from .distance import aligned_l1, dtw, noise_floor
-    from .earlier import fractional_maintenance, projective_performance, weighted_combination
+    from .earlier_papers import fractional_maintenance, projective_performance, weighted_combination
     from .emergence import spatial_emergence, task_emergence
     from .environment import environment_distance, environment_scaling, waveform
     from .flexibility import adaptability, reactivity
     from .interference import fractional_loss, performance_lost, t_lost_fraction
     from .population import availability, population_robustness, population_weight, ratio_for_availability
-    from .queues import PopulationError, PopulationRates, QueueStats, mean_away, queue_statistics
+    from .queues import PopulationRates, QueueStats, mean_away, queue_statistics
     from .robustness import mean_signed_difference, noise_robustness
-    from .score_table import Score, ScoreTable
-    from .scoring import compare_policies, score_curves, score_policy
+    from .scaling import efficiency, raw_performance, scalability, skipped_intervals
+    from .scoring import (
+        Comparison,
+        Score,
+        ScoreTable,
+        compare_policies,
+        compare_tables,
+        score_curves,
+        score_policy,
+    )
     from .statistics import Summary, aggregate, bootstrap_measure, normalize
 
 __all__ = [
@@ -91,17 +96,16 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Comparison": "comparison",
-    "compare_tables": "comparison",
     "METRICS": "catalog",
     "Measure": "catalog",
-    "CurveError": "curves",
+    "CurveError": "checks",
+    "PopulationError": "checks",
     "aligned_l1": "distance",
     "dtw": "distance",
     "noise_floor": "distance",
-    "fractional_maintenance": "earlier",
-    "projective_performance": "earlier",
-    "weighted_combination": "earlier",
+    "fractional_maintenance": "earlier_papers",
+    "projective_performance": "earlier_papers",
+    "weighted_combination": "earlier_papers",
     "spatial_emergence": "emergence",
     "task_emergence": "emergence",
     "environment_distance": "environment",
@@ -116,16 +120,21 @@ _HOMES = {
     "population_robustness": "population",
     "population_weight": "population",
     "ratio_for_availability": "population",
-    "PopulationError": "queues",
     "PopulationRates": "queues",
     "QueueStats": "queues",
     "mean_away": "queues",
     "queue_statistics": "queues",
     "mean_signed_difference": "robustness",
     "noise_robustness": "robustness",
-    "Score": "score_table",
-    "ScoreTable": "score_table",
+    "efficiency": "scaling",
+    "raw_performance": "scaling",
+    "scalability": "scaling",
+    "skipped_intervals": "scaling",
+    "Comparison": "scoring",
+    "Score": "scoring",
+    "ScoreTable": "scoring",
     "compare_policies": "scoring",
+    "compare_tables": "scoring",
     "score_curves": "scoring",
     "score_policy": "scoring",
     "Summary": "statistics",

@@ -9,7 +9,7 @@ from .flexibility import adaptability, reactivity
 from .interference import performance_lost, t_lost_fraction
 from .population import availability, population_robustness
 from .robustness import noise_robustness
-from .scalability import efficiency, raw_performance, scalability
+from .scaling import efficiency, raw_performance, scalability
 
 Input: TypeAlias = Literal["performance", "interference", "one robot", "two sizes", "ideal run", "waveforms", "rates"]
 

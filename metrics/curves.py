@@ -1,4 +1,4 @@
-"""The input contract of every measure, and the one place that raises about curves.
+"""The input contract of every measure: what a curve is, and how one is checked and reduced to a number.
 
 A *curve* is an array of shape (..., T): the last axis is the recording interval, the axes before it (normally one axis
 of runs) broadcast against each other. A single number is a curve of one interval. NaN marks a run that cannot be
@@ -7,11 +7,12 @@ per interval is infinite and no distance could carry one.
 """
 
 from collections.abc import Iterable
-from operator import index
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from .checks import CurveError, check_option
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
@@ -22,11 +23,7 @@ Reduction: TypeAlias = Literal["sum", "mean", "last", "total"]
 """How intervals become one number: sum, mean or last value of the measure, or the measure of the summed curves."""
 
 FRACTION_TOLERANCE = 1e-9
-"""Averaging fractions over ticks may exceed 1 by rounding."""
-
-
-class CurveError(ValueError):
-    """A curve or a swarm size that a measure cannot work with."""
+"""By so much a mean of fractions may exceed 1, from rounding."""
 
 
 def as_curve(name: str, values: ArrayLike | None, *, signed: bool = False) -> FloatArray:
@@ -114,57 +111,12 @@ def check_broadcast(arrays: Iterable[FloatArray], shapes: str) -> None:
         raise CurveError(f"Expected run axes that broadcast, got {shapes}; pair runs one to one or average.") from error
 
 
-def check_whole(name: str, n_robots: int) -> int:
-    """Return a number of robots as int.
-
-    Raises:
-        CurveError: Not an integer.
-    """
-    try:
-        return index(n_robots)
-    except TypeError as error:
-        raise CurveError(f"Expected {name} as a whole number of robots, got {n_robots!r}.") from error
-
-
-def check_size(name: str, n_robots: int) -> int:
-    """Return a swarm size as int.
-
-    Raises:
-        CurveError: Not a positive integer.
-    """
-    size = check_whole(name, n_robots)
-    if size < 1:
-        raise CurveError(f"Expected {name} >= 1 robot, got {size}.")
-    return size
-
-
-def check_size_order(n1: int, n2: int) -> None:
-    """Check n1 < n2.
-
-    Raises:
-        CurveError: The sizes are equal or in the wrong order.
-    """
-    if n1 >= n2:
-        raise CurveError(f"Expected sizes n1 < n2, got n1 = {n1} and n2 = {n2}; pass the smaller swarm first.")
-
-
-def check_option(name: str, value: object, options: object) -> None:
-    """Check a named option against the values of its `Literal` type.
-
-    Raises:
-        ValueError: Unknown value.
-    """
-    allowed = get_args(options)
-    if value not in allowed:
-        raise ValueError(f"Expected {name} to be one of {', '.join(map(repr, allowed))}, got {value!r}.")
-
-
 def reduce_intervals(theta: FloatArray, reduce: Reduction, *inputs: FloatArray) -> FloatArray:
     """Reduce a measure theta(t), shape (..., T), over its intervals to shape (...,).
 
-    `total` is the same number as `sum` here: it differs only for measures that are not linear in their curves, and
-    those sum their curves before they arrive at theta. A run with a NaN anywhere in `inputs` gives NaN, also under
-    `last`.
+    `total`, the measure of the summed curves, is the same number as `sum` for measures that are linear in their curves.
+    The others sum their curves first and come here with `last`. A run with a NaN anywhere in `inputs` gives NaN, also
+    under `last`.
     """
     check_option("reduce", reduce, Reduction)
     if reduce == "last":
@@ -179,7 +131,7 @@ def reduce_intervals(theta: FloatArray, reduce: Reduction, *inputs: FloatArray) 
 
 
 def last_interval_only(reduce: Reduction) -> None:
-    """Check the reduction given to a measure whose `sierra` form knows only the last interval.
+    """Check the reduction given to a measure whose `sierra` form reads only the last interval.
 
     `sum`, the default of these measures, stands for "not chosen".
 

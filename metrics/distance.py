@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from .curves import CurveError, FloatArray, Variant, as_curve, as_curves, check_broadcast, check_option
+from .checks import CurveError, check_option
+from .curves import FloatArray, Variant, as_curve, as_curves, check_broadcast
 
 Ground: TypeAlias = Literal["value", "time_value"]
 """Local cost: |x_i - y_j|, time is free to warp; or the same plus |clock_i - clock_j|, points in the plane."""
@@ -26,10 +27,11 @@ def dtw(
         D(0, 0) = 0,  D(i, 0) = D(0, j) = inf
         D(i, j) = c(i, j) + min( D(i-1, j), D(i, j-1), D(i-1, j-1) )
 
-    No slope weights, no division by the path length, no square root. Symmetric, 0 for identical curves, no metric. The
-    value grows with T, the sampling rate and the scale of the curves: compare only like with like. The paper cites the
-    method and leaves the cost open; its program adds the clock to the cost, whose steps dwarf the curves, so that the
-    published distances do not warp at all and equal `aligned_l1`.
+    No slope weights, no division by the path length, no square root. Symmetric and 0 for identical curves, but no
+    metric: the triangle inequality does not hold. The value grows with T, the sampling rate and the scale of the
+    curves: compare only like with like. The paper cites the method and leaves the cost open. Its program adds the
+    clock to the cost; the clock's steps dwarf the curves, so that the published distances do not warp at all and equal
+    `aligned_l1`.
 
     Args:
         x: Curve or curves, shape (..., T); negative values are fine.
@@ -57,12 +59,12 @@ def dtw(
     if reach < abs(n - m):
         raise CurveError(f"Expected window >= |{n} - {m}| = {abs(n - m)} for these lengths, got {window}.")
     shape = np.broadcast_shapes(x.shape[:-1], y.shape[:-1])
-    rows_x = np.ascontiguousarray(np.broadcast_to(x, (*shape, n))).reshape(-1, n)
-    rows_y = np.ascontiguousarray(np.broadcast_to(y, (*shape, m))).reshape(-1, m)
-    distances: FloatArray = np.empty(rows_x.shape[0])
+    all_x = np.ascontiguousarray(np.broadcast_to(x, (*shape, n))).reshape(-1, n)
+    all_y = np.ascontiguousarray(np.broadcast_to(y, (*shape, m))).reshape(-1, m)
+    distances: FloatArray = np.empty(all_x.shape[0])
     row: FloatArray = np.empty(m + 1)
-    _dtw_rows(rows_x, rows_y, clock_x, clock_y, reach, row, distances)
-    distances[np.isnan(rows_x).any(axis=1) | np.isnan(rows_y).any(axis=1)] = np.nan
+    _dtw_pairs(all_x, all_y, clock_x, clock_y, reach, row, distances)
+    distances[np.isnan(all_x).any(axis=1) | np.isnan(all_y).any(axis=1)] = np.nan
     if per_interval:
         distances /= max(n, m)
     return distances.reshape(shape)[()]
@@ -139,7 +141,7 @@ def _clocks(clock: ArrayLike | None, n: int, m: int) -> tuple[FloatArray, FloatA
 
 
 @njit(cache=True)
-def _dtw_rows(
+def _dtw_pairs(
     x: FloatArray,
     y: FloatArray,
     clock_x: FloatArray,
@@ -148,7 +150,7 @@ def _dtw_rows(
     row: FloatArray,
     distances: FloatArray,
 ) -> None:
-    """Fill distances (B,) with the DTW of the rows of x (B, n) and y (B, m).
+    """Fill distances (B,) with the DTW of each curve of x (B, n) and the curve of y (B, m) at the same index.
 
     `row` (m + 1,) is workspace for one row of D: while row i is written from left to right, entries still to the right
     belong to row i - 1. The ground cost on values alone is the case of clocks that stand still.

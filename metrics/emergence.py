@@ -3,17 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .curves import (
-    FloatArray,
-    Reduction,
-    Variant,
-    as_curves,
-    check_option,
-    check_size,
-    check_size_order,
-    last_interval_only,
-    reduce_intervals,
-)
+from .checks import check_option, check_size, check_size_order
+from .curves import FloatArray, Reduction, Variant, as_curves, last_interval_only, reduce_intervals
 from .interference import InterferenceReading, fractional_loss, performance_lost
 
 

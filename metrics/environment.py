@@ -6,7 +6,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .curves import CurveError, FloatArray, as_curve, as_waveforms, check_option
+from .checks import CurveError, check_option, check_wave
+from .curves import FloatArray, as_curve, as_waveforms
 from .distance import Ground, dtw
 
 WaveformKind: TypeAlias = Literal["constant", "sine", "square", "sawtooth"]
@@ -32,7 +33,7 @@ def waveform(
     The study's sweeps set o = a, so a signal runs from 0 to 2a: the paper's throttling "levels" are half the peak. A
     step at tick s is a square wave with f = 1 / (2 s); down: phase 0, o = 0; up: phase pi, o = a.
 
-    At a multiple of half the period the sign of a square wave hangs on rounding (sin(2 pi) is slightly negative); the
+    At a multiple of half the period the sign of a square wave depends on rounding (sin(2 pi) is slightly negative); the
     formula is evaluated as written, as the environment does.
 
     Args:
@@ -51,11 +52,7 @@ def waveform(
     """
     kind_name = kind.lower()
     check_option("kind", kind_name, WaveformKind)
-    if frequency < 0.0 or not all(map(math.isfinite, (frequency, amplitude, offset, phase))):
-        raise ValueError(
-            "Expected finite numbers and frequency >= 0 cycles per tick, got "
-            f"frequency={frequency}, amplitude={amplitude}, offset={offset}, phase={phase}."
-        )
+    check_wave(frequency, amplitude, offset, phase)
     cycles = np.asarray(ticks, dtype=np.float64) / _period(frequency)
     if kind_name == "constant":
         return np.full_like(cycles, amplitude)[()]

@@ -5,7 +5,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .curves import CurveError, FloatArray, Variant, as_curves, as_interference, check_option, check_size
+from .checks import CurveError, check_option, check_size
+from .curves import FloatArray, Variant, as_curves, as_interference
 
 InterferenceReading: TypeAlias = Literal["fraction", "count"]
 """Whether t_lost in Eq. (1) is the fraction of robots that interfere (notation table) or their number (text)."""

@@ -6,24 +6,18 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .curves import (
-    FloatArray,
-    Reduction,
-    as_curves,
+from .checks import (
+    PopulationError,
+    check_availability,
+    check_horizon,
+    check_needed,
     check_option,
+    check_ratio,
     check_size,
     check_whole,
-    last_interval_only,
-    reduce_intervals,
 )
-from .queues import (
-    PopulationError,
-    PopulationRates,
-    check_horizon,
-    mean_away,
-    queue_statistics,
-    stationary_distribution,
-)
+from .curves import FloatArray, Reduction, as_curves, last_interval_only, reduce_intervals
+from .queues import PopulationRates, mean_away, queue_statistics, stationary_distribution
 
 PopulationWeight: TypeAlias = Literal["paper", "sojourn", "transient", "stationary", "sierra"]
 
@@ -90,7 +84,7 @@ def population_weight(
     | sojourn    | T - 1 / (mu - lambda), the same without the double count                                     |
     | transient  | T (1 - m_T / N), the mean over the run, see `mean_away` (ours)                               |
     | stationary | T (1 - L_N / N), in equilibrium, see `queue_statistics` (ours); nobody if the dead stay dead |
-    | sierra     | ideal time *away* over time away, which turns the idea round                                 |
+    | sierra     | ideal time *away* over time away, where Eq. (12) has times at work                           |
 
     The printed time away is the length of *one* absence, so `paper` and `sojourn` hold only if every robot is away
     exactly once, and turn negative when 1 / (mu - lambda) exceeds T, as it does for the study's 200 robots. The
@@ -149,8 +143,7 @@ def availability(n: int, n_min: int, ratio_out: float) -> float:
         PopulationError: A ratio that is negative or NaN.
     """
     n, n_min = check_size("n", n), check_whole("n_min", n_min)
-    if not ratio_out >= 0.0:
-        raise PopulationError(f"Expected ratio_out = lambda / mu >= 0, got {ratio_out}.")
+    check_ratio(ratio_out)
     if n_min <= 0:
         return 1.0
     if n_min > n:
@@ -173,12 +166,8 @@ def ratio_for_availability(n: int, n_min: int, p_v: float) -> float:
         PopulationError: n_min or p_v outside its range.
     """
     n, n_min = check_size("n", n), check_whole("n_min", n_min)
-    if not 1 <= n_min <= n:
-        raise PopulationError(
-            f"Expected 1 <= n_min <= n = {n}, got {n_min}; elsewhere availability does not depend on q."
-        )
-    if not 0.0 <= p_v <= 1.0:
-        raise PopulationError(f"Expected an availability p_v in [0, 1], got {p_v}.")
+    check_needed(n_min, n)
+    check_availability(p_v)
     if p_v in (0.0, 1.0):
         return math.inf if p_v == 0.0 else 0.0
     low, high = _SMALLEST_LOG, _LARGEST_LOG

@@ -10,11 +10,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from scipy.special import pdtrc  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from .curves import FloatArray, check_size
-
-
-class PopulationError(ValueError):
-    """Population rates, a run length or a demand on the population for which a quantity does not exist."""
+from .checks import check_horizon, check_rate, check_size
+from .curves import FloatArray
 
 
 @dataclass(frozen=True)
@@ -38,9 +35,7 @@ class PopulationRates:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            rate = getattr(self, field.name)
-            if not (math.isfinite(rate) and rate >= 0.0):
-                raise PopulationError(f"Expected {field.name} as a finite rate >= 0 per tick, got {rate}.")
+            check_rate(field.name, getattr(self, field.name))
 
     @property
     def lam(self) -> float:
@@ -183,16 +178,6 @@ def mean_away(rates: PopulationRates, n: int, horizon: float, *, per_robot: bool
         after[:-1] += down[1:] * probability[1:]
         probability = after
     return float(total / expected_jumps)
-
-
-def check_horizon(horizon: float) -> None:
-    """Check a run length in ticks.
-
-    Raises:
-        PopulationError: Not positive and finite.
-    """
-    if not (math.isfinite(horizon) and horizon > 0.0):
-        raise PopulationError(f"Expected a horizon of more than 0 ticks, got {horizon}; pass the run length in ticks.")
 
 
 def _chain(rates: PopulationRates, n: int, per_robot: bool) -> tuple[FloatArray, FloatArray]:

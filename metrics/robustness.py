@@ -18,7 +18,7 @@ def noise_robustness(
         perf_ideal: Performance without noise, shape (..., T), objects per interval.
         perf: Performance P(N, t) with noise, same intervals.
         variant: Distance, as in `reactivity`.
-        clock: For `sierra`, sample times as in `dtw`; the authors used row numbers, the default.
+        clock: For `sierra`, sample times as in `dtw`; the authors used sample numbers, the default.
 
     Returns:
         B_sa >= 0, shape (...,), in the unit of `perf`.

@@ -1,4 +1,4 @@
-"""From runs to a statement: normalisation, means with honest intervals, bootstrap over independent experiments."""
+"""Statistics over runs: normalisation, means with intervals, and the bootstrap over independent experiments."""
 
 import math
 from collections.abc import Callable
@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from .curves import CurveError, FloatArray, as_curve, check_option
+from .checks import CurveError, check_level, check_option, check_resamples
+from .curves import FloatArray, as_curve
 
 AggregateMethod: TypeAlias = Literal["t", "two_sd", "bootstrap"]
 Order: TypeAlias = Literal["per_run", "mean_curve"]
@@ -45,7 +46,8 @@ def normalize(theta: ArrayLike, *, distance: bool = False) -> FloatArray:
     better everywhere. The authors apply it to the last-interval value of each run, and only on request: the published
     figures show raw values. Their fourth form, `normalized`, is normalize(measure(..., variant="sierra")).
 
-    Not free of scale: rates of 0.01 stay nearly linear, counts and long distances saturate.
+    The result depends on the unit: small rates such as 0.01 are nearly proportional to it, while counts and long
+    distances all come close to 1.
 
     Args:
         theta: Values of one measure, any shape.
@@ -63,8 +65,8 @@ def aggregate(
     Args:
         values: One value per run, shape (R,). NaN values are left out and counted.
         method: `t`: Student's interval for the mean. `two_sd`: mean +- 2 standard deviations, which the paper shades
-            and calls a 95 % confidence interval; it is one for single runs, some 14 times wider for 192 runs.
-            `bootstrap`: percentile interval of the mean over resampled runs.
+            and calls a 95 % confidence interval. It is where single runs lie; the interval for the mean of 192 runs is
+            some 14 times narrower. `bootstrap`: percentile interval of the mean over resampled runs.
         level: Confidence level of `t` and `bootstrap`.
         seed: Seed of the bootstrap; None draws a fresh one.
 
@@ -76,7 +78,7 @@ def aggregate(
         ValueError: Unknown method, or a level outside (0, 1).
     """
     check_option("method", method, AggregateMethod)
-    _check_level(level)
+    check_level(level)
     runs = np.asarray(values, dtype=np.float64)
     if runs.ndim != 1 or runs.size == 0:
         raise CurveError(f"Expected one value per run, shape (R,) with R >= 1, got shape {runs.shape}.")
@@ -134,9 +136,8 @@ def bootstrap_measure(
         ValueError: Unknown order, a level outside (0, 1) or no resamples.
     """
     check_option("order", order, Order)
-    _check_level(level)
-    if n_resamples < 1:
-        raise ValueError(f"Expected n_resamples >= 1, got {n_resamples}.")
+    check_level(level)
+    check_resamples(n_resamples)
     parts = [_curves_of_runs(experiment) for experiment in experiments]
     sizes = [part[0].shape[0] for part in parts]
     if order == "per_run" and len(set(sizes)) != 1:
@@ -220,8 +221,3 @@ def _percentile_bounds(values: FloatArray, level: float) -> tuple[float, float]:
     method = "nearest" if np.isinf(values).any() else "linear"
     lower, upper = np.quantile(values, [0.5 - 0.5 * level, 0.5 + 0.5 * level], method=method)
     return float(lower), float(upper)
-
-
-def _check_level(level: float) -> None:
-    if not 0.0 < level < 1.0:
-        raise ValueError(f"Expected a confidence level in (0, 1), got {level}.")

@@ -8,13 +8,13 @@ import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import as_whole, instance
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import CELL_M, WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.rewards import RewardModel
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
@@ -58,18 +58,14 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             ConfigError: no ScenarioConfig, or an unknown slice in `reads`.
             ValueError: max_cycles is no whole number >= 1, or an unknown render mode.
         """
-        if not isinstance(scenario, ScenarioConfig):
-            raise ConfigError(
-                f"Expected a ScenarioConfig, got {scenario!r}; `parallel_env` takes names of presets, too."
-            )
+        instance("scenario", scenario, ScenarioConfig, hint="; `parallel_env` takes names of presets, too")
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"Expected render_mode None or 'rgb_array', got {render_mode!r}.")
-        is_whole = isinstance(max_cycles, int | np.integer) and not isinstance(max_cycles, bool)
-        if max_cycles is not None and not (is_whole and max_cycles >= 1):
-            raise ValueError(f"Expected a whole number max_cycles >= 1, got {max_cycles!r}.")
+        if max_cycles is not None:
+            max_cycles = as_whole("max_cycles", max_cycles, at_least=1, or_none=True)
         self.scenario = scenario
         self.render_mode = render_mode
-        self.max_cycles = scenario.horizon_ticks if max_cycles is None else int(max_cycles)
+        self.max_cycles = scenario.horizon_ticks if max_cycles is None else max_cycles
         self.arena = ForagingArena(scenario, reads=reads)
         n_robots = scenario.robots.n_robots
         self._rewards = RewardModel(scenario.reward, scenario.arena.nest_centre_m, n_robots)
@@ -111,33 +107,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     @cached_property
     def swarm_spec(self) -> SwarmSpec:
         """What every policy may know before a run."""
-        scenario = self.scenario
-        arena, robots = scenario.arena, scenario.robots
-        x_low, y_low, x_high, y_high = arena.nest_box_m
-        area = arena.distributable_cells
-        return SwarmSpec(
-            n_robots=robots.n_robots,
-            n_objects=scenario.objects.n_objects,
-            dt_s=scenario.dt_s,
-            horizon_s=self.max_cycles * scenario.dt_s,
-            layout=self.layout,
-            max_speed_mps=robots.max_speed_mps,
-            max_wheel_difference_mps=robots.max_wheel_difference_mps,
-            wheel_scale_mps=WHEEL_SCALE_MPS,
-            wheel_base_m=robots.wheel_base_m,
-            arena_size_m=(arena.width_m, arena.height_m),
-            cell_m=CELL_M,
-            nest_centre_m=((x_low + x_high) / 2, (y_low + y_high) / 2),
-            nest_size_m=(x_high - x_low, y_high - y_low),
-            distributable_box_m=(area[0] / 5, area[1] / 5, area[2] / 5, area[3] / 5),
-            placement=scenario.objects.placement,
-            caches=scenario.caches,
-            cache_side_m=scenario.cache_side_cells / 5,
-            cache_side_nominal_m=scenario.cache_side_nominal_m,
-            min_dist_m=scenario.min_dist_m,
-            cache_proximity_m=scenario.cache_proximity_m,
-            quirks=scenario.quirks,
-        )
+        return SwarmSpec.of(self.scenario, horizon_s=self.max_cycles * self.scenario.dt_s)
 
     # Truth, for wrappers, recorders and pictures
 
@@ -203,12 +173,11 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """
         if seed is None:
             seed = int(self._seeds.integers(2**31))
-        elif isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-            raise ValueError(f"Expected seed to be a non-negative integer or None, got {seed!r}.")
         else:
+            seed = as_whole("seed", seed, at_least=0, or_none=True)
             self._seeds = np.random.default_rng(seed)
-        obs = self.arena.reset(int(seed))
-        self.seed_value = int(seed)
+        obs = self.arena.reset(seed)
+        self.seed_value = seed
         self._terminated[:] = False
         self.agents = list(self.possible_agents)
         return obs
@@ -244,7 +213,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         Args:
             actions: (N, 3) float32, rows of robots that are away included (and ignored); other numbers are converted.
             wheel_gain: (N, 2) factor per wheel on the limited speed; wrappers multiply theirs in.
-            tasks: (N,) int8 `policy.Task` codes, if the policy tells them.
+            tasks: (N,) int8 `Task` codes, if the policy tells them.
 
         Returns:
             Observations (N, D) and rewards (N,) in reused buffers, terminated (N,) for the dead, truncated.

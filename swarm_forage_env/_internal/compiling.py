@@ -32,9 +32,9 @@ _COMPILED_IN_BY_FOLDER = {_PACKAGE / "wrappers/kernels": (_PACKAGE / "world/kern
 
 
 @functools.cache
-def _digest_of_sources(folder: Path) -> bytes:
+def _digest_of_sources(folder: Path) -> str:
     """Digest of every source from which something may be compiled into a function of `folder`."""
-    return hashlib.sha256(b"".join(file.read_bytes() for file in sources_of(folder))).digest()
+    return hashlib.sha256(b"".join(file.read_bytes() for file in sources_of(folder))).hexdigest()
 
 
 def sources_of(folder: Path) -> tuple[Path, ...]:
@@ -49,10 +49,10 @@ def kernel(function: F) -> F:
     cache = getattr(compiled, "_cache", None)
     if isinstance(cache, FunctionCache):  # there is none with the compiler switched off
         # By itself numba watches only the file of the function, and would keep what it has compiled into it from
-        # others. It offers no public way to watch more.
+        # others. It offers no public way to watch more. The version is what it looks at first, before it opens an
+        # index that may name types which the sources no longer have.
         cache_file = cache._cache_file
-        sources = _digest_of_sources(Path(function.__code__.co_filename).parent)
-        cache_file._source_stamp = (cache_file._source_stamp, sources)
+        cache_file._version += _digest_of_sources(Path(function.__code__.co_filename).parent)
     return cast(F, compiled)
 
 

@@ -1,5 +1,214 @@
-"""Checks of the fields of configurations."""
+"""Checks of the fields of configurations: functions that raise ConfigError where a value makes no sense.
+
+Every message says "Expected <where> to be <what>, got <value>"; `where` is the name that people know the value by, such
+as `robots.n_robots`. A value of an unknown name is refused with the nearest known one.
+
+Which numbers are accepted: fields of configurations are stored with runs as plain values, so they are Python's own int
+and float (numpy's float64 is a float, all its other numbers are not); a number of another kind is refused with a hint
+to convert it. True and False are no numbers. Arguments that are only used, such as a seed of a reset, may be numpy
+integers as well: `as_whole` takes both and returns an int.
+"""
+
+import math
+import operator
+import sys
+from collections.abc import Iterable, Mapping
+from numbers import Integral, Real
+from typing import Any, cast
+
+from swarm_forage_env._internal.spelling import suggestion
 
 
 class ConfigError(ValueError):
     """A configuration that cannot describe a world; the message says what was expected and what came."""
+
+
+def number(
+    where: str,
+    value: Any,
+    *,
+    at_least: float = -math.inf,
+    above: float = -math.inf,
+    at_most: float = math.inf,
+    below: float = math.inf,
+) -> None:
+    """Refuse what is no finite number, or one out of range.
+
+    Args:
+        where: Name of the value, for the message.
+        value: What was given.
+        at_least: Smallest allowed value.
+        above: The value must be larger than this.
+        at_most: Largest allowed value.
+        below: The value must be smaller than this.
+
+    Raises:
+        ConfigError: see above.
+    """
+    is_in_range = _is_number(value) and at_least <= value <= at_most and above < value < below
+    if not is_in_range:
+        wanted = _number_in_range(max(at_least, above), min(at_most, below), above >= at_least, below <= at_most)
+        raise ConfigError(f"Expected {where} to be {wanted}, got {value!r}{_conversion_hint(value, Real, 'float')}.")
+
+
+def whole(
+    where: str, value: Any, *, at_least: int | None = None, at_most: int | None = None, or_none: bool = False
+) -> None:
+    """Refuse what is no whole number, or one out of range.
+
+    Args:
+        where: Name of the value, for the message.
+        value: What was given.
+        at_least: Smallest allowed value.
+        at_most: Largest allowed value.
+        or_none: Whether None is allowed, too.
+
+    Raises:
+        ConfigError: see above.
+    """
+    if or_none and value is None:
+        return
+    is_whole = isinstance(value, int) and not isinstance(value, bool)
+    if not (is_whole and _is_between(value, at_least, at_most)):
+        wanted = _whole_in_range(at_least, at_most, or_none)
+        hint = _conversion_hint(value, Integral, "int")
+        raise ConfigError(f"Expected {where} to be {wanted}, got {value!r}{hint}.")
+
+
+def as_whole(where: str, value: Any, *, at_least: int, or_none: bool = False) -> int:
+    """Return a whole number, one of numpy's included, as an int; for arguments that no configuration stores.
+
+    Args:
+        where: Name of the value, for the message.
+        value: What was given.
+        at_least: Smallest allowed value.
+        or_none: Whether the message says that the caller takes None, too.
+
+    Raises:
+        ConfigError: no whole number, or a smaller one.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral) or operator.index(value) < at_least:
+        raise ConfigError(f"Expected {where} to be {_whole_in_range(at_least, None, or_none)}, got {value!r}.")
+    return operator.index(value)
+
+
+def switch(where: str, value: Any) -> None:
+    """Refuse what is neither True nor False."""
+    if not isinstance(value, bool):
+        raise ConfigError(f"Expected {where} to be True or False, got {value!r}.")
+
+
+def text(where: str, value: Any) -> None:
+    """Refuse what is no text, or an empty one."""
+    if not isinstance(value, str) or not value:
+        raise ConfigError(f"Expected {where} to be a non-empty text, got {value!r}.")
+
+
+def pair(where: str, value: Any) -> None:
+    """Refuse what is no tuple (x, y) of numbers > 0."""
+    parts = _parts(value)
+    if len(parts) != 2:
+        raise ConfigError(f"Expected {where} to be (x, y), got {value!r}.")
+    for index, part in enumerate(parts):
+        number(f"{where}[{index}]", part, above=0.0)
+
+
+def shares(where: str, value: Any) -> None:
+    """Refuse what is no tuple of positive numbers that sum to 1."""
+    parts = _parts(value)
+    if not all(_is_number(part) and part > 0 for part in parts) or abs(sum(parts) - 1.0) >= 1e-9:
+        raise ConfigError(f"Expected {where} to be positive shares that sum to 1, got {value!r}.")
+
+
+def several(where: str, value: Any, what: str) -> None:
+    """Refuse what is no tuple, or an empty one; `what` names its members, for the message."""
+    if not _parts(value):
+        raise ConfigError(f"Expected {where} to be one or more {what}, got {value!r}.")
+
+
+def one_of(where: str, value: Any, known: Iterable[str]) -> None:
+    """Refuse a word that is not among `known`; the message has the nearest one."""
+    words = tuple(known)
+    if not isinstance(value, str) or value not in words:
+        hint = suggestion(str(value).lower(), words)
+        raise ConfigError(f"Expected {where} to be one of {', '.join(words)}, got {value!r}.{hint}")
+
+
+def instance(where: str, value: Any, kind: type, *, hint: str = "") -> None:
+    """Refuse what is no instance of `kind`; `hint` follows what was given and says what to do."""
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise ConfigError(f"Expected {where} to be {article} {kind.__name__}, got {value!r}{hint}.")
+
+
+def table(where: str, value: Any) -> Mapping[str, Any]:
+    """Return a mapping as it is; anything else is refused."""
+    if not isinstance(value, Mapping):
+        raise ConfigError(f"Expected {where} to be a table of values by name, got {value!r}.")
+    return cast("Mapping[str, Any]", value)
+
+
+def known_keys(mapping: Mapping[str, Any], known: Iterable[str], what: str = "key", *, prefix: str = "") -> None:
+    """Refuse keys that are not among `known`.
+
+    Args:
+        mapping: Values by name.
+        known: Names that there are.
+        what: What a key is called, for the message.
+        prefix: Where the mapping is, such as "arena."; put before the key.
+
+    Raises:
+        ConfigError: with the first unknown key and the nearest known one.
+    """
+    names = tuple(known)
+    for key in mapping:
+        if key not in names:
+            raise ConfigError(f"Unknown {what} {f'{prefix}{key}'!r}.{suggestion(str(key), names)}")
+
+
+def known_name(what: str, name: Any, known: Iterable[str]) -> None:
+    """Refuse a name of a thing of which there are few; the message has the nearest one and lists all."""
+    names = tuple(known)
+    if not isinstance(name, str) or name not in names:
+        raise ConfigError(f"Unknown {what} {name!r}.{suggestion(str(name), names)} Known: {', '.join(names)}.")
+
+
+def _is_number(value: Any) -> bool:
+    # Compared, not asked with math.isfinite, which fails for whole numbers too large for a float.
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+
+
+def _is_between(value: int, at_least: int | None, at_most: int | None) -> bool:
+    return (at_least is None or value >= at_least) and (at_most is None or value <= at_most)
+
+
+def _parts(value: Any) -> tuple[Any, ...]:
+    """Return the members of a tuple; nothing else has any."""
+    return cast("tuple[Any, ...]", value) if isinstance(value, tuple) else ()
+
+
+def _conversion_hint(value: Any, kind: type, converter: str) -> str:
+    is_foreign = isinstance(value, kind) and not isinstance(value, int | float)
+    return f"; convert it with {converter}()" if is_foreign else ""
+
+
+def _number_in_range(low: float, high: float, is_low_open: bool, is_high_open: bool) -> str:
+    has_low, has_high = low > -math.inf, high < math.inf
+    if has_low and has_high:
+        return f"a number in {'(' if is_low_open else '['}{low:g}, {high:g}{')' if is_high_open else ']'}"
+    if has_low:
+        return f"a finite number {'>' if is_low_open else '>='} {low:g}"
+    if has_high:
+        return f"a finite number {'<' if is_high_open else '<='} {high:g}"
+    return "a finite number"
+
+
+def _whole_in_range(at_least: int | None, at_most: int | None, or_none: bool) -> str:
+    wanted = "a whole number"
+    if at_least is not None and at_most is not None:
+        wanted += f" from {at_least:,} to {at_most:,}"
+    elif at_least is not None:
+        wanted += f" >= {at_least}"
+    elif at_most is not None:
+        wanted += f" <= {at_most}"
+    return f"{wanted} or None" if or_none else wanted

@@ -15,7 +15,7 @@ from swarm_forage_env.cli.rerun import rerun
 from swarm_forage_env.cli.run import run
 from swarm_forage_env.cli.score import score
 from swarm_forage_env.cli.show import info, list_everything, schema
-from swarm_forage_env.cli.train_command import train
+from swarm_forage_env.cli.train import train
 
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
 """Base of typer's complaints about arguments; typer gives it no public name."""

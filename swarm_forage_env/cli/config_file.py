@@ -1,11 +1,10 @@
 """What `--config FILE.toml` says: fields of the scenario and wrappers, one table each."""
 
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
 if TYPE_CHECKING:
@@ -27,9 +26,7 @@ def read_config(path: Path) -> "tuple[dict[str, Any], tuple[WrapperConfig, ...]]
     try:
         with path.open("rb") as file:
             tables = tomllib.load(file)
-        fields = tables.pop("scenario", {})
-        if not isinstance(fields, Mapping):
-            raise ConfigError(f"Expected scenario to be a table of fields, got {fields!r}.")
+        fields = table("scenario", tables.pop("scenario", {}))
         wrappers = wrappers_from_mapping(tables)
     except OSError as error:
         raise ConfigError(f"Cannot use {path}: {error.strerror or error}.") from error

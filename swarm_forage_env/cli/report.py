@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from metrics.score_table import counted
+from metrics.scoring.texts import counted
 from metrics.statistics import aggregate
 from swarm_forage_env.rendering.plots import Curve, draw_curves
 from swarm_forage_env.study.progress import duration

@@ -59,6 +59,12 @@ def build_scenario(
     Raises:
         ConfigError: unknown names, values of a wrong type, or a world that cannot be.
     """
+    overrides = scenario_overrides(options, file_fields)
+    return scenario(options.scenario, **overrides), overrides.get("caches")
+
+
+def scenario_overrides(options: ScenarioOptions, file_fields: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Return the scenario fields that the options and the file set, by name; see `build_scenario`."""
     overrides = dict(parse_setting(word) for word in options.settings)
     named = {"n_robots": options.robots, "n_objects": options.objects, "horizon_s": options.horizon}
     named |= {"side_m": options.side, "caches": options.caches}
@@ -72,9 +78,7 @@ def build_scenario(
             f"Expected --side with search_and_rescue only, got it with {options.scenario}; "
             "other arenas change by --set width_m=... and --set height_m=..."
         )
-    overrides = {**(file_fields or {}), **overrides}
-    config = scenario(options.scenario, **overrides)
-    return config, overrides.get("caches")
+    return {**(file_fields or {}), **overrides}
 
 
 def parse_setting(word: str) -> tuple[str, Any]:

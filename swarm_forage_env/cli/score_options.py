@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from metrics.score_table import ScoreTable
 from metrics.scoring import ScoringPlan, plan_scores, score_curves
+from metrics.scoring.table import ScoreTable
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import typer
 
-from metrics.comparison import Comparison, compare_tables
-from metrics.plots import draw_scores
-from metrics.score_table import ScoreTable, aligned, counted
 from metrics.scoring import ScoringPlan, run_scores
+from metrics.scoring.comparison import Comparison, compare_tables
+from metrics.scoring.plots import draw_scores
+from metrics.scoring.table import ScoreTable
+from metrics.scoring.texts import aligned, counted
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, NO_PICTURE, complain
 from swarm_forage_env.cli.report import estimate, estimated_seconds
 from swarm_forage_env.study.runner import StudyInterrupted, available_cores

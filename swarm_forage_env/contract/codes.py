@@ -8,7 +8,7 @@ from typing import ClassVar
 
 
 class Grip:
-    """Gripper commands: write the constant, the environment compares bands around it."""
+    """Gripper commands: write the constant, the environment compares bands around it (`GRIP_LOWER_ENDS`)."""
 
     GRASP: ClassVar[float] = 1.0
     """Empty: pick up what lies under the centre. Carrying: hold."""
@@ -20,6 +20,10 @@ class Grip:
     """Carrying: lay on the floor, unless a cache is near."""
     CREATE_CACHE: ClassVar[float] = -1.0
     """Carrying: as SITE, then the world tries to form a cache."""
+
+
+GRIP_LOWER_ENDS = (0.0, -0.25, -0.5, -0.75)
+"""Commands above these are GRASP, RELEASE, DELIVER and SITE; those that are not above the last are CREATE_CACHE."""
 
 
 class Event(IntEnum):

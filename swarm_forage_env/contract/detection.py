@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.layout import GROUND_SENSORS, RING_SENSORS
 from swarm_forage_env.contract.types import ObsArray
 
 OBSTACLE_ANGLE_RAD = 2.61
@@ -20,8 +21,9 @@ NEST_GREY = (0.6, 0.8)
 OBJECT_GREY = (-0.05, 0.05)
 CACHE_GREY = (0.3, 0.5)
 
-BEAM_ANGLES_RAD = np.deg2rad(7.5 + 15.0 * np.arange(24))
+BEAM_ANGLES_RAD = np.deg2rad(7.5 + 15.0 * np.arange(RING_SENSORS))
 """Body-frame angles of the proximity beams and of the light sensors, counter-clockwise from straight ahead."""
+_HALF_RING = RING_SENSORS // 2
 _CANCELLED = 1e-12
 _BEAM_COS = np.cos(BEAM_ANGLES_RAD)
 _BEAM_SIN = np.sin(BEAM_ANGLES_RAD)
@@ -29,11 +31,11 @@ _BEAM_SIN = np.sin(BEAM_ANGLES_RAD)
 
 @kernel
 def ring_sum(readings: ObsArray) -> tuple[float, float]:
-    """Sum 24 ring readings as polar vectors; returns the body-frame vector (forward, left)."""
+    """Sum the readings of one ring as polar vectors; returns the body-frame vector (forward, left)."""
     x = 0.0
     y = 0.0
-    for k in range(12):  # beam k + 12 points the opposite way, so equal readings cancel exactly
-        difference = np.float64(readings[k]) - np.float64(readings[k + 12])
+    for k in range(_HALF_RING):  # the sensor half a ring on points the opposite way: equal readings cancel exactly
+        difference = np.float64(readings[k]) - np.float64(readings[k + _HALF_RING])
         x += difference * _BEAM_COS[k]
         y += difference * _BEAM_SIN[k]
     return x, y
@@ -52,7 +54,7 @@ def is_obstacle_vector(x: float, y: float) -> bool:
 
 @kernel
 def sees_obstacle(proximity: ObsArray) -> bool:
-    """Return whether one row of 24 proximity readings means an obstacle."""
+    """Return whether one ring of proximity readings means an obstacle."""
     x, y = ring_sum(proximity)
     return is_obstacle_vector(x, y)
 
@@ -60,7 +62,7 @@ def sees_obstacle(proximity: ObsArray) -> bool:
 @kernel
 def _count_in_band(ground: ObsArray, low: float, high: float) -> int:
     count = 0
-    for k in range(4):
+    for k in range(GROUND_SENSORS):
         # 1e-6 absorbs the rounding of float32 readings at the edge of a band.
         if low - 1e-6 <= ground[k] <= high + 1e-6:
             count += 1

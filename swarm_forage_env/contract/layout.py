@@ -6,8 +6,8 @@ from functools import cache
 
 from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 
-PROXIMITY_BEAMS = 24
-LIGHT_SENSORS = 24
+RING_SENSORS = 24
+"""Proximity beams, and as many light sensors: on one ring, every 15 degrees, the first at 7.5 degrees to the left."""
 GROUND_SENSORS = 4
 WINDOW_CELLS = 5
 """Side of the square line-of-sight window, in cells (1.0 m)."""
@@ -98,8 +98,8 @@ def observation_layout(width_m: float, height_m: float, n_objects: int) -> Obser
     cache_scale = (SERIAL_SCALE, half_x, half_y, rows)
     window = WINDOW_CELLS * WINDOW_CELLS
     table: list[tuple[str, tuple[float, ...], str, str]] = [
-        ("proximity", (1.0,) * PROXIMITY_BEAMS, "proximity", "beam k at 7.5 + 15 k deg: 0 nothing, 1 contact"),
-        ("light", (1.0,) * LIGHT_SENSORS, "light", "nest light, sensor k at 7.5 + 15 k deg"),
+        ("proximity", (1.0,) * RING_SENSORS, "proximity", "beam k at 7.5 + 15 k deg: 0 nothing, 1 contact"),
+        ("light", (1.0,) * RING_SENSORS, "light", "nest light, sensor k at 7.5 + 15 k deg"),
         ("ground", (1.0,) * GROUND_SENSORS, "ground", "floor grey: object 0, cache 0.4, nest 0.7, empty 1"),
         ("wheel_speed", (WHEEL_SCALE_MPS,) * 2, "wheel_speed", "applied left, right wheel speed / 0.20 m/s"),
         ("position", (half_x, half_y), "position", "2 x / X - 1, 2 y / Y - 1"),

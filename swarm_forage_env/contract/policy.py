@@ -9,9 +9,11 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from swarm_forage_env.contract.layout import ObservationLayout
+from swarm_forage_env.contract.layout import ObservationLayout, observation_layout
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, WHEEL_SCALE_MPS
 
 
 class ActionError(ValueError):
@@ -20,7 +22,7 @@ class ActionError(ValueError):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class SwarmSpec:
-    """What every policy knows before a run: constants of robot and world, no state."""
+    """What every policy knows before a run: constants of robot and world, no state. `of` takes them from a scenario."""
 
     n_robots: int
     n_objects: int
@@ -53,13 +55,48 @@ class SwarmSpec:
     """SITE and CREATE_CACHE drops are refused within this distance of a cache centre."""
     quirks: Quirks
 
+    @classmethod
+    def of(cls, scenario: ScenarioConfig, *, horizon_s: float | None = None) -> "SwarmSpec":
+        """Return the constants of a scenario; no environment is needed.
+
+        Args:
+            scenario: The configuration of the world.
+            horizon_s: Length of a run, s; default that of the scenario.
+        """
+        arena, robots = scenario.arena, scenario.robots
+        nest_left, nest_bottom, nest_right, nest_top = arena.nest_box_m
+        left, bottom, right, top = (edge / CELLS_PER_M for edge in arena.distributable_cells)
+        return cls(
+            n_robots=robots.n_robots,
+            n_objects=scenario.objects.n_objects,
+            dt_s=scenario.dt_s,
+            horizon_s=scenario.horizon_ticks * scenario.dt_s if horizon_s is None else horizon_s,
+            layout=observation_layout(arena.width_m, arena.height_m, scenario.objects.n_objects),
+            max_speed_mps=robots.max_speed_mps,
+            max_wheel_difference_mps=robots.max_wheel_difference_mps,
+            wheel_scale_mps=WHEEL_SCALE_MPS,
+            wheel_base_m=robots.wheel_base_m,
+            arena_size_m=(arena.width_m, arena.height_m),
+            cell_m=CELL_M,
+            nest_centre_m=((nest_left + nest_right) / 2, (nest_bottom + nest_top) / 2),
+            nest_size_m=(nest_right - nest_left, nest_top - nest_bottom),
+            distributable_box_m=(left, bottom, right, top),
+            placement=scenario.objects.placement,
+            caches=scenario.caches,
+            cache_side_m=scenario.cache_side_cells / CELLS_PER_M,
+            cache_side_nominal_m=scenario.cache_side_nominal_m,
+            min_dist_m=scenario.min_dist_m,
+            cache_proximity_m=scenario.cache_proximity_m,
+            quirks=scenario.quirks,
+        )
+
 
 @runtime_checkable
 class Policy(Protocol):
     """Controls every robot at once. An instance drives one run; its memory is created by `reset`.
 
     Optional attributes: `task`, an (N,) int8 array of `Task` codes; the class attributes `caches` ("none", "static",
-    "dynamic": the world the policy is made for) and `reads` (names of the slices it looks at; default all).
+    "dynamic": those that the policy is made for) and `reads` (names of the slices it looks at; default all).
     """
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:

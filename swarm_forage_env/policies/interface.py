@@ -6,15 +6,14 @@ so that a policy runs exactly as it was trained.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, whole
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.layout import ObservationLayout, ObservationSlice
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
@@ -33,7 +32,7 @@ ACTIONS = ("continuous", "discrete")
 
 MOTIONS = ("stand", "forward", "arc left", "arc right", "turn left", "turn right")
 """Discrete actions that move, in order."""
-GRIPS = ("grasp", "release", "deliver", "site", "found")
+GRIPS = ("grasp", "release", "deliver", "site", "create_cache")
 """Discrete actions of the gripper, in order after the motions; the wheels stand."""
 _WHEELS = ((0.0, 0.0), (0.5, 0.5), (0.4, 0.6), (0.6, 0.4), (-0.25, 0.25), (0.25, -0.25))
 """Wheel commands of the motions (our choice): full speed, arcs of 0.35 m radius, turns of 8 degrees per tick."""
@@ -72,20 +71,10 @@ class InterfaceConfig:
     """Ticks for which an action is kept; rewards add up. An automatic gripper looks in every tick."""
 
     def __post_init__(self) -> None:
-        for name, known in (("observation", OBSERVATIONS), ("actions", ACTIONS)):
-            value = getattr(self, name)
-            if value not in known:
-                raise ConfigError(
-                    f"Expected interface.{name} to be one of {', '.join(known)}, got {value!r}."
-                    + suggestion(str(value), known)
-                )
-        if not isinstance(self.automatic_gripper, bool):
-            raise ConfigError(
-                f"Expected interface.automatic_gripper to be True or False, got {self.automatic_gripper!r}."
-            )
-        ticks = self.decision_ticks
-        if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 1:
-            raise ConfigError(f"Expected interface.decision_ticks to be a whole number >= 1, got {ticks!r}.")
+        one_of("interface.observation", self.observation, OBSERVATIONS)
+        one_of("interface.actions", self.actions, ACTIONS)
+        switch("interface.automatic_gripper", self.automatic_gripper)
+        whole("interface.decision_ticks", self.decision_ticks, at_least=1)
 
     @property
     def reads(self) -> tuple[str, ...] | None:
@@ -104,15 +93,16 @@ class LearnerInterface:
     """
 
     def __init__(self, config: InterfaceConfig, spec: SwarmSpec) -> None:
-        """Bind the choices to a world.
+        """Bind the choices to a swarm.
 
         Args:
             config: The choices.
-            spec: The world; see `ForageEnv.swarm_spec`.
+            spec: The swarm: `SwarmSpec.of(scenario)`, or `swarm_spec` of an environment.
         """
         self.config = config
         self._is_compact = config.observation == "compact"
         self._is_discrete = config.actions == "discrete"
+        self._n_choices = N_MOTIONS if config.automatic_gripper else N_MOTIONS + N_GRIPS
         self._dynamic_caches = spec.caches == "dynamic"
         source = spec.layout
         start = {part.name: part.start for part in source}
@@ -142,10 +132,9 @@ class LearnerInterface:
 
     def new_action_space(self) -> spaces.Box | spaces.Discrete:
         """Return a space of its own, with a random state of its own, for one robot's action."""
-        automatic = self.config.automatic_gripper
         if self._is_discrete:
-            return spaces.Discrete(N_MOTIONS if automatic else N_MOTIONS + N_GRIPS)
-        return spaces.Box(-1.0, 1.0, (2 if automatic else 3,), np.float32)
+            return spaces.Discrete(self._n_choices)
+        return spaces.Box(-1.0, 1.0, (2 if self.config.automatic_gripper else 3,), np.float32)
 
     @property
     def active_column(self) -> int:
@@ -175,7 +164,7 @@ class LearnerInterface:
             obs: (N, D) observations of the environment that the learner's choice is carried out in.
 
         Raises:
-            ActionError: another shape, or a number that is no action.
+            ActionError: another shape, or a number outside of `action_space`.
         """
         commands = self._commands
         if actions.shape != self._actions_shape:
@@ -197,7 +186,7 @@ class LearnerInterface:
         return commands
 
     def _check_numbers(self, actions: np.ndarray) -> None:
-        most = int(self.action_space.n) - 1  # type: ignore[union-attr]
+        most = self._n_choices - 1
         expected = f"Expected actions as whole numbers from 0 to {most}, got"
         if actions.dtype.kind not in "iu":
             raise ActionError(f"{expected} {actions.dtype}.")
@@ -207,8 +196,8 @@ class LearnerInterface:
     def mask(self, obs: ObsArray) -> BoolArray:
         """Return which discrete actions make sense, (N, number of actions) bool; at least one per row.
 
-        Moving is no choice during an interaction, a gripper action none where it would be refused; robots that are
-        not at work may only stand.
+        Left out are motions during an interaction and gripper actions that would be refused; robots that are not at
+        work may only stand.
 
         Args:
             obs: (N, D) observations of the environment.
@@ -217,8 +206,8 @@ class LearnerInterface:
             ValueError: the actions are continuous.
         """
         if not self._is_discrete:
-            raise ValueError("Expected discrete actions, continuous ones have no mask; set actions='discrete'.")
-        mask = np.empty((len(obs), int(self.action_space.n)), np.bool_)  # type: ignore[union-attr]
+            raise ValueError("Expected discrete actions: continuous ones have no mask. Set actions='discrete'.")
+        mask = np.empty((len(obs), self._n_choices), np.bool_)
         mask_actions(obs, self._mask_starts, self._dynamic_caches, mask)
         return mask
 
@@ -256,18 +245,23 @@ GivenInterface: TypeAlias = InterfaceConfig | Mapping[str, Any] | None
 """What environments take as their argument `interface`; see `chosen_interface`."""
 
 
-def chosen_interface(given: GivenInterface) -> InterfaceConfig:
-    """Return the choices that were given: as they are, as fields by name, or None for the defaults.
+def chosen_interface(given: GivenInterface, default: InterfaceConfig | None = None) -> InterfaceConfig:
+    """Return the choices that were given: as they are, as fields by name, or None for the default.
+
+    Args:
+        given: What the user said.
+        default: Says what fields by name leave out; None = `InterfaceConfig()`.
 
     Raises:
-        ConfigError: none of these, an unknown field or value.
+        ConfigError: `given` is none of these, or has an unknown field or value.
     """
-    if given is None:
-        return InterfaceConfig()
     if isinstance(given, InterfaceConfig):
         return given
+    default = default or InterfaceConfig()
+    if given is None:
+        return default
     if isinstance(given, Mapping):
-        return interface_from_mapping(given)
+        return interface_from_mapping({**asdict(default), **given})
     raise ConfigError(
         f"Expected interface as an InterfaceConfig or its fields by name, such as {{'actions': 'discrete'}}, "
         f"got {given!r}."
@@ -280,8 +274,5 @@ def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
     Raises:
         ConfigError: an unknown key or value.
     """
-    known = InterfaceConfig.__dataclass_fields__
-    for key in mapping:
-        if key not in known:
-            raise ConfigError(f"Unknown interface option {key!r}.{suggestion(key, known)}")
+    known_keys(mapping, InterfaceConfig.__dataclass_fields__, "interface option")
     return InterfaceConfig(**mapping)

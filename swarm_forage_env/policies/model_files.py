@@ -1,14 +1,13 @@
 """Trained policies in files: models that stable-baselines3 saved (`*.zip`), networks of our own (`*.npz`).
 
-`policy.policy_class` finds what opens a file by its suffix, in every process, so that a path is a policy wherever a
-name is one.
+`registry.policy_class` finds what opens a file by its suffix, in every process, so that the path of a file may be given
+wherever the name of a policy may.
 """
 
 import hashlib
 import pickle
 from collections.abc import Mapping
 from functools import lru_cache
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +17,14 @@ from gymnasium import spaces
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import (
-    ACTIONS,
-    OBSERVATIONS,
+    GivenInterface,
     InterfaceConfig,
-    LearnerInterface,
+    chosen_interface,
     interface_from_mapping,
 )
+from swarm_forage_env.policies.learned import Choose, LearnedPolicy
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
@@ -43,106 +42,86 @@ MODEL_FAULTS = (
     EOFError,
     pickle.UnpicklingError,
 )
-"""What stable-baselines3 and torch raise over a file that is no model or has been damaged."""
+"""What stable-baselines3 and torch raise over a file that does not hold a model or has been damaged."""
 
 
 class ModelError(ValueError):
-    """A file that is no model, or a model that cannot steer this swarm."""
+    """A file that does not hold a model, or a model that cannot steer this swarm."""
 
 
-class ModelPolicy:
+class ModelPolicy(LearnedPolicy):
     """A model saved by stable-baselines3 (PPO, A2C, DQN, SAC, TD3, DDPG), acting without exploration.
 
-    A model of one robot is applied to every robot, whatever the swarm size. What it sees and does, of the choices in
-    `learning.interface`, is read from the note that our training leaves in the file (`sb3.export.note_interface`);
-    without one it is told from the spaces, and a decision lasts one tick. A model of the whole swarm, (N, D) to (N, 3),
-    works for its own N only. Nothing is normalised: a model trained behind `VecNormalize` sees other numbers than it
-    was trained on.
+    A model of one robot is applied to every robot, whatever the swarm size. What it sees and does is told by
+
+    * the note that our training leaves in the file (`training.sb3.export.note_interface`),
+    * the parameter `interface`, whose fields go before those of the note,
+    * its spaces, where both are missing and the spaces are those of the environment itself, (D,) to (3,).
+
+    A model of the whole swarm, (N, D) to (N, 3), needs no note either and works for its own N only. Nothing is
+    normalised: a model trained behind `VecNormalize` sees other numbers than it was trained on.
 
     Opening a model runs code that the file contains. Open only what you trust.
 
     Attributes:
-        reads: Observation slices that are looked at, None = all.
-        caches: World that the model was trained in; there only when the file tells.
+        caches: Kind of caches that the model was trained with; there only when the file tells.
     """
 
-    reads: tuple[str, ...] | None = None
-    caches: str
-
-    def __init__(self, path: str | Path, *, digest: str | None = None, decision_ticks: int | None = None) -> None:
+    def __init__(self, path: str | Path, *, digest: str | None = None, interface: GivenInterface = None) -> None:
         """Open the model.
 
         Args:
             path: The saved file.
             digest: What `file_digest` returned when the run was planned; a file that has changed since is refused.
-            decision_ticks: Ticks for which an action is kept; default as in training where the file tells, else 1.
+            interface: What the model sees and does: fields of `InterfaceConfig` by name, which are plain values for
+                `RunSpec.parameters`. Fields that are left out are those of the note in the file, else the default.
 
         Raises:
             ImportError: stable-baselines3 is not installed.
-            ModelError: the file is missing, has changed, or holds no such model.
-            ConfigError: decision_ticks below 1.
+            ModelError: the file is missing, has changed, or does not hold such a model.
+            ConfigError: an unknown field or value in `interface`.
         """
         self._path = Path(path)
         self._network, note = _open_model(str(path), _checked_digest(path, digest))
-        self._noted = None
-        if note is not None:
-            self._noted, self.caches = _read_note(note, self._path)
-            self.reads = self._noted.reads
-        if decision_ticks is None:
-            decision_ticks = self._noted.decision_ticks if self._noted else 1
-        self._decision_ticks = InterfaceConfig(decision_ticks=decision_ticks).decision_ticks
+        noted, caches = (None, None) if note is None else _read_note(note, self._path)
+        self._is_told = noted is not None or interface is not None
+        self._source = f"the note in {self._path.name}" if interface is None else "the parameter interface"
+        super().__init__(chosen_interface(interface, noted), deterministic_choice(self._network), caches=caches)
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
-        """Find out how the model sees and steers this swarm.
+        """Start a run.
 
         Raises:
-            ModelError: it sees or does something else.
+            ModelError: the spaces of the model are not those of its interface, or nothing tells its interface.
         """
-        self._interface = self._fitting_interface(spec)
-        self._ticks_left = 0
-
-    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
-        """Return the model's deterministic choice, (N, 3) float32."""
-        if self._ticks_left == 0:
-            seen = obs if self._interface is None else self._interface.observe(obs)
-            self._actions, _ = self._network.predict(seen, deterministic=True)
-            self._ticks_left = self._decision_ticks
-        self._ticks_left -= 1
-        if self._interface is None:
-            return np.asarray(self._actions, np.float32)
-        return self._interface.command(self._actions, obs)
-
-    def _fitting_interface(self, spec: SwarmSpec) -> LearnerInterface | None:
-        """Return the interface whose spaces are those of the model; None for a model of the whole swarm."""
-        n_robots, size = spec.n_robots, spec.layout.size
-        found = describe_spaces(self._network)
-        if self._noted is not None:
-            return self._noted_interface(self._noted, spec, found)
-        if found == (f"Box({n_robots}, {size})", f"Box({n_robots}, 3)"):
-            return None
-        seen: list[str] = []
-        for observation, actions, automatic in product(OBSERVATIONS, ACTIONS, (False, True)):
-            config = InterfaceConfig(observation=observation, actions=actions, automatic_gripper=automatic)
-            interface = LearnerInterface(config, spec)
-            fitting = describe_spaces(interface)
-            if found == fitting:
-                return interface
-            seen.append(" to ".join(fitting))
+        super().reset(spec, rng)
+        found, fitting = describe_spaces(self._network), describe_spaces(self.interface)
+        columns, n_robots = spec.layout.size, spec.n_robots
+        whole_swarm = (f"Box({n_robots}, {columns})", f"Box({n_robots}, 3)")
+        sees_what_the_environment_shows = fitting == (f"Box({columns})", "Box(3)")
+        if found == fitting or (found == whole_swarm and sees_what_the_environment_shows):
+            return
+        name, goes = self._path.name, " to ".join(found)
+        if self._is_told:
+            raise ModelError(
+                f"Expected a model from {' to '.join(fitting)}, as {self._source} says; {name} goes from {goes}."
+            )
         raise ModelError(
-            f"Expected a model of one robot, from observations to actions {', '.join(seen)}, or of these {n_robots} "
-            f"robots together, Box({n_robots}, {size}) to Box({n_robots}, 3); {self._path.name} goes from "
-            f"{' to '.join(found)}."
+            f"Expected {name} to tell what it sees and does, but it has no note, and its spaces, {goes}, are neither "
+            f"those of the environment, {' to '.join(fitting)}, nor those of these {n_robots} robots together, "
+            f"{' to '.join(whole_swarm)}. Give the interface that it was trained with: "
+            'load_policy(path, {"interface": {"observation": "compact"}}), or such parameters in a RunSpec; or call '
+            "training.sb3.export.note_interface(model, interface) before the model is saved."
         )
 
-    def _noted_interface(self, noted: InterfaceConfig, spec: SwarmSpec, found: tuple[str, ...]) -> LearnerInterface:
-        interface = LearnerInterface(noted, spec)
-        fitting = describe_spaces(interface)
-        if found != fitting:
-            raise ModelError(
-                f"Expected a model from {' to '.join(fitting)}, as the note in {self._path.name} says, got one from "
-                f"{' to '.join(found)}."
-            )
-        return interface
+
+def deterministic_choice(model: Any) -> Choose:
+    """Return how a model of stable-baselines3, or its policy network, chooses without exploration."""
+
+    def choose(rows: ObsArray, rng: np.random.Generator) -> np.ndarray:  # noqa: ARG001 - nothing is drawn
+        return model.predict(rows, deterministic=True)[0]
+
+    return choose
 
 
 def _read_note(note: Any, path: Path) -> tuple[InterfaceConfig, str]:
@@ -165,7 +144,7 @@ def _read_note(note: Any, path: Path) -> tuple[InterfaceConfig, str]:
 
 
 def open_network(path: str | Path, *, digest: str | None = None) -> NetworkPolicy:
-    """Return the policy of a network file; see `learning.network`.
+    """Return the policy of a network file; see `policies.network`.
 
     Args:
         path: The file.
@@ -173,7 +152,7 @@ def open_network(path: str | Path, *, digest: str | None = None) -> NetworkPolic
 
     Raises:
         ModelError: the file is missing or has changed.
-        NetworkError: it holds no network.
+        NetworkError: it does not hold a network.
     """
     _checked_digest(path, digest)
     return NetworkPolicy(Network.load(path))
@@ -219,8 +198,8 @@ def _open_model(path: str, digest: str) -> tuple[Any, Any]:  # noqa: ARG001 - wi
     The network alone, not the algorithm around it, which for off-policy methods would allocate its replay buffer.
     """
     try:
-        from stable_baselines3.common.policies import ActorCriticPolicy  # pyright: ignore[reportMissingImports]
-        from stable_baselines3.common.save_util import load_from_zip_file  # pyright: ignore[reportMissingImports]
+        from stable_baselines3.common.policies import ActorCriticPolicy  # pyright: ignore[reportMissingImports] - an extra
+        from stable_baselines3.common.save_util import load_from_zip_file  # pyright: ignore[reportMissingImports] - an extra
     except ImportError as error:
         raise ImportError(f"The model {path} needs stable-baselines3: {install_command('train')}.") from error
 

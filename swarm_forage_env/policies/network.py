@@ -10,34 +10,32 @@ import itertools
 import json
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, table
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
-from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
+from swarm_forage_env.contract.types import ObsArray
+from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
+from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 ACTIVATIONS = ("tanh", "relu")
 _ARCHIVE = b"PK\x03\x04"
-"""How a zip file begins, and so an `.npz`."""
+"""First bytes of a zip file, which an `.npz` is."""
 _BROKEN = (ValueError, LookupError, TypeError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error)
-"""What numpy and zipfile raise over an archive that is none or has been damaged."""
-
-
+"""What numpy and zipfile raise over a file that is not an archive or has been damaged."""
 _LAYER_PARTS = ("weight", "bias")
 
 
 class NetworkError(ValueError):
-    """A file that holds no network, or a network that does not fit its interface."""
+    """A file that does not hold a network, or a network that does not fit its interface."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -51,18 +49,18 @@ class NetworkAbout:
     """Whether discrete actions are drawn by their probabilities; else the likeliest is taken. Continuous actions are
     always the mean."""
     caches: str = "none"
-    """World that the policy was trained in; what runs build when not told otherwise."""
+    """Kind of caches that the policy was trained with, which runs have when not told otherwise."""
     card: dict[str, Any] = field(default_factory=dict)
     """How the network came about, for people."""
 
     def __post_init__(self) -> None:
-        if self.activation not in ACTIVATIONS:
-            raise NetworkError(f"Expected an activation of {', '.join(ACTIVATIONS)}, got {self.activation!r}.")
-        if self.caches not in CACHE_KINDS:
-            raise NetworkError(f"Expected caches to be one of {', '.join(CACHE_KINDS)}, got {self.caches!r}.")
-        for name, kind, wanted in (("samples", bool, "true or false"), ("card", dict, "a table")):
-            if not isinstance(getattr(self, name), kind):  # files hold anything
-                raise NetworkError(f"Expected {name} to be {wanted}, got {getattr(self, name)!r}.")
+        try:
+            one_of("activation", self.activation, ACTIVATIONS)
+            one_of("caches", self.caches, CACHE_KINDS)
+            switch("samples", self.samples)
+            table("card", self.card)
+        except ConfigError as error:
+            raise NetworkError(str(error)) from error
 
     def to_json(self) -> str:
         """Return the text that files hold."""
@@ -73,7 +71,7 @@ class NetworkAbout:
         """Read the text back.
 
         Raises:
-            NetworkError: no JSON object, unknown or missing keys, or values that make no sense.
+            NetworkError: not a JSON object, unknown or missing keys, or values that make no sense.
         """
         try:
             mapping = json.loads(text)
@@ -81,11 +79,8 @@ class NetworkAbout:
             raise NetworkError(f"Expected a description of a network as JSON, got {text[:80]!r}.") from error
         if not isinstance(mapping, dict) or not isinstance(mapping.get("interface"), dict):
             raise NetworkError(f"Expected a description of a network with its interface, got {text[:80]!r}.")
-        known = cls.__dataclass_fields__
-        for key in mapping:
-            if key not in known:
-                raise NetworkError(f"Unknown key {key!r} about a network.{suggestion(key, known)}")
         try:
+            known_keys(mapping, cls.__dataclass_fields__, "key about a network")
             return cls(**{**mapping, "interface": interface_from_mapping(mapping["interface"])})
         except ConfigError as error:
             raise NetworkError(f"Expected a description of a network that can be used: {error}") from error
@@ -93,7 +88,7 @@ class NetworkAbout:
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """Layers of a perceptron with one hidden activation, and what it is about."""
+    """Layers of a perceptron with one hidden activation, and what the weights alone do not say."""
 
     weights: tuple[np.ndarray, ...]
     """(in, out) float32 per layer."""
@@ -145,7 +140,7 @@ class Network:
             n_outputs: How many outputs are actions; default all. Some libraries let the deviations follow the means.
 
         Raises:
-            NetworkError: these are no layers that follow on each other.
+            NetworkError: the layers do not follow on each other.
         """
         parts = {end: [_array(tensor) for name, tensor in state.items() if name.endswith(end)] for end in _LAYER_PARTS}
         weights, biases = ([array.T for array in parts["weight"]], parts["bias"])
@@ -158,7 +153,8 @@ class Network:
         layers = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
         layers |= {f"bias_{k}": bias for k, bias in enumerate(self.biases)}
         with replacing(Path(path)) as draft, draft.open("wb") as file:
-            np.savez_compressed(file, about=np.array(self.about.to_json()), **layers)  # type: ignore[arg-type]
+            about = np.array(self.about.to_json())
+            np.savez_compressed(file, about=about, **layers)  # type: ignore[arg-type] - no name of a layer is "allow_pickle"
 
     @classmethod
     def load(cls, path: str | Path) -> "Network":
@@ -166,7 +162,7 @@ class Network:
 
         Raises:
             OSError: the file cannot be read.
-            NetworkError: it holds no network.
+            NetworkError: it does not hold a network.
         """
         content = Path(path).read_bytes()
         try:
@@ -180,11 +176,11 @@ class Network:
 
 
 def _parts(content: bytes) -> Mapping[str, np.ndarray]:
-    """Return what an archive holds by name, unread. Like `_part` it tells in our words what numpy has others for."""
+    """Return the parts of an archive by name, not read yet. `_part` reads one; both turn errors into a NetworkError."""
     if not content:
         raise NetworkError("The file is empty.")
     if not content.startswith(_ARCHIVE):
-        raise NetworkError("The file is no .npz archive.")
+        raise NetworkError("The file is not an .npz archive.")
     try:
         return np.load(io.BytesIO(content), allow_pickle=False)
     except _BROKEN as error:
@@ -193,11 +189,11 @@ def _parts(content: bytes) -> Mapping[str, np.ndarray]:
 
 def _part(stored: Mapping[str, np.ndarray], name: str) -> np.ndarray:
     if name not in stored:
-        raise NetworkError(f"The archive has no part {name!r}; it is damaged, or one of something else.")
+        raise NetworkError(f"The archive has no part {name!r}; it is damaged, or holds something else.")
     try:
         return stored[name]
     except _BROKEN as error:
-        raise NetworkError(f"Its part {name!r} is damaged, or no plain array of numbers or text.") from error
+        raise NetworkError(f"Its part {name!r} is damaged, or not a plain array of numbers or text.") from error
 
 
 def _array(tensor: Any) -> np.ndarray:
@@ -205,52 +201,11 @@ def _array(tensor: Any) -> np.ndarray:
     return np.asarray(on_host, np.float32)
 
 
-Choose: TypeAlias = Callable[[ObsArray, np.random.Generator], np.ndarray]
-"""From what a learner sees, (N, d), to its actions, one row per robot."""
-
-
-class LearnedPolicy:
-    """A trained controller, the same for every robot, in policy clothes. An instance drives one run.
-
-    Attributes:
-        reads: Observation slices that are looked at.
-        caches: World that the policy was trained in.
-    """
-
-    def __init__(self, interface: InterfaceConfig, choose: Choose, *, caches: str = "none") -> None:
-        """Take the controller.
-
-        Args:
-            interface: What it saw and did in training.
-            choose: The controller.
-            caches: World that it was trained in.
-        """
-        self.reads = interface.reads
-        self.caches = caches
-        self._config = interface
-        self._choose = choose
-
-    def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
-        """Start a run."""
-        self._rng = rng
-        self._interface = LearnerInterface(self._config, spec)
-        self._view = np.empty((spec.n_robots, self._interface.layout.size), np.float32)
-        self._ticks_left = 0
-
-    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
-        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
-        if self._ticks_left == 0:
-            self._chosen = self._choose(self._interface.observe(obs, self._view), self._rng)
-            self._ticks_left = self._config.decision_ticks
-        self._ticks_left -= 1
-        return self._interface.command(self._chosen, obs)
-
-
 class NetworkPolicy(LearnedPolicy):
     """A network file as a policy."""
 
     def __init__(self, network: Network) -> None:
-        """Take the network; whether it fits its interface shows in a world, see `reset`."""
+        """Take the network; `reset` checks that it fits its interface."""
         about = network.about
         super().__init__(about.interface, network.choose, caches=about.caches)
         self._network = network
@@ -259,15 +214,15 @@ class NetworkPolicy(LearnedPolicy):
         """Start a run.
 
         Raises:
-            NetworkError: the network sees or does something else than its interface in this world.
+            NetworkError: the network has another number of columns or actions than its interface.
         """
         super().reset(spec, rng)
-        space = self._interface.action_space
+        space = self.interface.action_space
         n_actions = int(space.n) if isinstance(space, spaces.Discrete) else space.shape[0]
-        wanted = (self._interface.layout.size, n_actions)
+        wanted = (self.interface.layout.size, n_actions)
         found = (self._network.weights[0].shape[0], self._network.weights[-1].shape[1])
         if wanted != found:
             raise NetworkError(
-                f"Expected a network from {wanted[0]} columns to {wanted[1]} actions in this world, got one from "
-                f"{found[0]} to {found[1]}."
+                f"Expected a network from {wanted[0]} columns to {wanted[1]} actions, as its interface says, got one "
+                f"from {found[0]} to {found[1]}."
             )

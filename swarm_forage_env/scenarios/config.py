@@ -1,6 +1,6 @@
 """Frozen configurations that are complete and refuse nonsense at construction.
 
-A warehouse and a disaster zone are two configurations, never two environments. Presets live in `scenarios`.
+A warehouse and a disaster zone are two configurations, never two environments. Presets live in `presets`.
 """
 
 import dataclasses
@@ -10,12 +10,16 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, TypeVar, cast
 
+from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, capacity, distributable_box
-from swarm_forage_env.scenarios.units import CELL_M, WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, WHEEL_SCALE_MPS
 
+WALL_M = 0.2
+"""How far the walls in the west, south and north reach into the arena: half of their 0.4 m."""
+EAST_WALL_M = 0.4
+"""How far the wall in the east reaches into the arena: all of it."""
 CACHE_KINDS = ("none", "static", "dynamic")
 PERFORMANCE_MEASURES = ("collected", "first_picked")
 MAX_DISC_SHARE = 0.4
@@ -27,55 +31,6 @@ MAX_CELLS = 200_000_000
 def _require(condition: bool, message: str) -> None:
     if not condition:
         raise ConfigError(message)
-
-
-def _require_finite(section: str, **values: Any) -> None:
-    for name, value in values.items():
-        is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-        _require(is_number and math.isfinite(value), f"Expected {section}.{name} to be a finite number, got {value!r}.")
-
-
-def _require_positive(section: str, **values: Any) -> None:
-    _require_finite(section, **values)
-    for name, value in values.items():
-        _require(value > 0, f"Expected {section}.{name} > 0, got {value!r}.")
-
-
-def _require_whole(section: str, minimum: int, **values: Any) -> None:
-    for name, value in values.items():
-        is_whole = isinstance(value, int) and not isinstance(value, bool)
-        hint = "; convert it with int()" if hasattr(value, "__index__") and not isinstance(value, bool) else ""
-        _require(is_whole, f"Expected {section}.{name} to be a whole number, got {value!r}{hint}.")
-        _require(value >= minimum, f"Expected {section}.{name} >= {minimum}, got {value}.")
-
-
-def _require_switch(section: str, **values: Any) -> None:
-    for name, value in values.items():
-        _require(isinstance(value, bool), f"Expected {section}.{name} to be True or False, got {value!r}.")
-
-
-def _require_pair(section: str, **values: Any) -> None:
-    for name, value in values.items():
-        is_pair = isinstance(value, tuple) and len(cast("tuple[Any, ...]", value)) == 2
-        _require(is_pair, f"Expected {section}.{name} to be (x, y), got {value!r}.")
-        _require_positive(section, **{f"{name}[0]": value[0], f"{name}[1]": value[1]})
-
-
-def _require_text(section: str, **values: Any) -> None:
-    for name, value in values.items():
-        _require(
-            isinstance(value, str) and bool(value), f"Expected {section}.{name} to be a non-empty text, got {value!r}."
-        )
-
-
-def _require_shares(section: str, **values: Any) -> None:
-    for name, value in values.items():
-        shares = cast("tuple[Any, ...]", value) if isinstance(value, tuple) else ()
-        are_positive = all(isinstance(share, (int, float)) and share > 0 for share in shares)
-        _require(
-            are_positive and abs(sum(shares) - 1.0) < 1e-9,
-            f"Expected {section}.{name} to be positive shares of a tick that sum to 1, got {value!r}.",
-        )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -91,8 +46,8 @@ class ArenaConfig:
     """The nest is snapped to whole cells."""
 
     def __post_init__(self) -> None:
-        _require_positive("arena", width_m=self.width_m, height_m=self.height_m)
         for name, extent in (("width_m", self.width_m), ("height_m", self.height_m)):
+            fields.number(f"arena.{name}", extent, above=0.0)
             cells = extent / CELL_M
             _require(
                 abs(cells - round(cells)) < 1e-6 and cells >= 10,
@@ -102,7 +57,8 @@ class ArenaConfig:
             math.prod(self.n_cells) <= MAX_CELLS,
             f"Expected an arena of at most {MAX_CELLS:,} cells of {CELL_M} m, got {self.width_m} x {self.height_m} m.",
         )
-        _require_pair("arena", nest_centre_m=self.nest_centre_m, nest_size_m=self.nest_size_m)
+        fields.pair("arena.nest_centre_m", self.nest_centre_m)
+        fields.pair("arena.nest_size_m", self.nest_size_m)
         x_low, y_low, x_high, y_high = self.nest_cells
         nx, ny = self.n_cells
         _require(
@@ -131,7 +87,7 @@ class ArenaConfig:
     def nest_box_m(self) -> tuple[float, float, float, float]:
         """Closed nest rectangle: x low, y low, x high, y high."""
         x_low, y_low, x_high, y_high = self.nest_cells
-        return (x_low / 5, y_low / 5, x_high / 5, y_high / 5)
+        return (x_low / CELLS_PER_M, y_low / CELLS_PER_M, x_high / CELLS_PER_M, y_high / CELLS_PER_M)
 
     @property
     def distributable_cells(self) -> Box:
@@ -140,8 +96,8 @@ class ArenaConfig:
 
     @property
     def interior_m(self) -> tuple[float, float, float, float]:
-        """Free interior between the 0.4 m walls: x low, y low, x high, y high. The east wall stands inwards."""
-        return (0.2, 0.2, self.width_m - 0.4, self.height_m - 0.2)
+        """Free interior between the walls: x low, y low, x high, y high."""
+        return (WALL_M, WALL_M, self.width_m - EAST_WALL_M, self.height_m - WALL_M)
 
     @property
     def lights_m(self) -> tuple[tuple[float, float, float], ...]:
@@ -177,19 +133,13 @@ class RobotConfig:
     """Robots start at uniform positions at least this far from the arena border."""
 
     def __post_init__(self) -> None:
-        _require_whole("robots", 1, n_robots=self.n_robots)
-        _require_positive(
-            "robots",
-            radius_m=self.radius_m,
-            wheel_base_m=self.wheel_base_m,
-            max_speed_mps=self.max_speed_mps,
-            max_wheel_difference_mps=self.max_wheel_difference_mps,
-            start_margin_m=self.start_margin_m,
-        )
+        fields.whole("robots.n_robots", self.n_robots, at_least=1)
+        for name in ("radius_m", "wheel_base_m", "max_speed_mps", "max_wheel_difference_mps", "start_margin_m"):
+            fields.number(f"robots.{name}", getattr(self, name), above=0.0)
+        least = EAST_WALL_M + self.radius_m
         _require(
-            self.start_margin_m >= 0.4 + self.radius_m,
-            f"Expected robots.start_margin_m >= {0.4 + self.radius_m:.3f} (wall plus radius), got "
-            f"{self.start_margin_m}.",
+            self.start_margin_m >= least,
+            f"Expected robots.start_margin_m >= {least:.3f} (wall plus radius), got {self.start_margin_m}.",
         )
 
 
@@ -204,17 +154,9 @@ class ObjectConfig:
     """Probability p_rw that a free object takes a one-cell step, per object and tick."""
 
     def __post_init__(self) -> None:
-        _require_whole("objects", 1, n_objects=self.n_objects)
-        _require(
-            self.placement in PLACEMENTS,
-            f"Expected objects.placement to be one of {', '.join(PLACEMENTS)}, got {self.placement!r}."
-            + suggestion(str(self.placement), PLACEMENTS),
-        )
-        _require_finite("objects", walk_probability=self.walk_probability)
-        _require(
-            0.0 <= self.walk_probability <= 1.0,
-            f"Expected objects.walk_probability in [0, 1], got {self.walk_probability}.",
-        )
+        fields.whole("objects.n_objects", self.n_objects, at_least=1)
+        fields.one_of("objects.placement", self.placement, PLACEMENTS)
+        fields.number("objects.walk_probability", self.walk_probability, at_least=0.0, at_most=1.0)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -224,23 +166,22 @@ class CacheConfig:
     side_share: float = 0.2
     """Nominal side as a share of max(X, Y)."""
     distance_share: float = 0.2
-    """min_dist as a share of min(X, Y): objects this close to a founding drop join a dynamic cache."""
+    """min_dist as a share of min(X, Y): objects this close to a CREATE_CACHE drop join a dynamic cache."""
     static_size: int = 2
     """Objects that a static cache is created with."""
     respawn_scale: float = 0.05
     """Scale s of the restoration probability of static caches."""
 
     def __post_init__(self) -> None:
-        _require_positive("cache", side_share=self.side_share, distance_share=self.distance_share)
-        _require(self.side_share <= 0.5, f"Expected cache.side_share <= 0.5, got {self.side_share}.")
-        _require_whole("cache", 2, static_size=self.static_size)
-        _require_finite("cache", respawn_scale=self.respawn_scale)
-        _require(self.respawn_scale >= 0, f"Expected cache.respawn_scale >= 0, got {self.respawn_scale}.")
+        fields.number("cache.side_share", self.side_share, above=0.0, at_most=0.5)
+        fields.number("cache.distance_share", self.distance_share, above=0.0)
+        fields.whole("cache.static_size", self.static_size, at_least=2)
+        fields.number("cache.respawn_scale", self.respawn_scale, at_least=0.0)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RewardConfig:
-    """Weights of the reward terms in `rewards`; only learners use them. Zero switches a term off."""
+    """Weights of the reward terms in `world.rewards`; only learners use them. Zero switches a term off."""
 
     delivery: float = 1.0
     """Per object delivered to the nest."""
@@ -256,15 +197,9 @@ class RewardConfig:
     """Every active robot receives the mean over active robots instead of its own reward."""
 
     def __post_init__(self) -> None:
-        _require_finite(
-            "reward",
-            delivery=self.delivery,
-            first_pickup=self.first_pickup,
-            nest_progress=self.nest_progress,
-            interference=self.interference,
-            tick=self.tick,
-        )
-        _require_switch("reward", team=self.team)
+        for name in ("delivery", "first_pickup", "nest_progress", "interference", "tick"):
+            fields.number(f"reward.{name}", getattr(self, name))
+        fields.switch("reward.team", self.team)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -295,22 +230,16 @@ class ScenarioConfig:
     quirks: Quirks = field(default_factory=Quirks)
 
     def __post_init__(self) -> None:
-        _require_text("scenario", name=self.name)
+        fields.text("scenario.name", self.name)
         for section, section_class in SECTIONS.items():
-            value = getattr(self, section)
-            _require(
-                isinstance(value, section_class),
-                f"Expected {section} to be a {section_class.__name__}, got {value!r}.",
-            )
-        _require_switch("quirks", **dataclasses.asdict(self.quirks))
-        for name, known in (("caches", CACHE_KINDS), ("performance", PERFORMANCE_MEASURES)):
-            value = getattr(self, name)
-            _require(
-                value in known,
-                f"Expected {name} to be one of {', '.join(known)}, got {value!r}." + suggestion(str(value), known),
-            )
-        _require_positive("scenario", dt_s=self.dt_s, horizon_s=self.horizon_s, interval_s=self.interval_s)
-        _require_shares("scenario", physics_substeps=self.physics_substeps)
+            fields.instance(section, getattr(self, section), section_class)
+        for name, value in dataclasses.asdict(self.quirks).items():
+            fields.switch(f"quirks.{name}", value)
+        fields.one_of("caches", self.caches, CACHE_KINDS)
+        fields.one_of("performance", self.performance, PERFORMANCE_MEASURES)
+        for name in ("dt_s", "horizon_s", "interval_s"):
+            fields.number(f"scenario.{name}", getattr(self, name), above=0.0)
+        fields.shares("scenario.physics_substeps", self.physics_substeps)
         for name in ("horizon_s", "interval_s"):
             ticks = getattr(self, name) / self.dt_s
             _require(
@@ -381,7 +310,7 @@ class ScenarioConfig:
 
     @property
     def min_dist_m(self) -> float:
-        """Objects within this distance of a founding drop join a dynamic cache."""
+        """Objects within this distance of a CREATE_CACHE drop join a dynamic cache."""
         return self.cache.distance_share * min(self.arena.width_m, self.arena.height_m)
 
     @property
@@ -445,18 +374,14 @@ def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
         ConfigError: unknown name (with the nearest known one) or a combination that describes no world.
     """
     table = field_sections()
+    fields.known_keys(overrides, (*table, *SECTIONS), "scenario field")
     per_section: dict[str, dict[str, Any]] = {}
     top: dict[str, Any] = {}
     for name, value in overrides.items():
         if name in SECTIONS:
-            _require(
-                isinstance(value, SECTIONS[name]),
-                f"Expected {name} to be a {SECTIONS[name].__name__}, got {value!r}; single fields of it are given by "
-                f"their own names: {', '.join(item.name for item in dataclasses.fields(SECTIONS[name]))}.",
-            )
+            own = ", ".join(item.name for item in dataclasses.fields(SECTIONS[name]))
+            fields.instance(name, value, SECTIONS[name], hint=f"; single fields of it are given by their names: {own}")
             top[name] = value
-        elif name not in table:
-            raise ConfigError(f"Unknown scenario field {name!r}.{suggestion(name, table)}")
         elif table[name]:
             per_section.setdefault(table[name], {})[name] = value
         else:
@@ -494,14 +419,12 @@ def from_mapping(config_class: type[_C], mapping: Mapping[str, Any], *, where: s
     Raises:
         ConfigError: no mapping, or an unknown key, with the nearest valid one.
     """
-    if not isinstance(cast("Any", mapping), Mapping):
-        name = where.rstrip(".") or config_class.__name__
-        raise ConfigError(f"Expected {name} as a table of fields, got {mapping!r}.")
-    fields = {item.name: item for item in dataclasses.fields(config_class)}  # type: ignore[arg-type]
+    own = dataclasses.fields(config_class)  # pyright: ignore[reportArgumentType] - no public type means any dataclass
+    items = {item.name: item for item in own}
+    fields.table(where.rstrip(".") or config_class.__name__, mapping)
+    fields.known_keys(mapping, items, prefix=where)
     values: dict[str, Any] = {}
     for key, value in mapping.items():
-        if key not in fields:
-            raise ConfigError(f"Unknown key {where + key!r}.{suggestion(key, fields)}")
         nested = SECTIONS.get(key)
         if nested is not None and isinstance(value, Mapping):
             values[key] = from_mapping(nested, cast("Mapping[str, Any]", value), where=f"{where}{key}.")
@@ -511,7 +434,7 @@ def from_mapping(config_class: type[_C], mapping: Mapping[str, Any], *, where: s
             values[key] = value
     missing = [
         name
-        for name, item in fields.items()
+        for name, item in items.items()
         if name not in values and item.default is dataclasses.MISSING and item.default_factory is dataclasses.MISSING
     ]
     if missing:

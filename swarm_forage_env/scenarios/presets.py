@@ -8,8 +8,7 @@ Section numbers refer to the paper, "Improved Swarm Engineering: Aligning Intuit
 from collections.abc import Mapping
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError, known_name
 from swarm_forage_env.scenarios.config import (
     ArenaConfig,
     ObjectConfig,
@@ -124,7 +123,7 @@ def scenario(name: str, /, **overrides: Any) -> ScenarioConfig:
 
     Args:
         name: One of `SCENARIO_NAMES`.
-        overrides: Field names of ScenarioConfig or of its sections, see `config.with_overrides`.
+        overrides: Field names of ScenarioConfig or of its sections, see `with_overrides`.
 
     Raises:
         ConfigError: unknown name or field (with the nearest known one), or values that describe no world.
@@ -134,10 +133,7 @@ def scenario(name: str, /, **overrides: Any) -> ScenarioConfig:
         "warehouse_medium": warehouse_medium,
         "search_and_rescue": search_and_rescue,
     }
-    if name not in builders:
-        raise ConfigError(
-            f"Unknown scenario {name!r}.{suggestion(str(name), builders)} Known: {', '.join(SCENARIO_NAMES)}."
-        )
+    known_name("scenario", name, builders)
     if "side_m" in overrides and name != "search_and_rescue":
         raise ConfigError(
             f"Expected side_m with search_and_rescue only, got it with {name}; "

@@ -41,6 +41,13 @@ def source_boxes(placement: str, nx: int, ny: int) -> tuple[Box, ...]:
     return boxes[placement]
 
 
+def square_box(centre_cell: tuple[int, int], side_cells: int) -> Box:
+    """Cells of a square of an odd number of cells around its centre, such as a cache."""
+    x, y = centre_cell
+    half = side_cells // 2
+    return (x - half, y - half, x + half + 1, y + half + 1)
+
+
 def overlap_cells(a: Box, b: Box) -> int:
     """Number of cells that two boxes share."""
     return max(0, min(a[2], b[2]) - max(a[0], b[0])) * max(0, min(a[3], b[3]) - max(a[1], b[1]))

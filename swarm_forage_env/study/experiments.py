@@ -14,8 +14,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError, known_name, whole
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, robots_at_density, search_and_rescue
 from swarm_forage_env.scenarios.presets import scenario as preset_scenario
@@ -61,10 +60,9 @@ class Budget:
     """Levels of each kind of adversity, evenly spread up to the study's strongest; None = all of the study."""
 
     def __post_init__(self) -> None:
-        for name, least in (("n_seeds", 1), ("n_sizes", 2), ("n_levels", 1)):
-            value = getattr(self, name)
-            if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
-                raise ConfigError(f"Expected {name} of a budget to be a whole number >= {least}, got {value!r}.")
+        whole("n_seeds of a budget", self.n_seeds, at_least=1)
+        whole("n_sizes of a budget", self.n_sizes, at_least=2, or_none=True)
+        whole("n_levels of a budget", self.n_levels, at_least=1, or_none=True)
 
 
 BUDGETS: dict[str, Budget] = {
@@ -78,8 +76,7 @@ sizes, levels, length and number of runs of the study. Times for the warehouses 
 
 def budget(name: str) -> Budget:
     """Return a budget by name; raises ConfigError on an unknown one."""
-    if name not in BUDGETS:
-        raise ConfigError(f"Unknown budget {name!r}.{suggestion(name, BUDGETS)} Known: {', '.join(BUDGETS)}.")
+    known_name("budget", name, BUDGETS)
     return BUDGETS[name]
 
 
@@ -112,8 +109,7 @@ def plan_experiments(base: ScenarioConfig, criteria: Collection[str], budget: Bu
             room for.
     """
     for name in criteria:
-        if name not in CRITERIA:
-            raise ConfigError(f"Unknown criterion {name!r}.{suggestion(name, CRITERIA)} Known: {', '.join(CRITERIA)}.")
+        known_name("criterion", name, CRITERIA)
     scenario = replace(base, horizon_s=budget.horizon_s, interval_s=budget.interval_s)
     experiments: list[Experiment] = []
     if "population_size" in criteria:

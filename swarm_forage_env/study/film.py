@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import is_policy_file, load_policy
 from swarm_forage_env.rendering.frame import Trails, render_frame
@@ -68,8 +68,7 @@ def record_run(
         ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the world.
     """
     ticks = _picture_ticks(scenario, seconds, speedup, fps)
-    if not (math.isfinite(trail_s) and trail_s >= 0):
-        raise RenderError(f"Expected trail_s >= 0 seconds, got {trail_s!r}.")
+    _check_number("trail_s", trail_s, at_least=0.0)
     path = check_film(path, fps, len(ticks))
     arena_view(scenario, size_px)  # refuses a bad size before the run starts
     stating: object = policy
@@ -102,11 +101,17 @@ def record_run(
     return write_film(frames(), path, fps=fps, n_frames=len(ticks))
 
 
+def _check_number(where: str, value: float, **limits: float) -> None:
+    try:
+        number(where, value, **limits)
+    except ConfigError as error:
+        raise RenderError(str(error)) from error
+
+
 def _picture_ticks(scenario: ScenarioConfig, seconds: float, speedup: float, fps: float) -> list[int]:
     """Return the ticks to draw, 0 first, evenly spaced up to rounding."""
     for label, value in (("seconds", seconds), ("speedup", speedup), ("fps", fps)):
-        if not (math.isfinite(value) and value > 0):
-            raise RenderError(f"Expected {label} to be a finite number > 0, got {value!r}.")
+        _check_number(label, value, above=0.0)
     if seconds > scenario.horizon_s:
         raise RenderError(
             f"Expected seconds <= {scenario.horizon_s:g}, the scenario's horizon_s, got {seconds:g}; "

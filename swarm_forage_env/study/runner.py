@@ -25,6 +25,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, TypeAlias
 
+from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env.study.progress import RunProgress
 from swarm_forage_env.study.record import RunRecord, software_versions
 from swarm_forage_env.study.run import run_one, warm_up
@@ -138,8 +139,8 @@ def run_each(
         WorkerError: no worker process could be started.
     """
     todo = deque(specs)
-    if jobs is not None and jobs < 1:
-        raise ValueError(f"Expected jobs >= 1, got {jobs}.")
+    if jobs is not None:
+        jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
     if executor is not None:
         outcomes = _run_elsewhere(executor, todo)
     elif jobs == 1 or len(todo) == 1:

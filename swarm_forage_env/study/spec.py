@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, whole
 from swarm_forage_env.policies.registry import is_policy_file, load_policy, policy_class
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping, whole_intervals
 from swarm_forage_env.wrappers.registry import wrapper_config_class
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 RUN_ID_DIGITS = 16
 """Hexadecimal digits of a run_id: 64 bits, so that a million runs collide with probability 3e-8."""
-_MAX_SEED = 2**63
+_MAX_SEED = 2**63 - 1
 _KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion_value", "seed")
 
 
@@ -44,10 +43,8 @@ class RunSpec:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < _MAX_SEED:
-            raise ConfigError(f"Expected seed to be a whole number in [0, 2^63), got {self.seed!r}.")
-        if not isinstance(self.scenario, ScenarioConfig):
-            raise ConfigError(f"Expected scenario to be a ScenarioConfig, got {self.scenario!r}.")
+        whole("seed", self.seed, at_least=0, at_most=_MAX_SEED)
+        instance("scenario", self.scenario, ScenarioConfig)
         whole_intervals(self.scenario)
         try:
             plain = json.loads(json.dumps(dict(self.parameters), allow_nan=False))
@@ -93,9 +90,7 @@ class RunSpec:
         Raises:
             ConfigError: unknown or missing keys, or values that describe no run.
         """
-        for key in mapping:
-            if key not in _KEYS:
-                raise ConfigError(f"Unknown key {key!r} in a run specification.{suggestion(key, _KEYS)}")
+        known_keys(mapping, _KEYS, "key of a run specification")
         missing = [key for key in ("scenario", "policy") if key not in mapping]
         if missing:
             raise ConfigError(f"Missing key {missing[0]!r} in a run specification.")

@@ -1,17 +1,15 @@
-"""TrainingPlan: a training run as frozen data, read from TOML and written beside its results; and what it reports."""
+"""TrainingPlan: a training run as frozen data, read from TOML and written beside its results."""
 
 import dataclasses
 import json
-import math
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, table, whole
 from swarm_forage_env._internal.files import replacing
-from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
 from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.scenarios.config import ScenarioConfig, scenario_of_same_size, with_overrides
@@ -26,41 +24,28 @@ ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
 DEFAULT_STEPS = 5_000_000
 DEFAULT_HIDDEN = (64, 64)
 _COUNTS = ("n_steps", "batch_size", "n_epochs", "buffer_size")
-_RANGES: dict[str, tuple[str, Callable[[float], bool]]] = {
-    "gamma": ("a number in (0, 1]", lambda value: 0.0 < value <= 1.0),
-    "gae_lambda": ("a number in [0, 1]", lambda value: 0.0 <= value <= 1.0),
-    "tau": ("a number in (0, 1]", lambda value: 0.0 < value <= 1.0),
-    "learning_rate": ("a number > 0", lambda value: 0.0 < value < math.inf),
-    "clip_range": ("a number > 0", lambda value: 0.0 < value < math.inf),
+_RANGES: dict[str, dict[str, float]] = {
+    "gamma": {"above": 0.0, "at_most": 1.0},
+    "gae_lambda": {"at_least": 0.0, "at_most": 1.0},
+    "tau": {"above": 0.0, "at_most": 1.0},
+    "learning_rate": {"above": 0.0},
+    "clip_range": {"above": 0.0},
 }
 """Options of the algorithms that mean the same in all of them, and what they may be."""
 
 
-def _require_whole(name: str, value: Any, *, least: int = 1) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise ConfigError(f"Expected {name} to be a whole number >= {least}, got {value!r}.")
-
-
-def _require_options(name: str, options: Any) -> None:
-    """Refuse values that stable-baselines3 takes without a word and that no training survives."""
-    for key, value in _require_table(name, options).items():
+def _check_options(name: str, options: Any) -> None:
+    """Refuse values that stable-baselines3 accepts although no training can succeed with them."""
+    for key, value in table(name, options).items():
         if key in _COUNTS:
-            _require_whole(f"{name}.{key}", value)
-        wanted, fits = _RANGES.get(key, ("", None))
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if fits is not None and not (is_number and fits(value)):
-            raise ConfigError(f"Expected {name}.{key} to be {wanted}, got {value!r}.")
-
-
-def _require_table(name: str, value: Any) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ConfigError(f"Expected {name} to be a table, got {value!r}.")
-    return value
+            whole(f"{name}.{key}", value, at_least=1)
+        if key in _RANGES:
+            number(f"{name}.{key}", value, **_RANGES[key])
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Stage:
-    """A part of the training in a world of its own: a step of a curriculum."""
+    """A part of the training with a scenario of its own: a step of a curriculum."""
 
     steps: int
     """Decisions of single robots."""
@@ -70,9 +55,9 @@ class Stage:
     """Arguments of the algorithm that differ from here on (`learning_rate`, `gamma` ...)."""
 
     def __post_init__(self) -> None:
-        _require_whole("stage.steps", self.steps)
-        _require_table("stage.scenario", self.scenario)
-        _require_options("stage.options", self.options)
+        whole("stage.steps", self.steps, at_least=1)
+        table("stage.scenario", self.scenario)
+        _check_options("stage.options", self.options)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -90,8 +75,8 @@ class EvaluationPlan:
     """Controller to compare with, run once under the same seeds."""
 
     def __post_init__(self) -> None:
-        _require_whole("evaluation.every_steps", self.every_steps)
-        _require_whole("evaluation.n_runs", self.n_runs)
+        whole("evaluation.every_steps", self.every_steps, at_least=1)
+        whole("evaluation.n_runs", self.n_runs, at_least=1)
         try:
             policy_class(self.baseline)
         except ValueError as error:
@@ -103,9 +88,9 @@ class EvaluationPlan:
         Raises:
             ConfigError: a horizon that is not a whole number of recording intervals.
         """
-        world = with_overrides(scenario, horizon_s=self.horizon_s)
+        whole_run = with_overrides(scenario, horizon_s=self.horizon_s)
         seeds = range(self.first_seed, self.first_seed + self.n_runs)
-        return tuple(RunSpec(scenario=world, policy=policy, wrappers=wrappers, seed=seed) for seed in seeds)
+        return tuple(RunSpec(scenario=whole_run, policy=policy, wrappers=wrappers, seed=seed) for seed in seeds)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -113,12 +98,12 @@ class TrainingPlan:
     """Everything that decides a training run, but for the machine and the installed versions.
 
     Raises:
-        ConfigError: an unknown algorithm or baseline, sizes below 1, a stage whose world cannot be or has another
-            number of robots, or discrete actions for an algorithm that has none (and the other way round).
+        ConfigError: an unknown algorithm or baseline, sizes below 1, a stage whose scenario cannot be or has
+            another number of robots, or actions that the algorithm cannot choose.
     """
 
     scenario: ScenarioConfig
-    """The world to be mastered, rewards included; evaluations take place in it."""
+    """What is to be mastered, rewards included; evaluations take place in it."""
     wrappers: tuple[WrapperConfig, ...] = ()
     """What disturbs the swarm, in training and in evaluations."""
     algorithm: str = "ppo"
@@ -133,23 +118,19 @@ class TrainingPlan:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.algorithm not in ALGORITHMS:
-            raise ConfigError(
-                f"Expected algorithm to be one of {', '.join(ALGORITHMS)}, got {self.algorithm!r}."
-                + suggestion(str(self.algorithm).lower(), ALGORITHMS)
-            )
+        one_of("algorithm", self.algorithm, ALGORITHMS)
         unfit = {"dqn": "continuous", "sac": "discrete"}.get(self.algorithm)
         if self.interface.actions == unfit:
             raise ConfigError(f"Expected actions that {self.algorithm} can choose, got {unfit} ones.")
-        _require_whole("n_arenas", self.n_arenas)
+        whole("n_arenas", self.n_arenas, at_least=1)
         if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything
             raise ConfigError(f"Expected hidden to be sizes of layers, for example [64, 64], got {self.hidden!r}.")
         for size in self.hidden:
-            _require_whole("hidden", size)
+            whole("hidden", size, at_least=1)
         if not self.stages:
             raise ConfigError("Expected at least one stage, got none.")
-        _require_whole("seed", self.seed, least=0)
-        _require_options("options", self.options)
+        whole("seed", self.seed, at_least=0)
+        _check_options("options", self.options)
         for stage in self.stages:
             scenario_of_same_size(self.scenario, stage.scenario)
         self.evaluation.specs(self.scenario, self.wrappers, self.evaluation.baseline)
@@ -212,66 +193,38 @@ class TrainingPlan:
         fields by name. `wrappers` is a table of tables by name.
 
         Raises:
-            ConfigError: unknown keys, or values that make no plan.
+            ConfigError: unknown keys, or values that a plan cannot have.
         """
         values = _known(cls, mapping, "")
-        scenario = dict(_require_table("scenario", values.get("scenario")))
+        scenario = dict(table("scenario", values.get("scenario")))
         if "preset" in scenario:
             values["scenario"] = preset(scenario.pop("preset"), **_tuples(scenario))
         else:
             values["scenario"] = config_from_mapping(ScenarioConfig, scenario, where="scenario.")
         if "wrappers" in values:
-            values["wrappers"] = wrappers_from_mapping(_require_table("wrappers", values["wrappers"]))
+            values["wrappers"] = wrappers_from_mapping(table("wrappers", values["wrappers"]))
         if "interface" in values:
-            values["interface"] = interface_from_mapping(dict(_require_table("interface", values["interface"])))
+            values["interface"] = interface_from_mapping(dict(table("interface", values["interface"])))
         if "evaluation" in values:
             values["evaluation"] = EvaluationPlan(
-                **_known(EvaluationPlan, _require_table("evaluation", values["evaluation"]), "evaluation.")
+                **_known(EvaluationPlan, table("evaluation", values["evaluation"]), "evaluation.")
             )
         if "stages" in values:
             if not isinstance(values["stages"], list):
                 raise ConfigError(f"Expected stages to be a list of tables, [[stages]], got {values['stages']!r}.")
-            tables = [_known(Stage, table, "stages.") for table in values["stages"]]
+            stages = [_known(Stage, stage, "stages.") for stage in values["stages"]]
             values["stages"] = tuple(
-                Stage(**{**table, "scenario": _tuples(_require_table("stages.scenario", table.get("scenario", {})))})
-                for table in tables
+                Stage(**{**stage, "scenario": _tuples(table("stages.scenario", stage.get("scenario", {})))})
+                for stage in stages
             )
         return cls(**_tuples(values))
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Evaluation:
-    """How the policy did at some point of the training, beside the baseline; means over runs."""
-
-    steps: int
-    """Decisions of single robots so far."""
-    wall_time_s: float
-    """Time spent on the training, s; a resumed one counts on from its latest evaluation."""
-    performance: float
-    """What the scenario counts, per 1,000 simulated s."""
-    baseline: float
-    """The same of the baseline."""
-    interference_fraction: float
-    """Mean fraction of active robots in interference."""
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class TrainingStatus:
-    """Where a training run stands."""
-
-    steps: int
-    """Decisions of single robots so far."""
-    wall_time_s: float
-    """Time spent on the training, s; a resumed one counts on from its latest evaluation."""
-    episode_return: float
-    """Mean return of the latest episodes, nan before the first."""
 
 
 def read_plan(path: Path) -> TrainingPlan:
     """Read a plan from a TOML file, or from the JSON file that a training run leaves.
 
     Raises:
-        ConfigError: the file cannot be read or holds no plan; the message names it.
+        ConfigError: the file cannot be read or does not hold a plan; the message names it.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -295,11 +248,8 @@ def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _known(config_class: type, mapping: Mapping[str, Any], where: str) -> dict[str, Any]:
-    _require_table(where.rstrip(".") or "the plan", mapping)
-    known = [item.name for item in dataclasses.fields(config_class)]
-    for key in mapping:
-        if key not in known:
-            raise ConfigError(f"Unknown key {where + key!r}.{suggestion(key, known)}")
+    table(where.rstrip(".") or "the plan", mapping)
+    known_keys(mapping, [item.name for item in dataclasses.fields(config_class)], prefix=where)
     return dict(mapping)
 
 

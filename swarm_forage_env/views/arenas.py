@@ -1,6 +1,6 @@
 """Many arenas stepped as one batch of rows, one row per robot: what vector environments are made of.
 
-Row `a * N + i` is robot i of arena a for ever. The life of a row:
+Row `a * N + i` is robot i of arena a as long as the batch exists. The life of a row:
 
 * While its robot is in the world, or not yet born, the row is part of an episode.
 * When the robot dies, the row terminates once, with its last observation (zeros: it has left the world). Until its
@@ -40,7 +40,7 @@ class RunOutcome:
 
 @dataclass(kw_only=True, slots=True)
 class ArenaStep:
-    """Result of one step of R rows. All arrays with something in them are new and belong to the caller."""
+    """Result of one step of R rows. Arrays that are not empty are new and belong to the caller."""
 
     obs: ObsArray
     """(R, d) what to act on next; rows of arenas that ended show their new run already."""
@@ -57,7 +57,7 @@ class ArenaStep:
     final_obs: ObsArray
     """(E, d) their last observations."""
     is_episode: BoolArray
-    """(E,) whether an episode ended, not only an absence."""
+    """(E,) True where an episode ended, False where the row was absent."""
     returns: np.ndarray
     """(E,) float64, sums of rewards; float32 would lose the small ones of long runs."""
     lengths: IntArray
@@ -91,7 +91,7 @@ def closed_error() -> RuntimeError:
 
 
 def _owner(env: ForageEnv | SwarmWrapper, name: str) -> ForageEnv | SwarmWrapper:
-    """Return who in a stack has the attribute: wrappers show those of the environment below without owning them."""
+    """Return the layer of a stack that has the attribute itself; wrappers also show those of the layers below."""
     while isinstance(env, SwarmWrapper) and name not in vars(env) and not hasattr(type(env), name):
         env = cast("ForageEnv | SwarmWrapper", env.env)  # which it has checked
     return env
@@ -125,7 +125,7 @@ class ArenaBatch:
 
     Attributes:
         n_arenas, n_robots, n_rows: Sizes; n_rows = n_arenas * n_robots.
-        worlds: The arenas.
+        arenas: The arenas.
         interface: Spaces and layout of what learners see and do.
     """
 
@@ -171,26 +171,26 @@ class ArenaBatch:
         if self._is_closed:
             raise closed_error()
         obs = np.empty((self.n_arenas, self.n_robots, self._n_columns), np.float32)
-        self._is_reset = False  # stays so where a seed or an option is refused: half a reset is none
-        for arena, (seed, option) in enumerate(zip(seeds, options, strict=True)):
-            self._start(arena, obs[arena], seed, option)
+        self._is_reset = False  # and stays False where a seed or an option is refused before every arena has started
+        for number, (seed, option) in enumerate(zip(seeds, options, strict=True)):
+            self._start(number, obs[number], seed, option)
         self._is_reset = True
         return obs.reshape(self.n_rows, -1), self._active()
 
     def _start(
-        self, arena: int, out: ObsArray, seed: int | None = None, options: Mapping[str, Any] | None = None
+        self, number: int, out: ObsArray, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> None:
         """Start a run in one arena; writes what learners see to `out`."""
-        world = self.arenas[arena]
-        world.reset(seed, options)
-        self._present[arena] = world.forage_env.swarm.present
-        self._absent[arena] = False
-        self._returns[arena] = 0.0
-        self._lengths[arena] = 0
-        world.observe(out)
+        arena = self.arenas[number]
+        arena.reset(seed, options)
+        self._present[number] = arena.forage_env.swarm.present
+        self._absent[number] = False
+        self._returns[number] = 0.0
+        self._lengths[number] = 0
+        arena.observe(out)
 
     def _active(self) -> BoolArray:
-        return np.concatenate([world.forage_env.active for world in self.arenas])
+        return np.concatenate([arena.forage_env.active for arena in self.arenas])
 
     def step(self, actions: np.ndarray) -> ArenaStep:
         """Step every arena by one decision.
@@ -209,15 +209,15 @@ class ArenaBatch:
         rewards = np.zeros(shape, np.float32)
         terminated, truncated = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
         endings = _Endings()
-        for arena in range(self.n_arenas):
-            rows = slice(arena * self.n_robots, (arena + 1) * self.n_robots)
-            out = obs[arena], rewards[arena], terminated[arena], truncated[arena]
+        for number in range(self.n_arenas):
+            rows = slice(number * self.n_robots, (number + 1) * self.n_robots)
+            out = obs[number], rewards[number], terminated[number], truncated[number]
             try:
-                self._step_arena(arena, actions[rows], out, endings)
+                self._step_arena(number, actions[rows], out, endings)
             except ValueError as error:
                 error.add_note(
-                    f"This was in arena {self._first_arena + arena}: its world was not stepped. Worlds of other arenas "
-                    "may have been; where there are others, reset before going on."
+                    f"This was in arena {self._first_arena + number}, which was not stepped. Other arenas may have "
+                    "been stepped already; where there are others, reset before going on."
                 )
                 raise
         return ArenaStep(
@@ -231,46 +231,46 @@ class ArenaBatch:
 
     def _step_arena(
         self,
-        arena: int,
+        number: int,
         actions: np.ndarray,
         out: tuple[ObsArray, np.ndarray, BoolArray, BoolArray],
         endings: _Endings,
     ) -> None:
         """Step one arena; writes its rows of obs, rewards, terminated, truncated and appends to `endings`."""
         obs, rewards, terminated, truncated = out
-        world, absent = self.arenas[arena], self._absent[arena]
-        dead, all_dead, at_horizon = world.step(actions, rewards)
-        self._lengths[arena] += self._present[arena]  # as last seen: who died in this step had begun it
-        self._present[arena] = world.forage_env.swarm.present
-        self._returns[arena] += rewards
-        world.observe(obs)
+        arena, absent = self.arenas[number], self._absent[number]
+        dead, all_dead, at_horizon = arena.step(actions, rewards)
+        self._lengths[number] += self._present[number]  # as last seen: who died in this step had begun it
+        self._present[number] = arena.forage_env.swarm.present
+        self._returns[number] += rewards
+        arena.observe(obs)
         np.greater(dead, absent, out=terminated)
         if all_dead or at_horizon:
             terminated |= absent
             np.logical_not(terminated, out=truncated)
-            self._note_endings(arena, np.arange(self.n_robots), obs, endings)
-            endings.outcomes.append(self._outcome(arena))
-            self._start(arena, obs)
+            self._note_endings(number, np.arange(self.n_robots), obs, endings)
+            endings.outcomes.append(self._outcome(number))
+            self._start(number, obs)
         elif np.count_nonzero(terminated):  # a third of the time of any()
-            self._note_endings(arena, np.flatnonzero(terminated), obs, endings)
+            self._note_endings(number, np.flatnonzero(terminated), obs, endings)
             absent |= dead
 
-    def _note_endings(self, arena: int, robots: np.ndarray, obs: ObsArray, endings: _Endings) -> None:
-        endings.rows.append((robots + arena * self.n_robots).astype(np.int32))
+    def _note_endings(self, number: int, robots: np.ndarray, obs: ObsArray, endings: _Endings) -> None:
+        endings.rows.append((robots + number * self.n_robots).astype(np.int32))
         endings.final_obs.append(obs[robots])
-        endings.is_episode.append(~self._absent[arena, robots])
-        endings.returns.append(self._returns[arena, robots])
-        endings.lengths.append(self._lengths[arena, robots])
+        endings.is_episode.append(~self._absent[number, robots])
+        endings.returns.append(self._returns[number, robots])
+        endings.lengths.append(self._lengths[number, robots])
 
-    def _outcome(self, arena: int) -> RunOutcome:
-        base = self.arenas[arena].forage_env
-        assert base.seed_value is not None, "a stepped world has a seed"
+    def _outcome(self, number: int) -> RunOutcome:
+        env = self.arenas[number].forage_env
+        assert env.seed_value is not None, "an environment that was stepped has a seed"
         return RunOutcome(
-            arena=self._first_arena + arena,
-            seed=base.seed_value,
-            seconds=base.tick * base.scenario.dt_s,
-            collected=int(base.events.counters[Counter.COLLECTED]),
-            first_picked=int(base.events.counters[Counter.FIRST_PICKED]),
+            arena=self._first_arena + number,
+            seed=env.seed_value,
+            seconds=env.tick * env.scenario.dt_s,
+            collected=int(env.events.counters[Counter.COLLECTED]),
+            first_picked=int(env.events.counters[Counter.FIRST_PICKED]),
         )
 
     def action_masks(self) -> BoolArray:
@@ -281,7 +281,7 @@ class ArenaBatch:
             ValueError: the actions are continuous.
         """
         self._require_reset("action_masks")
-        return np.concatenate([world.mask() for world in self.arenas])
+        return np.concatenate([arena.mask() for arena in self.arenas])
 
     def _require_reset(self, what: str) -> None:
         if self._is_closed:
@@ -291,21 +291,21 @@ class ArenaBatch:
 
     def render(self) -> list[np.ndarray | None]:
         """Return one picture per arena."""
-        return [world.forage_env.render() for world in self.arenas]
+        return [arena.forage_env.render() for arena in self.arenas]
 
     def get_attribute(self, name: str, arenas: Sequence[int]) -> list[Any]:
         """Return an attribute of the environments of some arenas; raises AttributeError for unknown names."""
-        return [getattr(self.arenas[arena].env, name) for arena in arenas]
+        return [getattr(self.arenas[number].env, name) for number in arenas]
 
     def set_attribute(self, name: str, value: Any, arenas: Sequence[int]) -> None:
         """Set an attribute of the environments of some arenas, where it is: in a wrapper or at the bottom."""
-        for arena in arenas:
-            setattr(_owner(self.arenas[arena].env, name), name, value)
+        for number in arenas:
+            setattr(_owner(self.arenas[number].env, name), name, value)
 
     def call_method(self, name: str, arenas: Sequence[int], *args: Any, **kwargs: Any) -> list[Any]:
         """Call a method of the environments of some arenas, once each; returns what they return.
 
-        What is no method is returned as it is.
+        An attribute that cannot be called is returned as it is.
         """
         found = self.get_attribute(name, arenas)
         return [member(*args, **kwargs) if callable(member) else member for member in found]
@@ -313,8 +313,8 @@ class ArenaBatch:
     def close(self) -> None:
         """Close all environments; they take no reset or step any more."""
         self._is_closed = True
-        for world in self.arenas:
-            world.env.close()
+        for arena in self.arenas:
+            arena.env.close()
 
 
 def _joined(parts: list[np.ndarray], nothing: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
     """One agent that sees and steers every robot: the view of single-agent algorithms and of central control.
 
     Observations are (N, d) float32 in [-1, 1], row i = robot i; the columns are those of the parallel environment
-    (`world.layout`), or of the interface (`interface.layout`). Actions are (N, 3) or (N, 2) float32 in [-1, 1], or
+    (`forage_env.layout`), or of the interface (`interface.layout`). Actions are (N, 3) or (N, 2) float32 in [-1, 1], or
     (N,) whole numbers where the interface has discrete ones. The reward is the sum over robots and over the ticks of
     a decision. An episode terminates when every robot is dead and is truncated at the horizon.
 
@@ -57,7 +57,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
             overrides: Scenario fields by name (`n_robots=20`).
 
         Raises:
-            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
         """
         plan = plan_arena(
             scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
@@ -99,7 +99,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
             action: (N,) or (N, k), rows of robots that are away included (and ignored).
 
         Raises:
-            ActionError: wrong shape, numbers that are no actions, or an active robot's action that is not finite.
+            ActionError: wrong shape, numbers outside of `action_space`, or an active robot's action that is not finite.
         """
         rewards = np.zeros(self.forage_env.scenario.robots.n_robots)  # float64: the sum shall not depend on the order
         _, terminated, truncated = self._arena.step(np.asarray(action), rewards)
@@ -124,7 +124,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
     """Every robot of every arena as a sub-environment that one shared policy acts in.
 
     Sub-environment `a * N + i` is robot i of arena a. How rows end, stay absent and start anew is told in
-    `learning.arenas`: an arena starts anew within the step that ends it (`AutoresetMode.SAME_STEP`), so that
+    `views.arenas`: an arena starts anew within the step that ends it (`AutoresetMode.SAME_STEP`), so that
     `infos["final_obs"]` holds the last observations; a dead robot terminates once and is a row of zeros until then.
 
     Infos are arrays over rows, with masks under the name with an underscore in front, as Gymnasium does it:
@@ -171,7 +171,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
             overrides: Scenario fields by name (`n_robots=20`).
 
         Raises:
-            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
             ValueError: num_envs and n_arenas that do not fit together, or more processes than arenas.
         """
         plan = plan_arena(

@@ -1,4 +1,4 @@
-"""A world as a learner meets it: environment, wrappers, interface, seeds, and fields overridden for a curriculum."""
+"""One arena for learning: environment, wrappers, interface, seeds, and fields overridden for a curriculum."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
@@ -24,7 +24,7 @@ put them there: both Gymnasium and PettingZoo hand options on to everything in t
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ArenaPlan:
-    """What a world is made from; picklable."""
+    """What an arena is made from; picklable."""
 
     scenario: ScenarioConfig
     wrappers: tuple[WrapperConfig, ...] = ()
@@ -39,7 +39,7 @@ class ArenaPlan:
         """Build the environment in its wrappers, scenario fields overridden by name.
 
         Raises:
-            ConfigError: unknown fields, values that describe no world, or another number of robots.
+            ConfigError: unknown fields, values that do not fit together, or another number of robots.
         """
         scenario = scenario_of_same_size(self.scenario, overrides)
         env = ForageEnv(scenario, max_cycles=self.max_cycles, render_mode=self.render_mode, reads=self.interface.reads)
@@ -55,7 +55,7 @@ def plan_arena(
     max_cycles: int | None = None,
     render_mode: str | None = None,
 ) -> ArenaPlan:
-    """Plan a world from what the constructors of environments take.
+    """Plan an arena from what the constructors of environments take.
 
     Args:
         scenario: Name of a preset, or a complete configuration.
@@ -66,7 +66,7 @@ def plan_arena(
         render_mode: None or "rgb_array".
 
     Raises:
-        ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+        ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
     """
     return ArenaPlan(
         scenario=chosen_scenario(scenario, overrides),
@@ -78,16 +78,16 @@ def plan_arena(
 
 
 class LearnerArena:
-    """One world as a learner meets it, and the sequence of its runs.
+    """One arena for learning, and the sequence of its episodes.
 
     Attributes:
         env: Environment and wrappers as one stack.
-        base: The ForageEnv at its bottom.
+        forage_env: The ForageEnv at its bottom.
         interface: Translates for the learner; its spaces stay the same, the object does not.
     """
 
     def __init__(self, plan: ArenaPlan) -> None:
-        """Build the world of `plan`; raises ConfigError where it cannot be."""
+        """Build the environment of `plan`; raises ConfigError where it cannot be built."""
         self._plan = plan
         self._overrides: dict[str, Any] = {}
         self._seeds = np.random.default_rng()
@@ -104,13 +104,13 @@ class LearnerArena:
 
         Args:
             seed: Seed of the run and of those that follow it; None continues the sequence of the last seed given.
-            options: `{"scenario": {field: value}}` overrides fields of the scenario that the world was planned with,
-                in this run and all later ones; `{"scenario": {}}` goes back to the plan. Without that key nothing
+            options: `{"scenario": {field: value}}` overrides fields of the plan's scenario, in this run and all later
+                ones; `{"scenario": {}}` goes back to the plan. Without that key nothing
                 changes. Keys that have nothing to do with a scenario are ignored.
 
         Raises:
             ConfigError: a scenario field beside `scenario`, an option that is nearly one of these, an unknown field,
-                or another number of robots; the world stays as it was.
+                or another number of robots; the arena stays as it was.
         """
         overrides = _scenario_overrides(options)
         if overrides is not None and overrides != self._overrides:
@@ -162,11 +162,11 @@ class LearnerArena:
 
 
 _FIXED = ("interface", "wrappers")
-"""What people may expect a reset to change, and it cannot."""
+"""What a reset cannot change, although people may expect it to."""
 
 
 def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """Return the overridden fields that `options` asks for, None when it does not speak of them."""
+    """Return the overridden fields that `options` asks for, None when it has no such key."""
     if not options:
         return None
     for key in options:
@@ -174,14 +174,11 @@ def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | N
             _refuse_misplaced(key, options[key])
     if SCENARIO_OPTION not in options:
         return None
-    fields = options[SCENARIO_OPTION]
-    if not isinstance(fields, Mapping):
-        raise ConfigError(f"Expected the reset option 'scenario' as fields by name, got {fields!r}.")
-    return dict(fields)
+    return dict(table("the reset option 'scenario'", options[SCENARIO_OPTION]))
 
 
 def _refuse_misplaced(key: Any, value: Any) -> None:
-    """Raise ConfigError if a reset option was meant for the scenario: nothing would come of it."""
+    """Raise ConfigError if a reset option was probably meant for the scenario; it would have no effect."""
     if key in _FIXED:
         raise ConfigError(
             f"Expected {key} when the environment is made, not at a reset, which changes the scenario only."
@@ -195,7 +192,7 @@ def _refuse_misplaced(key: Any, value: Any) -> None:
     nearest = suggestion(str(key), (SCENARIO_OPTION,))
     if nearest:
         raise ConfigError(f"Unknown reset option {key!r}.{nearest}")
-    # Nearer than `suggestion` asks for: options of others, such as "high", are no misspelt fields.
+    # A closer match than `suggestion` asks for: options of others, such as "high", are not misspelt fields.
     for name in get_close_matches(str(key), known, n=1, cutoff=0.8):
         raise ConfigError(
             f"Unknown reset option {key!r}. If the scenario field {name!r} is meant: "

@@ -21,8 +21,8 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
     """`ForageEnv` with the observations and actions of an `InterfaceConfig`; agents live and die as there.
 
     `infos[agent]` holds `active` and, for discrete actions, `action_mask`: int8 (number of actions,), 1 = makes sense.
-    A step is one decision of `decision_ticks` ticks. Dictionaries cost more than the world itself; where a library can
-    take vector environments, `SwarmVectorEnv` is the faster way.
+    A step is one decision of `decision_ticks` ticks. Dictionaries take more time than the simulation itself; where a
+    library can take vector environments, `SwarmVectorEnv` is faster.
     """
 
     metadata: dict[str, Any] = {**ForageEnv.metadata, "name": "swarm_forage_learner_v0"}  # noqa: RUF012 - as PettingZoo
@@ -51,7 +51,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
             overrides: Scenario fields by name (`n_robots=20`).
 
         Raises:
-            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
         """
         plan = plan_arena(
             scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
@@ -113,7 +113,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
 
         Raises:
             RuntimeError: not reset, or everybody is done.
-            ValueError: an agent without an action, or actions that are none.
+            ValueError: an agent without an action, or actions outside of its action space.
         """
         if not self.agents:
             raise RuntimeError("Call reset before step; no agent is left.")
@@ -214,7 +214,7 @@ def parallel_env(
         A `ForageEnv`; with wrappers the outermost of them; with an interface a `ParallelLearnerEnv` around them all.
 
     Raises:
-        ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+        ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
     """
     if interface is not None:
         return ParallelLearnerEnv(

@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import BoolArray, ObsArray
+from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep, checked_rows, closed_error
-from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
+from swarm_forage_env.views.learner_arena import ArenaPlan
 
 _CLOSE = "close"
 _GOODBYE_S = 10.0
@@ -72,16 +74,17 @@ class ArenaProcesses:
                 everywhere, but needs the usual `if __name__ == "__main__"` in the starting script.
 
         Raises:
-            ValueError: fewer arenas than processes.
+            ValueError: fewer arenas than processes, or a plan that cannot be built.
+            ArenaProcessError: the first process ended while it started.
         """
         if not 1 <= n_processes <= n_arenas:
             raise ValueError(f"Expected n_processes from 1 to n_arenas = {n_arenas}, got {n_processes}.")
         self.n_arenas = n_arenas
         self.n_robots = plan.scenario.robots.n_robots
         self.n_rows = n_arenas * self.n_robots
-        self.interface = LearnerArena(plan).interface
+        self.interface = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
         self._shares = [part.tolist() for part in np.array_split(np.arange(n_arenas), n_processes)]
-        starter = multiprocessing.get_context(context)
+        starter: Any = multiprocessing.get_context(context)  # its declared type lacks Process, which every context has
         self._pipes: list[Connection] = []
         self._processes = []
         self._n_asked = [0] * n_processes
@@ -89,11 +92,17 @@ class ArenaProcesses:
         for share in self._shares:
             ours, theirs = starter.Pipe()
             arguments = (theirs, plan, len(share), share[0])
-            process = starter.Process(target=_serve, args=arguments, daemon=True)  # type: ignore[attr-defined]
+            process = starter.Process(target=_serve, args=arguments, daemon=True)
             process.start()
             theirs.close()
             self._pipes.append(ours)
             self._processes.append(process)
+        try:
+            # The first question makes a process build its arenas. One is enough to find out whether the plan can be.
+            self.get_attribute("tick", [0])
+        except BaseException:
+            self.close()
+            raise
 
     def _ask(self, process: int, method: str, *args: Any, **kwargs: Any) -> None:
         if not self._pipes:
@@ -197,7 +206,7 @@ class ArenaProcesses:
         return [found[arena] for arena in arenas]
 
     def close(self) -> None:
-        """End all processes; whatever they still had to say is dropped. Closed arenas may be closed again."""
+        """End all processes; answers that were not read are dropped. Closed arenas may be closed again."""
         pipes, self._pipes = self._pipes, []
         for pipe in pipes:
             with contextlib.suppress(OSError):  # it ended by itself

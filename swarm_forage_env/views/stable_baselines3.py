@@ -24,7 +24,7 @@ class SwarmVecEnv(VecEnv):
     """Every robot of every arena as a sub-environment that one shared policy acts in.
 
     Sub-environment `a * N + i` is robot i of arena a. Arrays pass straight through: no per-agent dicts. How rows end,
-    stay absent and start anew is told in `learning.arenas`; in terms of stable-baselines3:
+    stay absent and start anew is told in `views.arenas`; in terms of stable-baselines3:
 
     * `dones` is true when the observation returned is the first of a new episode, and when a robot dies.
     * `infos[row]["terminal_observation"]` is there whenever `dones[row]` is; `"TimeLimit.truncated"` is true where the
@@ -68,7 +68,7 @@ class SwarmVecEnv(VecEnv):
             overrides: Scenario fields by name (`n_robots=20`, `nest_progress=0.1`).
 
         Raises:
-            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that describe no world.
+            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
             ValueError: n_arenas below 1, or more processes than arenas.
         """
         if "num_envs" in overrides:
@@ -118,7 +118,7 @@ class SwarmVecEnv(VecEnv):
         assert self._actions is not None, "step_async comes before step_wait"
         step = self._arenas.step(self._actions)
         self.active = step.active
-        return step.obs, step.rewards, step.terminated | step.truncated, self._infos(step)  # type: ignore[return-value]
+        return step.obs, step.rewards, step.terminated | step.truncated, self._infos(step)
 
     def _infos(self, step: ArenaStep) -> list[dict[str, Any]]:
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

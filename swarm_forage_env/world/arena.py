@@ -116,14 +116,14 @@ class ForagingArena:
         Args:
             actions: (N, 3) float32 in [-1, 1]: left wheel, right wheel, gripper.
             wheel_gain: (N, 2) factor on each wheel's limited speed, or None.
-            tasks: (N,) int8 `policy.Task` codes, if the policy tells them.
+            tasks: (N,) int8 `Task` codes, if the policy tells them.
         """
         swarm, objects, caches, events, suite = self.swarm, self.objects, self.caches, self.events, self._suite
         self._drive.apply(actions, wheel_gain, swarm, self._physics.twist)
         self.tick += 1
         self._physics.advance(swarm)
         sense_proximity(swarm, suite)
-        mark_interference(swarm, events, suite.obs, suite.near)
+        mark_interference(swarm, events, suite.obs, suite.columns["proximity"], suite.near)
         if self._serve_requests(actions):
             self._create_dynamic_caches()
             self._replace_displaced()

@@ -1,4 +1,4 @@
-"""Caches as areas of the floor: static ones that an outside process restores, dynamic ones that robots found.
+"""Caches as areas of the floor: static ones that an outside process restores, dynamic ones that robots create.
 
 What robots do with caches (adding, taking, the last pair dissolving) is in `kernels.interact`.
 """
@@ -8,7 +8,7 @@ import numpy as np
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, Counter, ObjectStatus, Task
 from swarm_forage_env.contract.types import BoolArray, CodeArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.regions import Box, overlap_cells
+from swarm_forage_env.scenarios.regions import Box, overlap_cells, square_box
 from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.placement import Source, static_cache_centres
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
@@ -23,13 +23,6 @@ def n_cache_slots(config: ScenarioConfig) -> int:
         return 0
     nx, ny = config.arena.n_cells
     return (nx // config.cache_side_cells) * (ny // config.cache_side_cells)
-
-
-def cache_box(centre_cell: tuple[int, int], side_cells: int) -> Box:
-    """Cells of a cache square, half-open."""
-    x, y = centre_cell
-    half = side_cells // 2
-    return (x - half, y - half, x + half + 1, y + half + 1)
 
 
 def _inside(cells: IntArray, box: Box) -> BoolArray:
@@ -53,7 +46,7 @@ def create_cache(
     slot = int(np.flatnonzero(~caches.alive)[0])
     lying = rows[objects.status[rows] == ObjectStatus.FREE]
     objects.floor[objects.cell[lying, 1], objects.cell[lying, 0]] = CELL_EMPTY
-    x_low, y_low, x_high, y_high = cache_box(centre_cell, side_cells)
+    x_low, y_low, x_high, y_high = square_box(centre_cell, side_cells)
     objects.floor[y_low:y_high, x_low:x_high] = CELL_CACHE - slot
     objects.status[rows] = ObjectStatus.CACHED
     objects.cell[rows] = centre_cell
@@ -84,7 +77,7 @@ def create_static_caches(
     squares, and absorbs the free objects on its own square. With fewer than two objects there is no cache.
     """
     side = config.cache_side_cells
-    boxes = [cache_box(centre, side) for centre in static_cache_centres(config)]
+    boxes = [square_box(centre, side) for centre in static_cache_centres(config)]
     standing = {tuple(cell) for cell in caches.cell[caches.alive].tolist()}
     for centre, box in zip(static_cache_centres(config), boxes, strict=True):
         if centre in standing:
@@ -136,7 +129,7 @@ def restore_static_caches(
 
 
 def protected_boxes(config: ScenarioConfig, source: Source) -> list[Box]:
-    """Source regions and clusters, whose objects found no caches; the random placement protects nothing.
+    """Source regions and clusters, whose objects create no caches; the random placement protects nothing.
 
     Under the quirk `dynamic_cache_merges_all` its region is protected too, so that no cache ever forms there.
     """
@@ -145,20 +138,20 @@ def protected_boxes(config: ScenarioConfig, source: Source) -> list[Box]:
     return [(box[0], box[1], box[2], box[3]) for box in source.regions.tolist()]
 
 
-def cache_members(founder: int, config: ScenarioConfig, objects: ObjectState, protected: list[Box]) -> IntArray:
-    """Free, unprotected objects within `min_dist_m` of the object `founder`, itself included; empty if it is protected.
+def cache_members(first: int, config: ScenarioConfig, objects: ObjectState, protected: list[Box]) -> IntArray:
+    """Free, unprotected objects within `min_dist_m` of the object `first`, itself included; empty if it is protected.
 
-    Under the quirk `dynamic_cache_merges_all` neither the distance nor the founder itself matters: all unprotected
+    Under the quirk `dynamic_cache_merges_all` neither the distance nor the first object itself matters: all unprotected
     objects join.
     """
     usable = objects.status == ObjectStatus.FREE
     for box in protected:
         usable &= ~_inside(objects.cell, box)
     if not config.quirks.dynamic_cache_merges_all:
-        if not usable[founder]:
+        if not usable[first]:
             return np.empty(0, np.int32)
         # In cells, where squared distances are whole: in metres an object just at the limit would fall to rounding.
-        offset = objects.cell - objects.cell[founder]
+        offset = objects.cell - objects.cell[first]
         usable &= (offset * offset).sum(axis=1) <= (config.min_dist_m / CELL_M) ** 2 + 1e-6
     return np.flatnonzero(usable).astype(np.int32)
 
@@ -183,7 +176,7 @@ def clear_centre(
         x, y = min(max(x, x_low), x_high), min(max(y, y_low), y_high)
         overlapped = 0
         for obstacle in obstacles:
-            if overlap_cells(cache_box((x, y), config.cache_side_cells), obstacle):
+            if overlap_cells(square_box((x, y), config.cache_side_cells), obstacle):
                 overlapped += 1
                 x += 1 if rng.random() < 0.5 else -1
                 y += 1 if rng.random() < 0.5 else -1
@@ -217,19 +210,19 @@ def create_dynamic_caches(
     protected = protected_boxes(config, source)
     for robot in robots.tolist():
         x, y = swarm_cells[robot]
-        founder = int(objects.floor[y, x])
-        if founder < 0:
-            continue  # an earlier founder of this tick has already drawn the object into its cache
-        members = cache_members(founder, config, objects, protected)
+        first = int(objects.floor[y, x])
+        if first < 0:
+            continue  # an earlier creator of this tick has already drawn the object into its cache
+        members = cache_members(first, config, objects, protected)
         if len(members) < 2:
             continue
         mean = np.floor(objects.cell[members].mean(axis=0) + 0.5)
         side = config.cache_side_cells
-        standing = [cache_box((int(cx), int(cy)), side) for cx, cy in caches.cell[caches.alive].tolist()]
+        standing = [square_box((int(cx), int(cy)), side) for cx, cy in caches.cell[caches.alive].tolist()]
         obstacles = [config.arena.nest_cells, *protected, *standing]
         centre = clear_centre((int(mean[0]), int(mean[1])), config, obstacles, rng)
         if centre is None:
             continue
-        on_square = (objects.status == ObjectStatus.FREE) & _inside(objects.cell, cache_box(centre, side))
+        on_square = (objects.status == ObjectStatus.FREE) & _inside(objects.cell, square_box(centre, side))
         rows = np.union1d(members, np.flatnonzero(on_square)).astype(np.int32)
         create_cache(rows, centre, side, objects, caches, events)

@@ -5,13 +5,16 @@ from swarm_forage_env.world.kernels.interfere import mark
 from swarm_forage_env.world.state import StepEvents, SwarmState
 
 
-def mark_interference(swarm: SwarmState, events: StepEvents, obs: ObsArray, near: BoolArray) -> None:
+def mark_interference(swarm: SwarmState, events: StepEvents, obs: ObsArray, proximity: int, near: BoolArray) -> None:
     """Flag active robots for which the obstacle rule holds in this tick, walls included.
 
     Args:
         swarm: Read: active, present.
         events: Written: interfering, counters, interference_sum (share of active robots, 0/0 = 0).
-        obs: (N, D) with true proximity readings in columns 0..23.
+        obs: (N, D) with true proximity readings.
+        proximity: Column of the first of them.
         near: (N,) whether any beam may have hit something; others are skipped.
     """
-    mark(obs, near, swarm.active, swarm.present, events.interfering, events.counters, events.interference_sum)
+    mark(
+        obs, proximity, near, swarm.active, swarm.present, events.interfering, events.counters, events.interference_sum
+    )

@@ -12,7 +12,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.types import IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.regions import Box, overlap_cells, source_boxes
+from swarm_forage_env.scenarios.regions import Box, overlap_cells, source_boxes, square_box
 from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.clusters import draw_clusters
 from swarm_forage_env.world.kernels.scatter import DRAWS, UNLIMITED, scatter
@@ -183,10 +183,9 @@ def static_cache_centres(config: ScenarioConfig) -> tuple[tuple[int, int], ...]:
 
 def _check_cache_squares(config: ScenarioConfig, centres: tuple[tuple[int, int], ...]) -> None:
     nx, ny = config.arena.n_cells
-    half = config.cache_side_cells // 2
     taken: list[Box] = [config.arena.nest_cells]
     for x, y in centres:
-        square = (x - half, y - half, x + half + 1, y + half + 1)
+        square = square_box((x, y), config.cache_side_cells)
         inside = square[0] >= 0 and square[1] >= 0 and square[2] <= nx and square[3] <= ny
         if not inside or any(overlap_cells(square, other) for other in taken):
             side_m = config.cache_side_cells * CELL_M

@@ -65,7 +65,7 @@ class SensorSuite:
 
 
 def sense_proximity(swarm: SwarmState, suite: SensorSuite) -> None:
-    """24 beams every 15 degrees, 0.1 m beyond the body: 1 at contact, 0 when nothing is hit."""
+    """A ring of beams, 0.1 m beyond the body: 1 at contact, 0 when nothing is hit."""
     neighbours.bin_robots(swarm.position, swarm.present, suite.bin_m, suite.first_in_bin, suite.next_in_bin)
     beams.proximity(
         swarm.position,
@@ -76,6 +76,7 @@ def sense_proximity(swarm: SwarmState, suite: SensorSuite) -> None:
         suite.radius_m,
         PROXIMITY_RANGE_M,
         suite.obs,
+        suite.columns["proximity"],
         suite.near,
     )
 

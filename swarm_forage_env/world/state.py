@@ -122,7 +122,7 @@ class StepEvents:
     """What happened in this tick, per robot, rewritten in place; and cumulative counters."""
 
     code: CodeArray
-    """(N,) `policy.Event` code."""
+    """(N,) `Event` code."""
     event_object: IntArray
     """(N,) object row of the event, -1 = none."""
     event_cache: IntArray

@@ -62,14 +62,14 @@ class SwarmWrapper(BaseParallelWrapper):
         return self._unwrapped  # kept, because every hook of every tick asks for it
 
     def on_reset(self, seed: int) -> None:
-        """Prepare for a new run, after the world was reset.
+        """Prepare for a new run, after the environment was reset.
 
         Args:
-            seed: Seed of the run, for `rng.stream_rng`.
+            seed: Seed of the run, for `_internal.rng.stream_rng`.
         """
 
     def before_step(self) -> None:
-        """Act on the world before it steps."""
+        """Act on the environment before it steps."""
 
     def gain(self, actions: ActionArray, wheel_gain: FloatArray | None) -> FloatArray | None:
         """Return the wheel gain handed to the next wrapper inwards.
@@ -90,10 +90,10 @@ class SwarmWrapper(BaseParallelWrapper):
         return obs
 
     def after_step(self, tasks: CodeArray | None, terminated: BoolArray, truncated: bool) -> None:
-        """Look at the world after it stepped.
+        """Look at the environment after it stepped.
 
         Args:
-            tasks: (N,) `policy.Task` codes as handed to `step_batch`, or None.
+            tasks: (N,) `contract.codes.Task` codes as handed to `step_batch`, or None.
             terminated: (N,) bool, robots that are dead for good.
             truncated: Whether the horizon is reached.
         """
@@ -103,7 +103,7 @@ class SwarmWrapper(BaseParallelWrapper):
 
         Called once at the end of each interval, after `after_step` of every wrapper inside the recorder; a mean
         over the interval starts anew with the call. The names must be the same at each call; their meanings are
-        listed in `recording.KNOWN_CONTRIBUTIONS`.
+        listed in `study.record.KNOWN_CONTRIBUTIONS`.
         """
         return {}
 
@@ -111,7 +111,7 @@ class SwarmWrapper(BaseParallelWrapper):
         """Reset the stack and return the first observations, (N, D) float32; see `ForageEnv.reset_batch`."""
         obs = self._inner.reset_batch(seed)
         drawn = self.unwrapped.seed_value
-        assert drawn is not None, "a reset world has a seed"
+        assert drawn is not None, "an environment that was reset has a seed"
         self.on_reset(drawn)
         return self.observe(obs)
 
@@ -123,7 +123,7 @@ class SwarmWrapper(BaseParallelWrapper):
         Args:
             actions: (N, 3) float32 in [-1, 1].
             wheel_gain: (N, 2) factors on the wheel speeds, None = all 1.
-            tasks: (N,) int8 `policy.Task` codes, None = the policy has no tasks.
+            tasks: (N,) int8 `contract.codes.Task` codes, None = the policy has no tasks.
 
         Raises:
             ActionError: as `ForageEnv.step_batch`; for a wrong shape before any wrapper has done anything.

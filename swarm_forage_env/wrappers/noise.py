@@ -7,16 +7,15 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import known_name, number, one_of, several, table
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.types import ActionArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.kernels.gaussian import to_normal
 from swarm_forage_env.wrappers.kernels.noise import noisy_gain, perturb_readings, turn_heading
-from swarm_forage_env.wrappers.waveform import Signal, Waveform, gather_waveform, require_number
+from swarm_forage_env.wrappers.waveform import Signal, Waveform, gather_waveform
 
 NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
 """Groups of sensors that can be noisy, in the order of their columns."""
@@ -40,7 +39,7 @@ def _is_noisy(sigma: Sigma) -> bool:
 
 
 class SensorNoise(SwarmWrapper):
-    """Perturbs what policies see. The world, its rules and the measure of interference use the truth.
+    """Perturbs what policies see. The rules of the arena and the measure of interference use the truth.
 
     Unit of sigma: 1 for readings (proximity, light, ground; clamped to [0, 1]), 1 cm/s for wheel speeds and 1 m per
     axis for positions (both clamped to the ends of their range), 1 rad for the heading, whose angle is perturbed. All
@@ -167,18 +166,13 @@ class SensorNoiseConfig(WrapperConfig):
     """One of `DISTRIBUTIONS`; a uniform one has the same standard deviation (our choice)."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.groups, tuple) or not self.groups:
-            raise ConfigError(f"Expected sensor_noise.groups to be one or more names of sensors, got {self.groups!r}.")
-        if not isinstance(self.sigmas, Mapping):
-            raise ConfigError(f"Expected sensor_noise.sigmas to be a table of sigma by group, got {self.sigmas!r}.")
-        for name in (*self.groups, *self.sigmas):
-            if name not in NOISE_GROUPS:
-                hint = suggestion(str(name), NOISE_GROUPS)
-                raise ConfigError(f"Unknown group of sensors {name!r}.{hint} Known: {', '.join(NOISE_GROUPS)}.")
+        several("sensor_noise.groups", self.groups, "names of sensors")
+        for name in (*self.groups, *table("sensor_noise.sigmas", self.sigmas)):
+            known_name("group of sensors", name, NOISE_GROUPS)
         _check_sigma("sensor_noise.sigma", self.sigma)
         for name, sigma in self.sigmas.items():
             _check_sigma(f"sensor_noise.sigmas.{name}", sigma)
-        _check_distribution("sensor_noise", self.distribution)
+        one_of("sensor_noise.distribution", self.distribution, DISTRIBUTIONS)
         object.__setattr__(self, "groups", tuple(name for name in NOISE_GROUPS if name in self.groups))
         object.__setattr__(self, "sigmas", dict(self.sigmas))
 
@@ -194,7 +188,7 @@ class SensorNoiseConfig(WrapperConfig):
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "SensorNoiseConfig":
         """Build the configuration from plain values.
 
-        A waveform in place of a sigma is read as by `signals.gather_waveform`; groups may be one text, joined by "+".
+        A waveform in place of a sigma is read as by `waveform.gather_waveform`; groups may be one text, joined by "+".
         """
         values = gather_waveform(mapping, "sigma", cls)
         if isinstance(values.get("groups"), str):
@@ -226,7 +220,7 @@ class ActuatorNoiseConfig(WrapperConfig):
 
     def __post_init__(self) -> None:
         _check_sigma("actuator_noise.sigma", self.sigma)
-        _check_distribution("actuator_noise", self.distribution)
+        one_of("actuator_noise.distribution", self.distribution, DISTRIBUTIONS)
 
     def wrap(self, env: ForageEnv | SwarmWrapper) -> ActuatorNoise:
         """Build the wrapper around `env`."""
@@ -234,7 +228,7 @@ class ActuatorNoiseConfig(WrapperConfig):
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "ActuatorNoiseConfig":
-        """Build the configuration from plain values; a waveform as `signals.gather_waveform` reads it."""
+        """Build the configuration from plain values; a waveform as `waveform.gather_waveform` reads it."""
         return from_mapping(cls, gather_waveform(mapping, "sigma", cls))
 
 
@@ -257,12 +251,4 @@ def noise_levels(
 
 def _check_sigma(where: str, sigma: Any) -> None:
     if not isinstance(sigma, Waveform):
-        require_number(where, sigma, at_least=0.0)
-
-
-def _check_distribution(where: str, distribution: Any) -> None:
-    if distribution not in DISTRIBUTIONS:
-        raise ConfigError(
-            f"Expected {where}.distribution to be one of {', '.join(DISTRIBUTIONS)}, got {distribution!r}."
-            + suggestion(str(distribution), DISTRIBUTIONS)
-        )
+        number(where, sigma, at_least=0.0)

@@ -5,8 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError, number, one_of, whole
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.population_process import (
@@ -16,7 +15,6 @@ from swarm_forage_env.wrappers.population_process import (
     PopulationState,
     advance_population,
 )
-from swarm_forage_env.wrappers.waveform import require_number
 
 BIRTH_MARGIN_M = 2.0
 """Robots are born this far from the border of the arena (study configuration), or nearer where they start nearer."""
@@ -29,12 +27,12 @@ _STUDY_REPAIR_PER_TICK = {50: 0.001022222, 200: 0.001005556}
 
 
 class PopulationDynamics(SwarmWrapper):
-    """Lets the robots of a run die, be born, break down and be repaired, by the processes described in `queues`.
+    """Lets the robots of a run die, be born, break down and be repaired, as `population_process` describes.
 
     A robot in repair stays where it is with its wheels stopped, visible to others, keeping cargo and memory; it stays
     an agent, with `active` at 0. A robot that dies loses its cargo where it stands and its body disappears: its agent
     terminates, or stays as a row of zeros (`deaths="absorbing"`, for trainers that need a fixed number of agents). In
-    both cases the world and its record are the same, and the episode ends when the last robot is dead. A row that is
+    both cases the run and its record are the same, and the episode ends when the last robot is dead. A row that is
     not yet born is an agent without a body, a row of zeros; it enters at a uniform position, heading along +x.
 
     Records `deaths`, `births`, `malfunctions`, `repairs`, `n_in_repair`, `time_at_work_s`, `time_in_repair_s`.
@@ -68,7 +66,7 @@ class PopulationDynamics(SwarmWrapper):
         self._body_m = 2.0 * scenario.robots.radius_m
 
     def on_reset(self, seed: int) -> None:
-        """Start the clocks; robots that are not yet born leave the world before anybody sees them."""
+        """Start the clocks; robots that are not yet born leave the arena before anybody sees them."""
         config = self._config
         n_robots = self.unwrapped.scenario.robots.n_robots
         self._state = PopulationState.start(
@@ -107,7 +105,7 @@ class PopulationDynamics(SwarmWrapper):
         return columns
 
     def _apply(self) -> None:
-        """Tell the world who is present and active, and learners who is gone."""
+        """Tell the environment who is present and active, and learners who is gone."""
         state = self._state
         gone = state.dead
         if self._config.deaths == "absorbing":
@@ -151,16 +149,10 @@ class PopulationConfig(WrapperConfig):
     def __post_init__(self) -> None:
         for process in ("death", "birth", "malfunction", "repair"):
             field = f"{process}_per_tick"
-            require_number(f"population.{field}", getattr(self, field), at_least=0.0)
+            number(f"population.{field}", getattr(self, field), at_least=0.0)
         for field in ("initial_robots", "max_robots"):
-            size = getattr(self, field)
-            if size is not None and (isinstance(size, bool) or not isinstance(size, int) or size < 1):
-                raise ConfigError(f"Expected population.{field} to be a whole number >= 1, got {size!r}.")
-        if self.deaths not in DEATHS:
-            raise ConfigError(
-                f"Expected population.deaths to be one of {', '.join(DEATHS)}, got {self.deaths!r}."
-                + suggestion(str(self.deaths), DEATHS)
-            )
+            whole(f"population.{field}", getattr(self, field), at_least=1, or_none=True)
+        one_of("population.deaths", self.deaths, DEATHS)
 
     @property
     def rates(self) -> EventRates:

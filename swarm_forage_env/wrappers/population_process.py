@@ -1,4 +1,4 @@
-"""Population dynamics: when robots die, are born, break down and are repaired. Knows rows and ticks, not the world.
+"""Population dynamics: when robots die, are born, break down and are repaired. Knows rows and ticks, not the arena.
 
 Four processes act on the swarm as a whole, each with a clock of its own; their rates do not depend on how many robots
 there are. Event clock: after an event at tick t the next is due at t + floor(w), w exponential with the rate of the
@@ -19,10 +19,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.types import BoolArray, IntArray
-from swarm_forage_env.wrappers.waveform import require_number
 
 FindPlace: TypeAlias = Callable[[int, np.random.Generator], bool]
 """Puts the row that is to be born somewhere, drawing from the generator; returns False if there is no room now."""
@@ -43,7 +42,7 @@ class EventRates:
 
     def __post_init__(self) -> None:
         for process in ("death", "birth", "malfunction", "repair"):
-            require_number(f"the rate of {process}", getattr(self, process), at_least=0.0)
+            number(f"the rate of {process}", getattr(self, process), at_least=0.0)
 
 
 class EventClock:
@@ -245,12 +244,12 @@ def _return(state: PopulationState, tick: int) -> None:
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)
 class PopulationHistory:
-    """A population over a run, without a world around it."""
+    """A population over a run, without an arena around it."""
 
     n_active: IntArray
     """(ticks,) active robots during each tick."""
     n_present: IntArray
-    """(ticks,) robots in the world during each tick."""
+    """(ticks,) robots in the arena during each tick."""
     tally: EventTally
     """Totals of the run."""
 
@@ -266,7 +265,7 @@ def simulate_population(
 ) -> PopulationHistory:
     """Play population dynamics alone, in milliseconds; exactly what a run with this seed will do.
 
-    Births always find room here, which in a world they nearly always do.
+    Births always find room here, which in an arena they nearly always do.
 
     Args:
         rates: Events per tick.

@@ -1,4 +1,4 @@
-"""RunRecorder: turns the world's cumulative counters into columns over recording intervals."""
+"""RunRecorder: turns the arena's cumulative counters into columns over recording intervals."""
 
 from collections.abc import Iterator
 from typing import ClassVar
@@ -38,8 +38,8 @@ TICK_MEANS: dict[str, Counter] = {
 class RunRecorder(SwarmWrapper):
     """Outermost wrapper: records a run interval by interval.
 
-    The world counts; the recorder only takes differences at interval ends, so a tick costs it next to nothing.
-    Once every robot is dead the record is complete: what is left of it stays zero, even if the world is stepped on.
+    The arena counts; the recorder only takes differences at interval ends, so a tick costs it next to nothing.
+    Once every robot is dead the record is complete: what is left of it stays zero, even if stepping goes on.
     """
 
     stack_position: ClassVar[int] = 0
@@ -74,7 +74,7 @@ class RunRecorder(SwarmWrapper):
             return
         if tasks is not None and not add_task_shares(tasks, self.unwrapped.active, self._task_sums):
             raise ValueError(
-                f"Expected tasks with shape (n_robots,) = {self.unwrapped.active.shape} and codes of policy.Task "
+                f"Expected tasks with shape (n_robots,) = {self.unwrapped.active.shape} and codes of Task "
                 f"(0 to {len(Task) - 1}), got shape {tasks.shape} with codes {np.unique(tasks).tolist()}."
             )
         self._ticks_left -= 1

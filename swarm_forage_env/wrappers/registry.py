@@ -4,8 +4,7 @@ from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError, known_name, table
 
 if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import WrapperConfig
@@ -27,9 +26,7 @@ def wrapper_config_class(name: str) -> "type[WrapperConfig]":
     Raises:
         ConfigError: no wrapper has that name.
     """
-    if name not in WRAPPERS:
-        known = ", ".join(sorted(WRAPPERS))
-        raise ConfigError(f"Unknown wrapper {name!r}.{suggestion(name, WRAPPERS)} Known: {known}.")
+    known_name("wrapper", name, sorted(WRAPPERS))
     module, _, class_name = WRAPPERS[name].partition(":")
     return getattr(import_module(module), class_name)
 
@@ -52,12 +49,12 @@ def parse_wrapper(text: str) -> "WrapperConfig":
         key, equals, value = (part.strip() for part in setting.partition("="))
         if not (key and equals and value):
             raise ConfigError(f"Expected the settings of wrapper {name} as key=value, got {setting!r} in {text!r}.")
-        *tables, last = key.split(".")
+        *parents, last = key.split(".")
         target = mapping
-        for table in tables:
-            target = target.setdefault(table, {})
+        for parent in parents:
+            target = target.setdefault(parent, {})
             if not isinstance(target, dict):
-                raise ConfigError(f"Expected {table} of wrapper {name} either as a value or as a table, in {text!r}.")
+                raise ConfigError(f"Expected {parent} of wrapper {name} either as a value or as a table, in {text!r}.")
         if last in target:
             raise ConfigError(f"Expected {key} of wrapper {name} once, got it twice in {text!r}.")
         target[last] = _plain_value(value)
@@ -97,11 +94,9 @@ def wrappers_from_mapping(tables: Mapping[str, Any]) -> "tuple[WrapperConfig, ..
         ConfigError: an unknown name or key, or values that a wrapper refuses.
     """
     configs = []
-    for name, table in tables.items():
+    for name, settings in tables.items():
         config_class = wrapper_config_class(name)
-        if not isinstance(table, Mapping):
-            raise ConfigError(f"Expected the settings of wrapper {name} as a table, got {table!r}.")
-        configs.append(config_class.from_mapping(dict(table)))
+        configs.append(config_class.from_mapping(dict(table(f"the settings of wrapper {name}", settings))))
     return tuple(sorted(configs, key=lambda config: config.stack_position))
 
 

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, instance, switch
 from swarm_forage_env.contract.types import ActionArray, FloatArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
@@ -81,18 +81,14 @@ class ThrottleConfig(WrapperConfig):
     """Whether only robots that carry an object at the start of the step are throttled."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.waveform, Waveform):
-            raise ConfigError(
-                "Expected throttle.waveform to be a Waveform, such as one of kind constant with an amplitude, "
-                f"got {self.waveform!r}."
-            )
+        hint = "; for example Waveform(kind='constant', amplitude=0.1)"
+        instance("throttle.waveform", self.waveform, Waveform, hint=hint)
         if self.waveform.peak > 1.0:
             raise ConfigError(
                 f"Expected a throttle of at most 1 (robots stand still), got a waveform that reaches "
                 f"{self.waveform.peak:g}; lower its amplitude or its offset."
             )
-        if not isinstance(self.carriers, bool):
-            raise ConfigError(f"Expected throttle.carriers to be True or False, got {self.carriers!r}.")
+        switch("throttle.carriers", self.carriers)
 
     def wrap(self, env: ForageEnv | SwarmWrapper) -> Throttle:
         """Build the wrapper around `env`."""
@@ -100,7 +96,7 @@ class ThrottleConfig(WrapperConfig):
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "ThrottleConfig":
-        """Build the configuration from plain values; the waveform as `signals.gather_waveform` reads it."""
+        """Build the configuration from plain values; the waveform as `waveform.gather_waveform` reads it."""
         return from_mapping(cls, gather_waveform(mapping, "waveform", cls))
 
 

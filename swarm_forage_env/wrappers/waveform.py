@@ -19,8 +19,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, TypeAlias
 
-from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, several
 from swarm_forage_env.scenarios.config import from_mapping
 
 Signal: TypeAlias = Callable[[int], float]
@@ -36,26 +35,6 @@ _FIELDS_OF_KIND: dict[str, tuple[str, ...]] = {
 }
 WAVEFORM_KINDS = tuple(_FIELDS_OF_KIND)
 """Names of the waveforms."""
-
-
-def require_number(where: str, value: Any, *, at_least: float = -math.inf, above: float = -math.inf) -> None:
-    """Check one number of a configuration.
-
-    Args:
-        where: Name of the field, for the message.
-        value: What was given.
-        at_least: Smallest allowed value.
-        above: The value must be larger than this.
-
-    Raises:
-        ConfigError: no finite number, or one out of range.
-    """
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise ConfigError(f"Expected {where} to be a finite number, got {value!r}.")
-    if value < at_least:
-        raise ConfigError(f"Expected {where} >= {at_least:g}, got {value!r}.")
-    if value <= above:
-        raise ConfigError(f"Expected {where} > {above:g}, got {value!r}.")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -84,11 +63,7 @@ class Waveform:
     """Values of a table, one per time."""
 
     def __post_init__(self) -> None:
-        if self.kind not in _FIELDS_OF_KIND:
-            raise ConfigError(
-                f"Expected the kind of a waveform to be one of {', '.join(WAVEFORM_KINDS)}, got {self.kind!r}."
-                + suggestion(str(self.kind), WAVEFORM_KINDS)
-            )
+        one_of("the kind of a waveform", self.kind, WAVEFORM_KINDS)
         used = ("kind", *_FIELDS_OF_KIND[self.kind])
         for item in fields(self):
             if item.name not in used and getattr(self, item.name) != item.default:
@@ -97,21 +72,19 @@ class Waveform:
                     f"got {item.name} as well."
                 )
         for name in ("amplitude", "offset", "phase"):
-            require_number(f"{name} of a waveform", getattr(self, name))
+            number(f"{name} of a waveform", getattr(self, name))
         if "period_s" in used:
-            require_number(f"period_s of a {self.kind} waveform", self.period_s, above=0.0)
+            number(f"period_s of a {self.kind} waveform", self.period_s, above=0.0)
         if "start_s" in used:
-            require_number("start_s of a step waveform", self.start_s, at_least=0.0)
+            number("start_s of a step waveform", self.start_s, at_least=0.0)
         if self.kind == "table":
             self._check_table()
 
     def _check_table(self) -> None:
         for name in ("times_s", "values"):
-            numbers = getattr(self, name)
-            if not isinstance(numbers, tuple) or not numbers:
-                raise ConfigError(f"Expected {name} of a table waveform to be one or more numbers, got {numbers!r}.")
-            for number in numbers:
-                require_number(f"every one of {name} of a table waveform", number)
+            several(f"{name} of a table waveform", getattr(self, name), "numbers")
+            for value in getattr(self, name):
+                number(f"every one of {name} of a table waveform", value)
         if len(self.times_s) != len(self.values):
             raise ConfigError(
                 f"Expected as many values as times_s in a table waveform, got {len(self.values)} values at "
@@ -129,8 +102,8 @@ class Waveform:
             until_s: Last time that is sampled, if it is a multiple of `every_s`.
             every_s: Distance of the samples.
         """
-        require_number("until_s", until_s, at_least=0.0)
-        require_number("every_s", every_s, above=0.0)
+        number("until_s", until_s, at_least=0.0)
+        number("every_s", every_s, above=0.0)
         times = tuple(index * every_s for index in range(math.floor(until_s / every_s + 1e-9) + 1))
         return cls(kind="table", times_s=times, values=tuple(float(function(time_s)) for time_s in times))
 
@@ -207,10 +180,7 @@ def gather_waveform(mapping: Mapping[str, Any], key: str, owner: type) -> dict[s
         values[key] = Waveform.from_mapping(given)
     wave_fields = [item.name for item in fields(Waveform) if item.name != "kind"]
     if isinstance(given, str):
-        known = [*(item.name for item in fields(owner)), *wave_fields]
-        for name in values:
-            if name not in known:
-                raise ConfigError(f"Unknown key {name!r}.{suggestion(name, known)}")
+        known_keys(values, [*(item.name for item in fields(owner)), *wave_fields])
         beside = {name: values.pop(name) for name in wave_fields if name in values}
         values[key] = Waveform.from_mapping({"kind": given, **beside})
     elif key not in values and not values.keys().isdisjoint(wave_fields):

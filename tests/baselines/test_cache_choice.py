@@ -189,7 +189,7 @@ def test_quirk_finisher_tolerance_mismatch_arrives_far_away(mismatch, tolerance)
     assert robot.record.goal_tolerance_m == pytest.approx(tolerance)
 
 
-def test_founding_needs_an_object_within_eighty_centimetres():
+def test_creation_needs_an_object_within_eighty_centimetres():
     robot = TaskRobot()
     robot.know_object(3, (50, 50))  # centre (10.1, 10.1)
     for x, is_near in [(10.89, True), (10.91, False)]:

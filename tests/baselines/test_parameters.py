@@ -69,11 +69,11 @@ def test_durations_become_ticks_and_quirks_reach_the_kernels():
 def test_observations_of_another_swarm_are_refused(policy_class):
     policy = policy_class()
     policy.reset(make_spec(4), np.random.default_rng(0))
-    for rows, columns in ((3, policy._task.layout.size), (4, 10)):
+    for rows, columns in ((3, policy._spec.layout.size), (4, 10)):
         with pytest.raises(ObservationError, match=rf"\(n_robots, columns\) = \(4, .*got \({rows}, {columns}\)"):
             policy.act(np.zeros((rows, columns), np.float32), np.ones(rows, np.bool_))
     with pytest.raises(ObservationError, match=r"active with shape \(n_robots,\) = \(4,\), got \(5,\)"):
-        policy.act(np.zeros((4, policy._task.layout.size), np.float32), np.ones(5, np.bool_))
+        policy.act(np.zeros((4, policy._spec.layout.size), np.float32), np.ones(5, np.bool_))
 
 
 @pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy, STOCHMPolicy, STOCHXPolicy])

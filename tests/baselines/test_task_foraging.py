@@ -55,7 +55,7 @@ def test_swarms_deliver_and_use_caches(policy_name):
 
 
 @pytest.mark.compiled
-def test_stochx_founds_caches_in_the_medium_warehouse():
+def test_stochx_creates_caches_in_the_medium_warehouse():
     assert Run("warehouse_medium", "stochx", ticks=300, seed=2).counters[Counter.CACHES_CREATED] > 0
 
 

@@ -284,7 +284,7 @@ def test_info_describes_a_network_by_its_name_or_file(command, name):
     [
         ("gone.npz", "Cannot read the policy file gone.npz: there is no such file."),
         ("gone.zip", "Cannot read the policy file gone.zip: there is no such file."),
-        ("bad.npz", "Expected bad.npz to hold a network: The file is no .npz archive."),
+        ("bad.npz", "Expected bad.npz to hold a network: The file is not an .npz archive."),
     ],
 )
 def test_info_says_what_is_wrong_with_a_file(command, file, said):
@@ -409,7 +409,7 @@ def test_record_says_when_a_network_does_not_fit(command):
         (("run", "--robots", "100000"), "Expected at most"),
         (("run", "--objects", "100000"), "Expected at most"),
         (("run", "--horizon", "100"), "Expected a horizon of a whole number of intervals of 200 s, got 100 s"),
-        (("run", "--horizon", "-200"), "horizon_s > 0"),
+        (("run", "--horizon", "-200"), "horizon_s to be a finite number > 0"),
         (("run", "--side", "32"), "Expected --side with search_and_rescue only"),
         (("run", "--scenario", "search_and_rescue", "--side", "33"), "Expected side_m to be one of"),
         (("run", "--caches", "foo"), "Expected caches to be one of none, static, dynamic, got 'foo'"),

@@ -13,11 +13,9 @@ from swarm_forage_env import cli
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.scenario_options import ScenarioOptions
-from swarm_forage_env.cli.train import TrainOptions, build_plan, small_arena
-from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.scenarios.config import with_overrides
-from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.training.plan import read_plan
+from swarm_forage_env.cli.training_plan import TrainOptions, build_plan
+from swarm_forage_env.training.plan import EvaluationPlan, read_plan
+from swarm_forage_env.training.recipe import recipe
 
 TINY = ("--robots", "4", "--objects", "20", "--steps", "128", "--arenas", "2", "--arg", "n_steps=16", "--arg",
         "batch_size=64", "--evaluate-every", "128")  # fmt: skip
@@ -128,8 +126,8 @@ def test_without_the_training_library_the_message_says_what_to_install(command, 
         pytest.param(
             ("--arenas", "2", "--processes", "9"), "processes from 0 to n_arenas = 2, got 9", marks=needs_training
         ),
-        (("--objects", "800"), "(--small-start) of 12.8 x 16.0 m: Expected at most 392 objects"),
-        (NARROW, "(--small-start) of 4.8 x 16.0 m: Expected an arena larger than"),
+        (("--objects", "800"), "(small_start) of 12.8 x 16.0 m: Expected at most 392 objects"),
+        (NARROW, "(small_start) of 4.8 x 16.0 m: Expected an arena larger than"),
         (("--algo", "dqn", "--actions", "continuous"), "dqn can choose"),
         (("--arg", "gamma=much"), "key=number"),
         pytest.param(("--arg", "gama=0.9"), "Did you mean 'gamma'", marks=needs_training),
@@ -174,63 +172,65 @@ def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
     assert f"To go on: swarm-forage train --out {folder} --resume" in command("train", *TINY)[2]
 
 
-def test_defaults_are_what_a_driver_needs():
-    plan = build_plan(ScenarioOptions(scenario="warehouse_small"), TrainOptions())
-    assert plan.interface == InterfaceConfig(
-        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5
-    )
-    assert plan.options["gamma"] == 0.99
-    assert plan.options["batch_size"] == 3200
-    assert plan.hidden == (64, 64)
-    sac = build_plan(
-        ScenarioOptions(scenario="warehouse_small"), TrainOptions(algorithm="sac", automatic_gripper=False)
-    ).interface
-    assert sac.actions == "continuous"
-    assert not sac.automatic_gripper
+@pytest.mark.parametrize("name", ["warehouse_small", "search_and_rescue"])
+def test_the_plan_of_the_command_is_the_recipe(name):
+    assert build_plan(ScenarioOptions(scenario=name), TrainOptions()) == recipe(name)
 
 
-def test_defaults_are_the_recipe_that_learns():
-    plan = build_plan(ScenarioOptions(scenario="warehouse_small"), TrainOptions())
-    assert plan == build_plan(
-        ScenarioOptions(scenario="warehouse_small", settings=("nest_progress=0.05", "first_pickup=1")),
-        TrainOptions(small_start=True),
-    )
-    assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.05, 1.0)
-    assert [stage.steps for stage in plan.stages] == [1_666_666, 3_333_334]
-    assert [stage.scenario for stage in plan.stages] == [small_arena(plan.scenario), {}]
-
-
-def test_what_people_set_goes_before_the_recipe(tmp_path):
+def test_words_are_arguments_of_the_recipe(tmp_path):
     path = tmp_path / "world.toml"
-    path.write_text("[scenario]\nnest_progress = 0.0\n")
-    world = ScenarioOptions(scenario="warehouse_small", settings=("first_pickup=0.5",), config_file=path)
-    plan = build_plan(world, TrainOptions(small_start=False, hidden="128,32"))
-    assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.0, 0.5)
-    assert len(plan.stages) == 1
-    assert plan.hidden == (128, 32)
+    path.write_text("[scenario]\nn_robots = 7\nnest_progress = 0.0\n[sensor_noise]\nsigma = 0.01\n")
+    words = ScenarioOptions(
+        scenario="warehouse_small",
+        objects=60,
+        caches="static",
+        settings=("first_pickup=0.5",),
+        wrappers=("actuator_noise:sigma=0.1",),
+        config_file=path,
+    )
+    options = TrainOptions(
+        algorithm="sac",
+        steps=300,
+        n_arenas=3,
+        seed=4,
+        observation="full",
+        automatic_gripper=False,
+        decision_ticks=2,
+        evaluate_every=50,
+        small_start=False,
+        horizon_s=400.0,
+        hidden="128,32",
+        arguments=("batch_size=8", "gamma=0.9"),
+    )
+    assert build_plan(words, options) == recipe(
+        "warehouse_small",
+        algorithm="sac",
+        steps=300,
+        n_arenas=3,
+        seed=4,
+        interface={"observation": "full", "automatic_gripper": False, "decision_ticks": 2},
+        wrappers=["actuator_noise:sigma=0.1", "sensor_noise:sigma=0.01"],
+        evaluation=EvaluationPlan(every_steps=50),
+        small_start=False,
+        hidden=(128, 32),
+        options={"batch_size": 8, "gamma": 0.9},
+        n_objects=60,
+        n_robots=7,
+        caches="static",
+        first_pickup=0.5,
+        nest_progress=0.0,
+        horizon_s=400.0,
+    )
 
 
-def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
-    plan = build_plan(ScenarioOptions(scenario="search_and_rescue"), TrainOptions())
-    assert plan.scenario.reward == scenario("search_and_rescue").reward
-    assert len(plan.stages) == 1
-
-
-@pytest.mark.parametrize(
-    ("robots", "arenas", "words", "expected"),
-    [
-        (4, 2, (), 1024),  # all of 128 * 8
-        (50, 1, (), 3200),
-        (7, 5, (), 2240),  # half of 128 * 35
-        (1, 1, ("n_steps=9739",), 3200),  # a prime
-        (1, 1, ("n_steps=1",), 3200),
-        (7, 5, ("batch_size=1000",), 1000),
-    ],
-)
-def test_the_default_minibatch_fits_the_rollout(robots, arenas, words, expected):
-    world = ScenarioOptions(scenario="warehouse_small", robots=robots)
-    plan = build_plan(world, TrainOptions(n_arenas=arenas, arguments=words))
-    assert plan.options["batch_size"] == expected
+@pytest.mark.parametrize("by_file", [True, False])
+def test_what_people_set_goes_before_the_recipe(tmp_path, by_file):
+    path = tmp_path / "world.toml"
+    path.write_text("[scenario]\nnest_progress = 0.0\nhorizon_s = 400.0\n" if by_file else "")
+    settings = () if by_file else ("nest_progress=0.0", "horizon_s=400")
+    plan = build_plan(ScenarioOptions(scenario="warehouse_small", settings=settings, config_file=path), TrainOptions())
+    assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.0, 1.0)
+    assert plan.scenario.horizon_s == 400.0
 
 
 @needs_training
@@ -241,40 +241,17 @@ def test_small_runs_come_without_warnings(command, recwarn):
     assert not [warning for warning in recwarn if "mini-batch" in str(warning.message)]
 
 
-def test_the_files_of_a_world_reach_the_plan(tmp_path):
+@pytest.mark.parametrize("name", ["seed", "steps", "scenario", "n_robts"])
+def test_a_file_sets_fields_of_the_scenario_and_no_arguments_of_the_recipe(tmp_path, name):
     path = tmp_path / "world.toml"
-    path.write_text("[scenario]\nn_robots = 7\n[actuator_noise]\nsigma = 0.1\n")
-    world = ScenarioOptions(scenario="warehouse_small", config_file=path, wrappers=("sensor_noise:sigma=0.02",))
-    plan = build_plan(world, TrainOptions(seed=3))
-    assert plan.scenario.robots.n_robots == 7
-    assert sorted(config.name for config in plan.wrappers) == ["actuator_noise", "sensor_noise"]
-    assert plan.seed == 3
+    path.write_text(f"[scenario]\n{name} = 3\n")
+    with pytest.raises(ConfigError, match=f"Unknown scenario field '{name}'"):
+        build_plan(ScenarioOptions(scenario="warehouse_small", config_file=path), TrainOptions())
 
 
 def test_a_wrapper_option_goes_before_the_same_wrapper_in_the_file(tmp_path):
     path = tmp_path / "world.toml"
     path.write_text("[sensor_noise]\nsigma = 0.01\n")
-    world = ScenarioOptions(scenario="warehouse_small", config_file=path, wrappers=("sensor_noise:sigma=0.02",))
-    (config,) = build_plan(world, TrainOptions()).wrappers
+    words = ScenarioOptions(scenario="warehouse_small", config_file=path, wrappers=("sensor_noise:sigma=0.02",))
+    (config,) = build_plan(words, TrainOptions()).wrappers
     assert config.to_mapping()["sigma"] == 0.02
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("warehouse_small", (12.8, 16.0, (1.28, 8.0), (1.28, 12.8))),
-        ("warehouse_medium", (19.2, 19.2, (9.6, 9.6), (3.84, 3.84))),
-    ],
-)
-def test_a_small_start_keeps_proportions(name, expected):
-    config = scenario(name)
-    small = with_overrides(config, **small_arena(config)).arena
-    width, height, centre, size = expected
-    assert (small.width_m, small.height_m) == pytest.approx((width, height))
-    assert small.nest_centre_m == pytest.approx(centre)
-    assert small.nest_size_m == pytest.approx(size)
-
-
-def test_a_small_start_that_cannot_hold_the_objects_is_refused():
-    with pytest.raises(ConfigError, match="objects for placement"):
-        build_plan(ScenarioOptions(scenario="warehouse_small", objects=800), TrainOptions(small_start=True))

@@ -25,33 +25,61 @@ from .inner import inner
 def outer(x: float) -> float:
     return inner(x)
 """
-CALL = "from controllers.outer import outer; print(outer(1.0), sum(outer.stats.cache_hits.values()))"
 
 
-def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(tmp_path):
-    package = tmp_path / "controllers"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    (package / "outer.py").write_text(OUTER)
-    environ = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "NUMBA_DISABLE_JIT": "0"}
+PAIR = """
+from typing import NamedTuple
+from swarm_forage_env._internal.compiling import kernel
+
+class {name}(NamedTuple):
+    left: float
+    right: float
+
+@kernel
+def total(pair: {name}) -> float:
+    return pair.left + pair.right
+"""
+
+
+@pytest.fixture
+def package(tmp_path):
+    folder = tmp_path / "controllers"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    return folder
+
+
+def call(folder: Path, program: str) -> str:
+    """Run a program that can import `folder`, in a process of its own with a cache beside the folder."""
+    places = [str(folder.parent), str(Path(compiling.__file__).parents[2])]
+    environ = os.environ | {"NUMBA_CACHE_DIR": str(folder.parent / "cache"), "NUMBA_DISABLE_JIT": "0"}
     environ["PYTHONDONTWRITEBYTECODE"] = "1"  # Python's own cache does not notice two edits within a second
-    root = str(Path(compiling.__file__).parents[2])
+    run = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path[:0] = {places!r}; {program}"],
+        env=environ,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    return run.stdout.strip()
 
-    def call() -> str:
-        run = subprocess.run(
-            [sys.executable, "-c", f"import sys; sys.path[:0] = [{str(tmp_path)!r}, {root!r}]; {CALL}"],
-            env=environ,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return run.stdout.strip()
 
+def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(package):
+    program = "from controllers.outer import outer; print(outer(1.0), sum(outer.stats.cache_hits.values()))"
+    (package / "outer.py").write_text(OUTER)
     (package / "inner.py").write_text(INNER.format(added=1.0))
-    assert call() == "2.0 0"
-    assert call() == "2.0 1", "what is up to date comes from the cache"
+    assert call(package, program) == "2.0 0"
+    assert call(package, program) == "2.0 1", "what is up to date comes from the cache"
     (package / "inner.py").write_text(INNER.format(added=2.0))
-    assert call() == "3.0 0"
+    assert call(package, program) == "3.0 0"
+
+
+def test_a_type_that_the_sources_no_longer_have_does_no_harm(package):
+    program = "from controllers import pairs; print(pairs.total(pairs.{name}(1.0, 2.0)))"
+    for name in ("Pair", "Couple"):
+        (package / "pairs.py").write_text(PAIR.format(name=name))
+        assert call(package, program.format(name=name)) == "3.0"
 
 
 ROOT = Path(compiling.__file__).parents[2]

@@ -23,7 +23,7 @@ from tests.reference.compact_view import compact_row
 from tests.support.stage import NEST_CELL, OPEN_CELL, build_cache, cell_centre, lay, load, put, stand, tidy_world
 
 STAND, FORWARD = MOTIONS.index("stand"), MOTIONS.index("forward")
-GRASP, RELEASE, DELIVER, SITE, FOUND = (len(MOTIONS) + k for k in range(len(GRIPS)))
+GRASP, RELEASE, DELIVER, SITE, CREATE_CACHE = (len(MOTIONS) + k for k in range(len(GRIPS)))
 
 
 def bound(env: ForageEnv, **choices) -> LearnerInterface:
@@ -55,7 +55,7 @@ def test_the_compact_view_matches_its_twin_along_runs(caches, noise):
             assert view.max() <= 1.0
             kinds_seen += np.abs(view).sum(axis=0)
     if caches == "static" and not noise:
-        assert kinds_seen.all(), "every column is put to the test in at least this world"
+        assert kinds_seen.all(), "every column is put to the test in at least this run"
 
 
 def test_the_compact_view_of_robots_in_caches_and_of_robots_that_are_away_matches_its_twin():
@@ -139,7 +139,7 @@ def test_motions_drive_and_ask_for_nothing():
 
 def test_gripper_actions_by_number():
     env = tidy_world(n_robots=5)
-    commands = bound(env, actions="discrete").command(np.array([GRASP, RELEASE, DELIVER, SITE, FOUND]),
+    commands = bound(env, actions="discrete").command(np.array([GRASP, RELEASE, DELIVER, SITE, CREATE_CACHE]),
                                                       env.arena.observe())  # fmt: skip
     assert not commands[:, :2].any()
     np.testing.assert_allclose(commands[:, 2], [Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.CREATE_CACHE])
@@ -184,7 +184,7 @@ def test_masks_by_hand(caches):
     here = np.arange(8) < 7
     env.set_population(active=here & (np.arange(8) != 6), present=here)  # 6 in repair, 7 away
     moves = set(range(len(MOTIONS)))
-    site = {SITE, FOUND} if caches == "dynamic" else set()
+    site = {SITE, CREATE_CACHE} if caches == "dynamic" else set()
     expected = [
         moves | {GRASP},
         moves,
@@ -219,7 +219,7 @@ def test_masks_are_for_discrete_actions():
         ({"actions": "discrete"}, np.zeros(4), "whole numbers"),
     ],
 )
-def test_actions_that_are_none_are_refused(choices, actions, reason):
+def test_wrong_actions_are_refused(choices, actions, reason):
     env = tidy_world(n_robots=4)
     with pytest.raises(ValueError, match=reason):
         bound(env, **choices).command(actions, env.arena.observe())
@@ -235,7 +235,7 @@ def test_actions_that_are_none_are_refused(choices, actions, reason):
         ({"decision_ticks": True}, ">= 1"),
     ],
 )
-def test_choices_that_are_none_are_refused(choices, reason):
+def test_wrong_choices_are_refused(choices, reason):
     with pytest.raises(ConfigError, match=reason):
         InterfaceConfig(**choices)
 
@@ -253,5 +253,9 @@ def test_an_interface_is_given_as_it_is_by_fields_or_not_at_all():
     assert chosen_interface(numbered) is numbered
     assert chosen_interface({"actions": "discrete"}) == numbered
     assert chosen_interface(None) == chosen_interface({}) == InterfaceConfig()
+    driven = InterfaceConfig(automatic_gripper=True, decision_ticks=5)
+    assert chosen_interface(None, driven) is driven
+    assert chosen_interface({"decision_ticks": 2}, driven) == InterfaceConfig(automatic_gripper=True, decision_ticks=2)
+    assert chosen_interface(numbered, driven) is numbered
     with pytest.raises(ConfigError, match=r"InterfaceConfig or its fields by name, .* got 'discrete'\."):
         chosen_interface("discrete")

@@ -18,7 +18,8 @@ from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import is_policy_file, load_policy, local_policy, policy_class
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.experiments import Budget
-from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.study.run import run_one
+from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.pettingzoo import parallel_env
 
 TINY = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=1, n_sizes=2, n_levels=1)
@@ -29,7 +30,7 @@ SIZE = ENV.layout.size
 
 
 class Stage(gymnasium.Env):
-    """Spaces without a world, to build models from."""
+    """Spaces without an environment behind them, to build models from."""
 
     def __init__(self, seen, done):
         self.observation_space, self.action_space = seen, done
@@ -83,12 +84,47 @@ def test_actions_are_those_of_the_algorithm_itself(tmp_path, algorithm, options)
         ("PPO", {"observation": "compact", "automatic_gripper": True}),
     ],
 )
-def test_the_interface_of_a_model_is_told_from_its_spaces(tmp_path, algorithm, choices):
+def test_the_interface_of_a_model_is_told_by_a_parameter(tmp_path, algorithm, choices):
     interface = LearnerInterface(InterfaceConfig(**choices), ENV.swarm_spec)
     options = {"buffer_size": 10} if algorithm == "DQN" else {}
     made, path = model(algorithm, tmp_path, seen=interface.observation_space, done=interface.action_space, **options)
     choice, _ = made.predict(interface.observe(OBS), deterministic=True)
-    np.testing.assert_array_equal(started(path).act(OBS, ACTIVE), interface.command(choice, OBS))
+    policy = started(path, interface=choices)
+    np.testing.assert_array_equal(policy.act(OBS, ACTIVE), interface.command(choice, OBS))
+    assert policy.reads == interface.config.reads
+
+
+@pytest.mark.parametrize(
+    "choices",
+    [
+        {"observation": "compact", "actions": "discrete", "automatic_gripper": True},
+        {"actions": "discrete"},
+        {"automatic_gripper": True},
+    ],
+)
+def test_a_model_that_does_not_tell_its_interface_is_refused_until_somebody_does(tmp_path, choices):
+    interface = LearnerInterface(InterfaceConfig(**choices), ENV.swarm_spec)
+    _, path = model("A2C", tmp_path, seen=interface.observation_space, done=interface.action_space)
+    with pytest.raises(ModelError, match=r"model\.zip to tell .* has no note, .*\{\"interface\": .*note_interface"):
+        started(path)
+    other = {"observation": "compact", "actions": "continuous"}
+    with pytest.raises(ModelError, match=r"to Box\(3\), as the parameter interface says; model\.zip goes"):
+        started(path, interface=other)
+    started(path, interface=choices)
+
+
+def test_a_planned_run_carries_the_interface_as_plain_values(tmp_path):
+    interface = InterfaceConfig(observation="compact", automatic_gripper=True, decision_ticks=2)
+    bound = LearnerInterface(interface, ENV.swarm_spec)
+    _, path = model("A2C", tmp_path, seen=bound.observation_space, done=bound.action_space)
+    world = scenario("warehouse_small", n_robots=4, n_objects=20, horizon_s=4.0, interval_s=2.0)
+    parameters = {"interface": {"observation": "compact", "automatic_gripper": True, "decision_ticks": 2}}
+    spec = plan_run(world, str(path), parameters=parameters)
+    assert RunSpec.from_json(spec.to_json()) == spec
+    policy = load_policy(spec.policy, spec.parameters)
+    policy.reset(ENV.swarm_spec, np.random.default_rng(0))
+    assert policy.interface.config == interface
+    assert run_one(spec).scenario == "warehouse_small"
 
 
 def test_a_model_of_the_whole_swarm_sees_all_rows_at_once(tmp_path):
@@ -97,16 +133,19 @@ def test_a_model_of_the_whole_swarm_sees_all_rows_at_once(tmp_path):
     other = parallel_env("warehouse_small", n_robots=5, n_objects=20)
     with pytest.raises(ModelError, match="these 5 robots together"):
         load_policy(str(path)).reset(other.swarm_spec, np.random.default_rng(0))
+    with pytest.raises(ModelError, match=r"from Box\(23\) to Box\(3\), as the parameter interface says"):
+        started(path, interface={"observation": "compact"})
 
 
 def test_actions_are_kept_for_the_ticks_of_a_decision(tmp_path):
     _, path = model("A2C", tmp_path)
-    policy = started(path, decision_ticks=2)
+    policy = started(path, interface={"decision_ticks": 2})
     first, second, third = (policy.act(sign * OBS, ACTIVE).copy() for sign in (1.0, -1.0, -1.0))
     np.testing.assert_array_equal(first, second)
     assert np.any(third != second)
-    with pytest.raises(ConfigError, match="decision_ticks"):
-        load_policy(str(path), {"decision_ticks": 0})
+    for wrong in ({"decision_ticks": 0}, {"decision_tick": 2}, 2):
+        with pytest.raises(ConfigError, match=r"decision_ticks|InterfaceConfig or its fields"):
+            load_policy(str(path), {"interface": wrong})
 
 
 NOTED = {
@@ -135,12 +174,12 @@ def test_a_model_with_a_note_runs_as_it_was_trained(tmp_path):
     np.testing.assert_array_equal(wheels[0], interface.command(expected, OBS)[:, :2])
     np.testing.assert_array_equal(wheels[:3], [wheels[0]] * 3)
     assert np.any(wheels[3] != wheels[2])
-    policy = started(path, decision_ticks=1)
+    policy = started(path, interface={"decision_ticks": 1})  # the rest is as noted
     first, second = (policy.act(sign * OBS, ACTIVE)[:, :2].copy() for sign in (1.0, -1.0))
     assert np.any(first != second)
 
 
-def test_a_model_without_a_note_says_nothing_of_its_world(tmp_path):
+def test_a_model_without_a_note_does_not_tell_its_caches(tmp_path):
     _, path = model("A2C", tmp_path)
     policy = load_policy(str(path))
     assert not hasattr(policy, "caches")
@@ -160,7 +199,7 @@ def test_a_model_without_a_note_says_nothing_of_its_world(tmp_path):
         ),
     ],
 )
-def test_notes_that_cannot_be_are_refused(tmp_path, note, reason):
+def test_wrong_notes_are_refused(tmp_path, note, reason):
     _, path, _ = noted_model(tmp_path, note)
     with pytest.raises(ModelError, match=reason):
         started(path)
@@ -168,7 +207,7 @@ def test_notes_that_cannot_be_are_refused(tmp_path, note, reason):
 
 def test_a_model_that_sees_something_else_is_refused(tmp_path):
     _, path = model("A2C", tmp_path, seen=box(7))
-    with pytest.raises(ModelError, match=r"model\.zip goes from Box\(7\) to Box\(3\)"):
+    with pytest.raises(ModelError, match=r"its spaces, Box\(7\) to Box\(3\), are neither"):
         started(path)
 
 

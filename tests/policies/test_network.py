@@ -8,7 +8,8 @@ import pytest
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.policies.network import LearnedPolicy, Network, NetworkAbout, NetworkError, NetworkPolicy
+from swarm_forage_env.policies.learned import LearnedPolicy
+from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.views.pettingzoo import parallel_env
 
@@ -71,13 +72,13 @@ ABOUT = json.loads(small_network().about.to_json())
     ("content", "reason"),
     [
         (b"", "The file is empty"),
-        (b"no archive", "is no .npz archive"),
+        (b"text", "is not an .npz archive"),
         (b"PK\x03\x04 and no more", "damaged .npz archive"),
         ({"numbers": np.zeros(3)}, "has no part 'about'"),
         ({"weight_0": np.zeros((2, 2)), "about": np.array("{}")}, "has no part 'bias_0'"),
         (
             {"weight_0": np.array([{}], object), "about": np.array("{}")},
-            "part 'weight_0' is damaged, or no plain array",
+            "part 'weight_0' is damaged, or not a plain array",
         ),
         ({"about": np.array("{")}, "description of a network as JSON, got '{'"),
         ({"about": np.array("[1]")}, r"with its interface, got '\[1\]'"),
@@ -88,8 +89,8 @@ ABOUT = json.loads(small_network().about.to_json())
             {"about": np.array(json.dumps(ABOUT | {"caches": "statc"}))},
             "caches to be one of none, static, dynamic, got",
         ),
-        ({"about": np.array(json.dumps(ABOUT | {"samples": "no"}))}, "samples to be true or false, got 'no'"),
-        ({"about": np.array(json.dumps(ABOUT | {"card": [1]}))}, r"card to be a table, got \[1\]"),
+        ({"about": np.array(json.dumps(ABOUT | {"samples": "no"}))}, "samples to be True or False, got 'no'"),
+        ({"about": np.array(json.dumps(ABOUT | {"card": [1]}))}, r"card to be a table of values by name, got \[1\]"),
         ({"about": np.array(json.dumps(ABOUT))}, r"layers that follow on each other, got weights \[\]"),
     ],
 )
@@ -151,7 +152,7 @@ def test_layers_that_do_not_follow_on_each_other_are_refused():
         Network((network.weights[0], np.zeros((3, 2), np.float32)), network.biases, network.about)
     with pytest.raises(NetworkError, match="follow on each other"):
         Network((), (), network.about)
-    with pytest.raises(NetworkError, match="activation of tanh, relu"):
+    with pytest.raises(NetworkError, match="activation to be one of tanh, relu"):
         small_network(activation="elu")
 
 
@@ -176,7 +177,7 @@ def test_a_policy_keeps_its_choice_for_the_ticks_of_a_decision(actions):
 
 def test_a_network_that_does_not_fit_its_interface_is_refused_at_the_start_of_a_run():
     env = parallel_env("warehouse_small", n_robots=2, n_objects=20)
-    with pytest.raises(NetworkError, match="from 111 columns to 2 actions in this world, got one from 2 to 2"):
+    with pytest.raises(NetworkError, match="from 111 columns to 2 actions, as its interface says, got one from 2 to 2"):
         NetworkPolicy(small_network()).reset(env.swarm_spec, np.random.default_rng(0))
 
 

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-import metrics.plots
+import metrics.scoring.plots
 import swarm_forage_env.rendering.plots
 from metrics import waveform
-from metrics.score_rows import MEASURE_CRITERIA
-from metrics.study_table import CRITERIA, CURVE_COLUMNS, UNDISTURBED, study_curves
+from metrics.scoring.columns import CRITERIA, CURVE_COLUMNS, UNDISTURBED
+from metrics.scoring.curves_table import study_curves
+from metrics.scoring.measures import MEASURE_CRITERIA
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study import experiments
 from swarm_forage_env.study.record import RunRecord
@@ -44,7 +45,7 @@ def test_criteria_have_the_same_names():
 
 
 def test_pictures_have_the_same_colours():
-    assert metrics.plots.COLOURS == swarm_forage_env.rendering.plots.COLOURS
+    assert metrics.scoring.plots.COLOURS == swarm_forage_env.rendering.plots.COLOURS
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,13 @@ from gymnasium import spaces
 from pettingzoo.test import api_test, max_cycles_test, parallel_api_test, parallel_seed_test, seed_test, state_test
 from pettingzoo.utils.env import AECEnv
 
-import swarm_forage_env.env as env_module
 from swarm_forage_env import SCENARIO_NAMES
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.views.pettingzoo import env, parallel_env
+from swarm_forage_env.views import pettingzoo as views
+from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, env, parallel_env
+from swarm_forage_env.wrappers.throttle import Throttle
 
 SMALL = {"n_robots": 5, "n_objects": 80}
 WORLDS = [(name, caches) for name in SCENARIO_NAMES for caches in ("none", "static", "dynamic")]
@@ -49,7 +50,7 @@ def test_state(name):
 
 
 def test_max_cycles():
-    max_cycles_test(env_module)
+    max_cycles_test(views)
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
@@ -310,7 +311,7 @@ def test_actions_that_are_not_finite_name_the_robot():
 @pytest.mark.parametrize("seed", [-1, 1.5, 3.0, "3", True, [1], np.float64(2.0)])
 def test_seeds_are_whole_numbers(seed):
     world = parallel_env(**SMALL)
-    with pytest.raises(ValueError, match="non-negative integer or None"):
+    with pytest.raises(ValueError, match="seed to be a whole number >= 0 or None, got"):
         world.reset(seed=seed)
 
 
@@ -333,7 +334,7 @@ def test_resets_without_a_seed_continue_the_sequence_of_the_last_seed():
 
 def test_constructor_errors():
     for max_cycles in (0, 2.5, "5", True):
-        with pytest.raises(ValueError, match=f"max_cycles >= 1, got {max_cycles!r}"):
+        with pytest.raises(ValueError, match=f"max_cycles to be a whole number >= 1 or None, got {max_cycles!r}"):
             parallel_env(max_cycles=max_cycles, **SMALL)
     with pytest.raises(ConfigError, match=r"ScenarioConfig, got 'warehouse_small'; `parallel_env`"):
         ForageEnv("warehouse_small")
@@ -345,7 +346,10 @@ def test_constructor_errors():
         parallel_env(n_robot=3)
 
 
-@pytest.mark.parametrize("word", ["interface", "wrappers"])
-def test_the_plain_environment_names_the_door_for_learners(word):
-    with pytest.raises(ConfigError, match=rf"pettingzoo\.make\('parallel', id, {word}="):
-        parallel_env("warehouse_small", **{word: None})
+def test_one_factory_makes_all_forms():
+    throttle = "throttle:waveform=constant,amplitude=0.1"
+    assert isinstance(parallel_env("warehouse_small", wrappers=[throttle], **SMALL), Throttle)
+    learner = parallel_env("warehouse_small", wrappers=[throttle], interface={"actions": "discrete"}, **SMALL)
+    assert isinstance(learner, ParallelLearnerEnv)
+    by_id = pettingzoo.make("parallel", "swarm_forage/warehouse_small-v0", wrappers=[throttle], **SMALL)
+    assert isinstance(by_id, Throttle)

@@ -1,6 +1,6 @@
 """What `metrics` reads by name is what records hold: the border between the two is a list of columns."""
 
-from metrics.study_table import CURVE_COLUMNS
+from metrics.scoring.columns import CURVE_COLUMNS
 from swarm_forage_env.study.record import schema_table
 
 NOT_RECORDED = {"deaths_per_s", "malfunctions_per_s", "births_per_s", "repairs_per_s"}

@@ -125,7 +125,7 @@ def test_the_joint_view_passes_the_checker_of_gymnasium(wrappers):
 
 def play(env, seed: int, ticks: int, *, check=None) -> str:
     """Fingerprint of what a busy run shows, tick by tick."""
-    seen, policy, world = hashlib.sha256(), BusyPolicy(), env.world
+    seen, policy, world = hashlib.sha256(), BusyPolicy(), env.unwrapped
     policy.reset(world.swarm_spec, stream_rng(seed, Stream.POLICY))
     obs = env.reset_batch(seed)
     for _ in range(ticks):
@@ -310,7 +310,7 @@ def test_wrappers_are_named_on_a_command_line(text, expected):
         ("throttle:waveform=constant,amplitude=0.1,amplitude=0.2", "Expected amplitude of wrapper throttle once"),
         ("sensor_noise:sigma=0.1,sigma.kind=sine", "sigma of wrapper sensor_noise either as a value or as a table"),
         ("sensor_noise:sigma=0.1,groups=proximty", "Unknown group of sensors 'proximty'"),
-        ("population:death_per_tick=-1", "population.death_per_tick >= 0"),
+        ("population:death_per_tick=-1", "population.death_per_tick to be a finite number >= 0"),
         ("", "Unknown wrapper ''"),
     ],
 )
@@ -349,7 +349,7 @@ def test_wrappers_are_read_from_toml():
     ("tables", "message"),
     [
         ({"noise": {}}, "Unknown wrapper 'noise'"),
-        ({"throttle": 0.1}, "settings of wrapper throttle as a table, got 0.1"),
+        ({"throttle": 0.1}, "settings of wrapper throttle to be a table of values by name, got 0.1"),
         ({"population": {"deaths_per_tick": 1}}, "Unknown key 'deaths_per_tick'. Did you mean 'death_per_tick'"),
     ],
 )

@@ -70,7 +70,7 @@ def visible_objects(spec: SwarmSpec, senses: dict[str, np.ndarray]) -> tuple[tup
 class ReferenceRobot:
     """One robot under CRW, or under DPO if it has a memory."""
 
-    task: SwarmSpec
+    spec: SwarmSpec
     memory: ObjectDictionary | None = None
     state: str = "acquire"
     wander_deg: float = 0.0

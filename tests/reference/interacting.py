@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from swarm_forage_env.contract.codes import Event
 from swarm_forage_env.scenarios.regions import Box
 
-GRASP, RELEASE, DELIVER, SITE, FOUND = "grasp", "release", "deliver", "site", "found"
+GRASP, RELEASE, DELIVER, SITE, CREATE_CACHE = "grasp", "release", "deliver", "site", "create"
 Request = tuple[str, int | None]
 """What is asked, and the object row or the cache serial that it is about."""
 
@@ -16,7 +16,7 @@ def band_of(grip: float) -> str:
     for band, above in ((GRASP, 0.0), (RELEASE, -0.25), (DELIVER, -0.5), (SITE, -0.75)):
         if grip > above:
             return band
-    return FOUND
+    return CREATE_CACHE
 
 
 @dataclass
@@ -179,7 +179,7 @@ class SlowWorld:
             if len(cache.contents) == 1:
                 self.floor[cache.centre] = cache.contents.pop()
                 del self.caches[target]
-        elif self.lay_down(robot) and kind == FOUND:
+        elif self.lay_down(robot) and kind == CREATE_CACHE:
             self.creators.append(robot)
 
     def take(self, robot: int, row: int) -> None:

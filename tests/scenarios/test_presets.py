@@ -134,11 +134,11 @@ def test_too_many_robots_for_the_series():
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        ({"n_objects": 0}, r"objects\.n_objects >= 1, got 0"),
-        ({"n_robots": 0}, r"robots\.n_robots >= 1, got 0"),
-        ({"n_robots": 2.5}, r"robots\.n_robots to be a whole number, got 2\.5"),
-        ({"side_m": math.nan, "n_objects": 10, "n_robots": 1}, r"arena\.width_m to be a finite number, got nan"),
-        ({"side_m": -16.0, "n_objects": 10}, r"arena\.width_m > 0, got -16\.0"),
+        ({"n_objects": 0}, r"objects\.n_objects to be a whole number >= 1, got 0"),
+        ({"n_robots": 0}, r"robots\.n_robots to be a whole number >= 1, got 0"),
+        ({"n_robots": 2.5}, r"robots\.n_robots to be a whole number >= 1, got 2\.5"),
+        ({"side_m": math.nan, "n_objects": 10, "n_robots": 1}, r"arena\.width_m to be a finite number > 0, got nan"),
+        ({"side_m": -16.0, "n_objects": 10}, r"arena\.width_m to be a finite number > 0, got -16\.0"),
         ({"wlak_probability": 0.1}, r"Unknown scenario field 'wlak_probability'\. Did you mean 'walk_probability'\?"),
     ],
 )

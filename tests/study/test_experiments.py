@@ -203,7 +203,8 @@ def test_specifications_come_seed_by_seed_and_differ_in_identity():
         (lambda: planned("warehouse_small", "noize"), "Unknown criterion 'noize'. Did you mean 'noise'"),
         (lambda: planned("warehouse_small", "population_size", n_robots=1), "at least 2 robots"),
         (lambda: Budget(horizon_s=1.0, interval_s=1.0, n_seeds=0, n_sizes=2, n_levels=1), "n_seeds .* >= 1, got 0"),
-        (lambda: Budget(horizon_s=1.0, interval_s=1.0, n_seeds=1, n_sizes=1, n_levels=1), "n_sizes .* >= 2, got 1"),
+        (lambda: Budget(horizon_s=1.0, interval_s=1.0, n_seeds=None, n_sizes=2, n_levels=1), "n_seeds .* got None"),
+        (lambda: Budget(horizon_s=1.0, interval_s=1.0, n_seeds=1, n_sizes=1, n_levels=1), "n_sizes .* >= 2 .*got 1"),
         (lambda: Budget(horizon_s=1.0, interval_s=1.0, n_seeds=1, n_sizes=2, n_levels=0.5), "n_levels .* got 0.5"),
     ],
 )

@@ -270,7 +270,7 @@ def test_thread_settings_are_put_back(monkeypatch):
 
 @pytest.mark.parametrize("jobs", [0, -1])
 def test_jobs_must_be_positive(jobs):
-    with pytest.raises(ValueError, match="Expected jobs >= 1"):
+    with pytest.raises(ValueError, match="Expected jobs to be a whole number >= 1"):
         run_all(SPECS, jobs=jobs)
 
 

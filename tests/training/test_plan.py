@@ -99,7 +99,7 @@ def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
         ("gamma = 0.9", "clip_range = 0", "options.clip_range"),
         ("gamma = 0.9", "batch_size = 0", "options.batch_size to be a whole number >= 1, got 0"),
         ("gamma = 0.9", "n_steps = 1.5", "options.n_steps to be a whole number"),
-        ("learning_rate = 0.1", "learning_rate = 0", "stage.options.learning_rate to be a number > 0, got 0"),
+        ("learning_rate = 0.1", "learning_rate = 0", "stage.options.learning_rate to be a finite number > 0, got 0"),
         ("learning_rate = 0.1", "learning_rate = inf", "stage.options.learning_rate"),
         ("[interface]", "[[interface]]", "interface to be a table"),
         ("sigma = 0.02", "sigma = -1.0", "sigma"),
@@ -129,7 +129,7 @@ def test_a_plan_has_stages_and_a_readable_file(tmp_path):
 
 def test_a_file_without_a_table_is_no_plan(tmp_path):
     (tmp_path / "plan.json").write_text("[1]")
-    with pytest.raises(ConfigError, match=r"the plan to be a table, got \[1\]"):
+    with pytest.raises(ConfigError, match=r"the plan to be a table of values by name, got \[1\]"):
         read_plan(tmp_path / "plan.json")
 
 

@@ -49,7 +49,7 @@ def tiny_plan(**changes) -> TrainingPlan:
 
 
 ROOMLESS = {"width_m": 19.2, "height_m": 19.2, "nest_centre_m": (9.6, 9.6), "nest_size_m": (3.84, 3.84)}
-"""A world too small for the clusters of search and rescue."""
+"""An arena too small for the clusters of search and rescue."""
 SHORT = tiny_plan(stages=(Stage(steps=128),))
 
 
@@ -196,7 +196,7 @@ def test_a_training_that_kept_nothing_is_started_again(tmp_path):
             {"scenario": search_and_rescue(side_m=48.0, n_robots=4, horizon_s=200.0),
              "stages": (Stage(steps=64, scenario=ROOMLESS),)},
             0,
-            r"Cannot train in stage 1, a world with width_m = 19.2, .*: Expected at most \d+ objects",
+            r"Cannot train in stage 1, with width_m = 19.2, .*: Expected at most \d+ objects",
         ),
     ],
 )  # fmt: skip

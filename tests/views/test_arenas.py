@@ -113,7 +113,7 @@ def test_an_action_is_kept_for_the_ticks_of_a_decision_and_rewards_add_up():
     actions = np.zeros((3, 3), np.float32)
     step = batch.step(actions)
     assert step.rewards.tolist() == [3.0, 3.0, 3.0]
-    assert batch.arenas[0].base.tick == 3
+    assert batch.arenas[0].forage_env.tick == 3
     last = batch.step(actions)
     assert last.rewards.tolist() == [2.0, 2.0, 2.0], "the horizon of 5 ticks cuts the second decision short"
     assert last.truncated.all()
@@ -136,12 +136,12 @@ def test_seeds_decide_everything_and_runs_continue_their_sequence():
 def test_a_reset_changes_the_scenario_for_all_later_runs_until_told_otherwise():
     batch = ArenaBatch(plan(InterfaceConfig(observation="compact")), 2)
     batch.reset([0, 1], [{"scenario": {"n_objects": 9, "width_m": 24.0}}, None])
-    assert [world.forage_env.scenario.objects.n_objects for world in batch.arenas] == [9, 4]
+    assert [arena.forage_env.scenario.objects.n_objects for arena in batch.arenas] == [9, 4]
     for _ in range(lives.HORIZON_TICKS):
         batch.step(np.zeros((6, 3), np.float32))
-    assert [world.forage_env.scenario.arena.width_m for world in batch.arenas] == [24.0, 32.0]
+    assert [arena.forage_env.scenario.arena.width_m for arena in batch.arenas] == [24.0, 32.0]
     batch.reset([0, 1], [{"scenario": {}}, None])
-    assert [world.forage_env.scenario.objects.n_objects for world in batch.arenas] == [4, 4]
+    assert [arena.forage_env.scenario.objects.n_objects for arena in batch.arenas] == [4, 4]
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_a_reset_changes_the_scenario_for_all_later_runs_until_told_otherwise():
     [
         ({"scenario": {"n_robots": 4}}, "n_robots to stay 3"),
         ({"scenario": {"n_objekts": 4}}, "n_objects"),
-        ({"scenario": 4}, "fields by name"),
+        ({"scenario": 4}, "reset option 'scenario' to be a table of values by name, got 4"),
         ({"scenery": {}}, "scenario"),
         ({"width_m": 12.0}, r"inside of .* options=\{'scenario': \{'width_m': 12.0\}\}"),
         ({"scenario": {}, "width_m": 12.0}, "'width_m' inside of the reset option 'scenario'"),
@@ -174,7 +174,7 @@ def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
 def test_options_of_others_are_left_to_them():
     batch = ArenaBatch(plan(), 1)
     batch.reset([0], [{"reset_mask": np.ones(1, bool), "low": -1, "high": 1, 3: "three", "record": True}])
-    assert batch.arenas[0].base.scenario.objects.n_objects == 4
+    assert batch.arenas[0].forage_env.scenario.objects.n_objects == 4
 
 
 def test_closed_arenas_take_no_reset_and_no_step():
@@ -222,8 +222,8 @@ def test_actions_that_are_not_finite_are_refused_by_name(interface):
         batch.step(actions)
     assert "the world was not stepped" in str(refusal.value)
     (note,) = refusal.value.__notes__
-    assert "in arena 5: its world was not stepped" in note
-    assert [world.forage_env.tick for world in batch.arenas] == [1, 0], "worlds of other arenas may have been"
+    assert "in arena 5, which was not stepped" in note
+    assert [arena.forage_env.tick for arena in batch.arenas] == [1, 0], "other arenas may have been stepped"
     batch.reset([0, 1], [None, None])
     assert batch.step(np.zeros_like(actions)).obs.shape[0] == 6
 
@@ -257,5 +257,5 @@ def test_attributes_are_set_where_they_are_also_below_wrappers():
     batch = ArenaBatch(wrapped, 1)
     batch.reset([0], [None])
     batch.set_attribute("max_cycles", 1, [0])
-    assert batch.arenas[0].base.max_cycles == 1
+    assert batch.arenas[0].forage_env.max_cycles == 1
     assert batch.step(np.zeros((3, 3), np.float32)).truncated.all()

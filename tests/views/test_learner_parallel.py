@@ -38,10 +38,10 @@ def test_keeps_it_with_deaths():
 @pytest.mark.parametrize("interface", INTERFACES.values(), ids=INTERFACES)
 def test_shows_the_same_as_the_rows_of_an_arena(interface):
     wrappers = (parse_wrapper("population:death_per_tick=0.02"), parse_wrapper("sensor_noise:sigma=0.02"))
-    world = scenario("warehouse_small", n_robots=6, n_objects=40, width_m=12.0, nest_centre_m=(1.2, 8.0),
-                     nest_size_m=(1.2, 12.8), tick=0.01)  # fmt: skip
-    env = ParallelLearnerEnv(world, interface=interface, wrappers=wrappers, max_cycles=100)
-    batch = ArenaBatch(ArenaPlan(scenario=world, wrappers=wrappers, max_cycles=100, interface=interface), 1)
+    narrow = scenario("warehouse_small", n_robots=6, n_objects=40, width_m=12.0, nest_centre_m=(1.2, 8.0),
+                      nest_size_m=(1.2, 12.8), tick=0.01)  # fmt: skip
+    env = ParallelLearnerEnv(narrow, interface=interface, wrappers=wrappers, max_cycles=100)
+    batch = ArenaBatch(ArenaPlan(scenario=narrow, wrappers=wrappers, max_cycles=100, interface=interface), 1)
     observations, infos = env.reset(seed=2)
     rows, _ = batch.reset([2], [None])
     n_deaths = 0

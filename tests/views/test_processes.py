@@ -1,5 +1,6 @@
 """Arenas in processes of their own: ends, failures and interruptions."""
 
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -10,6 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views import processes
 from swarm_forage_env.views.arenas import ArenaBatch
@@ -61,11 +64,26 @@ def test_a_script_without_a_guard_is_told_so(tmp_path):
 
 
 def test_a_process_that_was_killed_before_its_first_answer_is_not_blamed_on_the_script():
-    arenas = ArenaProcesses(PLAN, 1, 1)
-    arenas._processes[0].kill()
-    with pytest.raises(ArenaProcessError, match=r"exit code -9\.$"):
-        arenas.reset([0], [None])
+    arenas = ArenaProcesses(PLAN, 2, 2)
+    arenas._processes[1].kill()
+    with pytest.raises(ArenaProcessError, match=r"arenas \[1\] ended with exit code -9\.$"):
+        arenas.reset([0, 1], [None, None])
     arenas.close()
+
+
+def test_a_plan_that_cannot_be_built_is_refused_at_once_and_leaves_no_process():
+    impossible = ArenaPlan(scenario=PLAN.scenario, max_cycles=0)
+    before = multiprocessing.active_children()
+    with pytest.raises(ValueError, match="max_cycles >= 1, got 0"):
+        ArenaProcesses(impossible, 2, 2)
+    assert multiprocessing.active_children() == before
+
+
+def test_the_interface_is_known_without_an_environment_in_this_process(monkeypatch):
+    monkeypatch.setattr(ForageEnv, "__init__", lambda *_, **__: pytest.fail("an environment was built"))
+    arenas = ArenaProcesses(PLAN, 1, 1)
+    arenas.close()
+    assert arenas.interface.observation_space.shape == (SwarmSpec.of(PLAN.scenario).layout.size,)
 
 
 def test_ctrl_c_is_left_to_the_parent(arenas):

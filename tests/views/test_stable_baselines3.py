@@ -115,9 +115,9 @@ def test_options_change_the_scenario_of_the_next_resets():
     env = SwarmVecEnv(**lives.WORLD, n_arenas=2)
     env.set_options({"scenario": {"n_objects": 9}})
     env.reset()
-    assert env.get_attr("task", indices=[0])[0].n_objects == 9
+    assert env.get_attr("swarm_spec", indices=[0])[0].n_objects == 9
     env.reset()
-    assert env.get_attr("task", indices=[5])[0].n_objects == 9
+    assert env.get_attr("swarm_spec", indices=[5])[0].n_objects == 9
 
 
 def test_masks_are_found_where_masking_algorithms_look():

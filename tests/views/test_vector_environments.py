@@ -218,17 +218,17 @@ def test_seeds_per_arena_and_their_number():
 def test_a_reset_can_change_the_scenario(view):
     if view == "joint":
         env = JointForageEnv("warehouse_small", n_robots=3)
-        worlds = lambda: [env.forage_env]  # noqa: E731 - a name for both views
+        forage_envs = lambda: [env.forage_env]  # noqa: E731 - a name for both views
     else:
         env = SwarmVectorEnv("warehouse_small", num_envs=6, n_robots=3)
-        worlds = lambda: [env._arenas.arenas[k].base for k in range(2)]  # noqa: E731
+        forage_envs = lambda: [env._arenas.arenas[k].forage_env for k in range(2)]  # noqa: E731 - as above
     space = env.observation_space
     env.reset(seed=0, options={"scenario": {"n_objects": 77, "delivery": 5.0}})
-    assert {world.scenario.objects.n_objects for world in worlds()} == {77}
+    assert {each.scenario.objects.n_objects for each in forage_envs()} == {77}
     env.reset()
-    assert {world.scenario.reward.delivery for world in worlds()} == {5.0}
+    assert {each.scenario.reward.delivery for each in forage_envs()} == {5.0}
     env.reset(options={"scenario": {}})
-    assert {world.scenario.objects.n_objects for world in worlds()} == {200}
+    assert {each.scenario.objects.n_objects for each in forage_envs()} == {200}
     assert env.observation_space == space
     with pytest.raises(ConfigError, match="n_robots to stay 3"):
         env.reset(options={"scenario": {"n_robots": 4}})

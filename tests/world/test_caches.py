@@ -9,8 +9,8 @@ import pytest
 from swarm_forage_env.contract.codes import Counter, Grip, ObjectStatus, Task
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.regions import square_box
 from swarm_forage_env.world.caches import (
-    cache_box,
     count_cache_users,
     create_static_caches,
     n_cache_slots,
@@ -73,7 +73,7 @@ def test_power_law_caches_stand_before_the_clusters_are_drawn():
     for seed in range(5):
         env = reset("search_and_rescue", seed, caches="static")
         assert [contents(env, slot) for slot in range(4)] == [[0, 1], [2, 3], [4, 5], [6, 7]]
-        boxes = [cache_box(centre, env.scenario.cache_side_cells) for centre in static_cache_centres(env.scenario)]
+        boxes = [square_box(centre, env.scenario.cache_side_cells) for centre in static_cache_centres(env.scenario)]
         for x_low, y_low, x_high, y_high in boxes:
             inside = np.all((env.objects.cell >= (x_low, y_low)) & (env.objects.cell < (x_high, y_high)), axis=1)
             assert not np.any(inside & (env.objects.status == ObjectStatus.FREE))

@@ -9,8 +9,8 @@ from swarm_forage_env.contract.codes import Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
-from swarm_forage_env.scenarios.regions import overlap_cells
-from swarm_forage_env.world.caches import MAX_PASSES, cache_box, cache_members, clear_centre, protected_boxes
+from swarm_forage_env.scenarios.regions import overlap_cells, square_box
+from swarm_forage_env.world.caches import MAX_PASSES, cache_members, clear_centre, protected_boxes
 from tests.support.stage import act, assert_conserved, build_cache, clear, depot, lay, load, stand, tidy_world
 
 MIDDLE = (70, 40)
@@ -19,7 +19,7 @@ STRIP_CELL = (125, 60)
 
 
 def found_at(env: ForageEnv, cell: tuple[int, int], row: int = 0, grip: float = Grip.CREATE_CACHE) -> list[int]:
-    """Robot 0 founds with an object at a cell; returns the slots of the caches that stand afterwards."""
+    """Robot 0 creates a cache with an object at a cell; returns the slots of the caches that stand afterwards."""
     stand(env, 0, cell)
     load(env, 0, row)
     act(env, {0: grip})
@@ -45,14 +45,14 @@ def test_a_cache_forms_from_the_objects_around_at_their_mean():
     assert np.all(env.objects.cell[:4] == (64, 41))
 
 
-def test_a_site_drop_founds_nothing():
+def test_a_site_drop_creates_nothing():
     env = tidy_world(caches="dynamic")
     lay(env, 1, (61, 40))
     assert found_at(env, (60, 40), grip=Grip.SITE) == []
     assert env.objects.status[0] == ObjectStatus.FREE
 
 
-def test_a_lone_object_founds_nothing():
+def test_a_lone_object_creates_nothing():
     env = tidy_world(caches="dynamic")
     assert found_at(env, MIDDLE) == []
     assert env.objects.cell[0].tolist() == list(MIDDLE)
@@ -99,7 +99,7 @@ def test_objects_on_the_square_join_although_they_are_far_or_alone():
     assert env.objects.status[3] == ObjectStatus.FREE
 
 
-def test_the_source_strip_founds_nothing():
+def test_the_source_strip_creates_nothing():
     env = tidy_world(caches="dynamic")
     lay(env, 1, (STRIP_CELL[0] - 1, STRIP_CELL[1]))
     assert found_at(env, STRIP_CELL) == []
@@ -154,7 +154,7 @@ def test_the_square_is_pushed_clear_of_nest_and_source(x, clear_x):
 
 
 def test_a_second_cache_stands_clear_of_the_first():
-    # Caches this close are refused to robots; two FOUND drops that finish in the same tick can still come close.
+    # Caches this close are refused to robots; two CREATE_CACHE drops that finish in the same tick can still come close.
     env = tidy_world(n_robots=2, caches="dynamic")
     for row, cell in ((0, (52, 40)), (1, (51, 44)), (2, (80, 40)), (3, (81, 44))):
         if row % 2:
@@ -181,7 +181,7 @@ def test_two_founders_of_one_group_make_one_cache():
     assert_conserved(env)
 
 
-def test_a_found_drop_without_a_free_cell_founds_nothing():
+def test_a_create_cache_drop_without_a_free_cell_creates_nothing():
     env = tidy_world(caches="dynamic")
     lay(env, 1, MIDDLE)
     lay(env, 2, (MIDDLE[0] + 1, MIDDLE[1]))
@@ -211,11 +211,13 @@ def test_an_accepted_centre_is_clear_and_a_place_for_an_object(centre, obstacles
     accepted = clear_centre(centre, config, obstacles, np.random.default_rng(seed))
     # Objects may lie in the cells 24 .. 136 and 12 .. 68; with D = 1.6 m = 8 cells the border is farther away.
     clamped = min(max(centre[0], 24), 136), min(max(centre[1], 12), 68)
-    untouched = all(overlap_cells(cache_box(clamped, config.cache_side_cells), obstacle) == 0 for obstacle in obstacles)
+    untouched = all(
+        overlap_cells(square_box(clamped, config.cache_side_cells), obstacle) == 0 for obstacle in obstacles
+    )
     if untouched:
         assert accepted == clamped
     if accepted is not None:
-        box = cache_box(accepted, config.cache_side_cells)
+        box = square_box(accepted, config.cache_side_cells)
         assert all(overlap_cells(box, obstacle) == 0 for obstacle in obstacles)
         assert 24 <= accepted[0] <= 136
         assert 12 <= accepted[1] <= 68

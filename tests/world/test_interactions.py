@@ -8,7 +8,7 @@ import pytest
 from swarm_forage_env.contract.codes import CELL_EMPTY, Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.world.kernels.interact import DELIVER_ONLY, FOUND, GRASP, RELEASE, SITE, band_of
+from swarm_forage_env.world.kernels.interact import CREATE_CACHE, DELIVER_ONLY, GRASP, RELEASE, SITE, band_of
 from tests.support.stage import (
     BASE_CELL,
     CORNER_CACHE,
@@ -50,9 +50,9 @@ ANY_RELEASE = (Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.CREATE_CACHE)
         (-0.5, SITE),
         (-0.625, SITE),
         (-0.7499, SITE),
-        (-0.75, FOUND),
-        (-1.0, FOUND),
-        (-7.0, FOUND),
+        (-0.75, CREATE_CACHE),
+        (-1.0, CREATE_CACHE),
+        (-7.0, CREATE_CACHE),
         (7.0, GRASP),
     ],
 )

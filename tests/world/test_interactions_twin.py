@@ -23,13 +23,13 @@ BANDS = {
     kernel.RELEASE: interacting.RELEASE,
     kernel.DELIVER_ONLY: interacting.DELIVER,
     kernel.SITE: interacting.SITE,
-    kernel.FOUND: interacting.FOUND,
+    kernel.CREATE_CACHE: interacting.CREATE_CACHE,
 }
 KINDS = {
     kernel.DELIVER: "deliver",
     kernel.CACHE_DROP: "drop into cache",
     kernel.SITE_DROP: interacting.SITE,
-    kernel.CREATE_DROP: interacting.FOUND,
+    kernel.CREATE_DROP: interacting.CREATE_CACHE,
     kernel.FLOOR_PICKUP: "take from floor",
     kernel.CACHE_PICKUP: "take from cache",
 }
@@ -116,10 +116,10 @@ def shuffle(env: ForageEnv, rng: np.random.Generator, grips: np.ndarray) -> None
             objects.floor[to_y, to_x] = row
             objects.cell[row] = to_x, to_y
     if len(env.caches.alive) and np.count_nonzero(env.caches.alive) < 2 and rng.random() < 0.5:
-        found_somewhere(env, rng)
+        create_somewhere(env, rng)
 
 
-def found_somewhere(env: ForageEnv, rng: np.random.Generator) -> None:
+def create_somewhere(env: ForageEnv, rng: np.random.Generator) -> None:
     half = env.scenario.cache_side_cells // 2
     x, y = rng.integers((PATCH[0], PATCH[1]), (PATCH[2], PATCH[3])).tolist()
     floor = env.objects.floor

@@ -422,14 +422,14 @@ def test_groups_are_kept_in_the_order_of_their_columns():
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"sigma": -0.1}, "sensor_noise.sigma >= 0, got -0.1"),
-        ({"sigma": np.nan}, "sensor_noise.sigma to be a finite number, got nan"),
-        ({"sigma": "high"}, "sensor_noise.sigma to be a finite number, got 'high'"),
+        ({"sigma": -0.1}, "sensor_noise.sigma to be a finite number >= 0, got -0.1"),
+        ({"sigma": np.nan}, "sensor_noise.sigma to be a finite number >= 0, got nan"),
+        ({"sigma": "high"}, "sensor_noise.sigma to be a finite number >= 0, got 'high'"),
         ({"sigma": 0.1, "groups": ("proximty",)}, "Unknown group of sensors 'proximty'.*Did you mean 'proximity'"),
         ({"sigma": 0.1, "groups": ()}, "one or more names of sensors"),
         ({"sigma": 0.1, "groups": "proximity"}, "one or more names of sensors, got 'proximity'"),
         ({"sigmas": {"lights": 0.1}}, "Unknown group of sensors 'lights'.*Did you mean 'light'"),
-        ({"sigmas": {"light": -0.1}}, "sensor_noise.sigmas.light >= 0"),
+        ({"sigmas": {"light": -0.1}}, "sensor_noise.sigmas.light to be a finite number >= 0"),
         ({"sigmas": 0.1}, "sigmas to be a table"),
         ({"sigma": 0.1, "distribution": "normal"}, "sensor_noise.distribution to be one of gaussian, uniform"),
     ],
@@ -442,7 +442,7 @@ def test_nonsense_about_sensors_is_refused(fields, message):
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"sigma": -0.1}, "actuator_noise.sigma >= 0, got -0.1"),
+        ({"sigma": -0.1}, "actuator_noise.sigma to be a finite number >= 0, got -0.1"),
         ({"sigma": np.inf}, "actuator_noise.sigma to be a finite number"),
         ({"sigma": 0.1, "distribution": "unifrom"}, "one of gaussian, uniform.*Did you mean 'uniform'"),
     ],

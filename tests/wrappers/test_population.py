@@ -415,13 +415,13 @@ def test_levels_of_the_study():
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"death_per_tick": -0.1}, "population.death_per_tick >= 0, got -0.1"),
-        ({"repair_per_tick": np.nan}, "population.repair_per_tick to be a finite number"),
-        ({"malfunction_per_tick": "often"}, "population.malfunction_per_tick to be a finite number, got 'often'"),
+        ({"death_per_tick": -0.1}, "population.death_per_tick to be a finite number >= 0, got -0.1"),
+        ({"repair_per_tick": np.nan}, "population.repair_per_tick to be a finite number >= 0, got nan"),
+        ({"malfunction_per_tick": "often"}, "population.malfunction_per_tick to be a finite number >= 0, got 'often'"),
         ({"birth_per_tick": np.inf}, "population.birth_per_tick to be a finite number"),
-        ({"initial_robots": 0}, "population.initial_robots to be a whole number >= 1, got 0"),
-        ({"max_robots": 2.5}, "population.max_robots to be a whole number >= 1, got 2.5"),
-        ({"max_robots": True}, "population.max_robots to be a whole number >= 1, got True"),
+        ({"initial_robots": 0}, "population.initial_robots to be a whole number >= 1 or None, got 0"),
+        ({"max_robots": 2.5}, "population.max_robots to be a whole number >= 1 or None, got 2.5"),
+        ({"max_robots": True}, "population.max_robots to be a whole number >= 1 or None, got True"),
         ({"deaths": "absorb"}, "population.deaths to be one of terminate, absorbing.*Did you mean 'absorbing'"),
     ],
 )

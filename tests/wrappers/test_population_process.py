@@ -286,7 +286,8 @@ def test_idle_ticks_may_be_skipped():
 
 
 @pytest.mark.parametrize(
-    ("rate", "message"), [(-0.1, "death >= 0, got -0.1"), ("often", "a finite number, got 'often'")]
+    ("rate", "message"),
+    [(-0.1, "death to be a finite number >= 0, got -0.1"), ("often", "a finite number >= 0, got 'often'")],
 )
 def test_rates_that_make_no_sense_are_refused(rate, message):
     with pytest.raises(ConfigError, match=f"Expected the rate of .*{message}"):

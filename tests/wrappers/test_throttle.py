@@ -233,7 +233,7 @@ def test_levels_of_the_study():
             {"waveform": Waveform(kind="sine", amplitude=0.6, offset=0.6, period_s=1.0)},
             "reaches 1.2; lower its amplitude",
         ),
-        ({"waveform": 0.3}, "throttle.waveform to be a Waveform, such as one of kind constant.*got 0.3"),
+        ({"waveform": 0.3}, "throttle.waveform to be a Waveform, got 0.3; for example Waveform.kind='constant'"),
         (
             {"waveform": Waveform(kind="constant"), "carriers": "yes"},
             "throttle.carriers to be True or False, got 'yes'",

@@ -3,6 +3,7 @@
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.detection import sees_cache, sees_nest
+from swarm_forage_env.contract.layout import GROUND_SENSORS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, IntArray, ObsArray
 from swarm_forage_env.policies.kernels.compact import is_over_object
 
@@ -31,7 +32,7 @@ def automatic_grip(obs: ObsArray, starts: tuple[int, int, int], actions: ActionA
     ground, carrying, window = starts
     for i in range(obs.shape[0]):
         row = obs[i]
-        below = row[ground : ground + 4]
+        below = row[ground : ground + GROUND_SENSORS]
         grip = idle_grip(row, carrying)
         if row[carrying] > 0.5:
             if sees_nest(below):
@@ -82,7 +83,7 @@ def mask_actions(obs: ObsArray, starts: tuple[int, int, int, int, int], dynamic_
         if not with_grips:
             allowed[0] = True
             continue
-        below = row[ground : ground + 4]
+        below = row[ground : ground + GROUND_SENSORS]
         if row[carrying] > 0.5:
             in_nest = sees_nest(below)
             allowed[ACT_RELEASE] = True

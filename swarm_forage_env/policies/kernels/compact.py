@@ -4,7 +4,7 @@ import math
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import is_obstacle_vector, ring_sum, sees_cache, sees_nest
-from swarm_forage_env.contract.layout import WINDOW_CELLS
+from swarm_forage_env.contract.layout import GROUND_SENSORS, RING_SENSORS, WINDOW_CELLS
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.scenarios.units import CELLS_PER_M
 
@@ -92,17 +92,17 @@ def compact_view(obs: ObsArray, starts: tuple[int, ...], half_x: float, half_y: 
         if cos == 0.0 and sin == 0.0:  # not in the world
             view[:] = 0.0
             continue
-        x, y = ring_sum(row[starts[0] : starts[0] + 24])
+        x, y = ring_sum(row[starts[0] : starts[0] + RING_SENSORS])
         share = 1.0 / max(1.0, math.sqrt(x * x + y * y))
         view[0] = x * share
         view[1] = y * share
         view[2] = 1.0 if is_obstacle_vector(x, y) else 0.0
-        x, y = ring_sum(row[starts[1] : starts[1] + 24])
+        x, y = ring_sum(row[starts[1] : starts[1] + RING_SENSORS])
         length = math.sqrt(x * x + y * y)
         share = 1.0 / length if length > 0.0 else 0.0
         view[3] = x * share
         view[4] = y * share
-        ground = row[starts[2] : starts[2] + 4]
+        ground = row[starts[2] : starts[2] + GROUND_SENSORS]
         view[5] = 1.0 if is_over_object(row, starts[10]) else 0.0
         view[6] = 1.0 if sees_nest(ground) else 0.0
         view[7] = 1.0 if sees_cache(ground) else 0.0

@@ -36,7 +36,7 @@ class PPOWarehouseSmall(NetworkPolicy):
     """Trained by PPO in the small warehouse; `ppo_warehouse_small.md` is its card."""
 
     caches: ClassVar[str] = "none"
-    """World that it was trained in."""
+    """Kind of caches that it was trained with."""
 
     def __init__(self) -> None:
         """Open the network."""

@@ -1,6 +1,6 @@
 """stable-baselines3: the swarm as its vector environment, buffers that leave absent robots out, training.
 
-Only this package imports stable_baselines3 and torch; install them with the `train` extra.
+It needs stable_baselines3 and torch; install them with the `train` extra.
 """
 
 from swarm_forage_env._internal.extras import install_command

@@ -14,7 +14,7 @@ _SAMPLES = ("observations", "actions", "values", "log_probs", "advantages", "ret
 
 
 class EmptyRolloutError(ValueError):
-    """A rollout with nothing to learn from."""
+    """A rollout in which nobody was at work, so that there is nothing to learn from."""
 
 
 class ActiveRolloutBuffer(RolloutBuffer):
@@ -48,7 +48,7 @@ class ActiveRolloutBuffer(RolloutBuffer):
         """Create the buffer.
 
         Args:
-            buffer_size: As in `RolloutBuffer`, like all that is not told here.
+            buffer_size: As in `RolloutBuffer`, like everything else up to `n_envs`.
             observation_space: Observations of one row.
             action_space: Actions of one row.
             device: Where minibatches go.
@@ -60,7 +60,7 @@ class ActiveRolloutBuffer(RolloutBuffer):
                 None: observations are single frames.
 
         Raises:
-            ValueError: observations that are no whole number of frames, or no such column in a frame.
+            ValueError: the columns of an observation are not a whole number of frames, or a frame has no such column.
         """
         width = (observation_space.shape or (0,))[-1]
         frame = width if n_columns is None else n_columns
@@ -177,10 +177,12 @@ class PresentReplayBuffer(ReplayBuffer):
             drawn = np.concatenate([drawn, pairs[present[pairs[:, 0], pairs[:, 1]]]])
         steps, rows = drawn[:batch_size].T
         done = self.dones[steps, rows] * (1.0 - self.timeouts[steps, rows])
+        obs = self._normalize_obs(self.observations[steps, rows], env)
+        next_obs = self._normalize_obs(self.next_observations[steps, rows], env)
         return ReplayBufferSamples(
-            self.to_torch(self._normalize_obs(self.observations[steps, rows], env)),  # type: ignore[arg-type]
+            self.to_torch(obs),  # type: ignore[arg-type] - a dict only where the space is one
             self.to_torch(self.actions[steps, rows]),
-            self.to_torch(self._normalize_obs(self.next_observations[steps, rows], env)),  # type: ignore[arg-type]
+            self.to_torch(next_obs),  # type: ignore[arg-type] - a dict only where the space is one
             self.to_torch(done.reshape(-1, 1)),
             self.to_torch(self._normalize_reward(self.rewards[steps, rows].reshape(-1, 1), env)),
         )

@@ -10,7 +10,7 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from stable_baselines3.dqn.policies import DQNPolicy
 from torch import nn
 
-from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.model_files import MODEL_NOTE, describe_spaces
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError
@@ -88,8 +88,8 @@ def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
 
 def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
     """Refuse an interface with other observations or actions than the model has."""
-    # Any world will do: all have the same columns and actions.
-    bound = LearnerInterface(interface, ForageEnv(scenario("warehouse_small", n_robots=1, n_objects=1)).swarm_spec)
+    # Any scenario will do: all have the same columns and actions.
+    bound = LearnerInterface(interface, SwarmSpec.of(scenario("warehouse_small")))
     wanted, found = describe_spaces(bound), describe_spaces(model)
     if wanted != found:
         raise NetworkError(

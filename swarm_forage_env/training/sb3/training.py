@@ -27,14 +27,15 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import Policy
-from swarm_forage_env.policies.model_files import MODEL_FAULTS
-from swarm_forage_env.policies.network import LearnedPolicy
+from swarm_forage_env.policies.learned import LearnedPolicy
+from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_choice
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.study.record import software_versions
 from swarm_forage_env.study.run import run_policy
-from swarm_forage_env.training.plan import Evaluation, Stage, TrainingPlan, TrainingStatus, read_plan
+from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
 from swarm_forage_env.training.sb3.export import export_network, note_interface
+from swarm_forage_env.training.status import Evaluation, TrainingStatus
 from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
 ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
@@ -95,8 +96,8 @@ def train(
 
     Raises:
         ConfigError: the algorithm knows no such option, more processes than arenas, the folder holds a training run and
-            nobody said resume, or none to resume, or that of another plan, or files that are broken; a stage whose
-            world cannot be; or a training that diverged.
+            `resume` is False, `resume` is True and the folder holds no training run, or one by another plan, or broken
+            files; a stage whose scenario cannot be built; or a training that diverged.
     """
     _check_options(plan)
     if not 0 <= n_processes <= plan.n_arenas:
@@ -151,7 +152,7 @@ def _check_options(plan: TrainingPlan) -> None:
 
 
 def _check_folder(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
-    """Refuse a folder that belongs to another training run, or to none where one is to be resumed."""
+    """Refuse a folder with a training run that is not this one, or without one where it is to be resumed."""
     if resume:
         differences = plan.differences(kept_plan(folder))
         if differences:
@@ -175,7 +176,7 @@ def kept_plan(folder: Path) -> TrainingPlan:
     """Return the plan of the training that a folder holds.
 
     Raises:
-        ConfigError: it holds none that can be resumed.
+        ConfigError: it does not hold a training that can be resumed.
     """
     for name in (PLAN_FILE, MODEL_FILE):
         if not (folder / name).exists():
@@ -223,15 +224,15 @@ def _prepared(plan: TrainingPlan, stage: Stage, folder: Path, env: SwarmVecEnv, 
 def training_seed(seed: int, done: int) -> int:
     """Return the seed for what comes after `done` decisions of a training with `seed`.
 
-    Drawn, so that runs of a later stage or of a resumed training are none that were seen before, and none of the
-    evaluations, whose seeds are counted up from a number of their own.
+    It is drawn, so that a later stage or a resumed training does not repeat earlier runs, nor those of the evaluations,
+    whose seeds are counted up from a number of their own.
     """
     return int(np.random.default_rng((seed, done)).integers(2**31))
 
 
 def _changes(stage: Stage) -> str:
     fields = ", ".join(f"{name} = {value}" for name, value in stage.scenario.items())
-    return f", a world with {fields}" if fields else ""
+    return f", with {fields}" if fields else ""
 
 
 def _learn(model: BaseAlgorithm, steps: int, watch: "_Watch", where: str) -> None:
@@ -241,7 +242,7 @@ def _learn(model: BaseAlgorithm, steps: int, watch: "_Watch", where: str) -> Non
         if not _has_diverged(model):
             watch.keep(model)
         raise
-    except (ConfigError, EmptyRolloutError) as error:  # worlds that only a reset or a run shows to be impossible
+    except (ConfigError, EmptyRolloutError) as error:  # what only a reset or a run finds to be impossible
         raise ConfigError(f"Cannot train in {where}: {error}") from error
     except ValueError as error:
         if not _has_diverged(model):
@@ -257,7 +258,7 @@ def _has_diverged(model: BaseAlgorithm) -> bool:
 
 
 class _Watch(BaseCallback):
-    """Checkpoints, evaluates and reports; knows the whole training, over all its stages."""
+    """Checkpoints, evaluates and reports, over all stages of a training."""
 
     def __init__(self, plan: TrainingPlan, folder: Path, report: Report) -> None:
         super().__init__()
@@ -325,7 +326,9 @@ class _Watch(BaseCallback):
         self.keep(self.model)
         if self._baseline is None:
             self._baseline, _ = self._judged(lambda: load_policy(self._plan.evaluation.baseline))
-        performance, interference = self._judged(lambda: LearnedPolicy(self._plan.interface, _acting(self.model)))
+        performance, interference = self._judged(
+            lambda: LearnedPolicy(self._plan.interface, deterministic_choice(self.model))
+        )
         evaluation = Evaluation(
             steps=self.num_timesteps,
             wall_time_s=round(self._wall_time_s(), 1),
@@ -378,16 +381,9 @@ def _read_evaluations(path: Path) -> list[Evaluation]:
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
-        return [Evaluation(**{**row, "steps": int(row["steps"])}) for row in rows]  # type: ignore[arg-type]
+        return [Evaluation(**{**row, "steps": int(row["steps"])}) for row in rows]
     except (ValueError, TypeError, KeyError, csv.Error) as error:
         raise ConfigError(f"Cannot read the evaluations in {path}: {error}; repair or remove the file.") from error
-
-
-def _acting(model: BaseAlgorithm) -> Callable[[np.ndarray, np.random.Generator], np.ndarray]:
-    def choose(rows: np.ndarray, rng: np.random.Generator) -> np.ndarray:  # noqa: ARG001 - nothing is drawn
-        return model.predict(rows, deterministic=True)[0]
-
-    return choose
 
 
 def _keep_quiet(news: TrainingStatus | Evaluation) -> None:

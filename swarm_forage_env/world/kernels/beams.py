@@ -1,4 +1,4 @@
-"""Proximity readings: 24 beams against the discs of other robots and the four walls."""
+"""Proximity readings: a ring of beams against the discs of other robots and the four walls."""
 
 import math
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
+from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.world.kernels.neighbours import bin_of
 
@@ -57,9 +58,10 @@ def proximity(
     radius: float,
     reach: float,
     obs: ObsArray,
+    start: int,
     near: BoolArray,
 ) -> None:
-    """Write readings into obs[:, 0:24] and into `near` (N,) whether anything is within reach of any beam.
+    """Write readings into `obs` from column `start`, and into `near` (N,) whether anything is within reach of a beam.
 
     `bins` = (cell size in m, first_in_bin, next_in_bin) from `bin_robots` with cells of at least
     2 radius + reach; `interior` = x low, y low, x high, y high of the free floor; `reach` is measured from the body.
@@ -70,8 +72,8 @@ def proximity(
     sight_squared = sight * sight
     wall_sight = radius + reach
     for i in range(position.shape[0]):
-        for k in range(24):
-            obs[i, k] = 0.0
+        for k in range(RING_SENSORS):
+            obs[i, start + k] = 0.0
         near[i] = False
         if not present[i]:
             continue
@@ -83,12 +85,12 @@ def proximity(
         sin_h = facing[i, 1]
         if min(west, east, south, north) < wall_sight:
             near[i] = True
-            for k in range(24):
+            for k in range(RING_SENSORS):
                 cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
                 sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
                 gap = min(_beam_to_wall(west, east, cos, radius), _beam_to_wall(south, north, sin, radius))
                 if gap <= reach:
-                    obs[i, k] = proximity_reading(gap)
+                    obs[i, start + k] = proximity_reading(gap)
         cell_x = int(x / cell_m)
         cell_y = int(y / cell_m)
         for step_x in range(-1, 2):
@@ -99,10 +101,10 @@ def proximity(
                     dy = position[j, 1] - y
                     if j != i and dx * dx + dy * dy <= sight_squared:
                         near[i] = True
-                        for k in range(24):
+                        for k in range(RING_SENSORS):
                             cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
                             sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
                             gap = _beam_to_disc(dx, dy, cos, sin, radius)
                             if gap <= reach:
-                                obs[i, k] = max(obs[i, k], proximity_reading(gap))
+                                obs[i, start + k] = max(obs[i, start + k], proximity_reading(gap))
                     j = next_in_bin[j]

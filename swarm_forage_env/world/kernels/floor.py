@@ -5,8 +5,16 @@ import math
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_NEST
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
-from swarm_forage_env.contract.layout import CACHE_FIELDS, SERIAL_SCALE, VISIBLE_CACHES, WINDOW_CELLS
+from swarm_forage_env.contract.layout import (
+    CACHE_FIELDS,
+    GROUND_SENSORS,
+    RING_SENSORS,
+    SERIAL_SCALE,
+    VISIBLE_CACHES,
+    WINDOW_CELLS,
+)
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.units import CELLS_PER_M
 
@@ -25,12 +33,12 @@ _HALF_WINDOW = WINDOW_CELLS // 2
 
 @kernel
 def grey_of(code: int) -> float:
-    """Grey level of a floor code (state.CELL_*): object 0, nest 0.70, cache 0.40, empty 1."""
+    """Grey level of a floor code of `contract.codes`: object 0, nest 0.70, cache 0.40, empty 1."""
     if code >= 0:
         return _GREY_OBJECT
-    if code == -1:
+    if code == CELL_EMPTY:
         return _GREY_EMPTY
-    if code == -2:
+    if code == CELL_NEST:
         return _GREY_NEST
     return _GREY_CACHE
 
@@ -43,14 +51,14 @@ def ground(
     ny, nx = floor.shape
     for i in range(position.shape[0]):
         if not present[i]:
-            obs[i, start : start + 4] = 0.0
+            obs[i, start : start + GROUND_SENSORS] = 0.0
             continue
         cos = facing[i, 0]
         sin = facing[i, 1]
         grey = _GREY_EMPTY
         last_x = -2
         last_y = -2
-        for k in range(4):
+        for k in range(GROUND_SENSORS):
             x = position[i, 0] + cos * _GROUND_X[k] - sin * _GROUND_Y[k]
             y = position[i, 1] + sin * _GROUND_X[k] + cos * _GROUND_Y[k]
             cell_x = int(math.floor(x * CELLS_PER_M))
@@ -74,13 +82,13 @@ def light(
     obs: ObsArray,
     start: int,
 ) -> None:
-    """Write 24 light readings per robot into obs[:, start:start + 24].
+    """Write the ring of light readings of each robot into the columns of `obs` from `start`.
 
     Per light of `lights` (L, 3: x, y, height in m): exp(-2 distance / intensity), falling linearly to 0 at
     90 degrees between sensor axis and light; lights add up; clamped to 1.
     """
     for i in range(position.shape[0]):
-        for k in range(start, start + 24):
+        for k in range(start, start + RING_SENSORS):
             obs[i, k] = 0.0
         if not present[i]:
             continue
@@ -98,11 +106,11 @@ def light(
             # Only the sensors within a quarter turn of the light: 12 or 13 in a row, counted round the ring.
             first = math.ceil((bearing - 0.5 * math.pi - _FIRST_SENSOR_RAD) / _SENSOR_STEP_RAD)
             away = _FIRST_SENSOR_RAD + first * _SENSOR_STEP_RAD - bearing
-            k = int(first) % 24
+            k = int(first) % RING_SENSORS
             while away < 0.5 * math.pi:
                 obs[i, start + k] = min(1.0, obs[i, start + k] + base * (1.0 - abs(away) / (0.5 * math.pi)))
                 away += _SENSOR_STEP_RAD
-                k = 0 if k == 23 else k + 1
+                k = 0 if k == RING_SENSORS - 1 else k + 1
 
 
 @kernel

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, Counter, Event, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, GRIP_LOWER_ENDS, Counter, Event, ObjectStatus
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray
-from swarm_forage_env.scenarios.units import CELLS_PER_M
+from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M
 
 NO_REQUEST = 0
 DELIVER = 1
@@ -27,7 +27,7 @@ TOO_NEAR = 9
 """Asked for a cache site too near an existing cache."""
 
 GRASP, RELEASE, DELIVER_ONLY, SITE, CREATE_CACHE = range(1, 6)
-"""Gripper bands (`policy.Grip`), from the top: g > 0, > -0.25, > -0.5, > -0.75, and below."""
+"""Gripper bands from the top, in the order of `codes.GRIP_LOWER_ENDS`."""
 
 FREE_PICKUP_HANDLER, NEST_HANDLER, CACHE_HANDLER, SITE_HANDLER, CREATE_HANDLER = range(5)
 
@@ -149,8 +149,8 @@ def _cache_too_near(state: InteractionState, rules: Rules, i: int) -> int:
     limit = rules.cache_proximity_m * rules.cache_proximity_m
     for slot in range(state.cache_alive.shape[0]):
         if state.cache_alive[slot]:
-            dx = (state.cache_cell[slot, 0] + 0.5) * 0.2 - state.position[i, 0]
-            dy = (state.cache_cell[slot, 1] + 0.5) * 0.2 - state.position[i, 1]
+            dx = (state.cache_cell[slot, 0] + 0.5) * CELL_M - state.position[i, 0]
+            dy = (state.cache_cell[slot, 1] + 0.5) * CELL_M - state.position[i, 1]
             distance = dx * dx + dy * dy
             if distance <= limit:
                 nearest = slot
@@ -161,14 +161,9 @@ def _cache_too_near(state: InteractionState, rules: Rules, i: int) -> int:
 @kernel
 def band_of(grip: float) -> int:
     """Gripper band of a command."""
-    if grip > 0.0:
-        return GRASP
-    if grip > -0.25:
-        return RELEASE
-    if grip > -0.5:
-        return DELIVER_ONLY
-    if grip > -0.75:
-        return SITE
+    for k in range(len(GRIP_LOWER_ENDS)):
+        if grip > GRIP_LOWER_ENDS[k]:
+            return GRASP + k
     return CREATE_CACHE
 
 

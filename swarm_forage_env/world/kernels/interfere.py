@@ -5,6 +5,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.detection import sees_obstacle
+from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 
 _INTERFERING, _ACTIVE, _PRESENT = int(Counter.INTERFERING), int(Counter.ACTIVE), int(Counter.PRESENT)
@@ -13,6 +14,7 @@ _INTERFERING, _ACTIVE, _PRESENT = int(Counter.INTERFERING), int(Counter.ACTIVE),
 @kernel
 def mark(
     obs: ObsArray,
+    proximity: int,
     near: BoolArray,
     active: BoolArray,
     present: BoolArray,
@@ -25,7 +27,7 @@ def mark(
     n_active = 0
     n_present = 0
     for i in range(active.shape[0]):
-        flag = active[i] and near[i] and sees_obstacle(obs[i, 0:24])
+        flag = active[i] and near[i] and sees_obstacle(obs[i, proximity : proximity + RING_SENSORS])
         interfering[i] = flag
         n_interfering += flag
         n_active += active[i]

@@ -1,14 +1,14 @@
-"""Which policy is better, and whether the runs can tell: pairing, t test, Holm's correction."""
+"""Which policy is better, and whether the runs can tell: pairing, families of tests, what is shown."""
 
 import math
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from metrics import CurveError, aggregate, compare_tables
-from metrics.comparison import Comparison, holm, paired_p
-from metrics.score_table import Score, ScoreTable, spread
+from metrics.scoring.comparison import Comparison
+from metrics.scoring.table import Score, ScoreTable
+from metrics.significance import holm, paired_p
 
 NAN = math.nan
 
@@ -37,20 +37,6 @@ def compared(**tables) -> Comparison:
     )
 
 
-def test_the_paired_test_is_that_of_scipy():
-    values = np.array([1.0, 2.5, -0.5, 3.0, 2.0])
-    assert paired_p(values) == pytest.approx(stats.ttest_1samp(values, 0.0).pvalue, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [([0.0, 0.0, 0.0], 1.0), ([2.0, 2.0, 2.0], 0.25), ([1.0], NAN), ([], NAN), ([math.inf, 1.0], NAN)],
-    ids=["all zero", "all equal", "one pair", "no pair", "infinite"],
-)
-def test_where_students_t_does_not_exist(values, expected):
-    assert paired_p(np.array(values)) == pytest.approx(expected, nan_ok=True)
-
-
 def test_rounding_does_not_make_equal_differences_significant():
     """6/50 - 5/50 and 5/50 - 4/50 differ in the last bit, which is no spread that a test could trust."""
     differences = np.array([6 / 50 - 5 / 50, 5 / 50 - 4 / 50, 3 / 50 - 2 / 50])
@@ -59,36 +45,6 @@ def test_rounding_does_not_make_equal_differences_significant():
     (difference,) = compared(a=score([6 / 50, 5 / 50, 3 / 50]), b=score([5 / 50, 4 / 50, 2 / 50])).differences
     assert not difference.is_significant
     assert difference.cell() == "0.02 ± 0"
-
-
-def test_holms_example_by_hand():
-    # Sorted 0.01, 0.03, 0.04 times 3, 2, 1: 0.03, 0.06, 0.04, never falling.
-    np.testing.assert_allclose(holm(np.array([0.04, 0.01, NAN, 0.03])), [0.06, 0.03, NAN, 0.06])
-    np.testing.assert_allclose(holm(np.array([0.9, 0.8])), [1.0, 1.0])
-    assert holm(np.empty(0)).size == 0
-
-
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [
-        ([0.0, 0.0], "0 ± 0"),
-        ([0.0041, 0.0041], "0.0041 ± 0"),
-        ([0.1, 0.1, 0.1], "0.1 ± 0"),
-        ([2e-18, -1e-18, 0.0], "0 ± 0"),
-        ([1.0, 2.0, 3.0, 4.0, 5.0], "3.0 ± 2.0"),
-        ([-0.001, 0.0012, -0.0003], "0.0000 ± 0.0028"),
-        ([7.0], "7"),
-        ([NAN], "-"),
-        ([1.0, -math.inf], "-inf"),
-    ],
-)
-def test_a_mean_is_shown_with_half_its_interval_to_two_digits(values, text):
-    assert spread(aggregate(values)) == text
-
-
-def test_shares_are_shown_in_percent():
-    assert spread(aggregate([0.5, 0.5]), is_share=True) == "50 ± 0 %"
-    assert spread(aggregate([0.4, 0.6]), is_share=True) == "50 ± 127 %"
 
 
 def test_differences_pair_runs_by_seed():

@@ -7,22 +7,14 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from .curves import CurveError, FloatArray
-from .score_table import (
-    ROUNDING,
-    Score,
-    ScoreTable,
-    aligned,
-    forecast_lines,
-    paragraph,
-    percent,
-    plain,
-    spread,
-    title,
-)
-from .statistics import Summary, aggregate
+from metrics.checks import CurveError
+from metrics.curves import FloatArray
+from metrics.significance import holm, paired_p
+from metrics.statistics import Summary, aggregate
+
+from .table import Score, ScoreTable, forecast_lines, title
+from .texts import aligned, paragraph, percent, plain, spread
 
 FAMILY_ERROR = 0.05
 """Probability of one or more false differences within a measure."""
@@ -43,7 +35,7 @@ PAIRS_PER_TABLE = 6
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Difference:
-    """Score of one policy minus that of another, in one row."""
+    """Score of one policy minus that of another, at one level of one measure."""
 
     measure: str
     at: str
@@ -57,13 +49,14 @@ class Difference:
     p: float
     """Of the paired t test; NaN where it cannot be made (fewer than two pairs, infinite scores)."""
     p_holm: float
-    """The same after Holm's correction over all differences of the measure of this kind."""
+    """The same after Holm's correction over all levels and pairs of policies of the measure; relative scores have a
+    correction of their own."""
     better: str
     """The better policy if the difference is significant, else empty."""
 
     @property
     def key(self) -> tuple[str, str, bool, str, str, tuple[int, ...]]:
-        """Who is compared in what."""
+        """Which policies are compared, and in which score."""
         return self.first, self.second, self.is_relative, self.measure, self.at, self.n_robots
 
     @property
@@ -206,7 +199,7 @@ def compare_tables(tables: Sequence[ScoreTable]) -> Comparison:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Pair:
-    """What is tested once."""
+    """One score of two policies, to be tested."""
 
     score: Score
     first: str
@@ -230,46 +223,6 @@ def _pairs(score: Score, other: Score, first: str, second: str) -> list[_Pair]:
         for is_relative, mine, theirs in kinds
         if mine and theirs
     ]
-
-
-def paired_p(differences: FloatArray) -> float:
-    """Two-sided p value of the paired t test that the mean difference is zero.
-
-    Args:
-        differences: One per pair of runs, (R,).
-
-    Returns:
-        The p value; NaN for fewer than two pairs or a difference that is not finite. Where all differences are equal
-        (but for rounding, which would pass for a tiny spread) Student's t does not exist: 1 if they are zero, else that
-        of the sign test, 2^(1 - R).
-    """
-    n_pairs = differences.size
-    if n_pairs < 2 or not np.isfinite(differences).all():
-        return math.nan
-    std = float(differences.std(ddof=1))
-    mean = float(differences.mean())
-    if std <= ROUNDING * abs(mean):
-        return 1.0 if mean == 0.0 else 2.0 ** (1 - n_pairs)
-    t = abs(mean) * math.sqrt(n_pairs) / std
-    return 2.0 * float(stdtr(n_pairs - 1, -t))
-
-
-def holm(p_values: FloatArray) -> FloatArray:
-    """Adjust p values of one family for testing many at once (Holm 1979); NaN values are no tests and stay NaN.
-
-    Args:
-        p_values: (K,).
-
-    Returns:
-        Adjusted values (K,), at most 1: rejecting where they are at most alpha keeps the probability of any false
-        rejection at alpha.
-    """
-    adjusted = np.full(p_values.shape, math.nan)
-    tests = np.flatnonzero(~np.isnan(p_values))
-    order = tests[np.argsort(p_values[tests], kind="stable")]
-    factors = np.arange(order.size, 0, -1)
-    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(factors * p_values[order]))
-    return adjusted
 
 
 def _paired_differences(first: Mapping[int, float], second: Mapping[int, float]) -> FloatArray:

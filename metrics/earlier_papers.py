@@ -5,7 +5,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .curves import CurveError, FloatArray, Reduction, as_curves, check_option, reduce_intervals
+from .checks import CurveError, check_option
+from .curves import FloatArray, Reduction, as_curves, reduce_intervals
 
 Direction: TypeAlias = Literal["positive", "negative"]
 

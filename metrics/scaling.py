@@ -1,21 +1,12 @@
-"""Scalability: how much of an added robot's work arrives in the result? Eq. (4)."""
+"""Performance over swarm size: scalability, Eq. (4), efficiency, and the performance itself."""
 
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .curves import (
-    FloatArray,
-    IntArray,
-    Reduction,
-    Variant,
-    as_curves,
-    check_option,
-    check_size,
-    check_size_order,
-    reduce_intervals,
-)
+from .checks import check_option, check_size, check_size_order
+from .curves import FloatArray, IntArray, Reduction, Variant, as_curves, reduce_intervals
 
 ZeroPolicy: TypeAlias = Literal["nan", "skip"]
 """What an interval without performance does to a sum: its IEEE value counts, NaN included, or it is left out."""

@@ -1,22 +1,20 @@
-"""What scoring returns: one row per measure and level, with everything needed to read it."""
+"""What scoring returns: one score per measure and level, with everything needed to read it, and tables of them."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from .catalog import METRICS
+from metrics.catalog import METRICS
+from metrics.statistics import Summary, aggregate
+
 from .forecast import FORECAST_HEADER, FORECAST_TITLE, PopulationForecast
-from .statistics import Summary, aggregate
+from .texts import aligned, bounds, counted, interval, number, paragraph, percent, plain
 
 if TYPE_CHECKING:
     import polars as pl
 
-ROUNDING = 1e-9
-"""Runs that spread less than this share of their mean are equal but for rounding."""
-_NO_AMOUNT = 1e-12
-"""Smaller amounts are what rounding leaves of zero."""
 HEADER = ("measure", "at", "robots", "value", "95 % interval", "noise floor", "relative", "runs", "better", "unit")
+"""Headings of `Score.cells`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,22 +33,22 @@ class Score:
     """Swarm sizes that enter, the reference run's included."""
     unit: str
     summary: Summary
-    """Mean over runs with Student's interval; a value per run, so that its runs pair experiments by seed."""
+    """Mean over seeds with Student's interval."""
     per_seed: Mapping[int, float]
-    """Value of each run by its seed."""
+    """Seed -> value of the runs with this seed, one run of each experiment that enters."""
     n_lost: int = 0
-    """Runs that failed or have no partner."""
+    """Runs that failed or have no partner of the same seed."""
     noise_floor: float | None = None
     """For distances: mean distance between two different reference runs, what a perfect swarm scores by chance."""
     relative_per_seed: Mapping[int, float] = field(default_factory=dict[int, float])
-    """For amounts and distances: value of each run over the total performance it compares with, which makes policies of
-    different performance comparable; NaN where that performance is zero."""
+    """For amounts and distances: the values over the total performance that they are compared with, which makes
+    policies of different performance comparable; NaN where that performance is zero."""
     of_mean_curves: Summary | None = None
     """For scalability and distances: the measure of the mean curves with a bootstrap interval."""
     beside: Mapping[str, float] = field(default_factory=dict[str, float])
     """Further numbers to read with the value."""
     note: str = ""
-    """What one has to know about this row, empty if nothing."""
+    """What to know before reading the value; empty if nothing."""
 
     @property
     def higher_is_better(self) -> bool:
@@ -64,11 +62,11 @@ class Score:
 
     @property
     def key(self) -> tuple[str, str, tuple[int, ...]]:
-        """What the row is about, the same for all policies."""
+        """What the score is about, the same for all policies."""
         return self.measure, self.at, self.n_robots
 
     def cells(self) -> tuple[str, ...]:
-        """Return the row as texts under `HEADER`."""
+        """Return the score as texts under `HEADER`."""
         summary = self.summary
         runs = str(summary.n_used) + (f" of {summary.n_used + summary.n_nan + self.n_lost}" if self.is_partial else "")
         enters = bool(self.per_seed) or self.is_partial  # no run enters what follows from rates alone
@@ -91,7 +89,7 @@ class Score:
         return self.summary.n_nan + self.n_lost > 0
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the row as plain values; numbers that JSON does not have are None."""
+        """Return the score as plain values; numbers that JSON does not have are None."""
         summary, means, relative = self.summary, self.of_mean_curves, self.relative
         return {
             "measure": self.measure,
@@ -137,35 +135,35 @@ class ScoreTable:
     """How the runs were made: budget, length, seeds, folder."""
 
     def __getitem__(self, measure: str) -> tuple[Score, ...]:
-        """Return the rows of one measure.
+        """Return the scores of one measure.
 
         Raises:
             KeyError: there are none; the message says why.
         """
-        rows = tuple(score for score in self.scores if score.measure == measure)
-        if not rows:
+        found = tuple(score for score in self.scores if score.measure == measure)
+        if not found:
             raise KeyError(f"No score for {measure!r}: {self.missing.get(measure, 'it was not asked for')}")
-        return rows
+        return found
 
     def notes(self) -> tuple[str, ...]:
-        """Return everything that must not be overlooked: rows with a note, missing measures, failed runs."""
-        rows = [f"{places}: {note}" for note, places in self._places_of_notes().items()]
+        """Return everything that must not be overlooked: notes of scores, missing measures, failed runs."""
+        noted = [f"{places}: {note}" for note, places in self._places_of_notes().items()]
         absent = [f"{measure} is not computed: {reason}" for measure, reason in self.missing.items()]
-        return (*rows, *absent, *(f"failed: {failure}" for failure in self.failures))
+        return (*noted, *absent, *(f"failed: {failure}" for failure in self.failures))
 
     def _places_of_notes(self) -> dict[str, str]:
-        """Note -> the rows it stands at, in words, so that what holds for many rows is told once."""
+        """Note -> the scores that have it, in words, so that what holds for many is told once."""
         levels: dict[str, dict[str, list[str]]] = {}
         for score in self.scores:
             if score.note:
                 levels.setdefault(score.note, {}).setdefault(score.measure, []).append(score.at)
         return {
-            note: "; ".join(f"{measure}, {', '.join(places)}" for measure, places in rows.items())
-            for note, rows in levels.items()
+            note: "; ".join(f"{measure}, {', '.join(places)}" for measure, places in places_of.items())
+            for note, places_of in levels.items()
         }
 
     def to_frame(self) -> "pl.DataFrame":
-        """Return the rows as a table; what a row holds more than a table can is left to `to_mapping`."""
+        """Return one row per score; `per_seed` and `beside` do not fit into a row and are only in `to_mapping`."""
         import polars as pl
 
         rows: list[dict[str, Any]] = []
@@ -218,63 +216,3 @@ def forecast_lines(tables: Sequence[ScoreTable]) -> list[str]:
             shown.append(rows)
             lines += ["", FORECAST_TITLE, *aligned([FORECAST_HEADER, *rows])]
     return lines
-
-
-def paragraph(lines: Sequence[str]) -> list[str]:
-    """Return the lines with an empty one before them; nothing if there are none."""
-    return ["", *lines] if lines else []
-
-
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return rows of texts as lines with columns under each other."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-
-
-def counted(count: int, noun: str) -> str:
-    """Return a number with its noun, "1 run" or "2,000 runs"."""
-    return f"{count:,} {noun}" + ("" if count == 1 else "s")
-
-
-def number(value: float) -> str:
-    """Return a number with about four digits; a dash where there is none."""
-    if math.isnan(value):
-        return "-"
-    if math.isinf(value):
-        return "inf" if value > 0 else "-inf"
-    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}"
-
-
-def percent(value: float) -> str:
-    """Return a share in percent; a dash where there is none."""
-    return "-" if not math.isfinite(value) else f"{100.0 * value:.3g} %"
-
-
-def interval(summary: Summary) -> str:
-    """Return the bounds of an interval."""
-    if math.isnan(summary.lower):
-        return "-"
-    return f"{number(summary.lower)} to {number(summary.upper)}"
-
-
-def plain(value: float | None) -> float | None:
-    """Return the value, or None where JSON has no such number."""
-    return value if value is not None and math.isfinite(value) else None
-
-
-def spread(summary: Summary, *, is_share: bool = False) -> str:
-    """Return a mean with half of its interval, to two digits of the latter."""
-    factor, unit = (100.0, " %") if is_share else (1.0, "")
-    mean, half = factor * summary.mean, factor * (summary.upper - summary.mean)
-    if not (math.isfinite(mean) and math.isfinite(half)):
-        return number(mean) + (unit if math.isfinite(mean) else "")
-    if half <= max(ROUNDING * abs(mean), _NO_AMOUNT):
-        return f"{number(0.0 if abs(mean) <= _NO_AMOUNT else mean)} ± 0{unit}"
-    decimals = max(0, 1 - math.floor(math.log10(half)))
-    mean = round(mean, decimals) + 0.0  # no "-0"
-    return f"{mean:.{decimals}f} ± {half:.{decimals}f}{unit}"
-
-
-def bounds(summary: Summary | None) -> list[float | None] | None:
-    """Return mean, lower and upper bound as plain values; None where there is no summary."""
-    return None if summary is None else [plain(value) for value in (summary.mean, summary.lower, summary.upper)]

@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from metrics.plots import draw_scores
-from metrics.score_rows import score_study
-from metrics.score_table import ScoreTable
-from metrics.study_table import study_curves
-from tests.scores.curve_tables import rows, table
+from metrics.scoring.curves_table import study_curves
+from metrics.scoring.plots import draw_scores
+from metrics.scoring.study_scores import score_study
+from metrics.scoring.table import ScoreTable
+from tests.support.curve_tables import rows, table
 
 PNG = b"\x89PNG"
 

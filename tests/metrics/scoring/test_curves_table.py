@@ -5,8 +5,9 @@ import polars as pl
 import pytest
 
 from metrics import CurveError, PopulationRates
-from metrics.study_table import common_runs, study_curves
-from tests.scores.curve_tables import rows, table
+from metrics.scoring.curves_table import study_curves
+from metrics.scoring.studies import common_runs
+from tests.support.curve_tables import rows, table
 
 
 def only(frame):

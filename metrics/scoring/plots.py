@@ -5,10 +5,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from .catalog import METRICS
-from .score_rows import MEASURE_CRITERIA
-from .score_table import Score, ScoreTable
-from .study_table import NOISE, POPULATION, SIZE, THROTTLE
+from metrics.catalog import METRICS
+
+from .columns import NOISE, POPULATION, SIZE, THROTTLE
+from .measures import MEASURE_CRITERIA
+from .table import Score, ScoreTable
 
 Panel: TypeAlias = Any
 """An `Axes` of matplotlib, whose types leave too much open for strict checking."""
@@ -36,7 +37,7 @@ def draw_scores(tables: Sequence[ScoreTable], path: str | Path) -> None:
 
     Raises:
         ImportError: matplotlib is not installed.
-        ValueError: no table has a row that can be drawn.
+        ValueError: no table has a score that can be drawn.
     """
     from matplotlib.figure import Figure  # not pyplot: no global state, no window system
 
@@ -59,12 +60,12 @@ def draw_scores(tables: Sequence[ScoreTable], path: str | Path) -> None:
 
 
 def _drawable(table: ScoreTable, measure: str) -> list[Score]:
-    rows = (score for score in table.scores if score.measure == measure and score.per_seed)
-    return [score for score in rows if math.isfinite(score.summary.mean)]
+    found = (score for score in table.scores if score.measure == measure and score.per_seed)
+    return [score for score in found if math.isfinite(score.summary.mean)]
 
 
 def _draw_measure(panel: Panel, measure: str, tables: Sequence[ScoreTable]) -> None:
-    row = METRICS[measure]
+    about = METRICS[measure]
     places = sorted({score.x for table in tables for score in _drawable(table, measure)})
     for index, table in enumerate(tables):
         scores = _drawable(table, measure)
@@ -78,9 +79,9 @@ def _draw_measure(panel: Panel, measure: str, tables: Sequence[ScoreTable]) -> N
         floors = [(place, score.noise_floor) for place, score in zip(x, scores, strict=True) if score.noise_floor]
         if floors:
             panel.plot(*zip(*floors, strict=True), color=colour, linestyle=":", marker="_")
-    if row.neutral is not None and not row.is_distance:
-        panel.axhline(row.neutral, color="0.6", linewidth=0.8, zorder=0)
-    arrow = "higher" if row.higher_is_better else "lower"
+    if about.neutral is not None and not about.is_distance:
+        panel.axhline(about.neutral, color="0.6", linewidth=0.8, zorder=0)
+    arrow = "higher" if about.higher_is_better else "lower"
     panel.set_title(f"{measure} ({arrow} is better)", fontsize=9)
     panel.set_ylabel(next(score.unit for table in tables for score in _drawable(table, measure)), fontsize=8)
     panel.set_xlabel(_X_LABELS[MEASURE_CRITERIA[measure]], fontsize=8)

@@ -7,10 +7,12 @@ import pytest
 
 import metrics
 from metrics import METRICS, CurveError, PopulationRates
-from metrics.score_rows import MEASURE_CRITERIA, check_measures, score_study
-from metrics.score_table import HEADER, ScoreTable
-from metrics.study_table import RunCurves, StudyCurves, study_curves
-from tests.scores.curve_tables import CROWDING, rows, table
+from metrics.scoring.curves_table import study_curves
+from metrics.scoring.measures import MEASURE_CRITERIA, check_measures
+from metrics.scoring.studies import RunCurves, StudyCurves
+from metrics.scoring.study_scores import score_study
+from metrics.scoring.table import HEADER, ScoreTable
+from tests.support.curve_tables import CROWDING, rows, table
 
 IDEAL = [[4.0, 6.0, 5.0, 6.0], [5.0, 5.0, 7.0, 4.0], [6.0, 4.0, 5.0, 5.0]]
 SLOWED = [[4.0, 5.0, 2.0, 3.0], [5.0, 5.0, 3.0, 2.0], [5.0, 4.0, 2.0, 3.0]]

@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import pkgutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import metrics
+import metrics.scoring
 
 FOLDER = Path(metrics.__file__).parent
 SIGNATURES = {
@@ -56,11 +58,14 @@ def test_type_checkers_and_the_interpreter_see_the_same_names():
     tree = ast.parse(Path(metrics.__file__).read_text())
     block = next(node for node in tree.body if isinstance(node, ast.If))
     homes = {alias.name: node.module for node in block.body if isinstance(node, ast.ImportFrom) for alias in node.names}
-    eager = {
-        alias.name for node in tree.body if isinstance(node, ast.ImportFrom) and node.level == 1 for alias in node.names
-    }
     assert homes == metrics._HOMES
-    assert {*homes, *eager} == set(metrics.__all__)
+    assert set(homes) == set(metrics.__all__)
+
+
+@pytest.mark.parametrize("package", [metrics, metrics.scoring], ids=["metrics", "scoring"])
+def test_no_public_name_is_that_of_a_module(package):
+    modules = {module.name for module in pkgutil.iter_modules(package.__path__)}
+    assert not modules & {*package.__all__, *(name for name in vars(package) if callable(vars(package)[name]))}
 
 
 def test_unknown_names_are_refused():
@@ -68,17 +73,18 @@ def test_unknown_names_are_refused():
         _ = metrics.scalabilty
 
 
-@pytest.mark.parametrize("first", ["metrics.scalability", "metrics.catalog", "metrics.population", "metrics"])
-def test_the_function_wins_over_its_module_in_any_order_of_imports(first):
+@pytest.mark.parametrize("first", ["metrics.scaling", "metrics.catalog", "metrics.population", "metrics"])
+def test_functions_and_modules_are_what_they_are_in_any_order_of_imports(first):
     code = (
-        f"import {first}; import metrics.catalog; from metrics import scalability; print(scalability([1], 1, [2], 2))"
+        f"import {first}; from metrics import scalability; import metrics.scaling, metrics.catalog; "
+        "print(scalability([1], 1, [2], 2), type(metrics.scaling).__name__)"
     )
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert (result.stdout.strip(), result.stderr) == ("1.0", "")
+    assert (result.stdout.strip(), result.stderr) == ("1.0 module", "")
 
 
 def test_importing_the_package_loads_nothing_heavy():
-    heavy = ("numba", "scipy", "polars", "pymunk", "swarm_forage_env", "baselines")
+    heavy = ("numpy", "numba", "scipy", "polars", "pymunk", "swarm_forage_env", "baselines")
     code = f"import sys, metrics; print(*[name for name in {heavy} if name in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.split() == []

@@ -4,9 +4,12 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from .queues import PopulationRates, mean_away, queue_statistics
-from .statistics import Summary, aggregate
-from .study_table import POPULATION, RunCurves, StudyCurves
+from metrics.queues import PopulationRates, mean_away, queue_statistics
+from metrics.statistics import Summary, aggregate
+
+from .columns import POPULATION
+from .studies import RunCurves, StudyCurves
+from .texts import plain
 
 FORECAST_TITLE = "Population: what the queueing model predicts for runs of this length, beside what the runs showed"
 FORECAST_HEADER = (
@@ -29,10 +32,10 @@ FORECAST_HEADER = (
 class PopulationForecast:
     """One level of population dynamics: predicted and observed.
 
-    Times per departure are the robot-seconds that a run spends in and out of the swarm, over the number of departures
-    (deaths and malfunctions): both prediction and observation end with the run, so that they can be compared. The time
-    per repair counts absences that ended within a run, which leaves out the longest. The equilibrium time belongs to a
-    run without end.
+    Times per departure are the seconds that all robots together spend in or out of the swarm, over the number of
+    departures (deaths and malfunctions). Prediction and observation both end with the run, so that they can be
+    compared. The time per repair counts absences that ended within a run, which leaves out the longest. The equilibrium
+    time is that of a run without end.
     """
 
     level: float
@@ -58,15 +61,15 @@ class PopulationForecast:
     """1 / (mu - lambda) + 1 / mu, as the paper prints it, which counts the repair itself twice."""
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the row as plain values; numbers that JSON does not have are None."""
+        """Return the level as plain values; numbers that JSON does not have are None."""
         names = [name for name in self.__dataclass_fields__ if name != "observed_at_work"]
-        row = {name: value if math.isfinite(value := getattr(self, name)) else None for name in names}
+        values = {name: plain(getattr(self, name)) for name in names}
         observed = self.observed_at_work
         bounds = {"observed_at_work": observed.mean, "lower": observed.lower, "upper": observed.upper}
-        return row | {name: value if math.isfinite(value) else None for name, value in bounds.items()}
+        return values | {name: plain(value) for name, value in bounds.items()}
 
     def cells(self) -> tuple[str, ...]:
-        """Return the row as texts under `FORECAST_HEADER`."""
+        """Return the level as texts under `FORECAST_HEADER`."""
         observed = self.observed_at_work
         spread = "" if math.isnan(observed.lower) else f" ({observed.lower:.1f} to {observed.upper:.1f})"
         times = (
@@ -88,7 +91,7 @@ class PopulationForecast:
 
 
 def forecast_population(study: StudyCurves) -> tuple[PopulationForecast, ...]:
-    """Return one row per level of population dynamics whose rates, clock and robots at work are known."""
+    """Return one forecast per level of population dynamics whose rates, clock and robots at work are known."""
     horizon_s = study.horizon_s
     if horizon_s is None:
         return ()

@@ -9,23 +9,23 @@ from metrics import METRICS
 
 
 @pytest.mark.parametrize("name", METRICS)
-def test_rows_are_named_after_public_functions(name):
+def test_measures_are_named_after_public_functions(name):
     assert METRICS[name].function is getattr(metrics, name)
 
 
 @pytest.mark.parametrize("name", METRICS)
 def test_neutral_values_lie_in_the_range(name):
-    row = METRICS[name]
-    assert row.lowest < row.highest
-    assert row.neutral is None or row.lowest <= row.neutral <= row.highest
+    measure = METRICS[name]
+    assert measure.lowest < measure.highest
+    assert measure.neutral is None or measure.lowest <= measure.neutral <= measure.highest
 
 
 def test_distances_are_best_at_zero():
-    distances = {name for name, row in METRICS.items() if row.is_distance}
+    distances = {name for name, measure in METRICS.items() if measure.is_distance}
     assert distances == {"reactivity", "adaptability", "noise_robustness"}
     for name in distances:
-        row = METRICS[name]
-        assert (row.higher_is_better, row.neutral, row.lowest, row.highest) == (False, 0.0, 0.0, math.inf)
+        best = METRICS[name]
+        assert (best.higher_is_better, best.neutral, best.lowest, best.highest) == (False, 0.0, 0.0, math.inf)
 
 
 INDEPENDENT = {
@@ -42,7 +42,7 @@ INDEPENDENT = {
 }
 
 
-@pytest.mark.parametrize("name", [name for name, row in METRICS.items() if row.neutral is not None])
+@pytest.mark.parametrize("name", [name for name, measure in METRICS.items() if measure.neutral is not None])
 def test_an_undisturbed_swarm_of_independent_robots_has_the_neutral_value(name):
-    row = METRICS[name]
-    assert INDEPENDENT[name](row.function) == pytest.approx(row.neutral, abs=1e-12)
+    measure = METRICS[name]
+    assert INDEPENDENT[name](measure.function) == pytest.approx(measure.neutral, abs=1e-12)

@@ -7,10 +7,10 @@ import polars as pl
 import pytest
 
 from metrics import CurveError, score_curves
-from metrics.study_table import CURVE_COLUMNS
-from tests.scores.curve_tables import CROWDING, rows, table
+from metrics.scoring.columns import CURVE_COLUMNS
+from tests.support.curve_tables import CROWDING, rows, table
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "scoring.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "scoring.md"
 
 THROTTLED = table(
     rows(5, [[2.0, 2.0], [3.0, 1.0]], criterion="throttle", criterion_value=0.0, adversity=0.1, t_end_s=[10.0, 20.0]),

@@ -1,0 +1,22 @@
+"""From policies, runs and files of curves to tables of scores, with everything needed to read them."""
+
+from .comparison import Comparison, compare_tables
+from .front_door import compare_policies, score_curves, score_policy
+from .plan import ScoringPlan, plan_scores
+from .plots import draw_scores
+from .runs import run_scores
+from .table import Score, ScoreTable
+
+__all__ = [
+    "score_policy",
+    "compare_policies",
+    "score_curves",
+    "compare_tables",
+    "plan_scores",
+    "run_scores",
+    "draw_scores",
+    "Score",
+    "ScoreTable",
+    "Comparison",
+    "ScoringPlan",
+]

@@ -1,0 +1,134 @@
+"""The front door: score any policy in any scenario, compare policies, or score curves from anywhere else."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from metrics.checks import CurveError
+
+from .comparison import Comparison, compare_tables
+from .contestants import PolicyLike
+from .curves_file import read_curves
+from .forecast import forecast_population
+from .measures import check_measures
+from .plan import plan_scores
+from .runs import run_scores
+from .study_scores import score_study
+from .table import ScoreTable
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from swarm_forage_env.scenarios.config import ScenarioConfig
+    from swarm_forage_env.study.experiments import Budget
+
+
+def score_policy(
+    policy: PolicyLike,
+    scenario: "str | ScenarioConfig" = "warehouse_small",
+    *,
+    measures: Sequence[str] | None = None,
+    budget: "str | Budget" = "standard",
+    seeds: int | Sequence[int] | None = None,
+    horizon_s: float | None = None,
+    name: str | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    caches: str | None = None,
+    out: str | Path | None = None,
+    jobs: int | None = None,
+    executor: "Executor | None" = None,
+    progress: bool = True,
+) -> ScoreTable:
+    """Run a policy in all experiments that the measures need, and score it.
+
+    Args:
+        policy: See `PolicyLike`. What is neither a name nor a path is run in this process, one run at a time; objects
+            are copied for each run.
+        scenario: Name of a preset, or a complete configuration; its horizon and interval are those of the budget.
+        measures: Names out of `MEASURE_CRITERIA`; default all.
+        budget: "quick", "standard", "paper" (`swarm_forage_env.study.experiments.BUDGETS`), or one of your own.
+        seeds: How many, or which; default those of the budget. Experiments share them, so runs are paired.
+        horizon_s: Length of a run in seconds, whole intervals; default that of the budget.
+        name: Name in tables and stored runs. A policy given as object or function needs one for `out`; it then stands
+            for the code: give another name when the code has changed.
+        parameters: Keyword arguments of a registered policy or a class.
+        caches: "none", "static", "dynamic"; default the world that the policy is made for.
+        out: Folder for run records. Runs it already holds are not repeated, so an interrupted call is just repeated.
+        jobs: Processes; default one per core.
+        executor: Runs the work instead, for example Dask's `client.get_executor()`.
+        progress: Show progress and an estimate on stderr.
+
+    Returns:
+        The table. Scores that lack runs say so in their note, and `failures` says why runs failed.
+
+    Raises:
+        CurveError: unknown measures.
+        ValueError: an unknown policy, scenario, budget, or values that describe no run.
+        ImportError: a model, and stable-baselines3 is not installed.
+        swarm_forage_env.study.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
+    """
+    plan = plan_scores(
+        {name: policy} if name else [policy],
+        scenario,
+        measures=measures,
+        budget=budget,
+        seeds=seeds,
+        horizon_s=horizon_s,
+        parameters=parameters,
+        caches=caches,
+    )
+    return run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress)[0]
+
+
+def compare_policies(
+    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
+    scenario: "str | ScenarioConfig" = "warehouse_small",
+    *,
+    measures: Sequence[str] | None = None,
+    budget: "str | Budget" = "standard",
+    seeds: int | Sequence[int] | None = None,
+    horizon_s: float | None = None,
+    caches: str | None = None,
+    out: str | Path | None = None,
+    jobs: int | None = None,
+    executor: "Executor | None" = None,
+    progress: bool = True,
+) -> Comparison:
+    """Score policies in the same worlds and compare them seed by seed.
+
+    Args and errors as in `score_policy`; `policies` are two or more, or a mapping from names to policies.
+    """
+    plan = plan_scores(
+        policies, scenario, measures=measures, budget=budget, seeds=seeds, horizon_s=horizon_s, caches=caches
+    )
+    return compare_tables(run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress))
+
+
+def score_curves(path: str | Path, *, measures: Sequence[str] | None = None) -> tuple[ScoreTable, ...]:
+    """Score curves from any simulator, one table per policy in the file.
+
+    Args:
+        path: CSV or Parquet file with the columns of `CURVE_COLUMNS`.
+        measures: Default all that the columns allow; the table says which others are missing, and why.
+
+    Raises:
+        CurveError: whatever is wrong with the file, or a measure that was asked for and cannot be computed.
+    """
+    wanted = check_measures(measures)
+    tables: list[ScoreTable] = []
+    for study in read_curves(path):
+        scores, missing = score_study(study, wanted)
+        if missing and (measures is not None or not scores):
+            measure, reason = next(iter(missing.items()))
+            raise CurveError(f"Cannot compute {measure} for {study.controller} from {path}: {reason}.")
+        tables.append(
+            ScoreTable(
+                policy=study.controller,
+                scenario="",
+                scores=scores,
+                forecasts=forecast_population(study),
+                missing=missing,
+                settings={"curves": str(path), "horizon_s": study.horizon_s},
+            )
+        )
+    return tuple(tables)

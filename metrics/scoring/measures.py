@@ -1,0 +1,42 @@
+"""Which measures there are to score, what has to be varied for each, and their order in tables."""
+
+import difflib
+from collections.abc import Sequence
+
+from metrics.checks import CurveError
+
+from .columns import NOISE, POPULATION, SIZE, THROTTLE
+
+MEASURE_CRITERIA: dict[str, str] = {
+    "raw_performance": SIZE,
+    "efficiency": SIZE,
+    "t_lost_fraction": SIZE,
+    "performance_lost": SIZE,
+    "spatial_emergence": SIZE,
+    "task_emergence": SIZE,
+    "scalability": SIZE,
+    "reactivity": THROTTLE,
+    "adaptability": THROTTLE,
+    "noise_robustness": NOISE,
+    "population_robustness": POPULATION,
+    "availability": POPULATION,
+}
+"""Measure -> what has to be varied for it. The order is that of score tables."""
+
+
+def check_measures(measures: Sequence[str] | None) -> tuple[str, ...]:
+    """Return measures in the order of tables, each once; None = all.
+
+    Raises:
+        CurveError: an unknown name, or none at all.
+    """
+    if measures is None:
+        return tuple(MEASURE_CRITERIA)
+    for name in measures:
+        if name not in MEASURE_CRITERIA:
+            close = difflib.get_close_matches(name, MEASURE_CRITERIA, n=1)
+            hint = f" Did you mean {close[0]!r}?" if close else ""
+            raise CurveError(f"Unknown measure {name!r}.{hint} Known: {', '.join(MEASURE_CRITERIA)}.")
+    if not measures:
+        raise CurveError(f"Expected one or more measures of {', '.join(MEASURE_CRITERIA)}, got none.")
+    return tuple(name for name in MEASURE_CRITERIA if name in measures)

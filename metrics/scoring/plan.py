@@ -1,0 +1,77 @@
+"""What would be run to score policies: which policies, which experiments, which seeds."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from metrics.checks import chosen_seeds
+
+from .contestants import Contestant, PolicyLike, contestants_of
+from .measures import MEASURE_CRITERIA, check_measures
+
+if TYPE_CHECKING:
+    from swarm_forage_env.scenarios.config import ScenarioConfig
+    from swarm_forage_env.study.experiments import Budget, Experiment
+    from swarm_forage_env.study.spec import RunSpec
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScoringPlan:
+    """What would be run to score some policies."""
+
+    contestants: tuple[Contestant, ...]
+    experiments: "tuple[Experiment, ...]"
+    seeds: tuple[int, ...]
+    measures: tuple[str, ...]
+    scenario: "ScenarioConfig"
+    budget: "Budget"
+    budget_name: str
+
+    def specs_of(self, contestant: Contestant) -> "tuple[RunSpec, ...]":
+        """Return the runs of one policy, seed by seed."""
+        from swarm_forage_env.study.experiments import plan_specs
+
+        return plan_specs(
+            self.experiments,
+            contestant.policy,
+            seeds=self.seeds,
+            parameters=contestant.parameters,
+            caches=contestant.caches,
+        )
+
+    @property
+    def specs(self) -> "tuple[RunSpec, ...]":
+        """All runs, those of the first policy first."""
+        return tuple(spec for contestant in self.contestants for spec in self.specs_of(contestant))
+
+
+def plan_scores(
+    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
+    scenario: "str | ScenarioConfig" = "warehouse_small",
+    *,
+    measures: Sequence[str] | None = None,
+    budget: "str | Budget" = "standard",
+    seeds: int | Sequence[int] | None = None,
+    horizon_s: float | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    caches: str | None = None,
+) -> ScoringPlan:
+    """Return what `score_policy` and `compare_policies` would run; arguments and errors as there."""
+    from swarm_forage_env.scenarios.presets import scenario as preset
+    from swarm_forage_env.study import experiments
+
+    wanted = check_measures(measures)
+    budget_name = budget if isinstance(budget, str) else "custom"
+    allowed = experiments.budget(budget) if isinstance(budget, str) else budget
+    if horizon_s is not None:
+        allowed = replace(allowed, horizon_s=horizon_s)
+    world = preset(scenario) if isinstance(scenario, str) else scenario
+    return ScoringPlan(
+        contestants=contestants_of(policies, parameters or {}, world, caches),
+        experiments=experiments.plan_experiments(world, {MEASURE_CRITERIA[name] for name in wanted}, allowed),
+        seeds=chosen_seeds(seeds, allowed.n_seeds),
+        measures=wanted,
+        scenario=world,
+        budget=allowed,
+        budget_name=budget_name,
+    )

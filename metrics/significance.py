@@ -1,0 +1,51 @@
+"""Whether a difference can be told from chance: the paired t test, and many tests at once."""
+
+import math
+
+import numpy as np
+from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
+
+from .curves import FloatArray
+
+ROUNDING = 1e-9
+"""Runs that spread less than this share of their mean are equal but for rounding."""
+
+
+def paired_p(differences: FloatArray) -> float:
+    """Two-sided p value of the paired t test that the mean difference is zero.
+
+    Args:
+        differences: One per pair of runs, (R,).
+
+    Returns:
+        The p value; NaN for fewer than two pairs or a difference that is not finite. Where all differences are equal
+        (but for rounding, which would pass for a tiny spread) Student's t does not exist: 1 if they are zero, else that
+        of the sign test, 2^(1 - R).
+    """
+    n_pairs = differences.size
+    if n_pairs < 2 or not np.isfinite(differences).all():
+        return math.nan
+    std = float(differences.std(ddof=1))
+    mean = float(differences.mean())
+    if std <= ROUNDING * abs(mean):
+        return 1.0 if mean == 0.0 else 2.0 ** (1 - n_pairs)
+    t = abs(mean) * math.sqrt(n_pairs) / std
+    return 2.0 * float(stdtr(n_pairs - 1, -t))
+
+
+def holm(p_values: FloatArray) -> FloatArray:
+    """Adjust p values of one family for testing many at once (Holm 1979); NaN values are no tests and stay NaN.
+
+    Args:
+        p_values: (K,).
+
+    Returns:
+        Adjusted values (K,), at most 1: rejecting where they are at most alpha keeps the probability of any false
+        rejection at alpha.
+    """
+    adjusted = np.full(p_values.shape, math.nan)
+    tests = np.flatnonzero(~np.isnan(p_values))
+    order = tests[np.argsort(p_values[tests], kind="stable")]
+    factors = np.arange(order.size, 0, -1)
+    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(factors * p_values[order]))
+    return adjusted

@@ -1,0 +1,123 @@
+"""From the words of `swarm-forage train` to a plan: by the recipe, from a file, or of a training that goes on."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli.config_file import read_config
+from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, build_wrappers, scenario_overrides
+from swarm_forage_env.policies.pretrained import plan_file
+from swarm_forage_env.training.plan import EvaluationPlan, TrainingPlan, read_plan
+from swarm_forage_env.training.recipe import recipe
+
+_INTERFACE_FIELDS = ("observation", "actions", "automatic_gripper", "decision_ticks")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TrainOptions:
+    """The options of the command that do not describe the scenario; None = the default of `training.recipe`."""
+
+    algorithm: str | None = None
+    steps: int | None = None
+    n_arenas: int | None = None
+    seed: int | None = None
+    observation: str | None = None
+    actions: str | None = None
+    automatic_gripper: bool | None = None
+    decision_ticks: int | None = None
+    evaluate_every: int | None = None
+    small_start: bool | None = None
+    horizon_s: float | None = None
+    hidden: str | None = None
+    """Sizes of hidden layers, separated by commas."""
+    arguments: tuple[str, ...] = ()
+    """Words of the form key=number, for the algorithm."""
+
+
+def build_plan(words: ScenarioOptions, options: TrainOptions) -> TrainingPlan:
+    """Return the plan that the words of the command line describe: `training.recipe` with what they say.
+
+    Raises:
+        ConfigError: whatever is wrong with them.
+    """
+    fields, file_wrappers = ({}, ()) if words.config_file is None else read_config(words.config_file)
+    words = replace(words, horizon=options.horizon_s)
+    build_scenario(words, fields)  # refuses what is not a field, so that the recipe does not take it for its argument
+    overrides = scenario_overrides(words, fields)
+    interface = {name: getattr(options, name) for name in _INTERFACE_FIELDS}
+    chosen = {name: getattr(options, name) for name in ("algorithm", "steps", "n_arenas", "small_start", "seed")}
+    if options.hidden is not None:
+        chosen["hidden"] = _layers(options.hidden)
+    if options.evaluate_every is not None:
+        chosen["evaluation"] = EvaluationPlan(every_steps=options.evaluate_every)
+    return recipe(
+        words.scenario,
+        interface=_given(interface),
+        wrappers=build_wrappers(words, file_wrappers),
+        options=dict(map(_argument, options.arguments)),
+        **_given(chosen),
+        **overrides,
+    )
+
+
+def _given(values: dict[str, Any]) -> dict[str, Any]:
+    """Leave out what nobody gave, so that the default is told in one place."""
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def named_plan(name: str) -> TrainingPlan:
+    """Return the plan of a file, or of a shipped policy by its name.
+
+    Raises:
+        ConfigError: there is none, or it cannot be used.
+    """
+    shipped = plan_file(name)
+    return read_plan(Path(name) if shipped is None else shipped)
+
+
+def resumed_plan(folder: Path, described: TrainingPlan | None, steps: int | None) -> TrainingPlan:
+    """Return the plan by which the training in a folder goes on: its own, made longer where `steps` says so.
+
+    Args:
+        folder: The training.
+        described: Plan of the other options, which has to agree; None where there were none.
+        steps: Decisions in all; None = those of the plan.
+
+    Raises:
+        ConfigError: no training there, options that differ from its plan, or fewer steps.
+    """
+    from swarm_forage_env.training.sb3.training import PLAN_FILE, kept_plan
+
+    kept = kept_plan(folder)
+    plan = kept if steps is None else kept.longer(steps)
+    if described is not None:
+        begun, wanted = ([(stage.scenario, stage.options) for stage in each.stages] for each in (kept, described))
+        # Options divide all steps into stages anew; a training keeps to those that it began.
+        wanted_plan = replace(described, stages=plan.stages) if begun == wanted else described
+        differences = wanted_plan.differences(kept)
+        if differences:
+            raise ConfigError(
+                f"Expected options that agree with {folder / PLAN_FILE}, got others: {'; '.join(differences)}. "
+                "Without options but --out and --steps, --resume goes on by that plan."
+            )
+    return plan
+
+
+def _layers(text: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(size) for size in text.split(","))
+    except ValueError as error:
+        raise ConfigError(f"Expected --hidden as sizes of layers, such as 128,128, got {text!r}.") from error
+
+
+def _argument(word: str) -> tuple[str, float | int]:
+    name, _, text = word.partition("=")
+    if name in ("hidden", "net_arch", "policy_kwargs"):
+        raise ConfigError(f"Expected the network as --hidden 128,128 (sizes of hidden layers), got --arg {word}.")
+    for kind in (int, float):
+        try:
+            return name, kind(text)
+        except ValueError:
+            continue
+    raise ConfigError(f"Expected an argument of the algorithm as key=number, got {word!r}.")

@@ -1,0 +1,89 @@
+"""What `swarm-forage train` shows: progress, evaluations as they come, a picture, and where the results are."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from swarm_forage_env.cli.options import NO_PICTURE
+from swarm_forage_env.cli.report import PERFORMANCE_WORDS
+from swarm_forage_env.rendering.plots import draw_training
+from swarm_forage_env.training.plan import TrainingPlan
+from swarm_forage_env.training.status import Evaluation, TrainingStatus
+
+PICTURE_FILE = "training.png"
+
+
+def run_training(plan: TrainingPlan, folder: Path, *, n_processes: int, resume: bool) -> None:
+    """Train, show how it goes, and say where the results are.
+
+    Raises:
+        ImportError: stable-baselines3 is not installed.
+        ConfigError: see `training.sb3.training.train`.
+    """
+    from swarm_forage_env.training.sb3.training import MODEL_FILE, train
+
+    console = Console(stderr=True, highlight=False)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        try:
+            result = train(plan, folder, n_processes=n_processes, resume=resume, report=_reporter(plan, bar))
+        except KeyboardInterrupt:
+            bar.console.print(_farewell(folder, is_kept=(folder / MODEL_FILE).exists()), soft_wrap=True, markup=False)
+            raise
+    if not result.steps:
+        console.print(
+            f"This training was finished: {result.model.num_timesteps:,} of {plan.total_steps:,} decisions. "
+            "For more, give --steps beside --resume, or a plan with more."
+        )
+    drawn = _draw(plan, result.evaluations, folder / PICTURE_FILE, console)
+    files = {"model": folder / MODEL_FILE, "network": result.policy_file, "picture": drawn}
+    console.print(", ".join(f"{what} {file}" for what, file in files.items() if file is not None), soft_wrap=True)
+
+
+def _farewell(folder: Path, *, is_kept: bool) -> str:
+    if is_kept:
+        return f"Stopped. To go on: swarm-forage train --out {folder} --resume"
+    return "Stopped before there was anything to keep; the same command starts again."
+
+
+def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, console: Console) -> Path | None:
+    """Draw the evaluations; returns `path`, None without any or without matplotlib."""
+    if not evaluations:
+        return None
+    try:
+        draw_training(
+            path,
+            [evaluation.steps for evaluation in evaluations],
+            [evaluation.performance for evaluation in evaluations],
+            [evaluation.interference_fraction for evaluation in evaluations],
+            baseline=(plan.evaluation.baseline, evaluations[-1].baseline),
+            stage_ends=np.cumsum([stage.steps for stage in plan.stages]).tolist(),
+            title=f"{plan.algorithm} in {plan.scenario.name}, {plan.scenario.robots.n_robots} robots",
+            ylabel=f"{PERFORMANCE_WORDS[plan.scenario.performance]} per 1,000 s",
+        )
+    except ImportError:
+        console.print(NO_PICTURE, markup=False)
+        return None
+    return path
+
+
+def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | Evaluation], None]:
+    task = bar.add_task("training", total=plan.total_steps)
+    heading = f"{'decisions':>12} {'per 1,000 s':>12} {plan.evaluation.baseline:>8} {'interference':>13}"
+
+    def report(news: TrainingStatus | Evaluation) -> None:
+        nonlocal heading
+        if isinstance(news, Evaluation):
+            if heading:
+                bar.console.print(heading)
+                heading = ""
+            bar.console.print(
+                f"{news.steps:>12,} {news.performance:>12.1f} {news.baseline:>8.1f} {news.interference_fraction:>13.3f}"
+            )
+        else:
+            bar.update(task, completed=news.steps, description=f"mean return {news.episode_return:.2f}")
+
+    return report
