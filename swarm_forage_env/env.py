@@ -101,8 +101,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     @cached_property
     def state_space(self) -> spaces.Box:
         """Space of `state()`: (6 N + 3 M,) float32 in [-1, 1]."""
-        size = 6 * self.scenario.robots.n_robots + 3 * self.scenario.objects.n_objects
-        return spaces.Box(-1.0, 1.0, (size,), np.float32)
+        return spaces.Box(-1.0, 1.0, (self.swarm_spec.state_size,), np.float32)
 
     @cached_property
     def swarm_spec(self) -> SwarmSpec:

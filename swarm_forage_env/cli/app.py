@@ -59,7 +59,7 @@ def main() -> None:
     try:
         code = app(standalone_mode=False)
     except _USAGE_ERROR as error:
-        code = complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined]
+        code = complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined] - see _USAGE_ERROR
     except (ConfigError, RecordError) as error:
         code = complain(str(error), EXIT_USAGE)
     except OSError as error:

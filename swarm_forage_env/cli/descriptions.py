@@ -11,7 +11,8 @@ from rich.table import Table
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
-from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.registry import is_policy_file, policy_class, policy_names
@@ -53,8 +54,8 @@ def information(name: str) -> str:
 
 
 def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
-    env = ForageEnv(config)
-    agent = env.possible_agents[0]
+    spec = SwarmSpec.of(config)
+    interface = LearnerInterface(InterfaceConfig(), spec)
     yield f"{config.name}: {headline}"
     yield ""
     yield "Fields (change them with --set name=value):"
@@ -68,12 +69,12 @@ def _scenario_lines(config: ScenarioConfig, headline: str) -> Iterator[str]:
             yield f"  {item.name:<36}{_plain(value)}"
     yield ""
     yield "Spaces, per robot:"
-    yield f"  action       {env.action_space(agent)}: left wheel, right wheel, gripper"
-    yield f"  observation  {env.observation_space(agent)}"
-    yield f"  state()      {env.state_space}"
+    yield f"  action       {interface.action_space}: left wheel, right wheel, gripper"
+    yield f"  observation  {interface.observation_space}"
+    yield f"  state()      Box(-1.0, 1.0, ({spec.state_size},), float32)"
     yield ""
     yield "Observation:"
-    yield env.layout.describe()
+    yield spec.layout.describe()
 
 
 def _policy_lines(name: str) -> Iterator[str]:

@@ -55,6 +55,11 @@ class SwarmSpec:
     """SITE and CREATE_CACHE drops are refused within this distance of a cache centre."""
     quirks: Quirks
 
+    @property
+    def state_size(self) -> int:
+        """Numbers in the global view `ForageEnv.state()`: six per robot, three per object."""
+        return 6 * self.n_robots + 3 * self.n_objects
+
     @classmethod
     def of(cls, scenario: ScenarioConfig, *, horizon_s: float | None = None) -> "SwarmSpec":
         """Return the constants of a scenario; no environment is needed.
