@@ -31,6 +31,7 @@ from rich.table import Table
 
 import swarm_forage_env.arena as arena_module
 from swarm_forage_env.config import ScenarioConfig, with_overrides
+from swarm_forage_env.contact import Contact
 from swarm_forage_env.env import parallel_env
 from swarm_forage_env.kernels.gaussian import to_normal
 from swarm_forage_env.physics import Physics
@@ -43,7 +44,7 @@ from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
 OBJECTS_PER_M2 = 0.35
-PHASES = ("physics", "sensing", "policy", "recording", "rest")
+PHASES = ("physics", "contact", "sensing", "policy", "recording", "rest")
 
 
 @dataclass(frozen=True)
@@ -117,6 +118,7 @@ def tick_shares(scenario: ScenarioConfig, policy_name: str, ticks: int) -> dict[
     spent: dict[str, list[float]] = {phase: [0.0] for phase in PHASES}
     with (
         stopwatch(Physics, "advance", spent["physics"]),
+        stopwatch(Contact, "apply", spent["contact"]),
         stopwatch(arena_module, "sense_proximity", spent["sensing"]),
         stopwatch(arena_module, "mark_interference", spent["sensing"]),
         stopwatch(arena_module, "sense", spent["sensing"]),
