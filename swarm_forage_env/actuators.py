@@ -32,8 +32,8 @@ class Drive:
         """Write `swarm.wheel_speed` and body twists.
 
         Commands beyond [-1, 1] are clipped. Centre speed and wheel difference are limited each by clipping, before the
-        gains and again after them: noise makes no motor faster than it is, and no robot drives through a wall. Wheels of
-        inactive robots and of robots in an interaction stand still.
+        gains and again after them: noise makes no motor faster than it is, and no robot drives through a wall. Wheels
+        of inactive robots and of robots in an interaction stand still.
 
         Args:
             actions: (N, 3) float32; rows of inactive robots are ignored.

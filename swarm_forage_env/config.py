@@ -23,10 +23,11 @@ MAX_CELLS = 200_000_000
 """Largest floor, 2.8 km square (our choice: its codes take 800 MB; the largest of the paper has 409,600 cells)."""
 
 MIN_SUBSTEPS = 4
-"""Fewest substeps of a tick that settle a crowd. All must be equal: Chipmunk works out how fast to undo an overlap from the
-length of one substep and moves bodies by it in the next, so that a longer one after a shorter throws them too far.
-Mean of the deepest overlap per tick, of 512 robots packed into a corner that all push into it, as a share of a diameter:
-4 equal ones at most 0.06; 3 equal ones 0.95 and (0.5, 0.2, 0.15, 0.15) 0.90, which is one robot on top of another."""
+"""Fewest substeps of a tick that settle a crowd. All must be equal: Chipmunk works out how fast to undo an overlap from
+the length of one substep and moves bodies by it in the next, so that a longer one after a shorter throws them too far.
+Mean of the deepest overlap per tick of 512 robots, packed into a corner, that all push into it, as a share of a
+diameter: 4 equal ones at most 0.06; 3 equal ones 0.95 and (0.5, 0.2, 0.15, 0.15) 0.90, which is one robot on top of
+another (60 solver rounds)."""
 
 
 class ConfigError(ValueError):
@@ -87,8 +88,8 @@ def _require_shares(section: str, **values: Any) -> None:
         )
         _require(
             len(shares) >= MIN_SUBSTEPS and max(shares) - min(shares) < 1e-6,
-            f"Expected {section}.{name} to be at least {MIN_SUBSTEPS} equal shares of a tick (others squeeze robots in a "
-            f"crowd through each other), got {value!r}.",
+            f"Expected {section}.{name} to be at least {MIN_SUBSTEPS} equal shares of a tick (others squeeze robots in "
+            f"a crowd through each other), got {value!r}.",
         )
 
 

@@ -3,9 +3,9 @@
 Facts this file relies on, each held by a test:
 
 * Chipmunk moves bodies first and resolves contacts afterwards, so a contact is met one substep late. How a tick is
-  divided bounds how deep robots push into each other. It undoes an overlap in the substep after the one it saw it in, at
-  a speed worked out for the length of the first: substeps are equal. `tests/science/test_physics_convergence.py` shows
-  the choice.
+  divided bounds how deep robots push into each other. It undoes an overlap in the substep after the one it saw it in,
+  at a speed worked out for the length of the first: substeps are equal. `tests/science/test_physics_convergence.py`
+  shows the choice.
 * In a crowd that is pushed against a wall the solver does not come to rest, and bodies end a tick a little inside the
   wall. They are put back onto the floor at the end of the tick, so that nobody ever comes through.
 * A batch lists dynamic bodies in the order they were added, then the space's static body. Bodies are never removed
@@ -36,9 +36,9 @@ WALL_INSET_M = COLLISION_SLOP_M + 1e-5
 """How far a wall stands inside of the floor's border, so that a robot that leans on it is on the floor in spite of the
 slop; a hundredth of the slop more, or rounding would have it put back in every tick."""
 ITERATIONS = 80
-"""Rounds of Chipmunk's solver per substep; only contacts cost. Mean of the deepest overlap per tick, of 512 robots packed
-into a corner that all push into it, as a share of a diameter: 10 rounds (its default) or 20: 0.93, which is one robot on
-top of another; 40 rounds 0.04, 80 rounds 0.01. Swarms of 1,000 need more."""
+"""Rounds of Chipmunk's solver per substep; only contacts cost. Mean of the deepest overlap per tick of 512 robots,
+packed into a corner, that all push into it, as a share of a diameter: 10 rounds (its default) or 20: 0.93, which is one
+robot on top of another; 40 rounds 0.04, 80 rounds 0.01. 1,000 robots pile up at 60 rounds, too."""
 
 _POSE = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.ANGLE
 _TWIST = pymunk.batch.BodyFields.VELOCITY | pymunk.batch.BodyFields.ANGULAR_VELOCITY

@@ -95,7 +95,7 @@ def unpack_poses(
 
 @kernel
 def hold_inside(poses: FloatArray, present: BoolArray, room: FloatArray) -> int:
-    """Move present bodies in `poses` (>= N, 3) into `room` = x low, y low, x high, y high; returns how many were not."""
+    """Move present bodies in `poses` (>= N, 3) into `room` = x low, y low, x high, y high; returns how many moved."""
     n_moved = 0
     for i in range(present.shape[0]):
         if present[i]:
