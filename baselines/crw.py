@@ -29,6 +29,7 @@ from .machines import (
     WAIT_PICKUP,
     command,
     deliver_and_leave,
+    describe_robot,
     explore_for_object,
     follow_cargo,
     new_robots,
@@ -107,3 +108,7 @@ class CRWPolicy:
     def activity(self) -> CodeArray:
         """(N,) `machines.Activity` codes, a copy."""
         return self._robots["activity"].copy()
+
+    def describe_robot(self, row: int) -> str:
+        """Return what one robot is up to, in one line for people."""
+        return describe_robot(self._robots[row])

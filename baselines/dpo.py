@@ -22,6 +22,7 @@ from .machines import (
     acquire,
     command,
     deliver_and_leave,
+    describe_robot,
     explore_for_object,
     follow_cargo,
     new_robots,
@@ -130,6 +131,10 @@ class DPOPolicy:
     def activity(self) -> CodeArray:
         """(N,) `machines.Activity` codes, a copy."""
         return self._robots["activity"].copy()
+
+    def describe_robot(self, row: int) -> str:
+        """Return what one robot is up to, in one line for people."""
+        return describe_robot(self._robots[row])
 
     @property
     def n_known(self) -> IntArray:

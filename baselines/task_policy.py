@@ -9,11 +9,12 @@ from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 from .cache_memory import new_task_memory
+from .machines import describe_robot
 from .memory import density, remembered_objects
 from .parameters import chosen_parameters, kernel_constants, require_inputs
 from .stoch_n1 import new_allocation
 from .task_machines import new_task_robots, step_tasks
-from .tasks import N_TASKS, TASK_DRAWS, TaskParameters
+from .tasks import N_TASKS, TASK_DRAWS, Goal, TaskParameters
 
 
 def site_box_m(spec: SwarmSpec) -> tuple[float, float, float, float]:
@@ -138,6 +139,12 @@ class TaskPolicy:
     def activity(self) -> CodeArray:
         """(N,) `machines.Activity` codes, a copy."""
         return self._robots["activity"].copy()
+
+    def describe_robot(self, row: int) -> str:
+        """Return what one robot is up to, in one line for people."""
+        robot = self._robots[row]
+        goal = Goal(int(robot.goal_kind)).name.lower().replace("_", " ")
+        return f"{describe_robot(robot)}; {goal} wanted, {robot.n_known} objects and {robot.n_caches} caches known"
 
     @property
     def n_known(self) -> IntArray:

@@ -37,13 +37,14 @@ from swarm_forage_env.scenarios.presets import warehouse_medium, warehouse_small
 from swarm_forage_env.study.run import LiveRun, build_stack, run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.pettingzoo import parallel_env
+from swarm_forage_env.world.contact import Contact
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.kernels.gaussian import to_normal
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
 OBJECTS_PER_M2 = 0.35
-PHASES = ("physics", "sensing", "policy", "recording", "rest")
+PHASES = ("physics", "contact", "sensing", "policy", "recording", "rest")
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,7 @@ def tick_shares(scenario: ScenarioConfig, policy_name: str, ticks: int) -> dict[
     spent: dict[str, list[float]] = {phase: [0.0] for phase in PHASES}
     with (
         stopwatch(Physics, "advance", spent["physics"]),
+        stopwatch(Contact, "apply", spent["contact"]),
         stopwatch(arena_module, "sense_proximity", spent["sensing"]),
         stopwatch(arena_module, "mark_interference", spent["sensing"]),
         stopwatch(arena_module, "sense", spent["sensing"]),

@@ -27,6 +27,13 @@ MAX_DISC_SHARE = 0.4
 MAX_CELLS = 200_000_000
 """Largest floor, 2.8 km square (our choice: its codes take 800 MB; the largest of the paper has 409,600 cells)."""
 
+MIN_SUBSTEPS = 4
+"""Fewest substeps of a tick that settle a crowd. All must be equal: Chipmunk works out how fast to undo an overlap from
+the length of one substep and moves bodies by it in the next, so that a longer one after a shorter throws them too far.
+Mean of the deepest overlap per tick of 512 robots, packed into a corner, that all push into it, as a share of a
+diameter: 4 equal ones at most 0.06; 3 equal ones 0.95 and (0.5, 0.2, 0.15, 0.15) 0.90, which is one robot on top of
+another (60 solver rounds)."""
+
 
 def _require(condition: bool, message: str) -> None:
     if not condition:
@@ -221,12 +228,10 @@ class ScenarioConfig:
     horizon_s: float = 10_000.0
     interval_s: float = 200.0
     """Length of a recording interval."""
-    physics_substeps: tuple[float, ...] = (0.5, 0.2, 0.15, 0.15)
-    """Shares of a tick that Chipmunk steps by. Free motion is exact for any; contacts are met one substep late, so the
-    last ones bound how deep robots are pushed into each other when a tick ends: 3 % of a diameter for two robots
-    driving head-on, where five equal substeps leave 4 % and one leaves 24 %. It takes at least three substeps after a
-    contact to settle a crowd: with (0.7, 0.15, 0.15) it squeezes robots through walls
-    (`tests/science/test_physics_convergence.py`)."""
+    physics_substeps: tuple[float, ...] = (0.25,) * 4
+    """Shares of a tick that Chipmunk steps by, at least `MIN_SUBSTEPS` and all equal. Free motion is exact for any;
+    contacts are met one substep late, so the last one bounds how deep two robots are pushed into each other when a tick
+    ends: 6 % of a diameter when they drive head-on (`tests/science/test_physics_convergence.py`)."""
     quirks: Quirks = field(default_factory=Quirks)
 
     def __post_init__(self) -> None:
@@ -240,6 +245,12 @@ class ScenarioConfig:
         for name in ("dt_s", "horizon_s", "interval_s"):
             fields.number(f"scenario.{name}", getattr(self, name), above=0.0)
         fields.shares("scenario.physics_substeps", self.physics_substeps)
+        _require(
+            len(self.physics_substeps) >= MIN_SUBSTEPS
+            and max(self.physics_substeps) - min(self.physics_substeps) < 1e-6,
+            f"Expected scenario.physics_substeps to be at least {MIN_SUBSTEPS} equal shares of a tick (others squeeze "
+            f"robots in a crowd through each other), got {self.physics_substeps!r}.",
+        )
         for name in ("horizon_s", "interval_s"):
             ticks = getattr(self, name) / self.dt_s
             _require(

@@ -17,7 +17,7 @@ def drive_limits(config: ScenarioConfig) -> FloatArray:
 
 
 class Drive:
-    """Differential drive of a swarm: wheel speed = limit(command) x gain, not limited again."""
+    """Differential drive of a swarm: wheel speed = limit(limit(command) x gain)."""
 
     def __init__(self, config: ScenarioConfig) -> None:
         """Take the limits from `config`."""
@@ -28,8 +28,9 @@ class Drive:
     def apply(self, actions: ActionArray, wheel_gain: FloatArray | None, swarm: SwarmState, twist: FloatArray) -> None:
         """Write `swarm.wheel_speed` and body twists.
 
-        Commands beyond [-1, 1] are clipped. Centre speed and wheel difference are limited each by clipping. Wheels of
-        inactive robots and of robots in an interaction stand still.
+        Commands beyond [-1, 1] are clipped. Centre speed and wheel difference are limited each by clipping, before the
+        gains and again after them: noise makes no motor faster than it is, and no robot drives through a wall. Wheels
+        of inactive robots and of robots in an interaction stand still.
 
         Args:
             actions: (N, 3) float32; rows of inactive robots are ignored.

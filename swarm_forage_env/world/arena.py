@@ -19,6 +19,7 @@ from swarm_forage_env.world.caches import (
     n_cache_slots,
     restore_static_caches,
 )
+from swarm_forage_env.world.contact import Contact
 from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.interference import mark_interference
 from swarm_forage_env.world.object_motion import walk_objects
@@ -86,6 +87,8 @@ class ForagingArena:
         self.swarm.position[:], self.swarm.heading[:] = position, heading
         self.swarm.facing[:] = np.column_stack((np.cos(heading), np.sin(heading)))
         self._physics = Physics(config, position, heading)
+        self._contact = Contact(config)
+        self._moved = False
         return self.observe()
 
     def observe(self) -> ObsArray:
@@ -121,6 +124,10 @@ class ForagingArena:
         swarm, objects, caches, events, suite = self.swarm, self.objects, self.caches, self.events, self._suite
         self._drive.apply(actions, wheel_gain, swarm, self._physics.twist)
         self.tick += 1
+        if self._moved:  # since robots were last looked for
+            sense_proximity(swarm, suite)
+            self._moved = False
+        self._contact.apply(swarm, suite.near, suite.bins, self._physics.twist)
         self._physics.advance(swarm)
         sense_proximity(swarm, suite)
         mark_interference(swarm, events, suite.obs, suite.columns["proximity"], suite.near)
@@ -217,4 +224,5 @@ class ForagingArena:
             angle = float(swarm.heading[robot])
             swarm.facing[robot] = np.cos(angle), np.sin(angle)
             self._physics.place(robot, x, y, angle)
+        self._moved |= not np.array_equal(swarm.present, present)
         swarm.active[:], swarm.present[:] = active, present

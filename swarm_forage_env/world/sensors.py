@@ -37,9 +37,8 @@ class SensorSuite:
     scales: FloatArray
     sizes: tuple[int, int, int]
     cache_half_side: int
-    bin_m: float
-    first_in_bin: IntArray
-    next_in_bin: IntArray
+    bins: tuple[float, IntArray, IntArray]
+    """Present robots by place as of the last proximity sweep: cell size in m, first_in_bin, next_in_bin."""
 
     @classmethod
     def build(cls, config: ScenarioConfig, layout: ObservationLayout, reads: Collection[str]) -> "SensorSuite":
@@ -58,20 +57,22 @@ class SensorSuite:
             scales=np.array([WHEEL_SCALE_MPS, config.arena.width_m, config.arena.height_m]),
             sizes=(*config.arena.n_cells, config.objects.n_objects),
             cache_half_side=config.cache_side_cells // 2,
-            bin_m=2 * config.robots.radius_m + PROXIMITY_RANGE_M,
-            first_in_bin=np.full(n_bins, -1, np.int32),
-            next_in_bin=np.full(n_robots, -1, np.int32),
+            bins=(
+                2 * config.robots.radius_m + PROXIMITY_RANGE_M,
+                np.full(n_bins, -1, np.int32),
+                np.full(n_robots, -1, np.int32),
+            ),
         )
 
 
 def sense_proximity(swarm: SwarmState, suite: SensorSuite) -> None:
     """A ring of beams, 0.1 m beyond the body: 1 at contact, 0 when nothing is hit."""
-    neighbours.bin_robots(swarm.position, swarm.present, suite.bin_m, suite.first_in_bin, suite.next_in_bin)
+    neighbours.bin_robots(swarm.position, swarm.present, *suite.bins)
     beams.proximity(
         swarm.position,
         swarm.facing,
         swarm.present,
-        (suite.bin_m, suite.first_in_bin, suite.next_in_bin),
+        suite.bins,
         suite.interior,
         suite.radius_m,
         PROXIMITY_RANGE_M,

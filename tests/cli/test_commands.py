@@ -140,14 +140,14 @@ def test_set_changes_any_field_with_its_type(command):
         "--set",
         "name=depot",
     )
-    _, out, _ = command(*RUN, *words, "--set", "physics_substeps=0.5,0.5", "--dry-run", "--json")
+    _, out, _ = command(*RUN, *words, "--set", "physics_substeps=0.2,0.2,0.2,0.2,0.2", "--dry-run", "--json")
     world = json.loads(out)["runs"][0]["spec"]["scenario"]
     assert world["reward"]["team"] is True
     assert world["arena"]["nest_size_m"] == [2.0, 4.0]
     assert world["objects"]["walk_probability"] == 0.5
     assert world["cache"]["static_size"] == 3
     assert world["name"] == "depot"
-    assert world["physics_substeps"] == [0.5, 0.5]
+    assert world["physics_substeps"] == [0.2] * 5
 
 
 def test_wrappers_disturb_the_run_and_are_part_of_its_record(command):

@@ -15,7 +15,7 @@ n_robots = 3
 n_objects = 20
 horizon_s = 4.0
 interval_s = 2
-physics_substeps = [0.5, 0.5]
+physics_substeps = [0.2, 0.2, 0.2, 0.2, 0.2]
 
 [throttle]
 waveform = "constant"
@@ -52,7 +52,7 @@ def test_a_file_gives_scenario_fields_and_wrappers(command):
     assert command(CONFIG, "--config", "world.toml")[0] == 0
     world, wrappers = stored_spec()["scenario"], stored_spec()["wrappers"]
     assert (world["robots"]["n_robots"], world["objects"]["n_objects"], world["horizon_s"]) == (3, 20, 4.0)
-    assert world["physics_substeps"] == [0.5, 0.5]
+    assert world["physics_substeps"] == [0.2] * 5
     assert [(wrapper["wrapper"], wrapper.get("sigma")) for wrapper in wrappers] == [
         ("throttle", None),
         ("actuator_noise", 0.1),

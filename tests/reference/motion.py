@@ -14,7 +14,11 @@ def clip(value: float, limit: float) -> float:
 
 def limited_wheels(left: float, right: float) -> tuple[float, float]:
     """Wheel speeds in m/s for a command in [-1, 1]: centre speed and difference are clipped separately."""
-    left, right = clip(left, 1.0) * WHEEL_SCALE_MPS, clip(right, 1.0) * WHEEL_SCALE_MPS
+    return limited_speeds(clip(left, 1.0) * WHEEL_SCALE_MPS, clip(right, 1.0) * WHEEL_SCALE_MPS)
+
+
+def limited_speeds(left: float, right: float) -> tuple[float, float]:
+    """Wheel speeds in m/s with centre speed and difference clipped separately."""
     speed = clip((left + right) / 2, MAX_SPEED_MPS)
     difference = clip(right - left, MAX_DIFFERENCE_MPS)
     return speed - difference / 2, speed + difference / 2

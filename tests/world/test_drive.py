@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.policy import ActionError
-from tests.reference.motion import MAX_DIFFERENCE_MPS, MAX_SPEED_MPS, WHEEL_SCALE_MPS, limited_wheels, steered_wheels
+from tests.reference.motion import (
+    MAX_DIFFERENCE_MPS,
+    MAX_SPEED_MPS,
+    WHEEL_SCALE_MPS,
+    limited_speeds,
+    limited_wheels,
+    steered_wheels,
+)
 from tests.support.stage import act, assert_same_world, lay, load, put, snapshot, stand, tidy_world
 
 command = st.floats(-2.0, 2.0, width=32)
@@ -90,8 +97,27 @@ def test_no_steering_command_of_the_study_meets_a_limit(lone_robot, force, angle
 
 def test_gain_multiplies_after_the_limit(lone_robot):
     assert drive(lone_robot, 1.0, 1.0, gain=(0.5, 0.25)) == pytest.approx((0.05, 0.025))
-    assert drive(lone_robot, 1.0, 1.0, gain=(1.2, 3.0)) == pytest.approx((0.12, 0.30)), "not limited again"
+    assert drive(lone_robot, 0.25, 0.25, gain=(1.2, 0.8)) == pytest.approx((0.06, 0.04))
     assert drive(lone_robot, 1.0, 1.0, gain=(0.0, 0.0)) == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("gain", [(1.2, 3.0), (30.0, -30.0), (-9.0, 1.0), (1.0, 1.5), (1e300, 1e300)])
+@pytest.mark.parametrize("command", [(1.0, 1.0), (-1.0, 1.0), (0.0, 1.0), (0.4, 0.5)])
+def test_no_gain_makes_a_robot_faster_than_its_motors(lone_robot, command, gain):
+    put(lone_robot, 0, 16.0, 8.0)
+    left, right = drive(lone_robot, *command, gain=gain)
+    wanted = [wheel * factor for wheel, factor in zip(limited_wheels(*command), gain, strict=True)]
+    assert (left, right) == pytest.approx(limited_speeds(*wanted), abs=1e-8)
+    assert abs(left + right) / 2 <= MAX_SPEED_MPS * (1 + 1e-9)
+    assert abs(right - left) <= MAX_DIFFERENCE_MPS * (1 + 1e-9)
+
+
+@given(command=st.tuples(command, command), gain=st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)))
+def test_a_gain_up_to_1_is_a_plain_factor_bit_for_bit(lone_robot, command, gain):
+    put(lone_robot, 0, 16.0, 8.0)
+    free = drive(lone_robot, *command)
+    put(lone_robot, 0, 16.0, 8.0)
+    assert drive(lone_robot, *command, gain=gain) == [free[0] * gain[0], free[1] * gain[1]]
 
 
 def test_gain_moves_the_robot(lone_robot):

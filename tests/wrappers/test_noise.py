@@ -359,7 +359,8 @@ def test_wheel_noise_acts_after_the_limit_and_only_on_wheels_that_turn():
     stack.reset_batch(0)
     actions = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.3, 0.0]], np.float32)
     speeds = np.stack([stack.step_batch(actions) and env.swarm.wheel_speed.copy() for _ in range(20)])
-    assert speeds[:, 0].max() > 0.10, "not limited again"
+    assert np.abs(speeds.sum(axis=2)).max() / 2 == pytest.approx(0.10), "limited again"
+    assert np.abs(np.diff(speeds, axis=2)).max() <= 0.20 + 1e-9
     assert speeds[:, 0].std() > 0.02
     assert not speeds[:, 1].any()
     assert not speeds[:, 2, 0].any()

@@ -5,6 +5,17 @@ import math
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray
 
+_MORE = 1.0 + 1e-12
+"""What is this little above a limit is at the limit and was rounded: it stays as it is, bit for bit."""
+
+
+@kernel
+def limit_wheels(left: float, right: float, max_speed: float, max_difference: float) -> tuple[float, float]:
+    """Left and right wheel speed with centre speed and difference each clipped, all in m/s."""
+    speed = min(max_speed, max(-max_speed, 0.5 * (left + right)))
+    difference = min(max_difference, max(-max_difference, right - left))
+    return speed - 0.5 * difference, speed + 0.5 * difference
+
 
 @kernel
 def limit_command(
@@ -16,9 +27,7 @@ def limit_command(
     """
     wanted_left = min(1.0, max(-1.0, command_left)) * scale
     wanted_right = min(1.0, max(-1.0, command_right)) * scale
-    speed = min(max_speed, max(-max_speed, 0.5 * (wanted_left + wanted_right)))
-    difference = min(max_difference, max(-max_difference, wanted_right - wanted_left))
-    return speed - 0.5 * difference, speed + 0.5 * difference
+    return limit_wheels(wanted_left, wanted_right, max_speed, max_difference)
 
 
 @kernel
@@ -35,6 +44,7 @@ def drive(
 ) -> int:
     """Fill wheel speeds (N, 2) m/s and twists (N + 1, 3): world velocity x, y in m/s and turn rate in rad/s.
 
+    Wheel speed = limit(limit(command) x gain): a gain above 1 makes no robot faster than its motors are.
     `limits` holds wheel scale, centre-speed limit, wheel-difference limit (m/s) and wheel base (m). The velocity is
     the chord of the exact arc over one tick, so that free motion is exact however the tick is divided.
     Returns -1, or the first active row with a command or gain that is not finite; then nothing is written.
@@ -51,6 +61,8 @@ def drive(
             left, right = limit_command(float(actions[i, 0]), float(actions[i, 1]), scale, max_speed, max_difference)
             left *= wheel_gain[i, 0]
             right *= wheel_gain[i, 1]
+            if abs(0.5 * (left + right)) > _MORE * max_speed or abs(right - left) > _MORE * max_difference:
+                left, right = limit_wheels(left, right, max_speed, max_difference)
         wheel_speed[i, 0] = left
         wheel_speed[i, 1] = right
         turn = (right - left) / wheel_base
@@ -79,3 +91,18 @@ def unpack_poses(
             facing[i, 0] = math.cos(angle)
             facing[i, 1] = math.sin(angle)
             heading[i] = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
+
+
+@kernel
+def hold_inside(poses: FloatArray, present: BoolArray, room: FloatArray) -> int:
+    """Move present bodies in `poses` (>= N, 3) into `room` = x low, y low, x high, y high; returns how many moved."""
+    n_moved = 0
+    for i in range(present.shape[0]):
+        if present[i]:
+            x = min(room[2], max(room[0], poses[i, 0]))
+            y = min(room[3], max(room[1], poses[i, 1]))
+            if x != poses[i, 0] or y != poses[i, 1]:
+                poses[i, 0] = x
+                poses[i, 1] = y
+                n_moved += 1
+    return n_moved

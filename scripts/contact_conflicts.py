@@ -1,0 +1,92 @@
+"""Count what happens when two robots want one object: conflicts, how many touch, how long those take.
+
+    python scripts/contact_conflicts.py --seeds 10
+
+A conflict is a pair of robots that go to the same remembered object and are both within its slowing radius, where
+they ignore obstacles. It touches if their bodies do. It is over when one goes for something else: one has the object.
+It is unresolved if the pair is still in touch when the run ends and has been for `UNRESOLVED_TICKS`.
+"""
+
+import argparse
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from baselines.dpo import DPOPolicy
+from baselines.machines import ACQUIRE
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.study.run import build_stack
+from swarm_forage_env.world.contact import TOUCH_SLACK_M
+
+UNRESOLVED_TICKS = 1_000
+
+
+def conflicts_of_run(name: str, seed: int, seconds: float, overrides: dict[str, Any]) -> tuple[int, list[list[int]]]:
+    """Deliveries of one run of DPO, and of each conflict its ticks, its ticks in touch, its last tick in touch."""
+    world = scenario(name, horizon_s=seconds, interval_s=seconds, **overrides)
+    policy = DPOPolicy()
+    env = build_stack(world, reads=policy.reads).world
+    policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
+    obs, done = env.reset_batch(seed), False
+    touch_m = 2 * world.robots.radius_m + TOUCH_SLACK_M
+    found: dict[tuple[int, int, int, int], list[int]] = {}
+    open_since: dict[tuple[int, int, int], tuple[int, int]] = {}
+    while not done:
+        obs, _, _, done = env.step_batch(policy.act(obs, env.active))
+        robots, at = policy._robots, env.swarm.position
+        goal = np.column_stack((robots["goal_x_m"], robots["goal_y_m"]))
+        there = np.hypot(*(goal - at).T) <= policy.parameters.slowing_radius_m
+        rows = np.flatnonzero(there & (robots["activity"] == ACQUIRE) & (robots["target"] >= 0))
+        rows = rows[np.argsort(robots["target"][rows], kind="stable")]
+        by_target = np.split(rows, np.flatnonzero(np.diff(robots["target"][rows])) + 1)
+        for group in by_target:
+            for i, j in combinations(group.tolist(), 2):
+                pair = (i, j, int(robots["target"][i]))
+                begun, last = open_since.get(pair, (env.tick, env.tick))
+                if env.tick - last > 1:
+                    begun = env.tick
+                open_since[pair] = begun, env.tick
+                conflict = found.setdefault((*pair, begun), [0, 0, 0])
+                conflict[0] += 1
+                if np.hypot(*(at[i] - at[j])) <= touch_m:
+                    conflict[1] += 1
+                    conflict[2] = env.tick
+    return int(env.events.counters[Counter.COLLECTED]), list(found.values())
+
+
+def main() -> None:
+    """Run the seeds and print one line each, and one for all."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenario", choices=SCENARIO_NAMES, default="warehouse_medium")
+    parser.add_argument("--robots", type=int, help="default: those of the scenario")
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--seconds", type=float, default=2_000.0)
+    arguments = parser.parse_args()
+    overrides = {} if arguments.robots is None else {"n_robots": arguments.robots}
+    delivered, conflicts = 0, []
+    for seed in range(arguments.seeds):
+        deliveries, of_run = conflicts_of_run(arguments.scenario, seed, arguments.seconds, overrides)
+        print(line(f"seed {seed}", deliveries, of_run, arguments.seconds))
+        delivered, conflicts = delivered + deliveries, conflicts + of_run
+    print(line("all", delivered, conflicts, arguments.seconds))
+
+
+def line(title: str, deliveries: int, conflicts: list[list[int]], seconds: float) -> str:
+    """One line of the table."""
+    touching = [conflict for conflict in conflicts if conflict[1]]
+    end = round(seconds / 0.2)
+    unresolved = sum(last == end and ticks >= UNRESOLVED_TICKS for _, ticks, last in touching)
+    median, most, longest = np.percentile([ticks for _, ticks, _ in touching] or [0], (50, 90, 100))
+    per_1000 = 1_000 / max(1, deliveries)
+    return (
+        f"{title:>8}: {deliveries} delivered; per 1,000 of them {len(conflicts) * per_1000:.1f} conflicts, "
+        f"{len(touching) * per_1000:.1f} in touch; {unresolved} unresolved; ticks in touch: median {median:.0f}, "
+        f"90 % {most:.0f}, longest {longest:.0f}"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,95 @@
+"""Robots that press against each other: commanded velocities to those that wheel motors of limited force allow."""
+
+import math
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
+from swarm_forage_env.world.kernels.neighbours import bin_of
+
+
+@kernel
+def common_speed(closing_i: float, closing_j: float, before: float) -> float:
+    """Speed of a pressing pair along the line from i to j, m/s, seen from i.
+
+    Each robot closes in with its commanded speed (m/s, positive towards the other). `before` is the common speed of the
+    tick before, NaN at first touch. Both motors work at their limit, so that the pair keeps the speed it has while
+    both press; at first touch that is the mean of the two commands.
+    """
+    if math.isnan(before):
+        return 0.5 * (closing_i - closing_j)
+    return min(closing_i, max(-closing_j, before))
+
+
+@kernel
+def press(
+    position: FloatArray,
+    present: BoolArray,
+    near: BoolArray,
+    bins: tuple[float, IntArray, IntArray],
+    touch_m: float,
+    memory: tuple[IntArray, IntArray, FloatArray],
+    next_memory: tuple[IntArray, IntArray, FloatArray],
+    command: FloatArray,
+    twist: FloatArray,
+) -> None:
+    """Give touching pairs that press their common speed: edits the velocities in `twist` (N + 1, 3), in m/s.
+
+    `near` (N,) and `bins` = (cell size in m, first_in_bin, next_in_bin) are those of `beams.proximity` at the present
+    positions; centres within `touch_m` touch. `memory` is that of the tick before, `next_memory` is written: number of
+    partners (N,), partners (N, slots), common speeds (N, slots). `command` (N, 2) is room to work in.
+
+    A robot with several partners changes its velocity by the mean of what each pair asks for, weighted by the speed
+    at which the two close in. Everything follows from commands, none from the order of rows.
+    """
+    cell_m, first_in_bin, next_in_bin = bins
+    n_before, partner_before, speed_before = memory
+    n_partners, partner, partner_speed = next_memory
+    n_bins = first_in_bin.shape[0]
+    touch_squared = touch_m * touch_m
+    for i in range(position.shape[0]):
+        n_partners[i] = 0
+        command[i, 0] = twist[i, 0]
+        command[i, 1] = twist[i, 1]
+    for i in range(position.shape[0]):
+        if not (near[i] and present[i]):
+            continue
+        weight = 0.0
+        change_x = 0.0
+        change_y = 0.0
+        cell_x = int(position[i, 0] / cell_m)
+        cell_y = int(position[i, 1] / cell_m)
+        for step_x in range(-1, 2):
+            for step_y in range(-1, 2):
+                j = first_in_bin[bin_of(cell_x + step_x, cell_y + step_y, n_bins)]
+                while j >= 0:
+                    dx = position[j, 0] - position[i, 0]
+                    dy = position[j, 1] - position[i, 1]
+                    distance_squared = dx * dx + dy * dy
+                    # A robot is no partner of itself, and two places of the nine may share a bin.
+                    if 0.0 < distance_squared <= touch_squared and (
+                        int(position[j, 0] / cell_m) == cell_x + step_x
+                        and int(position[j, 1] / cell_m) == cell_y + step_y
+                    ):
+                        distance = math.sqrt(distance_squared)
+                        dx /= distance
+                        dy /= distance
+                        closing_i = command[i, 0] * dx + command[i, 1] * dy
+                        closing_j = -(command[j, 0] * dx + command[j, 1] * dy)
+                        pressing = closing_i + closing_j
+                        if pressing > 0.0:
+                            before = math.nan
+                            for slot in range(n_before[i]):
+                                if partner_before[i, slot] == j:
+                                    before = speed_before[i, slot]
+                            speed = common_speed(closing_i, closing_j, before)
+                            if n_partners[i] < partner.shape[1]:
+                                partner[i, n_partners[i]] = j
+                                partner_speed[i, n_partners[i]] = speed
+                                n_partners[i] += 1
+                            weight += pressing
+                            change_x += pressing * (speed - closing_i) * dx
+                            change_y += pressing * (speed - closing_i) * dy
+                    j = next_in_bin[j]
+        if weight > 0.0:
+            twist[i, 0] += change_x / weight
+            twist[i, 1] += change_y / weight

@@ -1,0 +1,317 @@
+"""Touching robots: a pressing pair keeps its common speed; turned, mirrored or swapped it behaves the same."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.config import with_overrides
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.world.contact import TOUCH_SLACK_M, Contact
+from swarm_forage_env.world.sensors import SensorSuite, sense_proximity
+from swarm_forage_env.world.state import SwarmState
+from tests.reference.contact import pressed_velocities
+from tests.support.stage import lay, put, stand, tidy_world
+
+RADIUS_M = 0.085036758
+DIAMETER_M = 2 * RADIUS_M
+MIDDLE = np.array([16.0, 8.0])
+FULL = 0.5
+"""Wheel command of the highest centre speed, 0.10 m/s."""
+
+
+def world(*poses: tuple[float, float, float], n_objects: int = 1) -> ForageEnv:
+    """Robots at (x, y, heading) from the middle of the small warehouse."""
+    env = tidy_world(n_robots=len(poses), n_objects=n_objects)
+    for robot, (x, y, heading) in enumerate(poses):
+        put(env, robot, MIDDLE[0] + x, MIDDLE[1] + y, heading)
+    env.arena.observe()
+    return env
+
+
+def drive(env: ForageEnv, *commands: tuple[float, float], ticks: int = 1) -> np.ndarray:
+    """Drive with these wheel commands; returns the velocities of the last tick, (N, 2) in m/s."""
+    actions = np.column_stack((commands, np.ones(len(commands)))).astype(np.float32)
+    before = env.swarm.position.copy()
+    for _ in range(ticks):
+        before = env.swarm.position.copy()
+        env.step_batch(actions)
+    return (env.swarm.position - before) / env.scenario.dt_s
+
+
+# The rule
+
+
+def test_a_pair_that_meets_keeps_the_mean_speed_of_its_commands():
+    env = world((-0.10, 0.0, 0.0), (0.10, 0.0, math.pi))
+    drive(env, (FULL, FULL), (0.3, 0.3), ticks=3)
+    for _ in range(20):
+        np.testing.assert_allclose(drive(env, (FULL, FULL), (0.3, 0.3)), [(0.02, 0.0), (0.02, 0.0)], atol=1e-6)
+    np.testing.assert_allclose(
+        env.swarm.wheel_speed, [(0.10, 0.10), (0.06, 0.06)], atol=1e-8, err_msg="wheels turn as commanded"
+    )
+
+
+def test_the_common_speed_is_kept_when_commands_change_and_clipped_to_them():
+    env = world((-0.10, 0.0, 0.0), (0.10, 0.0, math.pi))
+    drive(env, (FULL, FULL), (0.3, 0.3), ticks=3)
+    assert drive(env, (0.2, 0.2), (0.45, 0.45))[0, 0] == pytest.approx(0.02, abs=1e-6), "the weaker one goes on shoving"
+    assert drive(env, (0.05, 0.05), (0.45, 0.45))[0, 0] == pytest.approx(0.01, abs=1e-6), "no faster than it wants"
+    assert drive(env, (FULL, FULL), (0.45, 0.45))[0, 0] == pytest.approx(0.01, abs=1e-6)
+    assert drive(env, (FULL, FULL), (-0.2, -0.2))[0, 0] == pytest.approx(0.04, abs=1e-6), "dragged along by who flees"
+
+
+def test_the_common_speed_is_forgotten_when_a_pair_no_longer_presses():
+    env = world((-0.10, 0.0, 0.0), (0.10, 0.0, math.pi))
+    drive(env, (FULL, FULL), (0.3, 0.3), ticks=3)
+    drive(env, (0.0, 0.0), (0.0, 0.0))
+    assert drive(env, (0.2, 0.2), (0.4, 0.4))[0, 0] == pytest.approx(-0.02, abs=1e-6)
+
+
+def test_robots_side_by_side_pass_each_other():
+    env = world((0.0, 0.0, 0.0), (0.0, DIAMETER_M, math.pi))
+    np.testing.assert_allclose(drive(env, (FULL, FULL), (FULL, FULL)), [(0.10, 0.0), (-0.10, 0.0)], atol=1e-9)
+
+
+def test_across_the_line_between_them_robots_move_as_commanded():
+    env = world((0.0, 0.0, 0.5), (DIAMETER_M, 0.0, math.pi))
+    velocity = drive(env, (FULL, FULL), (0.2, 0.2))
+    assert velocity[0, 1] == pytest.approx(0.10 * math.sin(0.5), abs=1e-3)
+    assert velocity[1, 1] == pytest.approx(0.0, abs=1e-3)
+    assert env.swarm.heading == pytest.approx([0.5, math.pi], abs=1e-9)
+
+
+def seek(env: ForageEnv, ticks: int) -> list[float]:
+    """Two robots seek the middle as in the specification; returns the pair's speed in every tick in touch."""
+    speeds = []
+    for _ in range(ticks):
+        distance = np.hypot(*(MIDDLE - env.swarm.position).T)
+        if distance.min() < 0.02:
+            return speeds
+        wheel = np.where(distance > 0.2, 0.08, 0.4 * distance) / 0.20
+        before = env.swarm.position.copy()
+        touching = math.dist(*before) <= DIAMETER_M + TOUCH_SLACK_M
+        drive(env, *zip(wheel, wheel, strict=True))
+        if touching:
+            speeds.append((env.swarm.position - before)[0, 0] / env.scenario.dt_s)
+    raise AssertionError("nobody arrived")
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("rows", [(0, 1), (1, 0)])
+def test_of_two_robots_at_one_target_one_gets_there(rows, mirrored):
+    sign = -1.0 if mirrored else 1.0
+    poses = [(-0.30 * sign, 0.0, math.pi * mirrored), (0.36 * sign, 0.0, math.pi * (not mirrored))]
+    env = world(*(poses[row] for row in rows))
+    speeds = seek(env, 300)
+    assert len(speeds) > 20
+    assert np.all(np.sign(speeds) == -sign), "the one from farther away was faster"
+    assert abs(env.swarm.position[rows[1], 0] - MIDDLE[0]) < 0.02
+
+
+# Several robots
+
+
+def test_a_robot_between_two_is_moved_by_the_mean_of_both():
+    env = world((-DIAMETER_M, 0.0, 0.0), (0.0, 0.0, 1.0), (DIAMETER_M, 0.0, math.pi))
+    velocity = drive(env, (FULL, FULL), (0.0, 0.0), (FULL, FULL), ticks=10)
+    np.testing.assert_allclose(velocity, 0.0, atol=1e-6)
+    env = world((-DIAMETER_M, 0.0, 0.0), (0.0, 0.0, 1.0), (DIAMETER_M, 0.0, math.pi))
+    drift = drive(env, (FULL, FULL), (0.0, 0.0), (0.25, 0.25), ticks=10)
+    assert 0.0 < drift[1, 0] < 0.05, "towards the weaker one"
+
+
+def test_one_robot_shoves_a_row():
+    env = world((-DIAMETER_M, 0.0, 0.0), (0.0, 0.0, 1.0), (DIAMETER_M, 0.0, 2.0))
+    velocity = drive(env, (FULL, FULL), (0.0, 0.0), (0.0, 0.0), ticks=10)
+    assert np.all(velocity[:, 0] > 0.01)
+    assert np.ptp(velocity[:, 0]) < 0.05
+
+
+def test_two_that_shove_one_do_not_kick_it_ahead():
+    half = DIAMETER_M / 2 + 0.0005
+    behind = -math.sqrt(DIAMETER_M**2 - half**2)
+    env = world((behind, half, 0.0), (behind, -half, 0.0), (0.0, 0.0, 0.0))
+    for _ in range(20):
+        velocity = drive(env, (FULL, FULL), (FULL, FULL), (0.0, 0.0))
+        assert velocity[2, 1] == pytest.approx(0.0, abs=1e-6)
+        assert 0.0 < velocity[2, 0] <= 0.10 + 1e-9
+
+
+def scene(rng: np.random.Generator, n_robots: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A heap of robots that touch and overlap a little: places, headings, wheel commands."""
+    side = math.sqrt(n_robots) * DIAMETER_M * 0.95
+    while True:
+        places = rng.uniform(-side / 2, side / 2, (n_robots, 2))
+        for _ in range(400):  # pushed apart, not quite
+            away = places[:, None] - places[None]
+            distance = np.hypot(away[..., 0], away[..., 1]) + np.eye(n_robots)
+            overlap = np.clip(0.99 * DIAMETER_M - distance, 0.0, None) * (1 - np.eye(n_robots))
+            places = places + 0.25 * np.sum(overlap[..., None] * away / distance[..., None], axis=1)
+        if distance[~np.eye(n_robots, dtype=bool)].min() > 0.9 * DIAMETER_M:
+            return places, rng.uniform(-math.pi, math.pi, n_robots), rng.uniform(-0.5, 0.5, (n_robots, 2))
+
+
+def contact_of(places: np.ndarray, present: np.ndarray) -> tuple[Contact, SwarmState, SensorSuite]:
+    """The contact of robots that stand there, with neighbours looked up."""
+    config = with_overrides(scenario("warehouse_small"), n_robots=len(places))
+    swarm = SwarmState.empty(len(places))
+    swarm.position[:], swarm.present[:] = places, present
+    suite = SensorSuite.build(config, ForageEnv(config).layout, ())
+    sense_proximity(swarm, suite)
+    return Contact(config), swarm, suite
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_contact_is_its_slow_twin(seed):
+    rng = np.random.default_rng(seed)
+    n_robots = 30
+    places, _, _ = scene(rng, n_robots)
+    places += MIDDLE
+    present = rng.random(n_robots) < 0.9
+    contact, swarm, suite = contact_of(places, present)
+    memory: dict[tuple[int, int], float] = {}
+    command = rng.uniform(-0.1, 0.1, (n_robots, 3))
+    n_pressing = 0
+    for _ in range(8):
+        changed = rng.random(n_robots) < 0.3
+        command[changed] = rng.uniform(-0.1, 0.1, (n_robots, 3))[changed]
+        twist = np.vstack((command, np.zeros((1, 3))))
+        contact.apply(swarm, suite.near, suite.bins, twist)
+        expected, memory = pressed_velocities(
+            [tuple(place) for place in swarm.position.tolist()],
+            [(x, y) for x, y, _ in command.tolist()],
+            present.tolist(),
+            DIAMETER_M + TOUCH_SLACK_M,
+            memory,
+        )
+        np.testing.assert_allclose(twist[:-1, :2], expected, atol=1e-12)
+        np.testing.assert_array_equal(twist[:-1, 2], command[:, 2])
+        n_pressing += len(memory)
+        swarm.position += rng.normal(0.0, 1e-4, (n_robots, 2))
+        sense_proximity(swarm, suite)
+    assert n_pressing > 50
+
+
+SYMMETRIES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "left and right": lambda at: at * (-1.0, 1.0),
+    "up and down": lambda at: at * (1.0, -1.0),
+    "half a turn": lambda at: -at,
+    "a quarter turn": lambda at: at[:, ::-1] * (-1.0, 1.0),
+}
+
+
+@pytest.mark.parametrize("name", SYMMETRIES)
+def test_a_mirrored_or_turned_scene_moves_mirrored_or_turned(name):
+    rng = np.random.default_rng(1)
+    places, _, _ = scene(rng, 20)
+    image = SYMMETRIES[name]
+    everybody = np.ones(20, np.bool_)
+    seen = [contact_of(MIDDLE + places, everybody), contact_of(MIDDLE + image(places), everybody)]
+    for _ in range(5):
+        command = rng.uniform(-0.1, 0.1, (20, 2))
+        moved = []
+        for (contact, swarm, suite), velocity in zip(seen, (command, image(command)), strict=True):
+            twist = np.zeros((21, 3))
+            twist[:-1, :2] = velocity
+            contact.apply(swarm, suite.near, suite.bins, twist)
+            moved.append(twist[:-1, :2])
+        np.testing.assert_allclose(moved[1], image(moved[0]), atol=1e-12)
+        assert np.abs(moved[0] - command).max() > 0.01
+
+
+def test_the_order_of_rows_does_not_matter():
+    rng = np.random.default_rng(2)
+    places, _, _ = scene(rng, 20)
+    order = rng.permutation(20)
+    everybody = np.ones(20, np.bool_)
+    seen = [contact_of(MIDDLE + places, everybody), contact_of(MIDDLE + places[order], everybody)]
+    for _ in range(5):
+        command = rng.uniform(-0.1, 0.1, (20, 2))
+        moved = []
+        for (contact, swarm, suite), velocity in zip(seen, (command, command[order]), strict=True):
+            twist = np.zeros((21, 3))
+            twist[:-1, :2] = velocity
+            contact.apply(swarm, suite.near, suite.bins, twist)
+            moved.append(twist[:-1, :2])
+        np.testing.assert_allclose(moved[1], moved[0][order], atol=1e-15)
+
+
+# Walls, and robots that do not drive
+
+
+def test_a_robot_at_a_wall_is_held_there_by_one_that_shoves():
+    x_high = scenario("warehouse_small").arena.interior_m[2] - MIDDLE[0]
+    env = world((x_high - RADIUS_M, 0.0, 0.0), (x_high - 3 * RADIUS_M, 0.0, 0.0))
+    drive(env, (0.0, 0.0), (FULL, FULL), ticks=50)
+    assert env.swarm.position[0, 0] == pytest.approx(MIDDLE[0] + x_high - RADIUS_M, abs=1e-4)
+    assert math.dist(*env.swarm.position) > 0.97 * DIAMETER_M
+    drive(env, (-FULL, -FULL), (FULL, FULL), ticks=20)
+    assert math.dist(*env.swarm.position) > 0.97 * DIAMETER_M
+    away = drive(env, (0.0, 0.0), (-FULL, -FULL), ticks=5)
+    assert away[1, 0] == pytest.approx(-0.10, abs=1e-6)
+
+
+def test_an_inactive_robot_is_shoved_at_half_speed():
+    env = world((0.0, 0.0, 0.0), (DIAMETER_M, 0.0, 2.0))
+    env.set_population(active=np.array([True, False]), present=np.array([True, True]))
+    velocity = drive(env, (FULL, FULL), (FULL, FULL), ticks=10)
+    np.testing.assert_allclose(velocity[:, 0], 0.05, atol=1e-6)
+    assert env.swarm.wheel_speed[1].tolist() == [0.0, 0.0]
+
+
+def test_a_robot_in_an_interaction_is_shoved_too():
+    env = world((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), n_objects=1)
+    stand(env, 1, (60, 40))
+    lay(env, 0, (60, 40))
+    x, y = env.swarm.position[1]
+    put(env, 0, x - DIAMETER_M, y)
+    env.arena.observe()
+    drive(env, (0.0, 0.0), (0.0, 0.0))
+    assert env.swarm.pending_kind[1] != 0, "it picks up"
+    velocity = drive(env, (FULL, FULL), (FULL, FULL))
+    np.testing.assert_allclose(velocity[:, 0], 0.05, atol=1e-6)
+
+
+def test_a_throttled_robot_presses_with_what_is_left_of_its_speed():
+    env = world((-DIAMETER_M, 0.0, 0.0), (0.0, 0.0, math.pi))
+    actions = np.array([[FULL, FULL, 1.0], [FULL, FULL, 1.0]], np.float32)
+    gain = np.array([[0.5, 0.5], [1.0, 1.0]])
+    before = env.swarm.position.copy()
+    env.step_batch(actions, wheel_gain=gain)
+    velocity = (env.swarm.position - before) / env.scenario.dt_s
+    np.testing.assert_allclose(velocity[:, 0], -0.025, atol=1e-6)
+
+
+def test_a_robot_that_turns_on_the_spot_is_shoved_and_goes_on_turning():
+    env = world((0.0, 0.0, 0.0), (DIAMETER_M, 0.0, 0.0))
+    velocity = drive(env, (FULL, FULL), (-FULL, FULL), ticks=5)
+    np.testing.assert_allclose(velocity[:, 0], 0.05, atol=1e-4)
+    assert env.swarm.heading[1] == pytest.approx(5 * 0.20 / 0.14 * 0.2, abs=1e-6)
+
+
+def test_absent_robots_take_no_part_from_the_first_tick_on():
+    env = world((0.0, 0.0, 0.0), (DIAMETER_M, 0.0, math.pi))
+    env.set_population(active=np.array([True, False]), present=np.array([True, False]))
+    assert drive(env, (FULL, FULL), (FULL, FULL))[0, 0] == pytest.approx(0.10, abs=1e-9)
+
+
+def test_a_robot_that_comes_takes_part_from_the_first_tick_on():
+    env = world((0.0, 0.0, 0.0), (DIAMETER_M, 0.0, math.pi))
+    env.set_population(active=np.array([True, False]), present=np.array([True, False]))
+    drive(env, (0.0, 0.0), (0.0, 0.0))
+    env.set_population(active=np.array([True, True]), present=np.array([True, True]))
+    velocity = drive(env, (FULL, FULL), (0.3, 0.3))
+    np.testing.assert_allclose(velocity[:, 0], 0.02, atol=1e-6)
+
+
+def test_a_reset_forgets_who_pressed():
+    env = world((-0.10, 0.0, 0.0), (0.10, 0.0, math.pi))
+    drive(env, (FULL, FULL), (0.3, 0.3), ticks=3)
+    env.reset_batch(1)
+    for robot, (x, heading) in enumerate(((-DIAMETER_M / 2, 0.0), (DIAMETER_M / 2, math.pi))):
+        put(env, robot, MIDDLE[0] + x, MIDDLE[1], heading)
+    env.arena.observe()
+    assert drive(env, (0.3, 0.3), (FULL, FULL))[0, 0] == pytest.approx(-0.02, abs=1e-6)
