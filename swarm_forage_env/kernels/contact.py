@@ -86,7 +86,7 @@ def press(
                         closing_j = -(command[j, 0] * dx + command[j, 1] * dy)
                         pressing = closing_i + closing_j
                         if pressing > 0.0:
-                            speed = common_speed(closing_i, closing_j, remembered(memory, i, j))
+                            speed = common_speed(closing_i, closing_j, remembered(memory, i, int(j)))
                             if n_partners[i] < partner.shape[1]:
                                 partner[i, n_partners[i]] = j
                                 partner_speed[i, n_partners[i]] = speed
