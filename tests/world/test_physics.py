@@ -11,6 +11,7 @@ from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.state import SwarmState
+from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig
 from tests.reference.motion import WHEEL_BASE_M, WHEEL_SCALE_MPS, free_motion, limited_wheels
 from tests.support.stage import put, tidy_world
 
@@ -153,6 +154,20 @@ def test_a_crowd_does_not_push_anybody_through_a_wall(at):
         assert room_to_walls(swarm) >= -ROUNDING_M
         deepest.append(deepest_overlap(swarm))
     assert max(deepest) < 2 * DEEPEST_OVERLAP
+
+
+@pytest.mark.parametrize("sigma", [0.5, 10.0])
+def test_noise_on_the_wheels_drives_nobody_through_a_wall(sigma):
+    env = tidy_world(n_robots=40)
+    x_high = env.scenario.arena.interior_m[2]
+    for robot in range(40):
+        put(env, robot, x_high - 0.1 - 0.2 * (robot % 2), 2.0 + 0.3 * (robot // 2), 0.0)
+    stack = ActuatorNoise(env, ActuatorNoiseConfig(sigma=sigma))
+    stack.on_reset(0)
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        stack.step_batch(rng.uniform(0.0, 1.0, (40, 3)).astype(np.float32))
+        assert room_to_walls(env.swarm) >= -ROUNDING_M
 
 
 def test_a_body_that_was_put_back_stays_where_it_was_put():

@@ -21,6 +21,16 @@ def common_speed(closing_i: float, closing_j: float, before: float) -> float:
 
 
 @kernel
+def remembered(memory: tuple[IntArray, IntArray, FloatArray], i: int, j: int) -> float:
+    """Common speed of the pair i, j in the tick before, seen from i, m/s; NaN if they did not press."""
+    n_partners, partner, speed = memory
+    for slot in range(n_partners[i]):
+        if partner[i, slot] == j:
+            return speed[i, slot]
+    return math.nan
+
+
+@kernel
 def press(
     position: FloatArray,
     present: BoolArray,
@@ -42,7 +52,6 @@ def press(
     at which the two close in. Everything follows from commands, none from the order of rows.
     """
     cell_m, first_in_bin, next_in_bin = bins
-    n_before, partner_before, speed_before = memory
     n_partners, partner, partner_speed = next_memory
     n_bins = first_in_bin.shape[0]
     touch_squared = touch_m * touch_m
@@ -77,11 +86,7 @@ def press(
                         closing_j = -(command[j, 0] * dx + command[j, 1] * dy)
                         pressing = closing_i + closing_j
                         if pressing > 0.0:
-                            before = math.nan
-                            for slot in range(n_before[i]):
-                                if partner_before[i, slot] == j:
-                                    before = speed_before[i, slot]
-                            speed = common_speed(closing_i, closing_j, before)
+                            speed = common_speed(closing_i, closing_j, remembered(memory, i, int(j)))
                             if n_partners[i] < partner.shape[1]:
                                 partner[i, n_partners[i]] = j
                                 partner_speed[i, n_partners[i]] = speed
