@@ -32,6 +32,8 @@ class Quirks:
     """The box of allowed cache sites is truncated to whole metres."""
     dynamic_cache_merges_all: bool = False
     """A new dynamic cache collects all usable objects, wherever they lie, and never forms in the random placement."""
+    dynamic_cache_avoids_clusters: bool = False
+    """A new dynamic cache never stands on a power-law cluster; where clusters leave it no room, there is none."""
     motion_self_conflict: bool = False
     """A randomly walking object conflicts with its own old place, so only few cell borders can be crossed."""
     serialized_interactions: bool = False
@@ -48,6 +50,7 @@ AUTHORS_PROGRAM = Quirks(
     explore_double_start=True,
     site_box_truncated=True,
     dynamic_cache_merges_all=True,
+    dynamic_cache_avoids_clusters=True,
     motion_self_conflict=True,
     serialized_interactions=True,
 )

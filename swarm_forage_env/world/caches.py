@@ -14,7 +14,7 @@ from swarm_forage_env.world.placement import Source, static_cache_centres
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
 MAX_PASSES = 100
-"""Attempts to push a new dynamic cache clear of nest, sources and caches before it is given up."""
+"""Attempts to push a new dynamic cache clear of nest, sources and caches before the place is given up."""
 
 
 def n_cache_slots(config: ScenarioConfig) -> int:
@@ -185,6 +185,27 @@ def clear_centre(
     return None
 
 
+def place_for_cache(
+    mean_cell: tuple[int, int],
+    config: ScenarioConfig,
+    protected: list[Box],
+    standing: list[Box],
+    rng: np.random.Generator,
+) -> tuple[int, int] | None:
+    """Centre for a cache of objects with mean `mean_cell`: clear of nest, `protected` and `standing` caches, or None.
+
+    Power-law clusters are only avoided where possible (study: strict constraints on new caches in scenario 1, loose
+    ones in scenario 2): if they leave no room, the passes start again with the nest and standing caches alone. The
+    objects of a cluster under the square join; the cluster then takes objects on the cells left to it.
+    """
+    nest = config.arena.nest_cells
+    centre = clear_centre(mean_cell, config, [nest, *protected, *standing], rng)
+    loose = config.objects.placement == "power_law" and not config.quirks.dynamic_cache_avoids_clusters
+    if centre is None and loose:
+        centre = clear_centre(mean_cell, config, [nest, *standing], rng)
+    return centre
+
+
 def create_dynamic_caches(
     robots: IntArray,
     config: ScenarioConfig,
@@ -219,8 +240,7 @@ def create_dynamic_caches(
         mean = np.floor(objects.cell[members].mean(axis=0) + 0.5)
         side = config.cache_side_cells
         standing = [square_box((int(cx), int(cy)), side) for cx, cy in caches.cell[caches.alive].tolist()]
-        obstacles = [config.arena.nest_cells, *protected, *standing]
-        centre = clear_centre((int(mean[0]), int(mean[1])), config, obstacles, rng)
+        centre = place_for_cache((int(mean[0]), int(mean[1])), config, protected, standing, rng)
         if centre is None:
             continue
         on_square = (objects.status == ObjectStatus.FREE) & _inside(objects.cell, square_box(centre, side))

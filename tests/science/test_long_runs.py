@@ -86,3 +86,12 @@ def test_controllers_deliver_over_a_whole_run(policy):
         assert collected[-1] > 50
         halves = collected[len(collected) // 2], collected[-1] - collected[len(collected) // 2]
         assert min(halves) > 10, "the flow of objects does not dry up"
+
+
+def test_stochx_uses_caches_among_clusters():
+    used = 0
+    for seed in range(10):
+        env = ForageEnv(scenario("search_and_rescue", caches="dynamic"))
+        run(env, load_policy("stochx"), seed, ticks=10_000)
+        used += env.events.counters[Counter.CACHE_PICKUPS] > 0
+    assert used >= 9

@@ -5,13 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm_forage_env.contract.codes import Counter, Event, Grip, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_CACHE, Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.regions import overlap_cells, square_box
 from swarm_forage_env.world.caches import MAX_PASSES, cache_members, clear_centre, protected_boxes
-from tests.support.stage import act, assert_conserved, build_cache, clear, depot, lay, load, stand, tidy_world
+from swarm_forage_env.world.placement import Source, place_objects
+from tests.support.stage import act, assert_conserved, build_cache, clear, depot, lay, lift, load, stand, tidy_world
 
 MIDDLE = (70, 40)
 """A cell around which a square of 31 cells is clear of nest, source and border."""
@@ -249,7 +250,124 @@ def test_objects_stay_when_no_cache_finds_room():
     assert env.objects.status.tolist() == [ObjectStatus.FREE, ObjectStatus.FREE]
 
 
+# Among power-law clusters
+
+
+EVERYWHERE = [(x, y, x + 8, y + 6) for x in range(40, 200, 36) for y in range(44, 200, 36)]
+"""Clusters 36 cells apart, of which a square of 47 cells overlaps some wherever it stands."""
+
+
+def clustered_world(clusters=EVERYWHERE, *, n_objects: int = 4, **overrides) -> ForageEnv:
+    """Search and rescue on 48 m, 240 x 240 cells, with hand-made clusters of 16 objects and nothing on the floor.
+
+    Nest: the cells 96 .. 143 of both axes. Objects may lie in the cells 36 .. 204.
+    """
+    env = ForageEnv(
+        scenario(
+            "search_and_rescue",
+            side_m=48.0,
+            n_robots=2,
+            n_objects=n_objects,
+            walk_probability=0.0,
+            caches="dynamic",
+            **overrides,
+        )
+    )
+    env.reset_batch(0)
+    clear(env)
+    n_clusters = len(clusters)
+    env.arena._source = Source(
+        np.array(clusters, np.int32), np.full(n_clusters, 16, np.int32), np.array([0, n_clusters], np.int32)
+    )
+    return env
+
+
+def test_a_cache_stands_on_clusters_that_leave_it_no_room():
+    env = clustered_world()
+    lay(env, 1, (64, 60))
+    lay(env, 2, (41, 45))  # in a cluster, on the square
+    lay(env, 3, (41, 84))  # in a cluster, within min_dist = 48 cells of the dropped object, off the square
+    (slot,) = found_at(env, (60, 60))
+    # Mean of the two that found it; the square covers the cells 39 .. 85, 37 .. 83.
+    assert env.caches.cell[slot].tolist() == [62, 60]
+    assert contents(env, slot) == [0, 1, 2]
+
+
+def test_a_cache_among_clusters_avoids_them_where_there_is_room():
+    cluster = (84, 56, 92, 62)
+    env = clustered_world([cluster], n_objects=3)
+    lay(env, 1, (64, 60))
+    lay(env, 2, (84, 58))
+    (slot,) = found_at(env, (60, 60))
+    # A square around (62, 60) would overlap the cluster in the columns 84 and 85.
+    assert overlap_cells(square_box((62, 60), 47), cluster) == 2 * 6
+    assert overlap_cells(square_box(tuple(env.caches.cell[slot].tolist()), 47), cluster) == 0
+    assert contents(env, slot) == [0, 1]
+
+
+def test_a_cache_on_clusters_keeps_off_the_nest():
+    env = clustered_world(n_objects=2)
+    lay(env, 1, (75, 120))
+    (slot,) = found_at(env, (71, 120))
+    # A square around (73, 120) would overlap the nest in column 96.
+    assert env.caches.cell[slot, 0] <= 72
+
+
+def test_caches_on_clusters_keep_off_each_other():
+    env = clustered_world()
+    lay(env, 2, (106, 66))
+    lay(env, 3, (109, 78))
+    for robot, cell in enumerate([(60, 60), (148, 60)]):
+        stand(env, robot, cell)
+        load(env, robot, robot)
+    for _ in range(2):
+        events = act(env, {0: Grip.CREATE_CACHE, 1: Grip.CREATE_CACHE})
+    assert events == [Event.DROPPED, Event.DROPPED]
+    # Means (83, 63) and (128.5, 69): 46 columns apart, one less than a side.
+    assert env.caches.cell[0].tolist() == [83, 63]
+    assert env.caches.cell[1, 0] >= 130
+    assert [contents(env, slot) for slot in (0, 1)] == [[0, 2], [1, 3]]
+    assert_conserved(env)
+
+
+def test_a_cluster_takes_objects_on_the_cells_that_a_cache_leaves_to_it():
+    cluster = (40, 44, 48, 50)
+    env = clustered_world([cluster], n_objects=10)
+    for row in range(10):
+        lay(env, row, (150 + row, 60))
+    slot = build_cache(env, [0, 1], (64, 60))  # the cells 41 .. 87, 37 .. 83: column 40 is left, 6 cells
+    for row in range(2, 10):
+        lift(env, row)
+    place_objects(
+        range(2, 10), env.objects, env.arena._source, env.scenario.arena.distributable_cells, np.random.default_rng(0)
+    )
+    assert sorted(env.objects.cell[2:8].tolist()) == [[40, y] for y in range(44, 50)]
+    assert env.objects.waiting == [8, 9]
+    assert np.count_nonzero(env.objects.floor == CELL_CACHE - slot) == 47 * 47
+    assert_conserved(env)
+    # A robot takes one of the last pair and delivers it: the square is floor again, and there is room for all.
+    stand(env, 0, (64, 60))
+    act(env, {0: Grip.GRASP})
+    assert act(env, {0: Grip.GRASP})[0] == Event.PICKED_FROM_CACHE
+    stand(env, 0, (120, 120))
+    act(env, {0: Grip.DELIVER})
+    assert act(env, {0: Grip.DELIVER})[0] == Event.DELIVERED
+    assert not env.objects.waiting
+    x, y = env.objects.cell.T
+    assert np.count_nonzero((x >= 40) & (x < 48) & (y >= 44) & (y < 50)) == 9
+    assert_conserved(env)
+
+
 # As the authors' program does it (quirk)
+
+
+def test_quirk_founds_no_cache_where_clusters_leave_no_room():
+    env = clustered_world(quirks=Quirks(dynamic_cache_avoids_clusters=True))
+    lay(env, 1, (64, 60))
+    lay(env, 2, (41, 45))
+    lay(env, 3, (41, 84))
+    assert found_at(env, (60, 60)) == []
+    assert np.all(env.objects.status == ObjectStatus.FREE)
 
 
 def quirky_world(name: str = "warehouse_small", **overrides) -> ForageEnv:
