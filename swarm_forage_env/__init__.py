@@ -1,7 +1,7 @@
 """Swarm foraging as a PettingZoo environment.
 
 Public names load on first use (PEP 562): importing the package compiles nothing and loads neither the physics nor
-numba. It registers every scenario with PettingZoo and Gymnasium under ids such as `swarm_forage/warehouse_small-v0`.
+numba. It registers every scenario with PettingZoo and Gymnasium under ids such as `swarm_forage/warehouse_small-v1`.
 """
 
 from importlib import import_module
@@ -146,7 +146,7 @@ def __dir__() -> list[str]:
 
 def _register_environments() -> None:
     for name in SCENARIO_NAMES:
-        env_id = f"swarm_forage/{name}-v0"
+        env_id = f"swarm_forage/{name}-v1"
         kwargs = {"scenario": name}
         pettingzoo.register("parallel", env_id, "swarm_forage_env.views.pettingzoo:parallel_env", kwargs=kwargs)
         pettingzoo.register("aec", env_id, "swarm_forage_env.views.pettingzoo:env", kwargs=kwargs)

@@ -32,7 +32,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo types it as an attribute of instances
-        "name": "swarm_forage_v0",
+        "name": "swarm_forage_v1",
         "render_modes": ["rgb_array"],
         "render_fps": 5,
         "is_parallelizable": True,

@@ -25,7 +25,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
     library can take vector environments, `SwarmVectorEnv` is faster.
     """
 
-    metadata: dict[str, Any] = {**ForageEnv.metadata, "name": "swarm_forage_learner_v0"}  # noqa: RUF012 - as PettingZoo
+    metadata: dict[str, Any] = {**ForageEnv.metadata, "name": "swarm_forage_learner_v1"}  # noqa: RUF012 - as PettingZoo
 
     def __init__(
         self,

@@ -72,7 +72,7 @@ def test_changelog_has_a_section_for_this_version():
 
 @pytest.mark.parametrize("name", swarm_forage_env.SCENARIO_NAMES)
 def test_every_scenario_is_registered(name):
-    env_id = f"swarm_forage/{name}-v0"
+    env_id = f"swarm_forage/{name}-v1"
     world = pettingzoo.make("parallel", env_id, n_robots=2, max_cycles=3)
     assert world.scenario.name == name
     assert world.scenario.robots.n_robots == 2
