@@ -5,10 +5,10 @@ The authors' program maximises a utility that grows without bound towards the mi
     U(s) = 1 / (1 + exp(4 (e - 1))) / (max(1, |s - robot|) e),   e = |s - m|,
 
 under the constraints that s keeps the proximity distance from the nest's centre and from every remembered cache (more
-from one that has refused, see `cache_memory.keep_away_m`), and lies in a box. Its stochastic optimiser thus ends up near the allowed point nearest to m, which is computed here: our
-choice, exact and without iterations. That point is m itself; or m pushed out of one disc or into the box; or where the
-border of a disc crosses another one or the box. A random offset, far below the distance at which robots count as
-arrived, stands for the optimiser's scatter.
+from one that has refused, see `cache_memory.keep_away_m`), and lies in a box. Its stochastic optimiser thus ends up
+near the allowed point nearest to m, which is computed here: our choice, exact and without iterations. That point is m
+itself; or m pushed out of one disc or into the box; or where the border of a disc crosses another one or the box. A
+random offset, far below the distance at which robots count as arrived, stands for the optimiser's scatter.
 """
 
 import math

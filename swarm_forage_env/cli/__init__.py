@@ -30,6 +30,7 @@ from swarm_forage_env.cli.options import (
     complain,
 )
 from swarm_forage_env.cli.score_commands import compare, score
+from swarm_forage_env.cli.stuck import stuck
 from swarm_forage_env.cli.train_command import train
 
 if TYPE_CHECKING:
@@ -194,6 +195,7 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
 app.command()(score)
 app.command()(compare)
 app.command()(train)
+app.command()(stuck)
 
 
 @app.command("list")

@@ -94,8 +94,8 @@ class StillnessWatch:
 def find_stuck(spec: RunSpec, *, window_s: float = 600.0, moved_m: float = 0.05) -> tuple[StuckRobot, ...]:
     """Run a specification and find the robots that get stuck.
 
-    A robot is stuck from s to s + window_s if it is active all that time, never farther than `moved_m` from where it was
-    at s, and the world does not keep it waiting, as it does during the ticks of a pick-up or a drop. Consecutive
+    A robot is stuck from s to s + window_s if it is active all that time, never farther than `moved_m` from where it
+    was at s, and the world does not keep it waiting, as it does during the ticks of a pick-up or a drop. Consecutive
     windows are one stretch. Positions are compared every `SAMPLE_S` seconds.
 
     Args:
