@@ -7,7 +7,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import Row
 
-from .cache_memory import OneTaskMemory, covers
+from .cache_memory import OneTaskMemory, covers, keep_away_m
 from .machines import ACQUIRE, TRANSPORT, Senses
 from .memory import OneMemory, density
 from .tasks import DRAW_POINT_X, DRAW_POINT_Y
@@ -110,14 +110,15 @@ def isolated_object_utility(
 
 @kernel
 def is_isolated(robot: np.record, entry: int, c: np.record, memory: OneTaskMemory) -> bool:
-    """Whether an object is remembered without another one, or a cache centre, within the proximity distance."""
+    """Whether an object is remembered without another one within the proximity distance, and far enough from caches."""
     objects = memory.objects
-    limit = c.proximity_m * c.proximity_m
     for k in range(robot.n_caches):
+        limit = keep_away_m(memory.caches[k], c) ** 2
         dx = (memory.caches[k].cell_x - objects.cell_x[entry]) * c.cell_m
         dy = (memory.caches[k].cell_y - objects.cell_y[entry]) * c.cell_m
         if dx * dx + dy * dy <= limit:
             return False
+    limit = c.proximity_m * c.proximity_m
     # What lies next in the list was seen next, and is probably near: begin there.
     for step in range(1, robot.n_known):
         other = entry + step

@@ -34,6 +34,7 @@ CACHE = np.dtype(
                 ("seen", np.int32),  # tick of the robot's own clock at which it was last seen
                 ("no_pickup", np.bool_),  # not to be taken from
                 ("no_drop", np.bool_),  # not to be added to
+                ("has_refused", np.bool_),  # the world refused to start another cache near it
             ],
             align=True,
         ),
@@ -129,6 +130,7 @@ def remember_cache(robot: np.record, memory: OneTaskMemory, fields: Row, c: np.r
         cache.cell_y = cell_y
         cache.no_pickup = False
         cache.no_drop = False
+        cache.has_refused = False
         _forget_objects_under(robot, memory.objects, cache, c)
     cache.count = int(fields[3] * c.n_objects + 0.5)
     cache.seen = robot.clock
@@ -231,10 +233,22 @@ def stop_shunning_objects(robot: np.record) -> None:
 
 @kernel
 def stop_shunning_caches(robot: np.record, caches: Row) -> None:
-    """Make every cache selectable again."""
+    """Make every cache selectable again, and forget refusals."""
     for entry in range(robot.n_caches):
         caches[entry].no_pickup = False
         caches[entry].no_drop = False
+        caches[entry].has_refused = False
+
+
+@kernel
+def keep_away_m(cache: np.record, c: np.record) -> float:
+    """How far from a remembered cache's centre a new one may be started.
+
+    Robots plan with a shorter distance than the world allows. One that was refused keeps the world's distance for the
+    rest of its task: with the old one it would choose the same place again and stand there. Our choice: the authors'
+    program knows only the shorter one.
+    """
+    return c.refusal_m if cache.has_refused else c.proximity_m
 
 
 @kernel

@@ -4,11 +4,11 @@ The authors' program maximises a utility that grows without bound towards the mi
 
     U(s) = 1 / (1 + exp(4 (e - 1))) / (max(1, |s - robot|) e),   e = |s - m|,
 
-under the constraints that s keeps the proximity distance from the nest's centre and from every remembered cache, and
-lies in a box. Its stochastic optimiser thus ends up near the allowed point nearest to m, which is computed here: our
-choice, exact and without iterations. That point is m itself; or m pushed out of one disc or into the box; or where the
-border of a disc crosses another one or the box. A random offset, far below the distance at which robots count as
-arrived, stands for the optimiser's scatter.
+under the constraints that s keeps the proximity distance from the nest's centre and from every remembered cache (more
+from one that has refused, see `cache_memory.keep_away_m`), and lies in a box. Its stochastic optimiser thus ends up
+near the allowed point nearest to m, which is computed here: our choice, exact and without iterations. That point is m
+itself; or m pushed out of one disc or into the box; or where the border of a disc crosses another one or the box. A
+random offset, far below the distance at which robots count as arrived, stands for the optimiser's scatter.
 """
 
 import math
@@ -18,7 +18,7 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
 
-from .cache_memory import OneTaskMemory
+from .cache_memory import OneTaskMemory, keep_away_m
 from .machines import Senses
 from .tasks import DRAW_POINT_X, DRAW_POINT_Y
 
@@ -36,12 +36,12 @@ class Best(NamedTuple):
 
 
 @kernel
-def _disc_centre(k: int, c: np.record, memory: OneTaskMemory) -> tuple[float, float]:
-    """Centre of forbidden disc k: the nest, then every remembered cache."""
+def _disc(k: int, c: np.record, memory: OneTaskMemory) -> tuple[float, float, float]:
+    """Centre and radius of forbidden disc k: the nest, then every remembered cache."""
     if k == 0:
-        return c.nest_x_m, c.nest_y_m
+        return c.nest_x_m, c.nest_y_m, c.proximity_m
     cache = memory.caches[k - 1]
-    return (cache.cell_x + 0.5) * c.cell_m, (cache.cell_y + 0.5) * c.cell_m
+    return (cache.cell_x + 0.5) * c.cell_m, (cache.cell_y + 0.5) * c.cell_m, keep_away_m(cache, c)
 
 
 @kernel
@@ -49,12 +49,11 @@ def is_allowed(robot: np.record, x: float, y: float, c: np.record, memory: OneTa
     """Whether a cache may be started at a point, as far as the robot knows."""
     if not (c.site_x_low_m <= x <= c.site_x_high_m and c.site_y_low_m <= y <= c.site_y_high_m):
         return False
-    limit = c.proximity_m * c.proximity_m
     for k in range(robot.n_caches + 1):
-        disc_x, disc_y = _disc_centre(k, c, memory)
+        disc_x, disc_y, radius = _disc(k, c, memory)
         dx = disc_x - x
         dy = disc_y - y
-        if dx * dx + dy * dy < limit:
+        if dx * dx + dy * dy < radius * radius:
             return False
     return True
 
@@ -84,8 +83,8 @@ def _edge_crossings(
     best: Best, robot: np.record, k: int, middle_x: float, middle_y: float, c: np.record, memory: OneTaskMemory
 ) -> Best:
     """Look at the crossings of disc k with the four edges of the box."""
-    radius = c.proximity_m + _RIM_M
-    disc_x, disc_y = _disc_centre(k, c, memory)
+    disc_x, disc_y, radius = _disc(k, c, memory)
+    radius += _RIM_M
     for side in range(2):
         edge = c.site_x_high_m if side else c.site_x_low_m
         square = radius * radius - (edge - disc_x) * (edge - disc_x)
@@ -114,22 +113,25 @@ def _disc_crossings(
     memory: OneTaskMemory,
 ) -> Best:
     """Look at the crossings of two discs."""
-    radius = c.proximity_m + _RIM_M
-    disc_x, disc_y = _disc_centre(k, c, memory)
-    other_x, other_y = _disc_centre(other, c, memory)
-    half_x = (other_x - disc_x) / 2.0
-    half_y = (other_y - disc_y) / 2.0
-    half = half_x * half_x + half_y * half_y
-    if half == 0.0 or half > radius * radius:
+    disc_x, disc_y, radius = _disc(k, c, memory)
+    other_x, other_y, other_radius = _disc(other, c, memory)
+    radius += _RIM_M
+    other_radius += _RIM_M
+    line_x = other_x - disc_x
+    line_y = other_y - disc_y
+    line = line_x * line_x + line_y * line_y
+    if line == 0.0:
         return best
-    # The crossings lie across the middle of the line between the centres.
-    share = math.sqrt((radius * radius - half) / half)
-    best = _better(
-        best, robot, disc_x + half_x - share * half_y, disc_y + half_y + share * half_x, middle_x, middle_y, c, memory
-    )
-    return _better(
-        best, robot, disc_x + half_x + share * half_y, disc_y + half_y - share * half_x, middle_x, middle_y, c, memory
-    )
+    # The crossings lie across the line between the centres, at this share of it.
+    along = 0.5 * (1.0 + (radius * radius - other_radius * other_radius) / line)
+    square = radius * radius / line - along * along
+    if square < 0.0:
+        return best
+    across = math.sqrt(square)
+    x = disc_x + along * line_x
+    y = disc_y + along * line_y
+    best = _better(best, robot, x - across * line_y, y + across * line_x, middle_x, middle_y, c, memory)
+    return _better(best, robot, x + across * line_y, y - across * line_x, middle_x, middle_y, c, memory)
 
 
 @kernel
@@ -152,15 +154,14 @@ def nearest_allowed(
     best = _better(best, robot, boxed_x, boxed_y, middle_x, middle_y, c, memory)
     if best.distance == 0.0:
         return best
-    radius = c.proximity_m + _RIM_M
     for k in range(robot.n_caches + 1):
-        disc_x, disc_y = _disc_centre(k, c, memory)
+        disc_x, disc_y, radius = _disc(k, c, memory)
         dx = middle_x - disc_x
         dy = middle_y - disc_y
         distance = math.sqrt(dx * dx + dy * dy)
         if distance == 0.0:
             dx, dy, distance = math.cos(turn), math.sin(turn), 1.0
-        share = radius / distance
+        share = (radius + _RIM_M) / distance
         best = _better(best, robot, disc_x + share * dx, disc_y + share * dy, middle_x, middle_y, c, memory)
         best = _edge_crossings(best, robot, k, middle_x, middle_y, c, memory)
         for other in range(k):

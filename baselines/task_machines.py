@@ -71,7 +71,6 @@ _OBJECT = int(Goal.OBJECT)
 _CACHE = int(Goal.CACHE)
 _NEST = int(Goal.NEST)
 _SITE = int(Goal.SITE)
-_ISOLATED_OBJECT = int(Goal.ISOLATED_OBJECT)
 _STARTER = int(Task.STARTER)
 _FINISHER = int(Task.FINISHER)
 _TRANSFERER = int(Task.TRANSFERER)
@@ -134,14 +133,18 @@ def goal_is_reached(robot: np.record, senses: Senses, row: Row, c: np.record, me
 
 @kernel
 def search_for_goal(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
-    """One tick of the search that suits the goal; sites are not searched for, the robot stands."""
+    """One tick of the search that suits the goal.
+
+    With no site allowed the robot walks at random until it learns of a change or gives up. Our choice: the authors'
+    program has no search for sites, but its robots never stand.
+    """
     if robot.goal_kind == _OBJECT:
         return explore_for_object(robot, senses, row, c, draws)
     x = 0.0
     y = 0.0
     if robot.goal_kind == _CACHE:
         x, y = search_from_last_cache(robot, senses, row, c, draws)
-    elif robot.goal_kind == _ISOLATED_OBJECT:
+    else:
         x, y = explore(robot, senses, c, draws)
     return False, x, y
 
@@ -200,6 +203,9 @@ def follow_events(
                 robot.shunned_cache_in_task = True
     elif senses.event == _CACHE_TOO_NEAR:
         remember_cache(robot, memory, row[c.event_cache : c.event_cache + CACHE_FIELDS], c)
+        entry = event_cache_entry(robot, row, c, memory.caches)
+        if entry >= 0:
+            memory.caches[entry].has_refused = True
         if robot.activity == WAIT_DROP:
             start_carrying(robot, loaded)
     elif robot.activity == WAIT_PICKUP and SOURCE[task] == _CACHE and not cache_is_known(robot, c, memory):

@@ -45,6 +45,8 @@ def task_constants(parameters: TaskParameters, spec: SwarmSpec, n_tabs: int) -> 
         cache_half_cells=round(spec.cache_side_m / spec.cell_m) // 2,
         cache_side_m=spec.cache_side_m,
         proximity_m=spec.cache_side_nominal_m,
+        # The world measures from where the robot stands, which is this far from its goal at most.
+        refusal_m=spec.cache_proximity_m + max(parameters.site_tolerance_m, parameters.creation_distance_m),
         creation_tolerance_m=loose_m if is_loose else parameters.creation_distance_m,
         site_x_low_m=x_low,
         site_y_low_m=y_low,

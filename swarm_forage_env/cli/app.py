@@ -15,6 +15,7 @@ from swarm_forage_env.cli.rerun import rerun
 from swarm_forage_env.cli.run import run
 from swarm_forage_env.cli.score import score
 from swarm_forage_env.cli.show import info, list_everything, schema
+from swarm_forage_env.cli.stuck import stuck
 from swarm_forage_env.cli.train import train
 
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
@@ -47,7 +48,7 @@ def _options(
 for command in (run, score, compare, train):
     app.command()(command)
 app.command("list")(list_everything)
-for command in (info, schema, rerun, record):
+for command in (info, schema, rerun, record, stuck):
     app.command()(command)
 
 

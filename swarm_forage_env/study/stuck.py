@@ -7,14 +7,13 @@ from typing import cast
 
 import numpy as np
 
-from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.contract.types import BoolArray, FloatArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.study.run import LiveRun, build_env
 from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.wrappers.base import wrap_in_order
 
 SAMPLE_S = 5.0
 """Positions are looked at this often; our choice: within it a robot in motion drives 0.4 m, so none is missed."""
@@ -119,30 +118,24 @@ def find_stuck_under(
     """As `find_stuck`, for a policy object, which must be fresh; `spec.policy` does not matter."""
     if not (window_s > 0.0 and moved_m > 0.0):
         raise ValueError(f"Expected window_s > 0 and moved_m > 0, got {window_s} and {moved_m}.")
-    stack = wrap_in_order(ForageEnv(spec.scenario, reads=getattr(policy, "reads", None)), spec.wrappers)
-    world = stack if isinstance(stack, ForageEnv) else stack.unwrapped
+    stack = build_env(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
+    env = stack.unwrapped
     n_samples = 1 + math.ceil(window_s / SAMPLE_S)
     sample_ticks = max(1, round(SAMPLE_S / spec.scenario.dt_s))
     watch = StillnessWatch(
-        spec.scenario.robots.n_robots, n_samples, moved_m, lambda robot: _describe(world, policy, robot)
+        spec.scenario.robots.n_robots, n_samples, moved_m, lambda robot: _describe(env, policy, robot)
     )
-    policy.reset(world.swarm_spec, stream_rng(spec.seed, Stream.POLICY))
-    obs, over = stack.reset_batch(spec.seed), False
-    has_tasks = hasattr(policy, "task")
-    while not over:
-        if world.tick % sample_ticks == 0:
-            swarm = world.swarm
-            watch.look(world.tick * spec.scenario.dt_s, swarm.position, world.active & (swarm.pending_kind == 0))
-        actions = policy.act(obs, world.active)
-        tasks = policy.task if has_tasks else None  # type: ignore[attr-defined] - optional, see Policy
-        obs, _, terminated, truncated = stack.step_batch(actions, tasks=tasks)
-        over = truncated or bool(terminated.all())
+    run = LiveRun(stack, policy, spec.seed)
+    while not run.over:
+        swarm = env.swarm
+        watch.look(env.tick * spec.scenario.dt_s, swarm.position, env.active & (swarm.pending_kind == 0))
+        run.advance(to_tick=env.tick + sample_ticks)
     return tuple(sorted([*watch.closed, *watch.open.values()], key=lambda found: (found.from_s, found.robot)))
 
 
-def _describe(world: ForageEnv, policy: Policy, robot: int) -> StuckRobot:
+def _describe(env: ForageEnv, policy: Policy, robot: int) -> StuckRobot:
     """Return what can be said of a robot now; its times are filled in by the watch."""
-    swarm = world.swarm
+    swarm = env.swarm
     x, y = swarm.position[robot].tolist()
     left, right = swarm.wheel_speed[robot].tolist()
     others = swarm.present.copy()
@@ -156,7 +149,7 @@ def _describe(world: ForageEnv, policy: Policy, robot: int) -> StuckRobot:
         to_s=0.0,
         place_m=(x, y),
         carrying=bool(swarm.carried_object[robot] >= 0),
-        interfering=bool(world.events.interfering[robot]),
+        interfering=bool(env.events.interfering[robot]),
         wheels_mps=(left, right),
         neighbour_m=float(distances.min(initial=math.inf)),
         task="" if tasks is None else Task(int(tasks[robot])).name.lower(),

@@ -1,5 +1,7 @@
 """The machine of every task, state by state, and how tasks end: finished, refused or given up."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -254,16 +256,43 @@ def test_a_cache_too_near_is_remembered_and_another_place_chosen(robot, task):
         assert robot.stage is VectorState.IDLE, "no isolated object left"
 
 
-def test_a_starter_stands_while_no_site_is_allowed(robot):
+def test_a_starter_walks_with_its_object_while_no_site_is_allowed(robot):
     wait_for_pickup(robot, Task.STARTER)
     for serial, cell in enumerate([(30, 40), (72, 40), (114, 40), (95, 40), (140, 40)], start=1):
         robot.know_cache(serial, cell, 5)
     robot.seen.caches((6, (50, 40), 5))
     robot.seen.carry(3)
-    assert robot.act().tolist() == [0.0, 0.0, Grip.GRASP]
-    assert robot.act().tolist() == [0.0, 0.0, Grip.GRASP]
+    left, right, grip = robot.act(5)
+    assert left + right > 0.8, "at walking speed"
+    assert grip == Grip.GRASP
+    assert robot.activity is Activity.TRANSPORT
+    assert robot.record.explore_ticks == 5
     robot.record.n_caches = 0
-    assert robot.act()[:2].tolist() != [0.0, 0.0]
+    robot.act()
+    assert robot.stage is VectorState.VECTOR
+
+
+def test_a_starter_goes_away_from_a_cache_that_has_refused(robot):
+    wait_for_drop(robot, Task.STARTER)
+    robot.seen.pose(15.0, 8.1)
+    robot.seen.event(Event.CACHE_TOO_NEAR, cache=(11, (118, 40), 4))  # centre 8.7 m away, the world wants 12.8 m
+    robot.act()
+    assert robot.memory.caches[0].has_refused
+    assert math.dist(robot.goal, (23.7, 8.1)) > 12.8 + 0.8
+    robot.seen.event(Event.NONE)
+    for task in (Task.HARVESTER, Task.STARTER):
+        robot.start(task)
+    assert not robot.memory.caches[0].has_refused, "until the task ends"
+
+
+def test_a_finisher_leaves_an_object_near_a_cache_that_has_refused(robot):
+    wait_for_drop(robot, Task.FINISHER)
+    x, y = robot.goal
+    robot.seen.event(Event.CACHE_TOO_NEAR, cache=(11, (int((x + 8.0) / 0.2), int(y / 0.2)), 4))
+    robot.act()
+    assert robot.activity is Activity.TRANSPORT
+    assert robot.stage is VectorState.IDLE, "no isolated object left"
+    assert robot.record.explore_ticks == 1
 
 
 def test_a_finisher_without_a_candidate_walks_with_its_object(robot):

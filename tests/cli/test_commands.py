@@ -299,6 +299,29 @@ def test_info_opens_no_model_that_could_run_code(command):
     assert "not opened here" in out
 
 
+STUCK = ("stuck", "--policy", "crw,dpo", "--robots", "3", "--horizon", "200", "--window", "20")
+
+
+def test_stuck_finds_nobody_and_says_so(command):
+    code, out, _ = command(*STUCK)
+    assert code == 0
+    assert out == "nobody is stuck in 2 runs\n"
+
+
+def test_stuck_shows_a_table_and_fails(command):
+    code, out, _ = command(*STUCK, "--moved", "100", "--seeds", "2", "--quirks")
+    assert code == 1
+    for word in ("policy", "seed", "robot", "place m", "dpo", "acquire, exploring for"):
+        assert word in out
+    assert len(re.findall(r"│ +0 +│ +195 +│", out)) == 12, "three robots, two policies, two seeds"
+
+
+def test_stuck_wants_sensible_numbers(command):
+    code, _, err = command(*STUCK, "--moved", "0")
+    assert code == 2
+    assert "Expected --window and --moved above 0, got 20 and 0." in err
+
+
 def test_list_names_everything(command):
     code, out, _ = command("list")
     assert code == 0

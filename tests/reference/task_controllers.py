@@ -38,6 +38,7 @@ class RememberedCache:
     density: float
     no_pickup: bool = False
     no_drop: bool = False
+    refused: bool = False
 
 
 @dataclass
@@ -168,6 +169,7 @@ class ReferenceTaskRobot(ReferenceRobot):
         if event == Event.CACHE_TOO_NEAR:
             if serial:
                 self.know(serial, cell, count, density=1.0 - RHO)
+                self.caches[cell].refused = True
             if self.state == "wait for drop":
                 self.set_out(onward)
         elif self.state == "wait for pick-up" and JOBS[self.job][0] == "cache" and not self.valid():
@@ -192,7 +194,7 @@ class ReferenceTaskRobot(ReferenceRobot):
         self.shunned = self.shunned if self.shunned_now else set()
         if not (self.shunned_cache_now and self.job == "transferer"):
             for cache in self.caches.values():
-                cache.no_pickup = cache.no_drop = False
+                cache.no_pickup = cache.no_drop = cache.refused = False
         self.shunned_now = self.shunned_cache_now = False
         self.restart()
         if self.carrying:
@@ -325,11 +327,15 @@ class ReferenceTaskRobot(ReferenceRobot):
     def choose_isolated(self) -> bool:
         near = self.spec.cache_side_nominal_m
         places = {row: ((x + 0.5) * 0.2, (y + 0.5) * 0.2) for row, ((x, y), _) in self.memory.known.items()}
-        others = [((x + 0.5) * 0.2, (y + 0.5) * 0.2) for x, y in self.caches]
+        far = self.spec.cache_proximity_m + 0.8
+        caches = [
+            ((x + 0.5) * 0.2, (y + 0.5) * 0.2, far if cache.refused else near) for (x, y), cache in self.caches.items()
+        ]
         utilities = {}
         for row, place in places.items():
-            company = [*others, *(other for key, other in places.items() if key != row)]
-            if all(math.dist(place, other) > near for other in company):
+            others = (other for key, other in places.items() if key != row)
+            is_clear = all(math.dist(place, (x, y)) > distance for x, y, distance in caches)
+            if is_clear and all(math.dist(place, other) > near for other in others):
                 away = math.dist(place, self.position) * math.dist(place, self.spec.nest_centre_m)
                 utilities[place] = math.exp(self.memory.known[row][1]) / away
         if not utilities:
@@ -359,8 +365,6 @@ class ReferenceTaskRobot(ReferenceRobot):
         """One tick of the search for a goal."""
         if self.kind == "object":
             return self.explore()
-        if self.kind == "site":
-            return False, 0j
         force = 0j
         if self.timer is None:
             self.timer = 0

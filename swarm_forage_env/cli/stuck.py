@@ -1,0 +1,104 @@
+"""The command `stuck`."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import (
+    EXIT_FAILURE,
+    Caches,
+    ConfigFile,
+    Objects,
+    Robots,
+    Scenario,
+    Settings,
+    Side,
+    Wrappers,
+)
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from swarm_forage_env.study.spec import RunSpec
+    from swarm_forage_env.study.stuck import StuckRobot
+
+
+def stuck(
+    scenario: Scenario = "warehouse_small",
+    policy: Annotated[
+        str,
+        typer.Option(
+            "--policy", "--controller", help="One or more, separated by commas: names, or files of trained ones."
+        ),
+    ] = "crw",
+    robots: Robots = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,
+    first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first of them.")] = 0,
+    horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
+    window: Annotated[float, typer.Option(help="Seconds in which every robot should get away.")] = 600.0,
+    moved: Annotated[float, typer.Option(help="How far that is, in m.")] = 0.05,
+    quirks: Annotated[bool, typer.Option("--quirks", help="The authors' program: all quirks on.")] = False,
+    objects: Objects = None,
+    side: Side = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    wrappers: Wrappers = None,
+    config: ConfigFile = None,
+) -> None:
+    """Find robots that get stuck: active, hardly moved for minutes, not waiting by rule. Exits with 1 if any are."""
+    from rich.console import Console
+
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs, split_names
+    from swarm_forage_env.scenarios.config import with_overrides
+    from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
+    from swarm_forage_env.study.stuck import find_stuck
+
+    if not (window > 0.0 and moved > 0.0):
+        raise ConfigError(f"Expected --window and --moved above 0, got {window:g} and {moved:g}.")
+    options = ScenarioOptions(
+        scenario=scenario,
+        robots=robots,
+        objects=objects,
+        side=side,
+        caches=caches,
+        horizon=horizon,
+        settings=tuple(settings or ()),
+        wrappers=tuple(wrappers or ()),
+        config_file=config,
+    )
+    specs = plan_runs(options, split_names(policy), n_seeds=seeds, first_seed=first_seed)
+    if quirks:
+        specs = tuple(replace(spec, scenario=with_overrides(spec.scenario, quirks=AUTHORS_PROGRAM)) for spec in specs)
+    found = [(spec, one) for spec in specs for one in find_stuck(spec, window_s=window, moved_m=moved)]
+    if not found:
+        typer.echo(f"nobody is stuck in {len(specs)} run{'s' * (len(specs) > 1)}")
+        return
+    console = Console(highlight=False)
+    if not console.is_terminal:
+        console.width = 200
+    console.print(_table(found))
+    raise typer.Exit(EXIT_FAILURE)
+
+
+def _table(found: "list[tuple[RunSpec, StuckRobot]]") -> "Table":
+    from rich.table import Table
+
+    table = Table("policy", "seed", "robot", "from s", "to s", "place m", "wheels m/s", "near m", "what it does")
+    for spec, one in found:
+        x, y = one.place_m
+        left, right = one.wheels_mps
+        signs = [sign for sign, is_so in (("carrying", one.carrying), ("obstacle", one.interfering)) if is_so]
+        table.add_row(
+            spec.policy,
+            str(spec.seed),
+            str(one.robot),
+            f"{one.from_s:g}",
+            f"{one.to_s:g}",
+            f"{x:.2f}, {y:.2f}",
+            f"{left:.2f}, {right:.2f}",
+            f"{one.neighbour_m:.2f}",
+            "; ".join(filter(None, [*signs, one.task, one.state])),
+        )
+    return table
