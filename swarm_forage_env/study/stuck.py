@@ -119,13 +119,13 @@ def find_stuck_under(
     if not (window_s > 0.0 and moved_m > 0.0):
         raise ValueError(f"Expected window_s > 0 and moved_m > 0, got {window_s} and {moved_m}.")
     stack = build_env(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
-    env = stack.unwrapped
+    run = LiveRun(stack, policy, spec.seed)
+    env = run.forage_env
     n_samples = 1 + math.ceil(window_s / SAMPLE_S)
     sample_ticks = max(1, round(SAMPLE_S / spec.scenario.dt_s))
     watch = StillnessWatch(
         spec.scenario.robots.n_robots, n_samples, moved_m, lambda robot: _describe(env, policy, robot)
     )
-    run = LiveRun(stack, policy, spec.seed)
     while not run.over:
         swarm = env.swarm
         watch.look(env.tick * spec.scenario.dt_s, swarm.position, env.active & (swarm.pending_kind == 0))
