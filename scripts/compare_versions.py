@@ -15,13 +15,12 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
+from swarm_forage_env.rendering.plots import COLOURS
 from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.store import load
 
-COLOURS = {"crw": "#0072B2", "dpo": "#E69F00", "stochm": "#009E73", "stochx": "#CC79A7"}
-"""Told apart by people who see fewer colours."""
 Curves = dict[str, dict[int, tuple[float, float]]]
-"""Controller -> swarm size -> deliveries per 1,000 s and share of active robot time in interference, mean over seeds."""
+"""Controller -> swarm size -> deliveries per 1,000 s, and share of robot time in interference; means over seeds."""
 
 
 def curves(records: tuple[RunRecord, ...]) -> Curves:
@@ -53,10 +52,10 @@ def draw(scenarios: list[str], before: dict[str, Curves], after: dict[str, Curve
     figure, grid = plt.subplots(len(scenarios), 2, figsize=(10, 3.6 * len(scenarios)), squeeze=False)
     for axes, scenario in zip(grid, scenarios, strict=True):
         for version, style in ((before, "--"), (after, "-")):
-            for controller, sizes in version[scenario].items():
+            for (controller, sizes), colour in zip(version[scenario].items(), COLOURS, strict=False):
                 for axis, column in zip(axes, zip(*sizes.values(), strict=True), strict=True):
                     label = controller if style == "-" else None
-                    axis.plot(list(sizes), column, style, marker="o", ms=3, color=COLOURS[controller], label=label)
+                    axis.plot(list(sizes), column, style, marker="o", ms=3, color=colour, label=label)
         for axis, title in zip(axes, ("deliveries per 1,000 s", "share of robot time in interference"), strict=True):
             axis.set_xscale("log", base=2)
             axis.set_xlabel("robots")
