@@ -134,7 +134,7 @@ def goal_is_reached(robot: np.record, senses: Senses, row: Row, c: np.record, me
 
 @kernel
 def search_for_goal(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
-    """One tick of the search that suits the goal; sites are not searched for, the robot stands."""
+    """One tick of the search for a goal of the robot's kind; there is no search for sites, the robot stands."""
     if robot.goal_kind == _OBJECT:
         return explore_for_object(robot, senses, row, c, draws)
     x = 0.0
@@ -203,7 +203,7 @@ def follow_events(
         if robot.activity == WAIT_DROP:
             start_carrying(robot, loaded)
     elif robot.activity == WAIT_PICKUP and SOURCE[task] == _CACHE and not cache_is_known(robot, c, memory):
-        restart_acquiring(robot)  # others have emptied the cache too far
+        restart_acquiring(robot)  # other robots have left too few objects in the cache
 
 
 @inline_kernel
