@@ -10,7 +10,7 @@ from swarm_forage_env._internal.extras import install_command
 EXIT_FAILURE = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
-"""What shells report for a program that Ctrl-C ended."""
+"""Exit code that shells report for a program ended by Ctrl-C."""
 
 NO_PICTURE = f"No picture without matplotlib: {install_command('plots')}."
 
@@ -53,6 +53,6 @@ DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and an e
 
 
 def complain(message: str, code: int) -> int:
-    """Say one line on stderr; returns `code`."""
+    """Print one line on stderr; returns `code`."""
     typer.echo("swarm-forage: " + " ".join(message.split()), err=True)
     return code

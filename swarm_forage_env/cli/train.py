@@ -1,4 +1,4 @@
-"""The command `train`; the plan it makes is `training.recipe`, what it does is `training.sb3.training`."""
+"""The command `train`: it makes a plan by `training.recipe` and carries it out by `training.sb3.training`."""
 
 from pathlib import Path
 from typing import Annotated
