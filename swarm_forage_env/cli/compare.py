@@ -26,7 +26,7 @@ def compare(
     policies: Annotated[
         str,
         typer.Option(
-            "--policy", "--policies", help="Two or more, separated by commas: names, or files of trained ones."
+            "--policy", "--policies", help="Two or more, separated by commas: names, or files of trained policies."
         ),
     ],
     scenario: Scenario = "warehouse_small",

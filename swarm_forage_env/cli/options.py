@@ -38,7 +38,7 @@ ConfigFile = Annotated[
     typer.Option(
         "--config",
         metavar="FILE.toml",
-        help="Scenario fields and wrappers, one table each; what other options say goes before it.",
+        help="Scenario fields and wrappers, one table each; other options override it.",
     ),
 ]
 

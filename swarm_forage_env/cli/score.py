@@ -30,7 +30,7 @@ def score(
     context: typer.Context,
     policy: Annotated[str | None, typer.Option(help="Name, or file of a trained policy.")] = None,
     curves: Annotated[
-        Path | None, typer.Option(help="Score curves from elsewhere instead: a CSV or Parquet file (docs/scoring.md).")
+        Path | None, typer.Option(help="Score curves from a CSV or Parquet file instead (docs/scoring.md).")
     ] = None,
     scenario: Scenario = "warehouse_small",
     measures: Measures = None,

@@ -56,7 +56,7 @@ class PopulationDynamics(SwarmWrapper):
             )
         if config.birth_per_tick > 0.0 and initial == n_robots:
             raise ConfigError(
-                f"Expected population.initial_robots below {n_robots}, the robots of the scenario, so that somebody "
+                f"Expected population.initial_robots below {n_robots}, the robots of the scenario, so that a robot "
                 f"can be born, got {config.initial_robots}."
             )
         self._config = config
