@@ -1,4 +1,4 @@
-"""STOCHM and STOCHX in whole runs: caches are created and used, and every robot keeps working."""
+"""STOCHM and STOCHX in whole runs: caches are created and used, and deliveries go on to the end."""
 
 import numpy as np
 import pytest
