@@ -44,10 +44,10 @@ def is_large_enough(cache: np.record, c: np.record) -> bool:
 
 @kernel
 def select_cache(robot: np.record, senses: Senses, c: np.record, draws: Row, memory: OneTaskMemory) -> bool:
-    """Choose the remembered cache of highest utility and a random point in it as goal.
+    """Choose the remembered cache of highest utility; the goal is a random point in it.
 
-    Left out are the cache that the robot stands in, so that one which has just dropped must leave before it can come
-    back; caches to be left alone in this task; and, for taking, caches with too few objects.
+    Not chosen are: the cache that the robot stands in, so that a robot which has just dropped its object leaves before
+    it comes back; caches to be left alone in this task; and, for taking, caches with too few objects.
 
     Returns:
         Whether there is one; then goal and tolerance of the robot are set.
@@ -104,7 +104,7 @@ def isolated_object_utility(
     robot_x, robot_y = object_x - x, object_y - y
     nest_x, nest_y = object_x - c.nest_x_m, object_y - c.nest_y_m
     product = (robot_x * robot_x + robot_y * robot_y) * (nest_x * nest_x + nest_y * nest_y)
-    # The floor stands for a robot exactly on the object, which nothing can surpass.
+    # The lower limit is for a robot exactly on the object.
     return math.exp(pheromone) / math.sqrt(max(product, 1e-12))
 
 
@@ -119,7 +119,7 @@ def is_isolated(robot: np.record, entry: int, c: np.record, memory: OneTaskMemor
         if dx * dx + dy * dy <= limit:
             return False
     limit = c.proximity_m * c.proximity_m
-    # What lies next in the list was seen next, and is probably near: begin there.
+    # The next entries in the list were seen next and are probably near, so begin there.
     for step in range(1, robot.n_known):
         other = entry + step
         if other >= robot.n_known:

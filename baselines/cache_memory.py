@@ -1,4 +1,4 @@
-"""Cache memory: which caches each robot has seen, where, with how many objects; and what it had better leave alone.
+"""Cache memory: which caches each robot has seen, where, with how many objects; and which ones it must leave alone.
 
 The rule, for one robot and tick, W being its 5 x 5 window of cells:
 
@@ -138,7 +138,7 @@ def remember_cache(robot: np.record, memory: OneTaskMemory, fields: Row, c: np.r
 
 @kernel
 def _new_entry(robot: np.record, caches: Row) -> int:
-    """A list entry for a cache not known so far; with a full list, that of the one unseen for longest."""
+    """A list entry for a new cache; if the list is full, the entry of the cache that was last seen longest ago."""
     if robot.n_caches < caches.shape[0]:
         entry = robot.n_caches
         robot.n_caches += 1
@@ -164,7 +164,7 @@ def _forget_objects_under(robot: np.record, objects: OneMemory, cache: np.record
 
 @kernel
 def forget_cache(robot: np.record, caches: Row, entry: int, c: np.record) -> None:
-    """Remove a cache; the last list entry takes its place. The place of the last one of all is kept."""
+    """Remove a cache; the last list entry takes its place. If none is left, its position stays known."""
     last = robot.n_caches - 1
     if last == 0:
         robot.last_cache_x_m = (caches[entry].cell_x + 0.5) * c.cell_m

@@ -5,10 +5,11 @@ The authors' program maximises a utility that grows without bound towards the mi
     U(s) = 1 / (1 + exp(4 (e - 1))) / (max(1, |s - robot|) e),   e = |s - m|,
 
 under the constraints that s keeps the proximity distance from the nest's centre and from every remembered cache (more
-from one that has refused, see `cache_memory.keep_away_m`), and lies in a box. Its stochastic optimiser thus ends up
-near the allowed point nearest to m, which is computed here: our choice, exact and without iterations. That point is m
-itself; or m pushed out of one disc or into the box; or where the border of a disc crosses another one or the box. A
-random offset, far below the distance at which robots count as arrived, stands for the optimiser's scatter.
+from one that has refused, see `cache_memory.keep_away_m`), and lies in a box. Its stochastic optimiser therefore ends
+near the allowed point nearest to m. This module computes that point exactly and without iterations (our choice). It is
+m itself, or m pushed out of one disc or into the box, or a crossing of the border of a disc with another disc or the
+box. A random offset replaces the scatter of the optimiser; it is far below the distance at which robots count as
+arrived.
 """
 
 import math
@@ -23,7 +24,7 @@ from .machines import Senses
 from .tasks import DRAW_POINT_X, DRAW_POINT_Y
 
 _RIM_M = 1e-6
-"""Points on a border lie this far on its allowed side."""
+"""Distance by which points on a border are moved to its allowed side."""
 
 
 class Best(NamedTuple):
@@ -144,7 +145,7 @@ def nearest_allowed(
         robot: Record of the robot.
         middle_x: The midpoint, m.
         middle_y: The same along y.
-        turn: Direction in which a midpoint is pushed out that coincides with a disc's centre, rad.
+        turn: Direction in which a midpoint exactly at a disc's centre is pushed out, rad.
         c: Constants of the run.
         memory: The robot's memory.
     """
@@ -189,7 +190,7 @@ def select_site(robot: np.record, senses: Senses, c: np.record, draws: np.ndarra
     offset_y = length * math.sin(turn)
     robot.goal_x_m = best.x
     robot.goal_y_m = best.y
-    for side in range(2):  # the offset, or the opposite one where only that is allowed, or none
+    for side in range(2):  # the offset; if it is not allowed, the opposite one; else none
         sign = 1.0 - 2.0 * side
         if is_allowed(robot, best.x + sign * offset_x, best.y + sign * offset_y, c, memory):
             robot.goal_x_m = best.x + sign * offset_x

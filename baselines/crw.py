@@ -1,4 +1,4 @@
-"""CRW: the correlated random walk controller. No memory: what a robot stumbles on, it carries to the light.
+"""CRW: the correlated random walk controller. It has no memory; robots carry objects that they meet to the light.
 
 States and exits (`machines.Activity`):
 

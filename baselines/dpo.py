@@ -1,7 +1,7 @@
 """DPO: decaying pheromones for objects. Robots remember every object they have seen and go to the most useful one.
 
-States as in `crw`, but ACQUIRE goes to the best remembered object and explores only while there is none to go to. The
-memory is kept up to date in every state. Source: DPO of the paper, section "Candidate Algorithms".
+States as in `crw`, but ACQUIRE goes to the best remembered object, and explores only while no object is remembered that
+it can go to. The memory is updated in every state. Source: DPO of the paper, section "Candidate Algorithms".
 """
 
 from typing import ClassVar

@@ -1,6 +1,6 @@
 """State machines of one robot: sensing, exploring, going to a point, acquiring, homing.
 
-Written once for all controllers. Every function is compiled, handles one robot and returns the steering force
+All controllers share these functions. Every function is compiled, handles one robot and returns the steering force
 (forward, left) that it adds this tick; a kernel of a controller loops over the robots. What differs between goals
 (which candidate, is it still valid, was it reached) is passed in as compiled functions.
 
@@ -112,9 +112,9 @@ NO_WINDOW = -(2**30)
 
 def new_robots(n_robots: int, more_fields: Sequence[tuple[str, type]] = ()) -> np.ndarray:
     """Return (n_robots,) records of `ROBOT_FIELDS` and `more_fields` that start to acquire and have seen nothing."""
-    # Were the common fields the first ones, numba would take a longer record for a kind of the shorter one, and warn.
+    # With the common fields first, numba would treat a longer record as a subtype of the shorter one, and warn.
     fields = np.dtype([*more_fields, *ROBOT_FIELDS], align=True)
-    # np.record makes fields readable as attributes when kernels run uncompiled; compiled they always are.
+    # np.record makes fields readable as attributes also in uncompiled kernels; compiled kernels need no help.
     robots = np.zeros(n_robots, np.dtype((np.record, fields)))
     robots["explore_ticks"] = NOT_EXPLORING
     robots["target"] = -1
@@ -178,7 +178,7 @@ def restart_acquiring(robot: np.record) -> None:
 
 @kernel
 def start_carrying(robot: np.record, activity: int) -> None:
-    """Begin to bring the cargo away: HOMING, or TRANSPORT with no goal and exploration not started."""
+    """Begin to carry the cargo to its destination: HOMING, or TRANSPORT with no goal and exploration not started."""
     robot.activity = activity
     robot.explore_ticks = NOT_EXPLORING
     stop_vector(robot)
@@ -186,11 +186,11 @@ def start_carrying(robot: np.record, activity: int) -> None:
 
 @kernel
 def follow_cargo(robot: np.record, senses: Senses, loaded: int, emptied: int) -> bool:
-    """Change the activity after what happened to the robot since its last tick, before it acts.
+    """Before the robot acts, adapt its activity to what happened since its last tick.
 
-    Cargo is the truth that activities follow, so a robot that missed an event in repair, or whose cargo something
-    else took or gave, still makes sense. Refusals and lost conditions arrive as events: a waiting robot then
-    looks for another object, or resumes homing (with a new drop depth once it sees the nest again) or transport.
+    The activity follows the cargo. So it is also right for a robot that missed an event while it was in repair, or
+    whose cargo changed for another reason. Refusals and lost conditions arrive as events: a waiting robot then looks
+    for another object, or resumes homing (with a new drop depth once it sees the nest again) or transport.
 
     Args:
         robot: Record of the robot.
@@ -221,7 +221,7 @@ def follow_cargo(robot: np.record, senses: Senses, loaded: int, emptied: int) ->
 
 @kernel
 def avoid(senses: Senses, c: np.record) -> tuple[float, float]:
-    """Avoidance force if there is an obstacle, else nothing."""
+    """Avoidance force if there is an obstacle, else zero."""
     if senses.obstacle:
         return avoidance(senses.obstacle_x, senses.obstacle_y, c)
     return 0.0, 0.0
@@ -247,7 +247,7 @@ def start_exploring(robot: np.record, senses: Senses, c: np.record, draws: Row) 
 
 @kernel
 def explore(robot: np.record, senses: Senses, c: np.record, draws: Row) -> tuple[float, float]:
-    """One tick of a random walk for something that is only found by seeing it from afar; returns the force."""
+    """One tick of a random walk that ends only when the robot sees what it looks for; returns the force."""
     x, y = start_exploring(robot, senses, c, draws)
     walk_x, walk_y = random_walk(robot, senses, c, draws[DRAW_WANDER])
     robot.explore_ticks += 1
@@ -258,7 +258,7 @@ def explore(robot: np.record, senses: Senses, c: np.record, draws: Row) -> tuple
 def explore_for_object(
     robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row
 ) -> tuple[bool, float, float]:
-    """Walk at random until the ground sensors see an object, which is ignored for the first 50 ticks.
+    """Walk at random until the ground sensors see an object; objects are ignored for the first 50 ticks.
 
     Returns:
         Whether an object was found (then the robot stands still), and the force.
@@ -290,8 +290,8 @@ def stop_vector(robot: np.record) -> None:
 def go_to_goal(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[bool, float, float]:
     """One tick on the way to the goal: arrival force, avoidance, then 2 s straight on before turning back.
 
-    A change of state acts in the same tick. Obstacles are ignored within the slowing radius, as far as the last
-    arrival force knew, and otherwise win over arriving.
+    A change of state acts in the same tick. If the robot was within the slowing radius at its last arrival force, it
+    ignores obstacles; otherwise it avoids them first.
 
     Returns:
         Whether the robot is within tolerance of its goal, and the force.
@@ -422,7 +422,7 @@ def home(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -
 
 @kernel
 def deliver_and_leave(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -> tuple[float, float]:
-    """Act in every activity that moves and is not acquiring: homing, and leaving the nest. Returns the force."""
+    """One tick of homing or of leaving the nest; returns the force."""
     x = 0.0
     y = 0.0
     if robot.activity == HOMING or robot.activity == HOMING_IN_NEST:

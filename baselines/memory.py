@@ -3,7 +3,7 @@
 The rule, for one robot and tick, W being its 5 x 5 window of cells:
 
 1. A remembered object whose cell lies in W, but which is not seen in W, is forgotten.
-2. Every object seen is remembered at its cell with pheromone density 1; what else was remembered there goes.
+2. Every object seen is remembered at its cell with pheromone density 1; another object remembered there is forgotten.
 3. Every density decays by the factor 1 - rho.
 
 The third step has a closed form: an object last seen a ticks ago has density (1 - rho)^(a + 1), so only the tick

@@ -31,7 +31,7 @@ class MemoryParameters(ControllerParameters):
     """A robot this near to an object's centre has arrived; authors' program."""
 
     def __post_init__(self) -> None:
-        # super() has no arguments to find in a slots dataclass, which is a new class.
+        # super() without arguments fails in a slots dataclass, because that is a new class.
         ControllerParameters.__post_init__(self)
         if self.evaporation_per_tick >= 1.0:
             raise ParameterError(f"Expected evaporation_per_tick < 1, got {self.evaporation_per_tick}.")
@@ -110,7 +110,7 @@ def _never(_robot: np.record, _memory: OneMemory, _object_row: int) -> bool:
 
 @kernel
 def select_object(robot: np.record, senses: Senses, c: np.record, _draws: Row, memory: OneMemory) -> bool:
-    """Choose the best remembered object, as `select_best_object`, leaving out none by name."""
+    """Choose the best remembered object, as `select_best_object`; no object is left out."""
     return select_best_object(robot, senses, c, memory, memory, _never)
 
 

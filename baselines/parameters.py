@@ -95,12 +95,12 @@ class ObservationError(ValueError):
 
 
 def require_inputs(obs: ObsArray, active: BoolArray, spec: SwarmSpec | None) -> None:
-    """Refuse what is of another shape than the swarm; compiled kernels would read and write beyond it.
+    """Refuse arrays of another shape than the swarm; compiled kernels would read and write beyond their ends.
 
     Args:
         obs: Observations.
         active: Which robots act.
-        spec: What the policy was reset with, None = it was not.
+        spec: The specification given to `reset`; None = there was no reset.
 
     Raises:
         ObservationError: `obs` is not (n_robots, layout.size), `active` not (n_robots,), or there was no reset.
@@ -177,7 +177,7 @@ def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derive
     for name, value in derived.items():
         (whole if isinstance(value, int) else real)[name] = value
     fields = np.dtype([(name, np.int64) for name in whole] + [(name, np.float64) for name in real], align=True)
-    # np.record makes fields readable as attributes when kernels run uncompiled; compiled they always are.
+    # np.record makes fields readable as attributes also in uncompiled kernels; compiled kernels need no help.
     constants = np.zeros(1, np.dtype((np.record, fields)))
     for name, value in (whole | real).items():
         constants[name] = value

@@ -1,10 +1,10 @@
 """STOCH-N1: each robot draws its next task from the neighbourhood of its last one in the task graph.
 
 A robot has one active task allocation block (TAB): a root task that it can do as a whole, or partitioned into two
-subtasks. When a task ends, the active block may move to its neighbour (`move_probability`); then the robot either does
+subtasks. When a task ends, the active block may move to its neighbour (`move_probability`). Then the robot does either
 the block's root or, with `partition_probability`, one of its subtasks (`switch_probability`). While it works it may
-give up (`abort_probability`). All four compare estimates of how long the tasks take, moving averages of the robot's
-own experience (`new_estimate`).
+give up (`abort_probability`). All four probabilities compare estimates of how long the tasks take. An estimate is a
+moving average of the robot's own times (`new_estimate`).
 
 Times are in control ticks. Source: STOCHM and STOCHX of the paper, section "Candidate Algorithms"; the numbers are in
 `tasks`. Whole-number arithmetic of the authors' program is the quirk `integer_estimates`.
@@ -167,7 +167,7 @@ def abort_probability(
 ) -> float:
     """Probability per tick of giving up: p = gamma / (1 + exp(k |r - offset|)), r = execution time / estimate.
 
-    A bump, not a step: a robot that has outlasted `offset` estimates becomes ever less likely to give up.
+    The curve is a bump, not a step: beyond `offset` estimates the probability of giving up falls again.
 
     Args:
         exec_time: Execution time so far.
@@ -264,9 +264,9 @@ def end_task(a: Allocation, i: int, now: int, c: Row) -> None:
 
 @kernel
 def move_tab(a: Allocation, i: int, c: Row, u: float) -> None:
-    """Move the active block by one level, or not, after the task that has just ended.
+    """Decide whether the active block moves by one level, after the task that has just ended.
 
-    Up from a lower block after its root, down from the Generalist's block after the root of a lower one.
+    After its root, a lower block moves up; after the root of a lower block, the Generalist's block moves down to it.
     """
     tab = a.tab[i]
     candidate = int(ROOTED_TAB[a.task[i]])

@@ -1,8 +1,8 @@
 """STOCHM: stochastic task allocation among three tasks, with static caches half way to the nest.
 
 A robot works as Generalist (free object to nest), as Harvester (free object to cache) or as Collector (cache to nest).
-What it does next is drawn by `stoch_n1`, how it does it is in `task_machines`. Source: STOCHM of the paper, section
-"Candidate Algorithms".
+`stoch_n1` draws what it does next; `task_machines` carries it out. Source: STOCHM of the paper, section "Candidate
+Algorithms".
 """
 
 from typing import ClassVar

@@ -1,8 +1,8 @@
 """STOCHX: stochastic task allocation among seven tasks, with caches that the robots make themselves.
 
-The tasks of STOCHM, whose Harvester and Collector can each be partitioned once more: Cache Starters lay objects down
-half way to the nest, Cache Finishers bring a second object there, which creates a cache; Cache Transferers and Cache
-Collectors empty caches. What a robot does next is drawn by `stoch_n1`, how it does it is in `task_machines`. Source:
+The tasks are those of STOCHM, and the Harvester and the Collector can each be partitioned once more. Cache Starters lay
+objects down half way to the nest. Cache Finishers bring a second object there, which creates a cache. Cache Transferers
+and Cache Collectors empty caches. `stoch_n1` draws what a robot does next; `task_machines` carries it out. Source:
 STOCHX of the paper, section "Candidate Algorithms".
 """
 

@@ -209,7 +209,7 @@ def follow_events(
         if robot.activity == WAIT_DROP:
             start_carrying(robot, loaded)
     elif robot.activity == WAIT_PICKUP and SOURCE[task] == _CACHE and not cache_is_known(robot, c, memory):
-        restart_acquiring(robot)  # others have emptied the cache too far
+        restart_acquiring(robot)  # other robots have left too few objects in the cache
 
 
 @inline_kernel

@@ -34,7 +34,7 @@ def site_box_m(spec: SwarmSpec) -> tuple[float, float, float, float]:
 def task_constants(parameters: TaskParameters, spec: SwarmSpec, n_tabs: int) -> np.ndarray:
     """Return `kernel_constants` with what task allocation and caches need besides."""
     x_low, y_low, x_high, y_high = site_box_m(spec)
-    # Quirk finisher_tolerance_mismatch: arriving and being accepted are different distances.
+    # Quirk finisher_tolerance_mismatch: a robot arrives at one distance and is accepted at another.
     is_loose = spec.quirks.finisher_tolerance_mismatch
     loose_m = parameters.loose_creation_share * max(spec.arena_size_m)
     return kernel_constants(
@@ -56,7 +56,7 @@ def task_constants(parameters: TaskParameters, spec: SwarmSpec, n_tabs: int) -> 
 
 
 class TaskPolicy:
-    """Robots that allocate tasks among themselves, each by its own experience. An instance drives one run.
+    """Every robot chooses its own tasks, from its own experience. An instance drives one run.
 
     Subclasses say which part of the task graph they use and with which numbers.
 
@@ -93,7 +93,7 @@ class TaskPolicy:
         self._spec: SwarmSpec | None = None
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
-        """Start a run: estimates are drawn, nobody has a task, and nothing is remembered."""
+        """Start a run: estimates are drawn, no robot has a task, and all memories are empty."""
         self._spec = spec
         self._rng = rng
         self._constants = task_constants(self.parameters, spec, self.n_tabs)

@@ -1,4 +1,4 @@
-"""Tasks of the controllers that use caches: what each one moves where, the task graph, and all numbers.
+"""Tasks of the controllers that use caches: source and destination of each, the task graph, and all numbers.
 
     Generalist            free object    -> nest
       Harvester           free object    -> existing cache
@@ -173,7 +173,7 @@ class TaskParameters(MemoryParameters):
     """Share of max(X, Y) at which a Cache Finisher arrives under the quirk `finisher_tolerance_mismatch`; study."""
 
     def __post_init__(self) -> None:
-        # super() has no arguments to find in a slots dataclass, which is a new class.
+        # super() without arguments fails in a slots dataclass, because that is a new class.
         MemoryParameters.__post_init__(self)
         for name in ("estimate_weight", "least_abort_probability"):
             if getattr(self, name) > 1.0:

@@ -1,11 +1,11 @@
 """Measures of swarm behaviour after Harwell and Gini: arrays in, numbers out.
 
 Every measure is a function of curves, arrays of shape (..., T) over recording intervals; it knows nothing of robots,
-files or policies. `docs/metrics.md` explains inputs and variants, `docs/errata.md` what the paper's print gets wrong.
-`score_policy` is the front door: it runs a policy in all that the measures need and makes one table
-(`docs/scoring.md`).
-Names load on first use (PEP 562), so importing the package compiles nothing. No name is that of a module: a module that
-loads later would take the place of the name.
+files or policies. `docs/metrics.md` explains inputs and variants, `docs/errata.md` the errors in the paper.
+`score_policy` runs a policy in all experiments that the measures need and makes one table (`docs/scoring.md`).
+
+Names load on first use (PEP 562), so importing the package compiles nothing. No public name equals the name of a
+module: a module that loads later would replace it.
 """
 
 from importlib import import_module

@@ -83,7 +83,7 @@ def check_rate(name: str, rate: float) -> None:
 
 
 def check_ratio(ratio_out: float) -> None:
-    """Check a ratio of leaving over entering; infinity is one.
+    """Check a ratio of leaving over entering; infinity is allowed.
 
     Raises:
         PopulationError: Negative or NaN.
@@ -148,10 +148,10 @@ def check_resamples(n_resamples: int) -> None:
 
 
 def chosen_seeds(seeds: int | Sequence[int] | None, default: int) -> tuple[int, ...]:
-    """Return the seeds that are meant: the first so many, those given, or the first `default` ones for None.
+    """Return seeds: the first `seeds` ones if it is a number, `seeds` itself if it is a list, `default` many for None.
 
     Raises:
-        ValueError: No seed, or one twice.
+        ValueError: No seed, or the same seed twice.
     """
     if seeds is None or isinstance(seeds, int):
         count = default if seeds is None else seeds

@@ -1,9 +1,9 @@
-"""The input contract of every measure: what a curve is, and how one is checked and reduced to a number.
+"""The input of every measure: what a curve is, how it is checked, and how it is reduced to a number.
 
 A *curve* is an array of shape (..., T): the last axis is the recording interval, the axes before it (normally one axis
 of runs) broadcast against each other. A single number is a curve of one interval. NaN marks a run that cannot be
-scored: it makes the result of that run NaN and leaves the other runs alone. Infinities are refused, because no count
-per interval is infinite and no distance could carry one.
+scored: the result of that run is NaN, and the other runs are not affected. Infinite values are refused, because a count
+per interval is finite and a distance between infinite curves has no meaning.
 """
 
 from collections.abc import Iterable
@@ -18,12 +18,12 @@ FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 
 Variant: TypeAlias = Literal["paper", "corrected", "sierra"]
-"""`paper`: as printed; `corrected`: with the print's slips put right; `sierra`: what the authors' program computed."""
+"""`paper`: as printed; `corrected`: with the printing errors corrected; `sierra`: as the authors' program computed."""
 Reduction: TypeAlias = Literal["sum", "mean", "last", "total"]
 """How intervals become one number: sum, mean or last value of the measure, or the measure of the summed curves."""
 
 FRACTION_TOLERANCE = 1e-9
-"""By so much a mean of fractions may exceed 1, from rounding."""
+"""A mean of fractions may exceed 1 by this much, from rounding."""
 
 
 def as_curve(name: str, values: ArrayLike | None, *, signed: bool = False) -> FloatArray:
@@ -115,8 +115,8 @@ def reduce_intervals(theta: FloatArray, reduce: Reduction, *inputs: FloatArray) 
     """Reduce a measure theta(t), shape (..., T), over its intervals to shape (...,).
 
     `total`, the measure of the summed curves, is the same number as `sum` for measures that are linear in their curves.
-    The others sum their curves first and come here with `last`. A run with a NaN anywhere in `inputs` gives NaN, also
-    under `last`.
+    All other measures sum their curves before this call and pass `last`. A run with a NaN anywhere in `inputs` gives
+    NaN, also under `last`.
     """
     check_option("reduce", reduce, Reduction)
     if reduce == "last":
@@ -133,7 +133,7 @@ def reduce_intervals(theta: FloatArray, reduce: Reduction, *inputs: FloatArray) 
 def last_interval_only(reduce: Reduction) -> None:
     """Check the reduction given to a measure whose `sierra` form reads only the last interval.
 
-    `sum`, the default of these measures, stands for "not chosen".
+    `sum` is the default of these measures, so it counts as "not chosen".
 
     Raises:
         ValueError: Another reduction was asked for.

@@ -10,7 +10,7 @@ from .checks import CurveError, check_option
 from .curves import FloatArray, Variant, as_curve, as_curves, check_broadcast
 
 Ground: TypeAlias = Literal["value", "time_value"]
-"""Local cost: |x_i - y_j|, time is free to warp; or the same plus |clock_i - clock_j|, points in the plane."""
+"""Local cost: |x_i - y_j|, so that shifts in time cost nothing; or the same plus |clock_i - clock_j|."""
 
 
 def dtw(
@@ -29,17 +29,17 @@ def dtw(
 
     No slope weights, no division by the path length, no square root. Symmetric and 0 for identical curves, but no
     metric: the triangle inequality does not hold. The value grows with T, the sampling rate and the scale of the
-    curves: compare only like with like. The paper cites the method and leaves the cost open. Its program adds the
-    clock to the cost; the clock's steps dwarf the curves, so that the published distances do not warp at all and equal
-    `aligned_l1`.
+    curves: compare only curves of the same kind and length. The paper cites the method but does not give the cost. Its
+    program adds the clock to the cost. The steps of the clock are much larger than the curves, so the published
+    distances do not warp at all and equal `aligned_l1`.
 
     Args:
         x: Curve or curves, shape (..., T); negative values are fine.
         y: Curve or curves of any length; leading axes broadcast with those of x.
         ground: `value` (the paper's stated intent) or `time_value` (the authors' program).
         clock: For `time_value`, the sample times: the step between samples as one number, or shape (T,) shared by
-            curves of equal length. Default: sample numbers. `value` does not look at it.
-        window: Largest |i - j| a path may use (Sakoe and Chiba band); None, the definition above, sets no limit.
+            curves of equal length. Default: sample numbers. `value` does not use it.
+        window: Largest |i - j| of a path (Sakoe and Chiba band); None = no limit, as in the definition above.
         per_interval: Divide by the length of the longer curve.
 
     Returns:
@@ -153,7 +153,7 @@ def _dtw_pairs(
     """Fill distances (B,) with the DTW of each curve of x (B, n) and the curve of y (B, m) at the same index.
 
     `row` (m + 1,) is workspace for one row of D: while row i is written from left to right, entries still to the right
-    belong to row i - 1. The ground cost on values alone is the case of clocks that stand still.
+    belong to row i - 1. The cost `value` is the case of clocks that stand still.
     """
     n = x.shape[1]
     m = y.shape[1]

@@ -40,9 +40,9 @@ def spatial_emergence(
         perf_one: P(1, t) of one robot alone.
         t_lost_one: Interference fraction of one robot alone.
         variant: `paper` as printed. `corrected` sets P_lost(1) to zero when N1 = 1: it is the loss to walls, which
-            P_lost(N > 1) no longer contains, so that independent robots would seem organised. `sierra` uses fractional
-            losses of the last interval, takes sizes in any order, and is 0 for N2 = 1; it reports organisation among
-            independent robots.
+            P_lost(N > 1) does not contain, and with it independent robots would seem organised. `sierra` uses
+            fractional losses of the last interval, takes sizes in any order, and is 0 for N2 = 1; independent robots
+            seem organised under it.
         reduce: `sum` as in the paper, `mean` or `last`. `sierra` always reads the last interval.
         t_lost_as: As in `performance_lost`.
         n_reference: As in `performance_lost`.
@@ -87,7 +87,7 @@ def task_emergence(
 
         E_T = sum_t [ P(N2, t) - (N2 / N1) P(N1, t) ]
 
-    Zero for linear speedup, positive for superlinear. The printed equation has no slip; the authors' program took the
+    Zero for linear speedup, positive for superlinear. The printed equation is correct; the authors' program took the
     last interval (reduce="last") instead of the sum. Their marginal form uses neighbouring sizes, the interactive form
     n1 = 1.
 

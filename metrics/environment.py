@@ -25,7 +25,7 @@ def waveform(
 ) -> FloatArray:
     """Signal of the environment at the given ticks, for example the throttle V(t) as a fraction of speed lost.
 
-        constant    a                                       (offset, frequency and phase play no part)
+        constant    a                                       (offset, frequency and phase are not used)
         sine        a sin(2 pi f t + phase) + o
         square      a sgn(sin(2 pi f t + phase)) + o        sgn(0) = +1
         sawtooth    2 a (f t - floor(f t + 1/2) + phase) + o
@@ -67,8 +67,8 @@ def waveform(
 def _period(frequency: float) -> float:
     """Period in ticks, whole where the frequency is the reciprocal of a whole number.
 
-    The environment divides by the period. The product of frequency and ticks, or a period that is rounded twice, lands
-    on the other side of some half periods, where a square wave then has the other sign.
+    The environment divides by the period. Multiplying ticks by the frequency, or rounding the period twice, would give
+    results on the other side of some half periods, where a square wave has the other sign.
     """
     if frequency == 0.0:
         return math.inf
@@ -85,9 +85,9 @@ def environment_scaling(
         reciprocal    c_t = I_ec / V              penalties: ticks lost
         paper         c_t = V / I_ec              as printed, (V_dev + I_ec) / I_ec with V_dev = V - I_ec
 
-    The print is the reciprocal of what is meant: adverse conditions (V above I_ec) give c_t > 1, so the best swarm
-    would improve when things get worse, and it is undefined for I_ec = 0, the value of the paper's own example. The
-    authors' program uses the other two. The physically proportional factor for throttles would be
+    The printed form is the reciprocal of what is meant: adverse conditions (V above I_ec) give c_t > 1, so the best
+    swarm would improve when conditions get worse. For I_ec = 0, the value of the paper's own example, it is undefined.
+    The authors' program uses the other two. The physically proportional factor for throttles would be
     (1 - V) / (1 - I_ec), which `linear` equals for I_ec = 0 only.
 
     Args:

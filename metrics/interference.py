@@ -66,8 +66,8 @@ def performance_lost(
         variant: `paper` and `corrected` are the same here. `sierra` is what the authors' program computed: zero for the
             first experiment, P(N) t_lost(N) - P(1) n_int(1) for the others (the loss of one lone robot is taken off
             instead of N), and +inf where P(N) = 0.
-        t_lost_as: `count` multiplies the fractions by the swarm size first, as the paper's text reads. Then independent
-            robots look worse the more they are. Not for `sierra`, which has its own reading.
+        t_lost_as: `count` multiplies the fractions by the swarm size first, as the paper's text reads. Independent
+            robots then look worse in larger swarms. Not for `sierra`, which has its own reading.
         n_reference: Robots in the reference run; the authors' program took its first experiment, whatever its size (12
             robots in search and rescue). Only `sierra` accepts another number than 1.
 
@@ -78,9 +78,9 @@ def performance_lost(
         CurveError: A curve is missing, negative, infinite or of another length; a fraction above 1; a size below 1.
         ValueError: Unknown variant or reading, or a combination of them that has no meaning.
 
-    The print contradicts itself: the text makes t_lost a number of robots, the notation table a fraction of time. Only
-    the fraction lets P_lost vanish for N robots that do not affect each other. The table also calls P_lost a fraction,
-    but the equation is an absolute loss; `fractional_loss` is the fraction.
+    The paper contradicts itself: t_lost is a number of robots in the text and a fraction of time in the notation table.
+    Only with the fraction P_lost is 0 for N robots that do not affect each other. The table also calls P_lost a
+    fraction, but the equation is an absolute loss; `fractional_loss` is the fraction.
     """
     n = check_size("n", n)
     n_reference = check_size("n_reference", n_reference)

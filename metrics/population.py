@@ -48,7 +48,7 @@ def population_robustness(
         rates: Population rates per tick.
         horizon: Run length in ticks, in the same unit as the rates.
         n: Swarm size N; `transient` and `stationary` need it.
-        ideal_rates: Rates of the ideal swarm; None: nobody leaves. `sierra` needs them.
+        ideal_rates: Rates of the ideal swarm; None: no robot leaves. `sierra` needs them.
         weight: See `population_weight`.
         reduce: `sum` as in the paper, `mean` or `last`. `sierra` always reads the last interval.
 
@@ -83,7 +83,7 @@ def population_weight(
     | paper      | T - [1 / (mu - lambda) + 1 / mu], Eq. (11) with the printed time, which counts service twice |
     | sojourn    | T - 1 / (mu - lambda), the same without the double count                                     |
     | transient  | T (1 - m_T / N), the mean over the run, see `mean_away` (ours)                               |
-    | stationary | T (1 - L_N / N), in equilibrium, see `queue_statistics` (ours); nobody if the dead stay dead |
+    | stationary | T (1 - L_N / N), in equilibrium, see `queue_statistics` (ours); 0 with deaths and no births  |
     | sierra     | ideal time *away* over time away, where Eq. (12) has times at work                           |
 
     The printed time away is the length of *one* absence, so `paper` and `sojourn` hold only if every robot is away
@@ -93,7 +93,7 @@ def population_weight(
     x axis of its scenario 1 figure.
 
     Returns:
-        The weight; 1 if nobody leaves either swarm. In [0, 1] for `transient` and `stationary` with ideal_rates None.
+        The weight; 1 if no robot leaves either swarm. In [0, 1] for `transient` and `stationary` with ideal_rates None.
 
     Raises:
         CurveError: n < 1.
@@ -125,15 +125,15 @@ def availability(n: int, n_min: int, ratio_out: float) -> float:
 
         p_v = sum_{j=0}^{N - N_min} q^j pi_N = (1 - q^(N - N_min + 1)) / (1 - q^(N + 1)),    q = lambda / mu
 
-    The printed 1 / rho must be lambda / mu, so its rho is mu / lambda, entering over leaving: the reciprocal of the rho
-    of the queue equations, where the symbol lost its subscript. The other rho gives the probability that at least n_min
-    robots are *away*. The print leaves pi_N, the probability that all are at work, undefined; it is
+    The printed 1 / rho must be lambda / mu, so this rho is mu / lambda, entering over leaving. It is the reciprocal of
+    the rho of the queue equations, which would give the probability that at least n_min robots are *away*. The paper
+    does not define pi_N, the probability that all are at work; it is
     (1 - q) / (1 - q^(N + 1)).
 
     Args:
         n: Swarm size N.
         n_min: Robots needed; any integer: 1.0 for n_min <= 0, 0.0 for n_min > n.
-        ratio_out: q = lambda / mu, leaving over entering, from 0 (nobody leaves) to inf (nobody returns).
+        ratio_out: q = lambda / mu, leaving over entering, from 0 (no robot leaves) to inf (no robot returns).
 
     Returns:
         p_v in [0, 1]. Higher is better.
@@ -199,7 +199,7 @@ def _share_at_work(rates: PopulationRates, horizon: float, n: int | None, weight
         n = check_size("n", n)
         if weight == "transient":
             return 1.0 - mean_away(rates, n, horizon) / n
-        if rates.lambda_d > 0.0 and rates.mu_b == 0.0:  # repairs bring nobody back from the dead
+        if rates.lambda_d > 0.0 and rates.mu_b == 0.0:  # repairs do not bring dead robots back
             return 0.0
         return float(stationary_distribution(rates, n) @ np.arange(n, -1.0, -1.0)) / n
     queue = queue_statistics(rates)

@@ -1,4 +1,4 @@
-"""Queue model of a changing population: who is away from the swarm, for how long, in equilibrium and in a finite run.
+"""Queue model of a changing population: how many robots are away, for how long, in equilibrium and in a finite run.
 
 S is the sub-swarm at work. Deaths and temporary departures take robots out of S, births and returns bring them in. The
 paper models the robots *not* in S as one M/M/1 queue with arrival rate lambda and service rate mu, Eqs. (9) to (11).
@@ -62,7 +62,7 @@ class QueueStats:
     mu: float
     """Rate of entering, mu."""
     rho: float
-    """lambda / mu; 0 if nobody leaves, inf if nobody returns."""
+    """lambda / mu; 0 if no robot leaves, inf if no robot returns."""
     stable: bool
     """Whether rho < 1. A finite swarm is always stable."""
     length_printed: float
@@ -76,7 +76,7 @@ class QueueStats:
     time: float
     """Time away per visit, W = 1 / (mu - lambda)."""
     waiting_time: float
-    """Of that, time before the service begins, 1 / (mu - lambda) - 1 / mu."""
+    """Part of that time before the service begins, 1 / (mu - lambda) - 1 / mu."""
     truncated_length: float | None
     """Mean number away of a swarm of n robots, L_N; None if n was not given."""
     truncated_distribution: FloatArray | None
@@ -130,10 +130,10 @@ def queue_statistics(rates: PopulationRates, n: int | None = None, *, per_robot:
 
 
 def mean_away(rates: PopulationRates, n: int, horizon: float, *, per_robot: bool = False) -> float:
-    """Mean number of robots away during a run that starts with nobody away, m_T.
+    """Mean number of robots away during a run that starts with no robot away, m_T.
 
-    The queue of `queue_statistics` solved in time, because runs are far shorter than its relaxation time (253,000 ticks
-    for the study's 50 robots, 4,000,000 for 200, against 50,000): most of the swarm is at work throughout. With the
+    This solves the queue of `queue_statistics` in time. Runs have 50,000 ticks, which is far less than its relaxation
+    time (253,000 ticks for the study's 50 robots, 4,000,000 for 200): most of the swarm is at work throughout. With the
     generator Q of the chain and pi(0) = (1, 0, ..., 0):
 
         d pi / dt = pi Q,    m_T = (1 / T) int_0^T sum_n n pi_n(s) ds
@@ -142,7 +142,7 @@ def mean_away(rates: PopulationRates, n: int, horizon: float, *, per_robot: bool
     m_T = 1 / (Lambda T) sum_k E[n after k jumps] P(Poisson(Lambda T) > k).
 
     Args:
-        rates: Rates per tick. No stability is needed; mu = 0 is pure death.
+        rates: Rates per tick. The queue need not be stable; with mu = 0 robots only leave.
         n: Swarm size N.
         horizon: Run length T in ticks.
         per_robot: As in `queue_statistics`.

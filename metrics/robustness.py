@@ -11,7 +11,7 @@ def noise_robustness(
 ) -> FloatArray:
     """Sensor and actuator noise robustness B_sa = DTW( P_ideal, P ), Eq. (8). Lower is better.
 
-    Blind to the sign: a swarm that does better under noise scores badly too, so report `mean_signed_difference` and
+    It has no sign: a swarm that does better under noise scores badly, too. Report `mean_signed_difference` and
     `noise_floor` beside it. The paper's x axis is the standard deviation of the noise, starting at 0 = P_ideal.
 
     Args:
@@ -32,7 +32,7 @@ def noise_robustness(
 
 
 def mean_signed_difference(perf_ideal: ArrayLike, perf: ArrayLike) -> FloatArray:
-    """Mean over intervals of P(N, t) - P_ideal(t), shape (...,): positive where a swarm gained from what disturbed it.
+    """Mean over intervals of P(N, t) - P_ideal(t), shape (...,): positive if the swarm did better when disturbed.
 
     Args:
         perf_ideal: Performance without the disturbance, shape (..., T), objects per interval.

@@ -9,7 +9,7 @@ from .checks import check_option, check_size, check_size_order
 from .curves import FloatArray, IntArray, Reduction, Variant, as_curves, reduce_intervals
 
 ZeroPolicy: TypeAlias = Literal["nan", "skip"]
-"""What an interval without performance does to a sum: its IEEE value counts, NaN included, or it is left out."""
+"""How an interval without performance enters a sum: with its IEEE value, NaN included, or not at all."""
 
 _DEFAULT_REDUCTION: dict[Variant, Reduction] = {"paper": "sum", "corrected": "total", "sierra": "last"}
 
@@ -33,8 +33,8 @@ def scalability(
         sierra       as paper, last interval; 0 if N1 = N2 or N2 = 1 or P(N1) = 0 < P(N2)
 
     The paper names e but prints the speedup where Karp and Flatt have its reciprocal. The printed value is -S times the
-    corrected one, so it ranks swarms upside down: at r = 2 linear gain (S = 2) gives 1 corrected and -2 printed, halved
-    performance gives -2 and 1. The text around the equation (higher means more cooperative) fits the corrected form.
+    corrected one, so it reverses the order of swarms: at r = 2, linear gain (S = 2) is 1 corrected and -2 printed, and
+    halved performance is -2 corrected and 1 printed. The text (higher means more cooperative) fits the corrected form.
 
     Args:
         perf1: P(N1, t), shape (..., T), objects per interval.

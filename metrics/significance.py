@@ -1,4 +1,4 @@
-"""Whether a difference can be told from chance: the paired t test, and many tests at once."""
+"""Whether a difference is significant: the paired t test, and the correction for many tests at once."""
 
 import math
 
@@ -8,7 +8,7 @@ from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (sci
 from .curves import FloatArray
 
 ROUNDING = 1e-9
-"""Runs that spread less than this share of their mean are equal but for rounding."""
+"""Differences that vary by less than this share of their mean are equal up to rounding."""
 
 
 def paired_p(differences: FloatArray) -> float:
@@ -18,9 +18,9 @@ def paired_p(differences: FloatArray) -> float:
         differences: One per pair of runs, (R,).
 
     Returns:
-        The p value; NaN for fewer than two pairs or a difference that is not finite. Where all differences are equal
-        (but for rounding, which would pass for a tiny spread) Student's t does not exist: 1 if they are zero, else that
-        of the sign test, 2^(1 - R).
+        The p value; NaN for fewer than two pairs or a difference that is not finite. If all differences are equal (up
+        to rounding), Student's t does not exist; the value is then 1 if they are zero, else that of the sign test,
+        2^(1 - R).
     """
     n_pairs = differences.size
     if n_pairs < 2 or not np.isfinite(differences).all():
@@ -34,7 +34,7 @@ def paired_p(differences: FloatArray) -> float:
 
 
 def holm(p_values: FloatArray) -> FloatArray:
-    """Adjust p values of one family for testing many at once (Holm 1979); NaN values are no tests and stay NaN.
+    """Adjust p values of one family for testing many at once (Holm 1979); NaN values do not count and stay NaN.
 
     Args:
         p_values: (K,).

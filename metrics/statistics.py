@@ -217,7 +217,7 @@ def _mean_and_std(values: FloatArray) -> tuple[float, float]:
 
 
 def _percentile_bounds(values: FloatArray, level: float) -> tuple[float, float]:
-    # Infinities, for example of scalability, are bounds like others, but nothing lies between them.
+    # An infinite value, for example of scalability, can be a bound, but interpolating between two of them gives NaN.
     method = "nearest" if np.isinf(values).any() else "linear"
     lower, upper = np.quantile(values, [0.5 - 0.5 * level, 0.5 + 0.5 * level], method=method)
     return float(lower), float(upper)

@@ -78,7 +78,7 @@ def run_spec(scenario: ScenarioConfig, policy: str, ticks: int) -> RunSpec:
 
 
 def robot_ticks_per_second(scenario: ScenarioConfig, policy: str, ticks: int, repeats: int) -> float:
-    """Median robot-ticks per second of `run_one`, compilation excluded, building the world included."""
+    """Median robot-ticks per second of `run_one`, without compilation, with building the environment."""
     run_one(run_spec(scenario, policy, 5))
     spec = run_spec(scenario, policy, ticks)
     rates = []
@@ -240,7 +240,7 @@ def rate_row(case: str, scenario: ScenarioConfig, policy: str, target: float | N
 
 
 def scaling_rows(ticks: int, repeats: int) -> Iterator[Row]:
-    """Cost per robot-tick of large swarms beside that of 200 robots, measured in turn."""
+    """Cost per robot-tick of large swarms and of 200 robots, measured in turn."""
     small, medium, large = warehouse_medium(), large_world(288.0, 4096), large_world(576.0, 16_384)
     costs: dict[int, list[float]] = {200: [], 4096: [], 16_384: []}
     for _ in range(repeats):
@@ -285,8 +285,9 @@ def _cost_per_robot_tick(
 def wrapper_rows(ticks: int, repeats: int) -> Iterator[Row]:
     """What four active wrappers add for 200 robots, and how much of it are the random numbers that they draw.
 
-    The adversities whisper: wrappers work as hard as ever, but the swarm behaves, and so costs, as without them. The
-    draws are measured in place, in a run without wrappers that draws the same numbers in every tick.
+    The adversities are very weak: the wrappers do their full work, but the swarm behaves as without them, and so the
+    rest of the tick costs the same. The draws are measured in a run without wrappers that draws the same numbers in
+    every tick.
     """
     whisper = 1e-9
     wrappers = [
@@ -330,7 +331,7 @@ def start_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a c
 
 
 Case = Callable[[int, int], Iterable[Row]]
-"""Measures something in so many ticks and repeats."""
+"""Measures a case; arguments: ticks, repeats."""
 
 
 def cases() -> dict[str, Case]:

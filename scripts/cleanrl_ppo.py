@@ -1,13 +1,13 @@
 #!/usr/bin/env python
-"""PPO in one file, in the manner of CleanRL: plain torch on `gymnasium.make_vec`, nothing hidden.
+"""PPO in one file, in the manner of CleanRL: plain torch on `gymnasium.make_vec`.
 
     pip install . "torch==2.13.0"  # in a checkout
     python scripts/cleanrl_ppo.py --total-timesteps 3000000 --out cleanrl_ppo.npz
     swarm-forage run --policy crw,cleanrl_ppo.npz
 
-Differs from the textbook in two places, both because robots are sub-environments: arenas start anew within the step
-that ends them, so that the value of the last observation is added where an episode was cut off by time; and steps of
-robots that are not at work (`infos["active"]`) are in no minibatch.
+It differs from the textbook in two places, because sub-environments are robots. Arenas start anew within the step that
+ends them, so the value of the last observation is added where an episode was truncated. And steps of robots that are
+not at work (`infos["active"]`) are in no minibatch.
 """
 
 import argparse
@@ -94,7 +94,7 @@ def update(
 
 @torch.no_grad()
 def rollout(envs, agent: Agent, obs: np.ndarray, active: np.ndarray, args: argparse.Namespace):
-    """Collect num_steps steps of every robot; returns the steps at work, and where things stand."""
+    """Collect num_steps steps of every robot; returns steps at work, last observation, active robots, mean reward."""
     shape = (args.num_steps, envs.num_envs)
     seen = torch.zeros((*shape, obs.shape[1]))
     actions, log_probs, values, rewards, dones = (torch.zeros(shape) for _ in range(5))
@@ -107,7 +107,7 @@ def rollout(envs, agent: Agent, obs: np.ndarray, active: np.ndarray, args: argpa
         obs, reward, terminated, truncated, infos = envs.step(action.numpy())
         active = infos["active"]
         earned += reward.mean() / args.num_steps
-        if truncated.any():  # cut off by time, not by death: what would have come is worth something
+        if truncated.any():  # ended by time, not by death: add the value of what would have followed
             last = torch.from_numpy(np.stack(infos["final_obs"][truncated]))
             reward[truncated] += args.gamma * agent.value(last).numpy()
         rewards[step], dones[step] = torch.from_numpy(reward), torch.from_numpy(terminated | truncated)
@@ -115,7 +115,7 @@ def rollout(envs, agent: Agent, obs: np.ndarray, active: np.ndarray, args: argpa
     next_value, last = agent.value(torch.from_numpy(obs)), torch.zeros(envs.num_envs)
     for step in reversed(range(args.num_steps)):
         target = rewards[step] + args.gamma * next_value * (1 - dones[step])
-        # Away from work, a state is worth what follows from it; the network is not asked, and lambda does not count.
+        # The value of a robot not at work follows from its next step: no network, and no lambda in the decay.
         values[step] = torch.where(at_work[step], values[step], target)
         decay = args.gamma * torch.where(at_work[step], args.gae_lambda, 1.0)
         last = target - values[step] + decay * (1 - dones[step]) * last

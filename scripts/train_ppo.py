@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""Train PPO of stable-baselines3 on a swarm, plainly: one shared policy, every robot a sub-environment.
+"""Train PPO of stable-baselines3 on a swarm: one shared policy, every robot is a sub-environment.
 
 pip install ".[train]" "torch==2.13.0"  # in a checkout
 python scripts/train_ppo.py --steps 3000000 --out ppo_example.npz
@@ -40,7 +40,7 @@ def main() -> None:
         n_epochs=4,
         gae_lambda=0.98,
         learning_rate=1e-3,
-        rollout_buffer_class=ActiveRolloutBuffer,  # robots that are dead or in repair do not teach
+        rollout_buffer_class=ActiveRolloutBuffer,  # leaves out robots that are dead or in repair
         rollout_buffer_kwargs=env.rollout_buffer_kwargs,
         seed=0,
         verbose=1,

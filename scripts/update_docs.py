@@ -6,7 +6,7 @@
     scripts/update_docs --remake run     the same for one of them
     scripts/update_docs --compare FILE   compare the deliveries that a run of README's command printed with the stored
 
-The commands are those below, the store is docs/results.json. A block looks like
+The commands are listed below; the store is docs/results.json. A block looks like
 `<!-- generated: run.crw by scripts/update_docs -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
 --remake needs an installation with everything: pip install -e ".[plots,train]" "torch==2.13.0"
 """
@@ -73,7 +73,7 @@ def make(name: str) -> dict[str, str]:
 
 
 def fields(printed: str, labels: tuple[str, ...]) -> dict[str, str]:
-    """Return the table without what stands around it, and the deliveries of each row by its label.
+    """Return the table without the text around it, and the deliveries of each row by its label.
 
     Raises:
         ValueError: The table has another number of rows than labels.

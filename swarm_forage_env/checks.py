@@ -1,10 +1,10 @@
-"""Checks for environments and policies of your own: do they keep what the package promises about its own?
+"""Checks for environments and policies of your own: do they keep the rules that the package keeps itself?
 
     check_env(env)                    an environment, alone or in wrappers
-    check_policy(policy)              what a policy returns, looks at and remembers
+    check_policy(policy)              what a policy returns, reads and remembers
     check_determinism(policy)         whole runs: equal seeds, equal records
 
-Each returns None where all is well, and raises a `CheckError` about the first fault otherwise.
+Each returns None if all is well, and otherwise raises a `CheckError` about the first fault.
 """
 
 import contextlib
@@ -37,7 +37,7 @@ from swarm_forage_env.study.spec import chosen_caches
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
 INTERVAL_TICKS = 10
-"""Length of a recording interval where records are compared; our choice: short, so that small differences show."""
+"""Length of a recording interval in compared records. Our choice: short, so that small differences are seen."""
 
 
 class CheckError(ValueError):
@@ -50,10 +50,10 @@ class CheckError(ValueError):
 def check_env(env: ParallelEnv[str, Any, Any], *, ticks: int = 60) -> None:
     """Check an environment.
 
-    PettingZoo's own test of parallel environments; observations and states lie in their spaces; equal seeds and
-    actions give equal runs; for a `ForageEnv` or a stack of `SwarmWrapper`s the arrays of `reset_batch` and
-    `step_batch` hold what the dictionaries of `reset` and `step` hold. The environment is stepped: reset it before you
-    go on.
+    It must pass PettingZoo's own test of parallel environments. Observations and states must lie in their spaces. Equal
+    seeds and actions must give equal runs. For a `ForageEnv` or a stack of `SwarmWrapper`s, the arrays of `reset_batch`
+    and `step_batch` must hold the same values as the dictionaries of `reset` and `step`. The environment is stepped:
+    reset it before you go on.
 
     Args:
         env: The environment, with or without wrappers.
@@ -96,7 +96,7 @@ def _check_parallel_api(env: ParallelEnv[str, Any, Any], ticks: int) -> None:
     horizon = getattr(env, "max_cycles", None)
     try:
         with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
-            warnings.simplefilter("error", UserWarning)  # it only warns of agents without rewards and the like
+            warnings.simplefilter("error", UserWarning)  # some faults are only warnings in PettingZoo
             parallel_api_test(env, num_cycles=ticks)
     except (AssertionError, UserWarning) as error:
         reason = str(error) or "an assertion without a message; the traceback shows which"
@@ -140,7 +140,7 @@ def _dict_run(env: ParallelEnv[str, Any, Any], actions: Sequence[dict[str, Any]]
 
 
 def _batch_run(env: ForageEnv | SwarmWrapper, actions: Sequence[dict[str, Any]]) -> list[_Tick]:
-    """The same at array level; agents that have left are left out, as in dictionaries."""
+    """The same with arrays; agents that have left the environment are left out, as in dictionaries."""
     names = env.possible_agents
     obs = env.reset_batch(1)
     run: list[_Tick] = [{name: (obs[row].copy(), 0.0, False, False) for row, name in enumerate(names)}]
@@ -175,7 +175,7 @@ def _check_in_spaces(env: ParallelEnv[str, Any, Any], obs: dict[str, Any], tick:
 
 
 def _compare_runs(run: Sequence[_Tick], other: Sequence[_Tick], expected: str, advice: str) -> None:
-    # Runs whose ticks are all equal end together, because terminations and truncations are compared, too.
+    # Terminations and truncations are compared, too, so runs with equal ticks have equal lengths.
     for tick, (one, two) in enumerate(zip(run, other, strict=False)):
         if one.keys() != two.keys():
             raise CheckError(
@@ -206,17 +206,17 @@ def check_policy(
 ) -> None:
     """Check a policy against `contract.policy.Policy`.
 
-    It acts for a while, with some robots and then with all robots away. Its actions have the right shape, type and
-    range, and `task` holds codes of `Task`. Then it is shown the same observations again: after a reset it must act in
-    the same way, whatever the slices that it does not read hold, and whatever becomes of an observation array after
-    `act`. Last it gets another number of robots.
+    The policy acts for a while, with some robots away and then with all robots away. Its actions must have the right
+    shape, type and range, and `task` must hold codes of `Task`. Then it gets the same observations again: after a reset
+    it must act in the same way, also if the slices that it does not read hold other values, and if an observation array
+    is overwritten after `act`. Last it gets another number of robots.
 
     Args:
         policy: A registered name, the path of a policy file, a class that needs no arguments, or an object (which is
             copied).
         scenario: Where it acts; with the caches of `study.spec.chosen_caches`. Choose one in which your policy meets
             everything that it reacts to.
-        seed: Seed of the world and of the policy.
+        seed: Seed of the environment and of the policy.
         ticks: How long it acts.
 
     Raises:
@@ -262,7 +262,7 @@ class _Scene:
 
 
 def _act_in(policy: Policy, world: ForageEnv, seed: int, ticks: int, *, away: bool) -> Iterator[_Scene]:
-    """Let a policy act in a world; with `away`, robots leave for repair and come back."""
+    """Let a policy act in an environment; with `away`, robots leave for repair and come back."""
     obs = world.reset_batch(seed)
     _reset(policy, world.swarm_spec, seed)
     rows = np.arange(world.num_agents)
@@ -279,7 +279,7 @@ def _act_in(policy: Policy, world: ForageEnv, seed: int, ticks: int, *, away: bo
 
 
 def _asked(policy: Policy, obs: ObsArray, active: BoolArray, tick: int) -> _Scene:
-    """Call `act` and check what comes; the scene holds copies."""
+    """Call `act` and check the actions; the scene holds copies."""
     shown, at_work = obs.copy(), active.copy()
     try:
         actions: Any = policy.act(obs, active)
@@ -305,7 +305,7 @@ def _asked(policy: Policy, obs: ObsArray, active: BoolArray, tick: int) -> _Scen
     for row in np.flatnonzero(at_work):
         if not (np.abs(actions[row]) <= 1.0).all():  # NaN included
             raise CheckError(f"{expected}, got {actions[row].tolist()} for robot {row} at tick {tick}; np.clip them.")
-    # What an inactive robot is told to do is ignored, whatever it is.
+    # Actions of inactive robots are ignored, so they are not checked.
     return _Scene(shown, at_work, np.where(at_work[:, None], actions, np.float32(0.0)))
 
 
@@ -319,7 +319,7 @@ def _reset(policy: Policy, spec: SwarmSpec, seed: int) -> None:
 
 
 def _checked_tasks(policy: Policy, n_robots: int, tick: int) -> Any:
-    """Return `policy.task`, None without one."""
+    """Return `policy.task`, or None if the policy has none."""
     tasks = getattr(policy, "task", None)
     if tasks is None:
         return None
@@ -341,7 +341,7 @@ def _check_same_actions(
     expected: str,
     advice: str,
 ) -> None:
-    """Show a policy the observations of `scenes` again, as `shown` presents them, and compare its actions."""
+    """Give a policy the observations of `scenes` again, in the form that `shown` makes, and compare its actions."""
     _reset(policy, spec, seed)
     for tick, (scene, obs) in enumerate(zip(scenes, shown(scenes), strict=True)):
         again = _asked(policy, obs, scene.active.copy(), tick).actions
@@ -355,12 +355,12 @@ def _check_same_actions(
 
 
 def _kept_apart(scenes: Sequence[_Scene]) -> Iterator[ObsArray]:
-    """An array of its own for each tick, never overwritten."""
+    """One array for each tick, never overwritten."""
     return (scene.obs.copy() for scene in scenes)
 
 
 def _in_one_buffer(scenes: Sequence[_Scene]) -> Iterator[ObsArray]:
-    """One array for all ticks, as the environment has it."""
+    """One array for all ticks, overwritten in each, as the environment does."""
     buffer = np.empty_like(scenes[0].obs)
     for scene in scenes:
         buffer[:] = scene.obs
@@ -370,7 +370,7 @@ def _in_one_buffer(scenes: Sequence[_Scene]) -> Iterator[ObsArray]:
 def _without_unread(
     layout: ObservationLayout, reads: tuple[str, ...], filling: float | None, scenes: Sequence[_Scene]
 ) -> Iterator[ObsArray]:
-    """Observations whose unread slices hold `filling`, None = random numbers."""
+    """Observations in which the slices that are not read hold `filling`; None = random numbers."""
     rng = np.random.default_rng(0)
     for scene in scenes:
         obs = scene.obs.copy()
@@ -407,7 +407,7 @@ def check_determinism(
     seeds: Sequence[int] = (0, 1),
     seconds: float = 60.0,
 ) -> None:
-    """Run a policy twice with each seed, in this process, and compare the records and where the robots end.
+    """Run a policy twice with each seed, in this process, and compare the records and the last positions.
 
     Args:
         policy: As in `check_policy`; each run gets a fresh one.
@@ -436,7 +436,7 @@ def check_determinism(
 
 
 def _results(policy: Policy, config: ScenarioConfig, seed: int) -> dict[str, np.ndarray]:
-    """Return the columns of a run's record, and the positions at its end, which differ first."""
+    """Return the columns of a run's record, and the positions at its end, which show differences first."""
     recorder = build_stack(config, reads=getattr(policy, "reads", None))
     run = LiveRun(recorder, policy, seed)
     run.advance()
@@ -447,7 +447,7 @@ def _results(policy: Policy, config: ScenarioConfig, seed: int) -> dict[str, np.
     }
 
 
-# ----------------------------------------------------------------------------------------------- what was given
+# ---------------------------------------------------------------------------------------- from arguments to policies
 
 
 def _factory(policy: Any) -> Callable[[], Any]:

@@ -1,4 +1,4 @@
-"""ForageEnv: the PettingZoo skin over the arena. Arrays inside, per-agent dicts built once at the outermost layer."""
+"""ForageEnv: the arena as a PettingZoo environment. It works on arrays; only `reset` and `step` make dicts."""
 
 from collections.abc import Callable, Collection, Mapping
 from functools import cached_property
@@ -27,8 +27,8 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     """A swarm that forages: one agent per robot, named robot_0, robot_1, ...
 
     Observations are flat float32 rows in named slices (`env.layout`, printed by `env.layout.describe()`); actions are
-    (left wheel, right wheel, gripper) in [-1, 1], values beyond are clipped. Robots that are away in repair stay in
-    `agents` with the observation column `active` at 0; only permanent death terminates, only the horizon truncates.
+    (left wheel, right wheel, gripper) in [-1, 1]; values outside are clipped. Robots in repair stay in `agents`; their
+    observation column `active` is 0. Only permanent death terminates, only the horizon truncates.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo types it as an attribute of instances
@@ -49,13 +49,13 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """Create the environment of one scenario.
 
         Args:
-            scenario: The world.
+            scenario: The configuration.
             max_cycles: Steps until truncation; default the scenario's horizon.
             render_mode: None or "rgb_array".
-            reads: Observation slices that will be looked at; others may stay zero (faster). Default: all.
+            reads: Observation slices that will be used; others may stay zero, which is faster. Default: all.
 
         Raises:
-            ConfigError: no ScenarioConfig, or an unknown slice in `reads`.
+            ConfigError: `scenario` is no ScenarioConfig, or an unknown slice in `reads`.
             ValueError: max_cycles is no whole number >= 1, or an unknown render mode.
         """
         instance("scenario", scenario, ScenarioConfig, hint="; `parallel_env` takes names of presets, too")
@@ -108,11 +108,11 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """What every policy may know before a run."""
         return SwarmSpec.of(self.scenario, horizon_s=self.max_cycles * self.scenario.dt_s)
 
-    # Truth, for wrappers, recorders and pictures
+    # True state, for wrappers, recorders and pictures
 
     @property
     def _world(self) -> ForagingArena:
-        """The arena once it holds a world; raises RuntimeError before the first reset."""
+        """The arena; raises RuntimeError before the first reset."""
         if self.seed_value is None:
             raise RuntimeError("There is no world before the first reset. Call reset before step, state or render.")
         return self.arena
@@ -148,9 +148,9 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         return self.arena.tick
 
     def set_population(self, *, active: BoolArray, present: BoolArray, terminated: BoolArray | None = None) -> None:
-        """Say who is at work and who is in the world; see `ForagingArena.set_population`.
+        """Set which robots are at work and which are in the world; see `ForagingArena.set_population`.
 
-        `terminated` (N,) names the robots that learners shall see as terminated from the next step on.
+        `terminated` (N,) marks robots that count as terminated from the next step on.
 
         Raises:
             ValueError: wrong shapes, or a robot that is active but not present.
@@ -167,7 +167,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """Start a run and return observations (N, D).
 
         Args:
-            seed: Non-negative integer; None continues a sequence of seeds that the last given seed (or the
+            seed: Non-negative integer. None takes the next of a sequence of seeds, which the last given seed (or the
                 operating system) started.
         """
         if seed is None:
@@ -182,14 +182,14 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         return obs
 
     def checked_actions(self, actions: ActionArray) -> ActionArray:
-        """Return `actions` as a contiguous (N, 3) float32 array, itself where it is one; values are not looked at.
+        """Return `actions` as a contiguous (N, 3) float32 array, the same array if it is one; values are not checked.
 
         Raises:
-            ActionError: no numbers, or another shape.
+            ActionError: values that are not numbers, or another shape.
         """
         expected = self._actions.shape
         try:
-            # Kernels are compiled for contiguous float32 only; anything else would be compiled anew, for a minute.
+            # Kernels are compiled for contiguous float32 only; another type would start a compilation of a minute.
             checked = np.ascontiguousarray(actions, np.float32)
         except (TypeError, ValueError) as error:
             raise ActionError(f"Expected actions with shape (n_robots, 3) = {expected}: {error}.") from error
@@ -210,15 +210,16 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """Advance one tick at array level.
 
         Args:
-            actions: (N, 3) float32, rows of robots that are away included (and ignored); other numbers are converted.
-            wheel_gain: (N, 2) factor per wheel on the limited speed; wrappers multiply theirs in.
-            tasks: (N,) int8 `Task` codes, if the policy tells them.
+            actions: (N, 3) float32, also for robots that are away (ignored); other number types are converted.
+            wheel_gain: (N, 2) factor per wheel on the limited speed: the product of the wrappers' gains.
+            tasks: (N,) int8 `Task` codes, if the policy has tasks.
 
         Returns:
             Observations (N, D) and rewards (N,) in reused buffers, terminated (N,) for the dead, truncated.
 
         Raises:
-            ActionError: no numbers, wrong shape, or an active robot's action or gain that is not finite.
+            ActionError: values that are not numbers, a wrong shape, or an action or gain of an active robot that is not
+                finite.
             RuntimeError: before the first reset.
         """
         arena = self._world
@@ -342,7 +343,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
         if self.render_mode is None:
             return None
-        from swarm_forage_env.rendering.frame import render_frame  # optional extra: only when a picture is asked for
+        from swarm_forage_env.rendering.frame import render_frame  # an optional extra, imported only for a picture
 
         return render_frame(self.scenario, self.swarm, self.objects, self.caches, self.events, tick=self.tick)
 

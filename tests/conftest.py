@@ -1,4 +1,4 @@
-"""Settings shared by all tests, and what becomes of skipped ones."""
+"""Settings shared by all tests, and rules for skipped tests."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""check_env, check_policy, check_determinism: what is sound passes, and each fault is found."""
+"""check_env, check_policy, check_determinism: correct subjects pass, and each fault is noticed."""
 
 import sys
 
@@ -166,7 +166,7 @@ def test_a_swarm_of_one_robot_can_be_checked():
 
 
 class Sound:
-    """Base of the faulty ones: everybody stands."""
+    """Base of the faulty policies: all robots stand still."""
 
     def reset(self, task, rng):
         self.n_robots, self.layout, self.rng = task.n_robots, task.layout, rng

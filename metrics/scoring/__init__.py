@@ -1,4 +1,4 @@
-"""From policies, runs and files of curves to tables of scores, with everything needed to read them."""
+"""From policies, runs and files of curves to tables of scores, with notes that help to read them."""
 
 from .comparison import Comparison, compare_tables
 from .front_door import compare_policies, score_curves, score_policy

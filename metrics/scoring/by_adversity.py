@@ -80,7 +80,7 @@ def _distance_scores(name: str, study: StudyCurves) -> Iterator[Score]:
 
 
 def _beside_distance(reference: RunCurves, level: RunCurves) -> dict[str, float]:
-    """What the distance does not tell: its sign, and how far the conditions were from the ideal ones."""
+    """What the distance does not show: its sign, and how far the conditions were from the ideal ones."""
     ideal, disturbed = common_runs(reference, level)
     if not ideal.seeds:
         return {}

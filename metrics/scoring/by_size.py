@@ -60,7 +60,7 @@ class _SizeMeasure:
     """Computes it. Arguments: the runs of one robot if `from_one`, of the next smaller swarm if `of_neighbours`, and of
     the swarm itself."""
     unit: str
-    """Of the value; {span} stands for the length of a run."""
+    """Unit of the value; {span} stands for the length of a run."""
     from_one: bool = False
     of_neighbours: bool = False
     needs_interference: bool = False

@@ -1,13 +1,13 @@
 """The columns of a table of curves, which has one row per recording interval.
 
-Run records of `swarm_forage_env` and curves from anywhere else arrive in the same table, under these names.
+Run records of `swarm_forage_env` and curves from other sources use the same table with these names.
 """
 
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 Kind: TypeAlias = Literal["text", "whole", "number", "amount", "fraction"]
-"""Of a column: text, whole numbers >= 0, numbers, numbers >= 0, numbers in [0, 1]."""
+"""Kind of a column: text, whole numbers >= 0, numbers, numbers >= 0, numbers in [0, 1]."""
 
 SIZE, THROTTLE, NOISE, POPULATION, UNDISTURBED = "population_size", "throttle", "noise", "population_dynamics", "none"
 CRITERIA = (SIZE, THROTTLE, NOISE, POPULATION, UNDISTURBED)

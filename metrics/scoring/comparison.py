@@ -1,4 +1,4 @@
-"""Which of several policies is better, and whether the runs can tell."""
+"""Which of several policies is better, and whether the difference is significant."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,14 +17,14 @@ from .table import Score, ScoreTable, forecast_lines, title
 from .texts import aligned, paragraph, percent, plain, spread
 
 FAMILY_ERROR = 0.05
-"""Probability of one or more false differences within a measure."""
+"""Probability that one or more differences within a measure are called significant by chance."""
 TEST = (
     "Differences: first policy minus second, runs paired by seed, mean with half of Student's 95 % interval. "
     "* = significant: two-sided paired t test, p at most 0.05 after Holm's correction over all levels and pairs of "
     "policies of a measure. Relative = per unit of the performance compared with, tested as a measure of its own: "
     "amounts and distances grow with performance, so a swarm that does little has little to lose."
 )
-"""How differences are tested, for people."""
+"""How differences are tested, as a text for readers."""
 VALUES = (
     "Values: mean over seeds with half of Student's 95 % interval; in brackets the mean relative to the performance "
     "compared with; ! = runs are missing."
@@ -45,9 +45,9 @@ class Difference:
     is_relative: bool
     """Whether scores relative to performance are compared, or the scores themselves."""
     summary: Summary
-    """Of the differences of runs with the same seed."""
+    """Mean difference of runs with the same seed, with its interval."""
     p: float
-    """Of the paired t test; NaN where it cannot be made (fewer than two pairs, infinite scores)."""
+    """p value of the paired t test; NaN where there is none (fewer than two pairs, infinite scores)."""
     p_holm: float
     """The same after Holm's correction over all levels and pairs of policies of the measure; relative scores have a
     correction of their own."""
@@ -149,7 +149,7 @@ class Comparison:
         return lines
 
     def notes(self) -> tuple[str, ...]:
-        """Return what must not be overlooked, policy by policy; what holds for all of them once."""
+        """Return notes to the scores, policy by policy; a note that holds for all of them appears once."""
         per_table = [table.notes() for table in self.tables]
         shared = [note for note in per_table[0] if all(note in notes for notes in per_table)]
         own = [
@@ -256,7 +256,7 @@ def _difference(pair: _Pair, p: float, p_holm: float) -> Difference:
 
 
 def _cell(score: Score | None) -> str:
-    """Value with its half interval, what it is relative to performance, and "!" where runs are missing."""
+    """Value with its half interval, the value relative to performance, and "!" where runs are missing."""
     if score is None:
         return "-"
     relative = "" if score.relative is None else f" ({percent(score.relative.mean)})"

@@ -1,4 +1,4 @@
-"""Whatever is given as a policy, made ready to be run: a name, a file, an object, a class or a function."""
+"""Policies made ready to be run, given as a name, a file, an object, a class or a function."""
 
 import copy
 import inspect
@@ -31,7 +31,7 @@ class Contestant:
     caches: str
     """Which caches its runs have."""
     factory: Callable[..., Any] | None = None
-    """Builds the policy in this process; None where workers find it by its name."""
+    """Builds the policy in this process; None if worker processes can load it by its name."""
     is_named: bool = True
     """Whether its runs may be stored: a name tells which policy a stored run belongs to."""
 
@@ -59,7 +59,7 @@ def contestants_of(
 
 
 def _told_apart(contestants: tuple[Contestant, ...]) -> tuple[Contestant, ...]:
-    """Name files of equal names by their folders, too, or by whole paths.
+    """If files have equal names, add their folders to the names, or use whole paths.
 
     Raises:
         CurveError: policies still have equal names.
@@ -120,6 +120,6 @@ def _takes_nothing(function: Any) -> bool:
     """Whether a function can only be a factory: it could not take observations."""
     try:
         parameters = inspect.signature(function).parameters.values()
-    except ValueError:  # some compiled functions do not tell; they are taken for policies
+    except ValueError:  # some compiled functions have no signature; they are taken for policies
         return False
     return not any(p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD, p.VAR_POSITIONAL) for p in parameters)

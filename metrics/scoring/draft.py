@@ -1,4 +1,4 @@
-"""One score in the making: which experiments enter, how their runs are paired, and what has to be said about it."""
+"""How one score is made: which experiments are used, how their runs are paired, and which notes it gets."""
 
 import math
 from collections.abc import Callable
@@ -22,7 +22,7 @@ Values: TypeAlias = Callable[..., ArrayLike]
 """A measure of experiments: it takes their common runs and returns one value per run."""
 
 
-class Uncomputable(Exception):  # noqa: N818 - no error: the table says so and goes on
+class Uncomputable(Exception):  # noqa: N818 - not an error: the table notes it and continues
     """The curves do not allow this measure; the message says why."""
 
 
@@ -35,9 +35,9 @@ class ScoreDraft:
     x: float
     unit: str
     experiments: tuple[RunCurves, ...]
-    """Those that enter, reference first."""
+    """Experiments that are used, the reference first."""
     compared_with: int | None = None
-    """Index in `experiments` of the swarm by whose total performance relative values are divided; None: no such."""
+    """Index in `experiments` of the swarm whose total performance divides relative values; None: no relative values."""
     beside: dict[str, float] = field(default_factory=dict[str, float])
 
     def score(self, values: Values, *, floor: float | None = None, order_matters: bool = False) -> Score:

@@ -32,10 +32,10 @@ FORECAST_HEADER = (
 class PopulationForecast:
     """One level of population dynamics: predicted and observed.
 
-    Times per departure are the seconds that all robots together spend in or out of the swarm, over the number of
-    departures (deaths and malfunctions). Prediction and observation both end with the run, so that they can be
-    compared. The time per repair counts absences that ended within a run, which leaves out the longest. The equilibrium
-    time is that of a run without end.
+    Times per departure are the seconds that all robots together spend in or out of the swarm, divided by the number of
+    departures (deaths and malfunctions). Prediction and observation both end with the run, so they can be compared. The
+    time per repair counts only absences that ended within a run, which leaves out the longest. The equilibrium time is
+    that of a run without end.
     """
 
     level: float
@@ -47,16 +47,16 @@ class PopulationForecast:
     observed_at_work: Summary
     """The same in the runs."""
     predicted_time_in_s: float
-    """Robot-seconds at work per departure: horizon times robots at work, over lambda times horizon."""
+    """Robot-seconds at work per departure: (horizon times robots at work) / (lambda times horizon)."""
     observed_time_in_s: float
-    """NaN where nobody departed or departures were not recorded."""
+    """The same in the runs; NaN if no robot departed or departures were not recorded."""
     predicted_time_out_s: float
     """Robot-seconds away per departure."""
     observed_time_out_s: float
     observed_time_per_repair_s: float
     """Mean length of absences that ended with a repair; NaN where there was none."""
     equilibrium_time_out_s: float
-    """1 / (mu - lambda), of an unlimited queue without end; infinite where nobody returns."""
+    """1 / (mu - lambda), of an unlimited queue without end; infinite if no robot returns."""
     printed_time_out_s: float
     """1 / (mu - lambda) + 1 / mu, as the paper prints it, which counts the repair itself twice."""
 

@@ -1,4 +1,4 @@
-"""The front door: score any policy in any scenario, compare policies, or score curves from anywhere else."""
+"""The public functions of scoring: score a policy in a scenario, compare policies, or score curves from a file."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -42,7 +42,7 @@ def score_policy(
     """Run a policy in all experiments that the measures need, and score it.
 
     Args:
-        policy: See `PolicyLike`. What is neither a name nor a path is run in this process, one run at a time; objects
+        policy: See `PolicyLike`. Objects, classes and functions are run in this process, one run at a time; objects
             are copied for each run.
         scenario: Name of a preset, or a complete configuration; its horizon and interval are those of the budget.
         measures: Names out of `MEASURE_CRITERIA`; default all.
@@ -52,8 +52,8 @@ def score_policy(
         name: Name in tables and stored runs. A policy given as object or function needs one for `out`; it then stands
             for the code: give another name when the code has changed.
         parameters: Keyword arguments of a registered policy or a class.
-        caches: "none", "static", "dynamic"; default the world that the policy is made for.
-        out: Folder for run records. Runs it already holds are not repeated, so an interrupted call is just repeated.
+        caches: "none", "static", "dynamic"; default see `study.spec.chosen_caches`.
+        out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
         jobs: Processes; default one per core.
         executor: Runs the work instead, for example Dask's `client.get_executor()`.
         progress: Show progress and an estimate on stderr.
@@ -64,7 +64,7 @@ def score_policy(
     Raises:
         CurveError: unknown measures.
         ValueError: an unknown policy, scenario, budget, or values that describe no run.
-        ImportError: a model, and stable-baselines3 is not installed.
+        ImportError: the policy is a model, and stable-baselines3 is not installed.
         swarm_forage_env.study.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
     """
     plan = plan_scores(
@@ -94,7 +94,7 @@ def compare_policies(
     executor: "Executor | None" = None,
     progress: bool = True,
 ) -> Comparison:
-    """Score policies in the same worlds and compare them seed by seed.
+    """Score policies in the same experiments and compare them seed by seed.
 
     Args and errors as in `score_policy`; `policies` are two or more, or a mapping from names to policies.
     """

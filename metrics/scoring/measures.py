@@ -1,4 +1,4 @@
-"""Which measures there are to score, what has to be varied for each, and their order in tables."""
+"""Which measures can be scored, what has to be varied for each, and their order in tables."""
 
 import difflib
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What would be run to score policies: which policies, which experiments, which seeds."""
+"""The plan of a scoring: which policies, which experiments, which seeds."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScoringPlan:
-    """What would be run to score some policies."""
+    """The runs that score some policies."""
 
     contestants: tuple[Contestant, ...]
     experiments: "tuple[Experiment, ...]"
@@ -56,7 +56,7 @@ def plan_scores(
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
 ) -> ScoringPlan:
-    """Return what `score_policy` and `compare_policies` would run; arguments and errors as there."""
+    """Return the runs that `score_policy` and `compare_policies` make; arguments and errors as there."""
     from swarm_forage_env.scenarios.presets import scenario as preset
     from swarm_forage_env.study import experiments
 

@@ -28,8 +28,8 @@ _X_LABELS = {
 def draw_scores(tables: Sequence[ScoreTable], path: str | Path) -> None:
     """Draw score tables side by side into a picture file: one panel per measure, one line per policy.
 
-    Error bars are the intervals of the tables, dotted lines the noise floors. Measures that runs do not enter
-    (availability) are left out, as are values that are not finite.
+    Error bars are the intervals of the tables, dotted lines the noise floors. Measures that are computed without runs
+    (availability) and values that are not finite are left out.
 
     Args:
         tables: One per policy.

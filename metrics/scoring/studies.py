@@ -21,11 +21,11 @@ class RunCurves:
     seeds: tuple[int, ...]
     """Number of each run, rising, (R,)."""
     curves: dict[str, FloatArray]
-    """Column -> values, (R, T); columns that the table does not have are not in it."""
+    """Column -> values, (R, T); only columns that the table has."""
     rates: PopulationRates | None = None
     """Rates of change of the population, per second."""
     n_planned: int | None = None
-    """How many runs there should be; None = those there are."""
+    """How many runs were planned; None = as many as there are."""
 
     @property
     def performance(self) -> FloatArray:
@@ -65,7 +65,7 @@ class StudyCurves:
     controller: str
     experiments: tuple[RunCurves, ...]
     t_end_s: FloatArray | None
-    """Ends of the intervals, (T,); None where the table does not tell."""
+    """Ends of the intervals, (T,); None if the table has no such column."""
     where: str = "the table"
     """Name of the table in error messages."""
 

@@ -1,4 +1,4 @@
-"""What scoring returns: one score per measure and level, with everything needed to read it, and tables of them."""
+"""What scoring returns: one score per measure and level, with notes that help to read it, and tables of scores."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -30,12 +30,12 @@ class Score:
     x: float
     """The level as a number: the larger swarm size, or the criterion's value."""
     n_robots: tuple[int, ...]
-    """Swarm sizes that enter, the reference run's included."""
+    """Swarm sizes of the runs that are used, the reference run's included."""
     unit: str
     summary: Summary
     """Mean over seeds with Student's interval."""
     per_seed: Mapping[int, float]
-    """Seed -> value of the runs with this seed, one run of each experiment that enters."""
+    """Seed -> value of the runs with this seed, one run of each experiment that is used."""
     n_lost: int = 0
     """Runs that failed or have no partner of the same seed."""
     noise_floor: float | None = None
@@ -69,7 +69,7 @@ class Score:
         """Return the score as texts under `HEADER`."""
         summary = self.summary
         runs = str(summary.n_used) + (f" of {summary.n_used + summary.n_nan + self.n_lost}" if self.is_partial else "")
-        enters = bool(self.per_seed) or self.is_partial  # no run enters what follows from rates alone
+        enters = bool(self.per_seed) or self.is_partial  # a measure that follows from rates alone uses no runs
         return (
             self.measure,
             self.at,
@@ -119,11 +119,11 @@ class Score:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScoreTable:
-    """All scores of one policy in one world."""
+    """All scores of one policy in one scenario."""
 
     policy: str
     scenario: str
-    """Name of the world; empty where nobody told."""
+    """Name of the scenario; empty if it is not known."""
     scores: tuple[Score, ...]
     forecasts: tuple[PopulationForecast, ...] = ()
     """What the queue model predicts for a changing population, beside what the runs showed."""
@@ -146,13 +146,13 @@ class ScoreTable:
         return found
 
     def notes(self) -> tuple[str, ...]:
-        """Return everything that must not be overlooked: notes of scores, missing measures, failed runs."""
+        """Return all notes: those of scores, missing measures, failed runs."""
         noted = [f"{places}: {note}" for note, places in self._places_of_notes().items()]
         absent = [f"{measure} is not computed: {reason}" for measure, reason in self.missing.items()]
         return (*noted, *absent, *(f"failed: {failure}" for failure in self.failures))
 
     def _places_of_notes(self) -> dict[str, str]:
-        """Note -> the scores that have it, in words, so that what holds for many is told once."""
+        """Note -> the scores that have it, in words, so that a note of many scores appears once."""
         levels: dict[str, dict[str, list[str]]] = {}
         for score in self.scores:
             if score.note:
@@ -207,7 +207,7 @@ def title(tables: Sequence[ScoreTable]) -> str:
 
 
 def forecast_lines(tables: Sequence[ScoreTable]) -> list[str]:
-    """Return forecasts and observations as lines, each once: often they are the same for all policies."""
+    """Return forecasts and observations as lines; equal lines of several policies appear once."""
     lines: list[str] = []
     shown: list[list[tuple[str, ...]]] = []
     for table in tables:

@@ -7,7 +7,7 @@ from metrics.significance import ROUNDING
 from metrics.statistics import Summary
 
 _NO_AMOUNT = 1e-12
-"""Smaller amounts are what rounding leaves of zero."""
+"""Smaller amounts are rounding errors and are shown as zero."""
 
 
 def paragraph(lines: Sequence[str]) -> list[str]:

@@ -53,7 +53,7 @@ for command in (info, schema, rerun, record, stuck):
 
 
 def main() -> None:
-    """Run the command line and exit; whatever a person got wrong is one line on stderr."""
+    """Run the command line and exit; an error of the user is one line on stderr."""
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.study.record import RecordError
 

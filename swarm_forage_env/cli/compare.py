@@ -26,7 +26,7 @@ def compare(
     policies: Annotated[
         str,
         typer.Option(
-            "--policy", "--policies", help="Two or more, separated by commas: names, or files of trained ones."
+            "--policy", "--policies", help="Two or more, separated by commas: names, or files of trained policies."
         ),
     ],
     scenario: Scenario = "warehouse_small",
@@ -44,7 +44,7 @@ def compare(
     as_json: AsJson = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Score policies in the same worlds, seed by seed, and say which differences are significant."""
+    """Score policies in the same experiments, seed by seed, and say which differences are significant."""
     from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder
     from swarm_forage_env.cli.score_options import ScoreOptions, build_plan
     from swarm_forage_env.cli.score_report import run_and_show

@@ -1,4 +1,4 @@
-"""What `list` and `info` tell: which scenarios and policies there are, and what they are made of."""
+"""The texts of `list` and `info`: which scenarios and policies there are, and their fields."""
 
 import dataclasses
 import inspect
@@ -85,7 +85,7 @@ def _policy_lines(name: str) -> Iterator[str]:
     yield ""
     yield f"  defined in  {policy.__module__}"
     yield f"  parameters  {inspect.signature(policy)}"
-    yield f"  caches      {getattr(policy, 'caches', 'none')} (the world it is made for)"
+    yield f"  caches      {getattr(policy, 'caches', 'none')} (which it is made for)"
     yield f"  reads       {'all slices' if reads is None else ', '.join(reads) or 'nothing'}"
 
 
@@ -105,9 +105,9 @@ def _file_lines(file: Path) -> Iterator[str]:
     yield ""
     for name, value in dataclasses.asdict(about.interface).items():
         yield f"  {name:<20}{_plain(value)}"
-    yield f"  {'caches':<20}{about.caches} (the world it is made for)"
+    yield f"  {'caches':<20}{about.caches} (which it is made for)"
     for part, values in about.card.items():
-        if part != "plan":  # a page of its own
+        if part != "plan":  # shown on its own page
             yield ""
             yield f"  [{part}]"
             if isinstance(values, dict):

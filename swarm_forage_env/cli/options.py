@@ -10,7 +10,7 @@ from swarm_forage_env._internal.extras import install_command
 EXIT_FAILURE = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
-"""What shells report for a program that Ctrl-C ended."""
+"""Exit code that shells report for a program ended by Ctrl-C."""
 
 NO_PICTURE = f"No picture without matplotlib: {install_command('plots')}."
 
@@ -38,7 +38,7 @@ ConfigFile = Annotated[
     typer.Option(
         "--config",
         metavar="FILE.toml",
-        help="Scenario fields and wrappers, one table each; what other options say goes before it.",
+        help="Scenario fields and wrappers, one table each; other options override it.",
     ),
 ]
 
@@ -53,6 +53,6 @@ DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and an e
 
 
 def complain(message: str, code: int) -> int:
-    """Say one line on stderr; returns `code`."""
+    """Print one line on stderr; returns `code`."""
     typer.echo("swarm-forage: " + " ".join(message.split()), err=True)
     return code

@@ -1,4 +1,4 @@
-"""What a command has to say: tables for people, JSON for programs, a picture."""
+"""Output of a command: tables for people, JSON for programs, a picture."""
 
 import json
 import math
@@ -51,7 +51,7 @@ class ControllerSummary:
     first_pickups_per_1000_s: Estimate
     interference_fraction: float
     simulated_s_per_wall_s: float
-    """Per process, policy and recording included."""
+    """Simulated seconds per second and process, policy and recording included."""
 
 
 def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[ControllerSummary, ...]:
@@ -101,7 +101,7 @@ def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummar
 
 
 def shown(policy: str) -> str:
-    """Return the name of a policy for people: a file below the current folder without the way there."""
+    """Return the name of a policy for people; a file below the current folder is shown relative to it."""
     path = Path(policy)
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else policy
 

@@ -35,12 +35,12 @@ def run(
     policy: Annotated[
         str,
         typer.Option(
-            "--policy", "--controller", help="One or more, separated by commas: names, or files of trained ones."
+            "--policy", "--controller", help="One or more, separated by commas: names, or files of trained policies."
         ),
     ] = "crw",
     robots: Robots = None,
     seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,
-    first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first of them.")] = 0,
+    first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first run.")] = 0,
     horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
     objects: Objects = None,
     side: Side = None,

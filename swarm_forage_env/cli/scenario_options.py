@@ -1,4 +1,4 @@
-"""From command-line words to run specifications. Everything a person can get wrong raises a ConfigError here."""
+"""From command-line words to run specifications. Every wrong input raises a ConfigError here."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -32,14 +32,14 @@ class ScenarioOptions:
     wrappers: tuple[str, ...] = ()
     """Words of the form name:key=value,key=value."""
     config_file: Path | None = None
-    """TOML file with scenario fields and wrappers; the other options go before it."""
+    """TOML file with scenario fields and wrappers; the other options override it."""
 
 
 def split_names(text: str) -> tuple[str, ...]:
     """Split a comma-separated list of names, dropping repetitions.
 
     Raises:
-        ConfigError: nothing in it.
+        ConfigError: there is no name in it.
     """
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     if not names:
@@ -50,14 +50,14 @@ def split_names(text: str) -> tuple[str, ...]:
 def build_scenario(
     options: ScenarioOptions, file_fields: Mapping[str, Any] | None = None
 ) -> tuple[ScenarioConfig, str | None]:
-    """Return the scenario, and which caches were asked for (None = nobody asked).
+    """Return the scenario, and which caches were asked for (None = none given).
 
     Args:
-        options: What the command line says.
-        file_fields: Scenario fields that hold where the command line says nothing.
+        options: Options of the command line.
+        file_fields: Scenario fields of the file; options override them.
 
     Raises:
-        ConfigError: unknown names, values of a wrong type, or a world that cannot be.
+        ConfigError: unknown names, values of a wrong type, or values that do not fit together.
     """
     overrides = scenario_overrides(options, file_fields)
     return scenario(options.scenario, **overrides), overrides.get("caches")
@@ -152,5 +152,5 @@ def plan_runs(
 
 
 def default_folder(scenario_name: str) -> Path:
-    """Return where results go unless told otherwise: one folder per scenario, so that repeated runs are found."""
+    """Return the default folder for results: one folder per scenario, so that repeated runs are found."""
     return Path("results") / scenario_name

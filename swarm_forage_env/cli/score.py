@@ -30,7 +30,7 @@ def score(
     context: typer.Context,
     policy: Annotated[str | None, typer.Option(help="Name, or file of a trained policy.")] = None,
     curves: Annotated[
-        Path | None, typer.Option(help="Score curves from elsewhere instead: a CSV or Parquet file (docs/scoring.md).")
+        Path | None, typer.Option(help="Score curves from a CSV or Parquet file instead (docs/scoring.md).")
     ] = None,
     scenario: Scenario = "warehouse_small",
     measures: Measures = None,
@@ -47,7 +47,7 @@ def score(
     as_json: AsJson = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Run a policy in all that the measures of swarm engineering need, and score it.
+    """Run a policy in all experiments that the measures of swarm engineering need, and score it.
 
     Swarms of several sizes, throttled, noisy and failing robots; one table with intervals and noise floors. Runs that
     the folder holds already are not repeated.
@@ -71,7 +71,7 @@ def score(
 
 
 def _refuse_options_of_runs(context: typer.Context) -> None:
-    """Refuse what curves that exist already would silently ignore."""
+    """Refuse options about runs, which would have no effect on curves from a file."""
     sources = {option: context.get_parameter_source(str(option.name)) for option in context.command.params}
     given = [
         option.opts[0]

@@ -26,17 +26,17 @@ class ScoreOptions:
 def build_plan(
     described: ScenarioOptions, options: ScoreOptions, *, at_least: int = 1, at_most: int | None = None
 ) -> ScoringPlan:
-    """Return what the words ask for.
+    """Return the plan that the options describe.
 
     Args:
-        described: The scenario; its horizon is that of the budget.
-        options: The rest.
+        described: Options of the scenario; its horizon is that of the budget.
+        options: The other options.
         at_least: How many policies there must be.
         at_most: How many there may be, None = any number.
 
     Raises:
         ConfigError: whatever is wrong with the words.
-        ImportError: a model, and stable-baselines3 is not installed.
+        ImportError: the policy is a model, and stable-baselines3 is not installed.
     """
     for word in described.settings:
         if word.partition("=")[0] in _OF_THE_BUDGET:

@@ -1,4 +1,4 @@
-"""What `score` and `compare` do with a plan, and what they have to say: tables, JSON, a picture."""
+"""How `score` and `compare` carry out a plan, and what they print: tables, JSON, a picture."""
 
 import json
 from collections import Counter
@@ -21,7 +21,7 @@ from swarm_forage_env.study.store import RunStore
 def run_and_show(
     plan: ScoringPlan, folder: Path, picture: str, jobs: int | None, *, as_json: bool, dry_run: bool
 ) -> None:
-    """Run a plan and show the scores; or show the plan, where nothing is to be run.
+    """Run a plan and show the scores; with `dry_run`, only show the plan.
 
     Args:
         plan: What to run.
@@ -49,7 +49,7 @@ def run_and_show(
 
 
 def show_scores(tables: Sequence[ScoreTable], picture: Path | None, *, as_json: bool) -> None:
-    """Show the scores of one policy, or compare those of several; draw them where `picture` says so."""
+    """Show the scores of one policy, or compare those of several; draw them into `picture` unless it is None."""
     comparison = compare_tables(tables) if len(tables) > 1 else None
     drawn = None
     if picture is not None:
@@ -116,7 +116,7 @@ def _json_text(tables: Sequence[ScoreTable], comparison: Comparison | None, pict
 
 
 def _draw(tables: Sequence[ScoreTable], path: Path) -> Path | None:
-    """Draw the tables; None where there is nothing to draw.
+    """Draw the tables; returns None if there is nothing to draw.
 
     Raises:
         ImportError: matplotlib is not installed.

@@ -6,7 +6,7 @@ _WIDTH_WITHOUT_TERMINAL = 140
 
 
 def output() -> Console:
-    """Return a console on stdout; tables stay whole where nobody knows the width."""
+    """Return a console on stdout; if the width is unknown, tables are not cut."""
     console = Console(highlight=False)
     if not console.is_terminal:
         console.width = _WIDTH_WITHOUT_TERMINAL

@@ -1,4 +1,4 @@
-"""The command `train`; the plan it makes is `training.recipe`, what it does is `training.sb3.training`."""
+"""The command `train`: it makes a plan by `training.recipe` and carries it out by `training.sb3.training`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -24,7 +24,8 @@ def train(  # long: one parameter per option
         str | None, typer.Option(help="discrete or continuous; default discrete, for sac continuous.")
     ] = None,
     automatic_gripper: Annotated[
-        bool | None, typer.Option("--automatic-gripper/--own-gripper", help="Who grasps; default automatic.")
+        bool | None,
+        typer.Option("--automatic-gripper/--own-gripper", help="Whether the gripper is automatic; default yes."),
     ] = None,
     decision_ticks: Annotated[int | None, typer.Option(min=1, help="Ticks per decision; default 5.")] = None,
     evaluate_every: Annotated[
@@ -34,7 +35,7 @@ def train(  # long: one parameter per option
         bool | None,
         typer.Option(
             "--small-start/--no-small-start",
-            help="Spend the first third in a smaller arena, where ways are short; default where deliveries count.",
+            help="Spend the first third in a smaller arena with short ways; default if deliveries count.",
         ),
     ] = None,
     hidden: Annotated[str | None, typer.Option(help="Sizes of the hidden layers; default 64,64.")] = None,
@@ -50,10 +51,10 @@ def train(  # long: one parameter per option
     settings: Settings = None,
     wrappers: Wrappers = None,
     config: ConfigFile = None,
-    processes: Annotated[int, typer.Option(min=0, help="Processes for the arenas; 0 = none of their own.")] = 0,
+    processes: Annotated[int, typer.Option(min=0, help="Processes for the arenas; 0 = all in this process.")] = 0,
     resume: Annotated[
         bool,
-        typer.Option("--resume", help="Go on from the checkpoint in --out, by its plan; with --steps, a longer one."),
+        typer.Option("--resume", help="Continue from the checkpoint in --out by its plan; --steps makes it longer."),
     ] = False,
 ) -> None:
     """Train one policy that every robot shares, beside evaluations of it and of a scripted controller.

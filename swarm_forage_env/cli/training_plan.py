@@ -1,4 +1,4 @@
-"""From the words of `swarm-forage train` to a plan: by the recipe, from a file, or of a training that goes on."""
+"""From the words of `swarm-forage train` to a plan: by the recipe, from a file, or of a training to resume."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,14 +36,14 @@ class TrainOptions:
 
 
 def build_plan(words: ScenarioOptions, options: TrainOptions) -> TrainingPlan:
-    """Return the plan that the words of the command line describe: `training.recipe` with what they say.
+    """Return the plan that the command line describes, made by `training.recipe`.
 
     Raises:
-        ConfigError: whatever is wrong with them.
+        ConfigError: anything wrong with the options.
     """
     fields, file_wrappers = ({}, ()) if words.config_file is None else read_config(words.config_file)
     words = replace(words, horizon=options.horizon_s)
-    build_scenario(words, fields)  # refuses what is not a field, so that the recipe does not take it for its argument
+    build_scenario(words, fields)  # refuses unknown fields, which the recipe could take for its own arguments
     overrides = scenario_overrides(words, fields)
     interface = {name: getattr(options, name) for name in _INTERFACE_FIELDS}
     chosen = {name: getattr(options, name) for name in ("algorithm", "steps", "n_arenas", "small_start", "seed")}
@@ -62,7 +62,7 @@ def build_plan(words: ScenarioOptions, options: TrainOptions) -> TrainingPlan:
 
 
 def _given(values: dict[str, Any]) -> dict[str, Any]:
-    """Leave out what nobody gave, so that the default is told in one place."""
+    """Leave out options that were not given, so that the defaults stand in one place."""
     return {name: value for name, value in values.items() if value is not None}
 
 
@@ -77,15 +77,15 @@ def named_plan(name: str) -> TrainingPlan:
 
 
 def resumed_plan(folder: Path, described: TrainingPlan | None, steps: int | None) -> TrainingPlan:
-    """Return the plan by which the training in a folder goes on: its own, made longer where `steps` says so.
+    """Return the plan of the training in a folder, to resume it; `steps` can make it longer.
 
     Args:
-        folder: The training.
-        described: Plan of the other options, which has to agree; None where there were none.
+        folder: Folder of the training.
+        described: Plan of the other options, which must agree with it; None if there were none.
         steps: Decisions in all; None = those of the plan.
 
     Raises:
-        ConfigError: no training there, options that differ from its plan, or fewer steps.
+        ConfigError: no training in the folder, options that differ from its plan, or fewer steps.
     """
     from swarm_forage_env.training.sb3.training import PLAN_FILE, kept_plan
 
@@ -93,7 +93,7 @@ def resumed_plan(folder: Path, described: TrainingPlan | None, steps: int | None
     plan = kept if steps is None else kept.longer(steps)
     if described is not None:
         begun, wanted = ([(stage.scenario, stage.options) for stage in each.stages] for each in (kept, described))
-        # Options divide all steps into stages anew; a training keeps to those that it began.
+        # The options would divide the steps into other stages; a training keeps its own stages.
         wanted_plan = replace(described, stages=plan.stages) if begun == wanted else described
         differences = wanted_plan.differences(kept)
         if differences:

@@ -1,1 +1,1 @@
-"""What world and policies agree on: observation columns, codes, decisions from readings, the policy protocol."""
+"""What the world and the policies share: observation columns, codes, decisions from readings, the policy protocol."""

@@ -1,6 +1,6 @@
-"""The numbers that stand for things: gripper commands, events, tasks, floor codes, object states, counters.
+"""Numeric codes: gripper commands, events, tasks, floor codes, object states, counters.
 
-Policies reach the first three through `policy`, rooms the rest through `state`; compiled kernels read them here.
+Policies use the first three; the rest is for the world.
 """
 
 from enum import IntEnum
@@ -8,18 +8,18 @@ from typing import ClassVar
 
 
 class Grip:
-    """Gripper commands: write the constant, the environment compares bands around it (`GRIP_LOWER_ENDS`)."""
+    """Gripper commands. Send the constant; the environment accepts a band of values around it (`GRIP_LOWER_ENDS`)."""
 
     GRASP: ClassVar[float] = 1.0
     """Empty: pick up what lies under the centre. Carrying: hold."""
     RELEASE: ClassVar[float] = -0.125
-    """Carrying: let go here, whatever is here. Empty: nothing."""
+    """Carrying: let go at this place, never refused. Empty: nothing."""
     DELIVER: ClassVar[float] = -0.375
     """Carrying: drop only into the nest or a cache."""
     SITE: ClassVar[float] = -0.625
     """Carrying: lay on the floor, unless a cache is near."""
     CREATE_CACHE: ClassVar[float] = -1.0
-    """Carrying: as SITE, then the world tries to form a cache."""
+    """Carrying: as SITE, then a cache is formed if possible."""
 
 
 GRIP_LOWER_ENDS = (0.0, -0.25, -0.5, -0.75)
@@ -68,7 +68,7 @@ class ObjectStatus(IntEnum):
     CARRIED = 1
     CACHED = 2
     WAITING = 3
-    """Found no free cell; re-enters the world with the next re-placement that succeeds."""
+    """There was no free cell; it is placed again as soon as there is one and objects are placed."""
 
 
 class Counter(IntEnum):
@@ -79,7 +79,7 @@ class Counter(IntEnum):
     FREE_PICKUPS = 1
     """Objects picked up from the floor."""
     FIRST_PICKED = 2
-    """Pick-ups of an object that nobody had carried since it was placed."""
+    """Pick-ups of an object that no robot had carried since it was placed."""
     CACHE_PICKUPS = 3
     CACHE_DROPS = 4
     FLOOR_DROPS = 5

@@ -34,7 +34,7 @@ def ring_sum(readings: ObsArray) -> tuple[float, float]:
     """Sum the readings of one ring as polar vectors; returns the body-frame vector (forward, left)."""
     x = 0.0
     y = 0.0
-    for k in range(_HALF_RING):  # the sensor half a ring on points the opposite way: equal readings cancel exactly
+    for k in range(_HALF_RING):  # opposite sensors are paired, so that equal readings cancel exactly
         difference = np.float64(readings[k]) - np.float64(readings[k + _HALF_RING])
         x += difference * _BEAM_COS[k]
         y += difference * _BEAM_SIN[k]

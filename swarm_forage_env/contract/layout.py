@@ -1,4 +1,4 @@
-"""ObservationLayout: the named slices of an observation row, the one contract between sensors and policies."""
+"""ObservationLayout: the named slices of an observation row. Sensors write them, policies read them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class ObservationSlice:
         size: Number of columns.
         scale: Natural units per 1.0 of observation, one number per column.
         noise_group: Group that `SensorNoise` may perturb, or "" for exact columns.
-        meaning: What the columns hold, for people.
+        meaning: What the columns hold, as a text for readers.
     """
 
     name: str

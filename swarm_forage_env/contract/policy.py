@@ -1,7 +1,7 @@
-"""What controls a swarm: the Policy protocol, and what a policy knows before a run.
+"""The Policy protocol, and what a policy knows before a run.
 
-A policy, scripted or trained, sees observations and never the world. `baselines` imports from this folder, `Quirks`,
-and the tools `compiling` and `spelling`, and from nothing else of the environment.
+A policy, scripted or trained, sees observations and never the state of the world. `baselines` imports only this folder,
+`Quirks`, and the tools `compiling` and `spelling`, and nothing else of `swarm_forage_env`.
 """
 
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ class SwarmSpec:
         """Return the constants of a scenario; no environment is needed.
 
         Args:
-            scenario: The configuration of the world.
+            scenario: The configuration.
             horizon_s: Length of a run, s; default that of the scenario.
         """
         arena, robots = scenario.arena, scenario.robots

@@ -1,8 +1,8 @@
-"""What a learner sees and does: a choice of observations and actions over the contract of the environment.
+"""What a learner sees and does: a choice of observations and actions.
 
-The environment always speaks (N, D) observations and (N, 3) commands. A learner may prefer fewer columns, numbered
-actions or a gripper that works by itself; training environments and trained policies translate by the same object,
-so that a policy runs exactly as it was trained.
+The environment itself has observations (N, D) and commands (N, 3). A learner may prefer fewer columns, numbered actions
+or a gripper that works by itself. Training environments and trained policies use the same translation, so a policy
+runs exactly as it was trained.
 """
 
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ ACTIONS = ("continuous", "discrete")
 MOTIONS = ("stand", "forward", "arc left", "arc right", "turn left", "turn right")
 """Discrete actions that move, in order."""
 GRIPS = ("grasp", "release", "deliver", "site", "create_cache")
-"""Discrete actions of the gripper, in order after the motions; the wheels stand."""
+"""Discrete actions of the gripper, in order after the motions; the wheels stand still."""
 _WHEELS = ((0.0, 0.0), (0.5, 0.5), (0.4, 0.6), (0.6, 0.4), (-0.25, 0.25), (0.25, -0.25))
 """Wheel commands of the motions (our choice): full speed, arcs of 0.35 m radius, turns of 8 degrees per tick."""
 _COMPACT_READS = (
@@ -68,7 +68,7 @@ class InterfaceConfig:
     automatic_gripper: bool = False
     """Grasp when empty and over an object or a cache, deliver when carrying in the nest; the learner only drives."""
     decision_ticks: int = 1
-    """Ticks for which an action is kept; rewards add up. An automatic gripper looks in every tick."""
+    """Ticks for which an action is kept; rewards add up. An automatic gripper decides in every tick."""
 
     def __post_init__(self) -> None:
         one_of("interface.observation", self.observation, OBSERVATIONS)
@@ -78,12 +78,12 @@ class InterfaceConfig:
 
     @property
     def reads(self) -> tuple[str, ...] | None:
-        """Observation slices that are looked at, None = all; what `ForageEnv(reads=...)` takes."""
+        """Observation slices that are used, None = all; the value for `ForageEnv(reads=...)`."""
         return _COMPACT_READS if self.observation == "compact" else None
 
 
 class LearnerInterface:
-    """Translates between a swarm and a learner that controls each robot alike.
+    """Translates between a swarm and a learner that controls all robots in the same way.
 
     Attributes:
         config: The choices.
@@ -127,11 +127,11 @@ class LearnerInterface:
         self._actions_shape = (spec.n_robots, *(self.action_space.shape or ()))
 
     def new_observation_space(self) -> spaces.Box:
-        """Return a space of its own, with a random state of its own, for one robot's row."""
+        """Return a new space, with its own random state, for one robot's row."""
         return spaces.Box(-1.0, 1.0, (self.layout.size,), np.float32)
 
     def new_action_space(self) -> spaces.Box | spaces.Discrete:
-        """Return a space of its own, with a random state of its own, for one robot's action."""
+        """Return a new space, with its own random state, for one robot's action."""
         if self._is_discrete:
             return spaces.Discrete(self._n_choices)
         return spaces.Box(-1.0, 1.0, (2 if self.config.automatic_gripper else 3,), np.float32)
@@ -161,7 +161,7 @@ class LearnerInterface:
 
         Args:
             actions: (N,) whole numbers or (N, 2 or 3) float, as `action_space` says, one row per robot.
-            obs: (N, D) observations of the environment that the learner's choice is carried out in.
+            obs: (N, D) observations of the environment in the tick in which the commands are carried out.
 
         Raises:
             ActionError: another shape, or a number outside of `action_space`.
@@ -196,7 +196,7 @@ class LearnerInterface:
     def mask(self, obs: ObsArray) -> BoolArray:
         """Return which discrete actions make sense, (N, number of actions) bool; at least one per row.
 
-        Left out are motions during an interaction and gripper actions that would be refused; robots that are not at
+        Motions during an interaction and gripper actions that would be refused make no sense. Robots that are not at
         work may only stand.
 
         Args:
@@ -214,7 +214,7 @@ class LearnerInterface:
 
 @lru_cache(maxsize=64)  # a curriculum may ask for a new size in every run
 def compact_layout(half_width_m: float, half_height_m: float) -> ObservationLayout:
-    """Build the layout of the compact view (our choice of what a driver needs); directions are forward and left."""
+    """Build the layout of the compact view (its columns are our choice); directions are forward and left."""
     reach = (1.0, 1.0, 1.0)
     table: list[tuple[str, tuple[float, ...], str, str]] = [
         ("proximity", (1.0, 1.0), "proximity", "sum of the 24 readings as vectors, cut to length 1"),
@@ -242,15 +242,15 @@ def compact_layout(half_width_m: float, half_height_m: float) -> ObservationLayo
 
 
 GivenInterface: TypeAlias = InterfaceConfig | Mapping[str, Any] | None
-"""What environments take as their argument `interface`; see `chosen_interface`."""
+"""Type of the argument `interface` of environments; see `chosen_interface`."""
 
 
 def chosen_interface(given: GivenInterface, default: InterfaceConfig | None = None) -> InterfaceConfig:
-    """Return the choices that were given: as they are, as fields by name, or None for the default.
+    """Return the configuration for an argument `interface`.
 
     Args:
-        given: What the user said.
-        default: Says what fields by name leave out; None = `InterfaceConfig()`.
+        given: A configuration, fields by name, or None for the default.
+        default: Gives the fields that are not named; None = `InterfaceConfig()`.
 
     Raises:
         ConfigError: `given` is none of these, or has an unknown field or value.

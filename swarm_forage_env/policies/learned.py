@@ -10,7 +10,7 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 
 Choose: TypeAlias = Callable[[ObsArray, np.random.Generator], np.ndarray]
-"""From what a learner sees, (N, d), to its actions, one row per robot."""
+"""A function from observations of a learner, (N, d), to its actions, one row per robot."""
 
 
 class LearnedPolicy:
@@ -19,9 +19,9 @@ class LearnedPolicy:
     An instance drives one run.
 
     Attributes:
-        reads: Observation slices that are looked at, None = all.
-        caches: Kind of caches that the controller was trained with; not there where that is unknown.
-        interface: The choices bound to the swarm; there after `reset`.
+        reads: Observation slices that are used, None = all.
+        caches: Kind of caches that the controller was trained with; missing if that is unknown.
+        interface: The interface for the swarm; set by `reset`.
     """
 
     interface: LearnerInterface
@@ -32,7 +32,7 @@ class LearnedPolicy:
         Args:
             interface: What it saw and did in training.
             choose: The controller.
-            caches: Kind of caches that it was trained with; None = unknown, runs then keep those of the scenario.
+            caches: Kind of caches that it was trained with; None = unknown, runs then use those of the scenario.
         """
         self.reads = interface.reads
         if caches is not None:

@@ -1,4 +1,4 @@
-"""Trained policies in files: models that stable-baselines3 saved (`*.zip`), networks of our own (`*.npz`).
+"""Trained policies in files: models saved by stable-baselines3 (`*.zip`), networks in our own format (`*.npz`).
 
 `registry.policy_class` finds what opens a file by its suffix, in every process, so that the path of a file may be given
 wherever the name of a policy may.
@@ -29,7 +29,7 @@ from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 MODEL_NOTE = "swarm_forage_note"
-"""Attribute of a model, saved with it, that says what its spaces do not: {"interface": fields, "caches": kind}."""
+"""Attribute of a model, saved with it: {"interface": fields, "caches": kind}, which its spaces do not show."""
 _DIGEST_DIGITS = 16
 MODEL_FAULTS = (
     ValueError,
@@ -42,7 +42,7 @@ MODEL_FAULTS = (
     EOFError,
     pickle.UnpicklingError,
 )
-"""What stable-baselines3 and torch raise over a file that does not hold a model or has been damaged."""
+"""Errors that stable-baselines3 and torch raise for a damaged file or one without a model."""
 
 
 class ModelError(ValueError):
@@ -52,19 +52,19 @@ class ModelError(ValueError):
 class ModelPolicy(LearnedPolicy):
     """A model saved by stable-baselines3 (PPO, A2C, DQN, SAC, TD3, DDPG), acting without exploration.
 
-    A model of one robot is applied to every robot, whatever the swarm size. What it sees and does is told by
+    A model of one robot is applied to every robot, whatever the swarm size. Its interface is given by
 
     * the note that our training leaves in the file (`training.sb3.export.note_interface`),
-    * the parameter `interface`, whose fields go before those of the note,
+    * the parameter `interface`, whose fields override those of the note,
     * its spaces, where both are missing and the spaces are those of the environment itself, (D,) to (3,).
 
-    A model of the whole swarm, (N, D) to (N, 3), needs no note either and works for its own N only. Nothing is
-    normalised: a model trained behind `VecNormalize` sees other numbers than it was trained on.
+    A model of the whole swarm, (N, D) to (N, 3), needs no note either, and works for its own N only. Nothing is
+    normalised: a model trained behind `VecNormalize` gets other numbers than in training.
 
     Opening a model runs code that the file contains. Open only what you trust.
 
     Attributes:
-        caches: Kind of caches that the model was trained with; there only when the file tells.
+        caches: Kind of caches that the model was trained with; only set if the file has a note.
     """
 
     def __init__(self, path: str | Path, *, digest: str | None = None, interface: GivenInterface = None) -> None:
@@ -72,9 +72,9 @@ class ModelPolicy(LearnedPolicy):
 
         Args:
             path: The saved file.
-            digest: What `file_digest` returned when the run was planned; a file that has changed since is refused.
-            interface: What the model sees and does: fields of `InterfaceConfig` by name, which are plain values for
-                `RunSpec.parameters`. Fields that are left out are those of the note in the file, else the default.
+            digest: Result of `file_digest` when the run was planned; a file that has changed since then is refused.
+            interface: What the model sees and does: an `InterfaceConfig` or its fields by name, which are plain values
+                for `RunSpec.parameters`. Other fields are those of the note in the file, else the default.
 
         Raises:
             ImportError: stable-baselines3 is not installed.
@@ -92,7 +92,7 @@ class ModelPolicy(LearnedPolicy):
         """Start a run.
 
         Raises:
-            ModelError: the spaces of the model are not those of its interface, or nothing tells its interface.
+            ModelError: the spaces of the model are not those of its interface, or its interface is not known.
         """
         super().reset(spec, rng)
         found, fitting = describe_spaces(self._network), describe_spaces(self.interface)
@@ -125,10 +125,10 @@ def deterministic_choice(model: Any) -> Choose:
 
 
 def _read_note(note: Any, path: Path) -> tuple[InterfaceConfig, str]:
-    """Return interface and caches that a note tells.
+    """Return the interface and the caches of a note.
 
     Raises:
-        ModelError: it tells something else.
+        ModelError: the note holds something else.
     """
     if not isinstance(note, Mapping) or not isinstance(note.get("interface"), Mapping):
         raise ModelError(f"Expected the note in {path} to be a table with interface and caches, got {note!r}.")
@@ -182,7 +182,7 @@ def _checked_digest(path: str | Path, planned: str | None) -> str:
 
 
 def describe_spaces(owner: Any) -> tuple[str, str]:
-    """Return kind and size of what a model or an interface sees and does, which is what has to agree."""
+    """Return kind and size of the spaces of a model or an interface; a model and its interface must agree in them."""
     return _kind_and_size(owner.observation_space), _kind_and_size(owner.action_space)
 
 
@@ -193,9 +193,9 @@ def _kind_and_size(space: spaces.Space[Any]) -> str:
 
 @lru_cache(maxsize=2)
 def _open_model(path: str, digest: str) -> tuple[Any, Any]:  # noqa: ARG001 - with the digest a changed file is new
-    """Return the policy network of a saved model, in evaluation mode, on the CPU; and its note, None without one.
+    """Return the policy network of a saved model, in evaluation mode, on the CPU; and its note, or None.
 
-    The network alone, not the algorithm around it, which for off-policy methods would allocate its replay buffer.
+    Only the network is built: the algorithm of an off-policy method would allocate its replay buffer.
     """
     try:
         from stable_baselines3.common.policies import ActorCriticPolicy  # pyright: ignore[reportMissingImports] - an extra

@@ -1,7 +1,7 @@
 """Trained policies without torch: a small network in a file, evaluated by numpy.
 
 A file is an `.npz` of plain arrays: the layers of the network ("weight_0", "bias_0", ...) and "about", the JSON text
-of `NetworkAbout`. Nothing in it is executed, so that opening a file from a stranger is safe.
+of `NetworkAbout`. Nothing in it is executed, so it is safe to open a file from an unknown source.
 """
 
 import dataclasses
@@ -30,7 +30,7 @@ ACTIVATIONS = ("tanh", "relu")
 _ARCHIVE = b"PK\x03\x04"
 """First bytes of a zip file, which an `.npz` is."""
 _BROKEN = (ValueError, LookupError, TypeError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error)
-"""What numpy and zipfile raise over a file that is not an archive or has been damaged."""
+"""Errors that numpy and zipfile raise for a file that is damaged or not an archive."""
 _LAYER_PARTS = ("weight", "bias")
 
 
@@ -40,18 +40,18 @@ class NetworkError(ValueError):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class NetworkAbout:
-    """What the weights alone do not say. Plain values."""
+    """What is needed besides the weights, as plain values."""
 
     interface: InterfaceConfig
     activation: str = "tanh"
-    """After every layer but the last."""
+    """Activation after every layer except the last."""
     samples: bool = False
-    """Whether discrete actions are drawn by their probabilities; else the likeliest is taken. Continuous actions are
-    always the mean."""
+    """Whether discrete actions are drawn by their probabilities; if not, the most probable one is taken. Continuous
+    actions are always the mean."""
     caches: str = "none"
-    """Kind of caches that the policy was trained with, which runs have when not told otherwise."""
+    """Kind of caches that the policy was trained with; the default for its runs."""
     card: dict[str, Any] = field(default_factory=dict)
-    """How the network came about, for people."""
+    """How the network was made, as a text for readers."""
 
     def __post_init__(self) -> None:
         try:
@@ -88,7 +88,7 @@ class NetworkAbout:
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """Layers of a perceptron with one hidden activation, and what the weights alone do not say."""
+    """Layers of a perceptron with one kind of activation, and what is needed besides the weights."""
 
     weights: tuple[np.ndarray, ...]
     """(in, out) float32 per layer."""
@@ -136,8 +136,8 @@ class Network:
         Args:
             state: Tensors by name, in the order of the layers: (out, in) under names that end in "weight", (out,) under
                 names that end in "bias". Others are left out.
-            about: What the weights alone do not say.
-            n_outputs: How many outputs are actions; default all. Some libraries let the deviations follow the means.
+            about: What is needed besides the weights.
+            n_outputs: How many outputs are actions; default all. Some libraries add deviations after the means.
 
         Raises:
             NetworkError: the layers do not follow on each other.
@@ -176,7 +176,7 @@ class Network:
 
 
 def _parts(content: bytes) -> Mapping[str, np.ndarray]:
-    """Return the parts of an archive by name, not read yet. `_part` reads one; both turn errors into a NetworkError."""
+    """Return the parts of an archive by name, not read yet; `_part` reads one. Both raise NetworkError only."""
     if not content:
         raise NetworkError("The file is empty.")
     if not content.startswith(_ARCHIVE):

@@ -16,14 +16,14 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
 """Entry-point group under which installed packages offer policies by name."""
 POLICY_FILE_ENTRY_POINTS = "swarm_forage_env.policy_files"
-"""Entry-point group of what opens policy files: the name is the file's suffix without its dot, the value is called with
-the path and the parameters of a run."""
+"""Entry-point group of functions that open policy files. The name is the suffix of the file without its dot; the value
+is called with the path and the parameters of a run."""
 _LOCAL_POLICIES: dict[str, Callable[..., Policy]] = {}
-"""Names that `local_policy` lends to policies of this process."""
+"""Names that `local_policy` has given to policies of this process."""
 
 
 class RandomPolicy:
-    """Uniformly random actions: the floor that every other policy has to beat."""
+    """Uniformly random actions: the minimum that every other policy has to beat."""
 
     reads: ClassVar[tuple[str, ...]] = ()
 
@@ -38,7 +38,7 @@ class RandomPolicy:
 
 
 class CallablePolicy:
-    """A plain function `obs -> actions` in policy clothes; see `from_callable`."""
+    """A plain function `obs -> actions` as a policy; see `from_callable`."""
 
     def __init__(self, function: Callable[[ObsArray], ActionArray], name: str) -> None:
         self.function = function
@@ -75,7 +75,7 @@ def policy_names() -> tuple[str, ...]:
 
 
 def is_policy_file(name: str) -> bool:
-    """Return whether `name` is that of a file which an installed package opens as a policy, by its suffix."""
+    """Return whether `name` has the suffix of files that an installed package opens as policies."""
     return bool(entry_points(group=POLICY_FILE_ENTRY_POINTS, name=_suffix(name)))
 
 
@@ -105,7 +105,7 @@ def policy_class(name: str) -> Callable[..., Policy]:
 
 @contextmanager
 def local_policy(name: str, factory: Callable[..., Policy]) -> Generator[None]:
-    """Let `name` stand for `factory` meanwhile, in this process only: workers do not know it, so run with jobs=1.
+    """While the context lasts, `name` means `factory`; in this process only, so run with jobs=1.
 
     Args:
         name: A name that no installed policy has.

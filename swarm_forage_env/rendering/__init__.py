@@ -1,1 +1,1 @@
-"""Pictures, films and plots; pure readers of the world."""
+"""Pictures, films and plots. They read the state and never change it."""

@@ -1,4 +1,4 @@
-"""One picture of the world: a pure reader of the state arrays."""
+"""One picture of the world. Drawing reads the state arrays and never changes them."""
 
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -69,7 +69,7 @@ class Trails:
 
     @property
     def position(self) -> FloatArray:
-        """(n_samples, N, 2) m, oldest first; NaN where nothing is known."""
+        """(n_samples, N, 2) m, oldest first; NaN where there is no position."""
         return self._position
 
     @property
@@ -94,15 +94,15 @@ def render_frame(
 
     Robots are far smaller than an arena (0.17 m across in 32 m). They are therefore drawn with a minimum radius of a
     few pixels, larger than life, and may look as if they overlap each other or a wall when they only come close; in
-    very dense worlds the minimum shrinks so that the swarm does not cover the floor. The same holds for objects.
+    very large swarms the minimum shrinks so that the swarm does not cover the floor. The same holds for objects.
 
     Args:
-        scenario: The world's configuration.
+        scenario: The configuration.
         swarm: Robots: blue discs when empty, orange ones around a square while carrying, grey rings in repair; the
             needle shows the heading, a red ring interference. Robots without a body are left out.
         objects: Objects; the free ones are drawn where they lie.
         caches: Caches, drawn with the number of objects inside.
-        events: Counters for the line of figures, and who is in interference.
+        events: Counters for the line of figures, and which robots are in interference.
         tick: Ticks done since reset, for the clock.
         size_px: Longer side of the drawn arena in pixels; a header and a legend come on top.
         trails: Past positions to draw as fading lines.
@@ -128,7 +128,7 @@ def render_frame(
 
 @lru_cache(maxsize=4)
 def _background(scenario: ScenarioConfig, size_px: int) -> Canvas:
-    """Everything that never changes during a run, painted once."""
+    """All parts that never change during a run, painted once."""
     view = arena_view(scenario, size_px)
     arena = scenario.arena
     canvas = np.empty((view.height, view.width, 3), np.float32)
@@ -206,7 +206,7 @@ def _draw_robots(canvas: Canvas, view: View, swarm: SwarmState, events: StepEven
 
 
 def _draw_bodies(canvas: Canvas, centre: FloatArray, direction: FloatArray, radius: float, colour: Colour) -> None:
-    """Discs of one colour; unless they are tiny with dark rims, which part robots that touch, and needles."""
+    """Discs of one colour; unless they are tiny, they get needles and dark rims that separate robots that touch."""
     detailed = radius >= _SMALLEST_DETAILED_PX
     if detailed:
         paint_discs(canvas, centre, radius + max(0.5, 0.22 * radius), PALETTE.floor)

@@ -1,9 +1,10 @@
 """Antialiased painting of many small shapes at once on a numpy canvas.
 
 A canvas is an (H, W, 3) float32 array of colour values in [0, 255]. Coordinates are pixels from the upper left corner,
-x to the right and y down; pixel (column 0, row 0) covers [0, 1] x [0, 1]. Every function paints in place. Shapes are
-stamps of a distance function, all of them evaluated together, so that thousands of robots cost milliseconds and
-move smoothly between pixels. Shapes of one call share one colour and do not add up where they overlap.
+with x to the right and y down; pixel (column 0, row 0) covers [0, 1] x [0, 1]. Every function paints in place. A
+function of the distance says how much of a pixel a shape covers, and all shapes of a call are computed together. So
+thousands of robots take milliseconds and move smoothly between pixels. Shapes of one call share one colour and do not
+add up where they overlap.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,7 +18,7 @@ Colour: TypeAlias = tuple[int, int, int]
 """Red, green, blue in 0..255."""
 
 _STAMP_BUDGET = 2_000_000
-"""Pixels evaluated at once: bounds the memory of a call, whatever the number of shapes."""
+"""Pixels computed at once: this limits the memory of a call for any number of shapes."""
 
 _Coverage: TypeAlias = Callable[[NDArray[np.float32], NDArray[np.float32], slice], NDArray[np.floating]]
 
@@ -118,8 +119,8 @@ def _paint(
         canvas: Painted in place.
         centre: (n, 2) pixel coordinates of the shapes' middles.
         reach: Distance from the middle beyond which coverage is zero, pixels.
-        coverage: Maps offsets from the middles to pixel centres, (k, 1, P) and (k, P, 1), and the rows k they belong
-            to, to shares in [0, 1], (k, P, P).
+        coverage: A function of the offsets from the middles to pixel centres, (k, 1, P) and (k, P, 1), and of the
+            slice of the k shapes; returns shares in [0, 1], (k, P, P).
         colour: Colour of all shapes.
         opacity: One number or (n,).
     """

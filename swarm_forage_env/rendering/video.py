@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Frame = NDArray[np.uint8]
 SUFFIXES = (".gif", ".mp4")
 MAX_FPS = {".gif": 50, ".mp4": 60}
-"""GIF counts in hundredths of a second, and viewers slow films down that ask for less than two of them per frame."""
+"""Highest rates. GIF counts in hundredths of a second, and viewers slow down films with less than two per frame."""
 MAX_GIF_FRAMES = 1500
 """A GIF is built in memory, 1 byte per pixel and frame."""
 
@@ -97,9 +97,9 @@ def _write_gif(frames: Iterable[Frame], path: Path, fps: float) -> None:
 
 
 def _gif_palette() -> "Image.Image":
-    """Colours of our pictures: grounds, things on them, and the steps between that antialiasing and fading make.
+    """Colours of our pictures: grounds, things on them, and mixtures that antialiasing and fading produce.
 
-    Fewer than 256, since one index stands for "unchanged".
+    There are fewer than 256, since one index means "unchanged".
     """
     from PIL import Image
 
@@ -151,7 +151,7 @@ def _import_imageio() -> Any:
     """Return the module `imageio.v2`, checked to be able to write MP4."""
     try:
         import imageio.v2
-        import imageio_ffmpeg  # noqa: F401  (imageio looks it up by itself; without it the error is obscure)
+        import imageio_ffmpeg  # noqa: F401  (imageio loads it by itself; without it the error is hard to understand)
     except ImportError as error:
         raise ImportError(
             "Writing .mp4 needs imageio and imageio-ffmpeg, which are not installed; "

@@ -1,7 +1,7 @@
 """How a picture is laid out: colours, fonts, and where the arena and the legend go.
 
-Design: a dark floor on which robots, objects and caches are the bright things; hues that stay apart in the common
-forms of colour blindness, and shape as a second sign (interference is a ring, repair a hollow disc). Our choice.
+Design (our choice): robots, objects and caches are bright on a dark floor. The colours differ for readers with the
+common forms of colour blindness, too, and shape is a second sign (interference is a ring, repair a hollow disc).
 """
 
 from dataclasses import dataclass

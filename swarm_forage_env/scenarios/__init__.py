@@ -1,1 +1,1 @@
-"""What a world is, as data: configurations, presets, quirks, regions of the floor."""
+"""Scenarios as data: configurations, presets, quirks, regions of the floor."""

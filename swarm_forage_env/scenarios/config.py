@@ -1,6 +1,6 @@
-"""Frozen configurations that are complete and refuse nonsense at construction.
+"""Frozen, complete configurations that check their values when they are made.
 
-A warehouse and a disaster zone are two configurations, never two environments. Presets live in `presets`.
+A warehouse and a disaster zone are two configurations of the same environment. Presets are in `presets`.
 """
 
 import dataclasses
@@ -23,7 +23,7 @@ EAST_WALL_M = 0.4
 CACHE_KINDS = ("none", "static", "dynamic")
 PERFORMANCE_MEASURES = ("collected", "first_picked")
 MAX_DISC_SHARE = 0.4
-"""Robot discs may cover at most this share of the start area; beyond it random starting poses stop being findable."""
+"""Robot discs may cover at most this share of the start area; with more, random start poses cannot be drawn."""
 MAX_CELLS = 200_000_000
 """Largest floor, 2.8 km square (our choice: its codes take 800 MB; the largest of the paper has 409,600 cells)."""
 
@@ -193,7 +193,7 @@ class RewardConfig:
     delivery: float = 1.0
     """Per object delivered to the nest."""
     first_pickup: float = 0.1
-    """Per pick-up of an object that nobody had carried since it was placed."""
+    """Per pick-up of an object that no robot had carried since it was placed."""
     nest_progress: float = 0.0
     """Per metre that a carrying robot comes closer to the nest centre."""
     interference: float = 0.0
@@ -211,14 +211,14 @@ class RewardConfig:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ScenarioConfig:
-    """A complete world: everything a run needs except the policy, the wrappers and the seed."""
+    """A complete scenario: everything that a run needs except the policy, the wrappers and the seed."""
 
     name: str
     arena: ArenaConfig
     robots: RobotConfig
     objects: ObjectConfig
     caches: str = "none"
-    """Which caches the world has: "none", "static" or "dynamic"."""
+    """Which caches there are: "none", "static" or "dynamic"."""
     cache: CacheConfig = field(default_factory=CacheConfig)
     reward: RewardConfig = field(default_factory=RewardConfig)
     performance: str = "collected"
@@ -229,9 +229,9 @@ class ScenarioConfig:
     interval_s: float = 200.0
     """Length of a recording interval."""
     physics_substeps: tuple[float, ...] = (0.25,) * 4
-    """Shares of a tick that Chipmunk steps by, at least `MIN_SUBSTEPS` and all equal. Free motion is exact for any;
-    contacts are met one substep late, so the last one bounds how deep two robots are pushed into each other when a tick
-    ends: 6 % of a diameter when they drive head-on (`tests/science/test_physics_convergence.py`)."""
+    """Substeps of Chipmunk as shares of a tick, at least `MIN_SUBSTEPS` and all equal. Free motion is exact for any
+    shares. A contact is resolved one substep late, so a substep limits how deep two robots are pushed into each other
+    when a tick ends: 6 % of a diameter when they drive head-on (`tests/science/test_physics_convergence.py`)."""
     quirks: Quirks = field(default_factory=Quirks)
 
     def __post_init__(self) -> None:
@@ -382,7 +382,7 @@ def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
     (`quirks=AUTHORS_PROGRAM`).
 
     Raises:
-        ConfigError: unknown name (with the nearest known one) or a combination that describes no world.
+        ConfigError: unknown name (with the nearest known one), or values that do not fit together.
     """
     table = field_sections()
     fields.known_keys(overrides, (*table, *SECTIONS), "scenario field")
@@ -403,10 +403,10 @@ def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
 
 
 def scenario_of_same_size(scenario: ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
-    """Return the scenario with fields overridden by name, but for the number of robots.
+    """Return the scenario with fields overridden by name; the number of robots must stay the same.
 
     Raises:
-        ConfigError: unknown fields, values that describe no world, or another number of robots.
+        ConfigError: unknown fields, values that do not fit together, or another number of robots.
     """
     changed = with_overrides(scenario, **overrides)
     n_robots = scenario.robots.n_robots
@@ -428,7 +428,7 @@ def from_mapping(config_class: type[_C], mapping: Mapping[str, Any], *, where: s
     """Build a configuration dataclass from nested mappings (TOML, JSON).
 
     Raises:
-        ConfigError: no mapping, or an unknown key, with the nearest valid one.
+        ConfigError: `mapping` is no mapping, a missing key, or an unknown one (with the nearest known one).
     """
     own = dataclasses.fields(config_class)  # pyright: ignore[reportArgumentType] - no public type means any dataclass
     items = {item.name: item for item in own}

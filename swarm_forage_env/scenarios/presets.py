@@ -21,7 +21,7 @@ from swarm_forage_env.scenarios.config import (
 SCENARIO_NAMES = ("warehouse_small", "warehouse_medium", "search_and_rescue")
 
 SEARCH_AND_RESCUE_OBJECTS = {16: 80, 32: 272, 48: 368, 64: 448, 80: 544, 96: 1248, 112: 1408, 128: 1568}
-"""Side in metres -> objects: what the power-law clusters of that side are sure to hold (our choice: the study asked
+"""Side in metres -> objects: a number that the power-law clusters of that side always hold (our choice: the study asked
 for 4,000 everywhere and placed what fitted)."""
 DENSITY = 0.05
 """Robots per square metre in search and rescue: 5 % (scenario 2 of the paper)."""
@@ -72,10 +72,10 @@ def search_and_rescue(*, side_m: float | None = None, n_robots: int | None = Non
     Args:
         side_m: Side of the square arena; default the smallest of 16, 32, ..., 128 m that holds `n_robots` at
             5 % density, or 48 m when neither is given.
-        n_robots: Swarm size; default what 5 % density gives for `side_m`.
+        n_robots: Swarm size; default the size for 5 % density at `side_m`.
         overrides: Any other scenario field.
     """
-    robots = None if n_robots is None else RobotConfig(n_robots=n_robots)  # refuses nonsense before a side is chosen
+    robots = None if n_robots is None else RobotConfig(n_robots=n_robots)  # checks the number before a side is chosen
     if side_m is None:
         side_m = 48.0 if n_robots is None else _side_for(n_robots)
     n_objects = overrides.pop("n_objects", None)
@@ -126,7 +126,7 @@ def scenario(name: str, /, **overrides: Any) -> ScenarioConfig:
         overrides: Field names of ScenarioConfig or of its sections, see `with_overrides`.
 
     Raises:
-        ConfigError: unknown name or field (with the nearest known one), or values that describe no world.
+        ConfigError: unknown name or field (with the nearest known one), or values that do not fit together.
     """
     builders = {
         "warehouse_small": warehouse_small,
@@ -146,7 +146,7 @@ def chosen_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any]) -
     """Return a preset by name, or a complete configuration, with fields overridden by name.
 
     Raises:
-        ConfigError: unknown preset or field, or values that describe no world.
+        ConfigError: unknown preset or field, or values that do not fit together.
     """
     if isinstance(given, ScenarioConfig):
         return with_overrides(given, **overrides)

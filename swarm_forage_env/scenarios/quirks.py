@@ -1,7 +1,7 @@
 """Where the published description and its authors' program disagree: one switch per difference.
 
-The default is always the description. `AUTHORS_PROGRAM` turns every switch on, so that a study can say which
-reading gives a published ordering. A quirk is a single `if` at the place where it acts; nothing else forks.
+The default is always the description. `AUTHORS_PROGRAM` turns every switch on, so that a study can find out which of
+the two gives a published result. A quirk is a single `if` at the place where it acts.
 
 Not reproduced at all: two-cell ramp objects, the rule that objects may not touch, throttling before the speed
 cap, and interference counted from each controller's machine state.
@@ -23,7 +23,7 @@ class Quirks:
     transferer_interface_never_leaves: bool = False
     """A Cache Transferer's destination interface is never left and its source interface never becomes active."""
     cache_forget_unit_mismatch: bool = False
-    """A cache is forgotten by comparing metres with cell indices, in either axis."""
+    """The rule for forgetting a cache compares metres with cell indices, and one axis suffices."""
     finisher_tolerance_mismatch: bool = False
     """A Cache Finisher arrives at one distance and is accepted at another; starting within tolerance is no arrival."""
     explore_double_start: bool = False

@@ -1,4 +1,4 @@
-"""Sizes that everything else is counted in: the floor cell, and the wheel speed behind a command of 1."""
+"""Basic units: the floor cell, and the wheel speed of a command of 1."""
 
 CELL_M = 0.2
 """Side of a floor cell and of an object."""

@@ -1,7 +1,7 @@
 """The experiments behind the measures: ladders of swarm sizes and of adversity, at three budgets.
 
-An experiment is what one criterion at one value asks of a run; every experiment is run once per seed. Criteria, the
-value each of them varies, and its reference run:
+An experiment is a run with one criterion at one value; every experiment is run once per seed. The criteria, the value
+that each of them varies, and its reference run:
 
     population_size       number of robots; reference: one robot
     throttle              amplitude of the waveform by which robots lose speed; reference: value 0, ideal throttle
@@ -27,9 +27,9 @@ from swarm_forage_env.wrappers.throttle import ThrottleConfig, sine_throttles, s
 
 CRITERIA = ("population_size", "throttle", "noise", "population_dynamics")
 UNDISTURBED = "none"
-"""Criterion of the runs that nothing is varied in."""
+"""Criterion of the runs in which nothing is varied."""
 STUDY_HORIZON_S = 10_000.0
-"""Length of the study's runs; the period of its throttle waveforms is made for it."""
+"""Length of the study's runs, for which the periods of its throttle waveforms are chosen."""
 SIZE_SWEEP_OBJECTS = {"warehouse_small": 512, "warehouse_medium": 2048}
 """Objects while the swarm size varies (study configuration): enough for the largest swarm."""
 STUDY_LARGEST_SIZE = 2.56
@@ -70,7 +70,7 @@ BUDGETS: dict[str, Budget] = {
     "standard": Budget(horizon_s=10_000.0, interval_s=200.0, n_seeds=16, n_sizes=5, n_levels=4),
     "paper": Budget(horizon_s=STUDY_HORIZON_S, interval_s=200.0, n_seeds=192, n_sizes=None, n_levels=None),
 }
-"""quick: about a minute per policy, tells large differences; standard: ten minutes to an hour per policy; paper: the
+"""quick: about a minute per policy, shows large differences; standard: ten minutes to an hour per policy; paper: the
 sizes, levels, length and number of runs of the study. Times for the warehouses on two cores."""
 
 
@@ -105,8 +105,8 @@ def plan_experiments(base: ScenarioConfig, criteria: Collection[str], budget: Bu
         budget: How many sizes and levels, and how long a run is.
 
     Raises:
-        ConfigError: an unknown criterion, a swarm of one robot where sizes are varied, or a size that the arena has no
-            room for.
+        ConfigError: an unknown criterion, a swarm of one robot when sizes are varied, or a size for which the arena has
+            no room.
     """
     for name in criteria:
         known_name("criterion", name, CRITERIA)
@@ -141,14 +141,15 @@ def plan_specs(
 ) -> tuple[RunSpec, ...]:
     """Return one specification per experiment and seed, seed by seed.
 
-    So an interrupted study has whole sets of experiments, and the estimate of the remaining time settles early.
+    In this order an interrupted study has complete sets of experiments, and the estimate of the remaining time is soon
+    stable.
 
     Args:
         experiments: What to run.
         policy: Registered name.
-        seeds: Seeds of the runs; all experiments share them, which pairs their worlds.
-        parameters: Of the policy.
-        caches: Which caches the world has; default see `study.spec.chosen_caches`.
+        seeds: Seeds of the runs; all experiments share them, so their runs are paired.
+        parameters: Keyword arguments of the policy.
+        caches: Which caches there are; default see `study.spec.chosen_caches`.
 
     Raises:
         ConfigError: see `study.spec.RunSpec`.
@@ -178,7 +179,7 @@ def spread(levels: Sequence[_T], count: int | None) -> tuple[_T, ...]:
 
 
 def size_ladder(scenario: ScenarioConfig, count: int | None) -> tuple[ScenarioConfig, ...]:
-    """Return the scenario with one robot, with more robots, up to the swarm it was made for (or that of the study).
+    """Return the scenario with one robot, with more robots, up to its own swarm size (or the largest of the study).
 
     In search and rescue the arena grows with the swarm; the one-robot run is in the smallest arena.
 
@@ -188,7 +189,7 @@ def size_ladder(scenario: ScenarioConfig, count: int | None) -> tuple[ScenarioCo
             512), or all eight arenas of search and rescue.
 
     Raises:
-        ConfigError: one robot has no smaller size, or there is no room for the largest.
+        ConfigError: the scenario has one robot only, or there is no room for the largest swarm.
     """
     n_robots = scenario.robots.n_robots
     if n_robots < 2:
@@ -206,7 +207,7 @@ def size_ladder(scenario: ScenarioConfig, count: int | None) -> tuple[ScenarioCo
 
 
 def _preset_objects(name: str) -> int | None:
-    """Number of objects of a preset whose size sweep has another one."""
+    """Number of objects in the size sweep of a preset, if it differs from the usual one; else None."""
     return preset_scenario(name).objects.n_objects if name in SIZE_SWEEP_OBJECTS else None
 
 
@@ -215,7 +216,7 @@ def _growing_arenas(scenario: ScenarioConfig, count: int | None) -> tuple[Scenar
     base_side = scenario.arena.width_m
     density = scenario.robots.n_robots / (base_side * base_side)
     if scenario.robots.n_robots == robots_at_density(base_side):
-        density = robots_at_density(1000.0) / 1e6  # that of the preset, free of the truncation to whole robots
+        density = robots_at_density(1000.0) / 1e6  # the density of the preset, without truncation to whole robots
     smallest = min(SEARCH_AND_RESCUE_OBJECTS)
     sides = [float(side) for side in SEARCH_AND_RESCUE_OBJECTS if count is None or side < base_side]
     sides = sides if count is None else [*spread(sides, min(count - 2, len(sides))), base_side]
@@ -273,7 +274,7 @@ def _population_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Le
 
 
 def _malfunctions(n_robots: int) -> tuple[PopulationConfig, ...]:
-    """Rates of the study, or their like for other swarm sizes (our choice: the same share of the swarm away)."""
+    """Rates of the study; for other swarm sizes rates with the same share of the swarm away (our choice)."""
     if n_robots in STUDY_SIZES_OF_MALFUNCTIONS:
         return malfunction_levels(n_robots)
     away = AWAY_SHARE * n_robots  # rho / (1 - rho) with rho = malfunctions / repairs

@@ -1,7 +1,7 @@
 """Filming a run: `record_run` drives a policy and writes a GIF or an MP4.
 
-A film is planned and driven like any run, by `study.spec` and `study.run`. Drawing reads the world and never writes it,
-so a run that is filmed and one that is not are the same run.
+A film is planned and driven like any run, by `study.spec` and `study.run`. Drawing reads the state and never writes it,
+so filming does not change a run.
 """
 
 import math
@@ -47,13 +47,13 @@ def record_run(
         policy: Name of an installed policy, path of a policy file, or a fresh policy object.
         path: File to write, .gif or .mp4.
         seconds: Simulated time to film.
-        seed: Seed of the run; the film shows the run that `run_one` makes of it.
+        seed: Seed of the run; `run_one` with the same seed makes the same run.
         speedup: Simulated seconds per second of film.
         fps: Pictures per second of film.
         size_px: Longer side of the drawn arena.
         trail_s: Simulated time over which the robots' trails fade; 0 for none.
-        caches: "none", "static" or "dynamic"; default what the policy states in `caches`, or what the scenario has
-            where the policy states nothing (`study.spec.chosen_caches`).
+        caches: "none", "static" or "dynamic"; default what the policy states in `caches`, or what the scenario has if
+            the policy states nothing (`study.spec.chosen_caches`).
         parameters: Keyword arguments of a policy that is given by name or path.
         wrappers: Configurations of noise, throttling and population dynamics, in any order.
         progress: Called with (pictures done, pictures in all) after each picture.
@@ -62,10 +62,10 @@ def record_run(
         The path written.
 
     Raises:
-        RenderError: a value out of range; nothing has been run or written then.
-        ConfigError: parameters beside a policy object.
+        RenderError: a value out of range; then nothing has been run or written.
+        ConfigError: `parameters` with a policy object.
         ImportError: Pillow, or for .mp4 imageio with ffmpeg, is not installed.
-        ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the world.
+        ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
     """
     ticks = _picture_ticks(scenario, seconds, speedup, fps)
     _check_number("trail_s", trail_s, at_least=0.0)
@@ -90,7 +90,7 @@ def record_run(
         run = LiveRun(stack, policy, seed)
         world = run.forage_env
         for done, tick in enumerate(ticks, start=1):
-            run.advance(to_tick=tick)  # a run that is over stays as it ended
+            run.advance(to_tick=tick)  # a run that has ended stays as it is
             if trails is not None:
                 trails.add(world.swarm)
             state = (world.swarm, world.objects, world.caches, world.events)

@@ -14,7 +14,7 @@ class RunProgress:
     """Context manager: a bar on a terminal, an occasional plain line elsewhere."""
 
     def __init__(self, *, total: int, done: int = 0, foreign: int = 0) -> None:
-        """Count `total` runs; `done` need not be run again, `foreign` of them were made by other versions."""
+        """Count `total` runs. `done` of them are stored already; other versions made `foreign` of these."""
         self._total = total
         self._stored = done
         self._foreign = foreign
@@ -50,7 +50,7 @@ class RunProgress:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Take the bar down."""
+        """Remove the bar."""
         if self._bar is not None:
             self._bar.stop()
 

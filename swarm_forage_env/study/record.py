@@ -1,8 +1,8 @@
 """RunRecord: one run as columns over recording intervals, and the Parquet file that holds it.
 
-The fields of `RunRecord` are the schema: name, type, unit and meaning stand beside each other there and nowhere
-else; `schema_table()` prints them. A file is self-contained: its metadata hold the complete specification of the
-run and where it came from, and a digest that tells a damaged file from a sound one.
+The fields of `RunRecord` are the schema: name, type, unit and meaning stand there and nowhere else; `schema_table()`
+returns them as text. A file is self-contained: its metadata hold the complete specification of the run, the versions
+that made it, and a digest by which a damaged file is noticed.
 """
 
 import hashlib
@@ -37,7 +37,7 @@ _FILE_KEYS = tuple(_PREFIX + name for name in ("schema_version", "spec", "proven
 
 
 class RecordError(ValueError):
-    """A record that cannot be built or a file that does not hold a sound one; the message names the file."""
+    """A record that cannot be built, or a file that holds no undamaged record; the message names the file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class RunRecord:
     t_end_s: Annotated[FloatArray, Column("s", "end of the interval")]
     performance: Annotated[FloatArray, Column("objects", "collected or first_picked, as the scenario says")]
     collected: Annotated[CountArray, Column("objects", "delivered to the nest")]
-    first_picked: Annotated[CountArray, Column("objects", "picked up that nobody had carried since they were placed")]
+    first_picked: Annotated[CountArray, Column("objects", "picked up that no robot had carried since they were placed")]
     free_pickups: Annotated[CountArray, Column("objects", "picked up from the floor")]
     cache_pickups: Annotated[CountArray, Column("objects", "picked up from a cache")]
     cache_drops: Annotated[CountArray, Column("objects", "dropped into a cache")]
@@ -184,13 +184,13 @@ class RunRecord:
         """Read a record back.
 
         Raises:
-            RecordError: the file is missing, no record, damaged, or of another schema version; names the file.
+            RecordError: the file is missing, no record, damaged, or of another schema version; the message names it.
         """
         import polars as pl
 
         name = str(path)
         try:
-            with Path(path).open("rb"):  # a missing or unreadable file is told apart from a damaged one
+            with Path(path).open("rb"):  # a missing or unreadable file gets another message than a damaged one
                 pass
             stamp = pl.read_parquet_metadata(name)
             _check_stamp(name, stamp)

@@ -1,6 +1,6 @@
 """One run: from a specification to its record.
 
-`LiveRun` is the loop of policy and world. Records, films and measurements of speed all drive their worlds by it.
+`LiveRun` is the loop of policy and environment. Records, films and measurements of speed all use it.
 """
 
 import time
@@ -22,14 +22,14 @@ from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_
 from swarm_forage_env.wrappers.recorder import RunRecorder
 
 WARM_UP_TICKS = 5
-"""Ticks of a warm-up run under its policy: enough to reach every kernel that a tick always calls."""
+"""Ticks of a warm-up run under its policy: enough to compile every kernel that each tick calls."""
 
 
 class LiveRun:
-    """A run between its first and its last tick; making one resets the world and the policy.
+    """A run between its first and its last tick. The constructor resets the environment and the policy.
 
     Attributes:
-        forage_env: The environment at the bottom of the stack, to look at.
+        forage_env: The ForageEnv at the bottom of the stack; only read it.
         over: Whether the run has ended: horizon reached, or every robot dead.
     """
 
@@ -39,7 +39,7 @@ class LiveRun:
         Args:
             stack: The environment, with or without wrappers and recorder.
             policy: A policy that drives no other run.
-            seed: Seed of the world, of its wrappers and of the policy.
+            seed: Seed of the environment, of its wrappers and of the policy.
         """
         self.forage_env: ForageEnv = stack if isinstance(stack, ForageEnv) else stack.unwrapped
         self.over = False
@@ -50,14 +50,14 @@ class LiveRun:
         self._has_tasks = hasattr(policy, "task")
 
     def advance(self, *, to_tick: int | None = None) -> None:
-        """Let policy and world act in turn until `to_tick` ticks have passed since the start, or the run is over."""
+        """Let policy and environment act in turn until `to_tick` ticks have passed since the start, or the run ends."""
         world, policy, has_tasks, obs, over = self.forage_env, self._policy, self._has_tasks, self._obs, self.over
         act, step = policy.act, self._stack.step_batch
         while not over and world.tick != to_tick:
             actions = act(obs, world.active)
             tasks = policy.task if has_tasks else None  # type: ignore[attr-defined] - optional, see Policy
             obs, _, terminated, truncated = step(actions, tasks=tasks)
-            # The first row is looked at alone because in almost every tick it settles the question.
+            # Checking the first row alone is fast, and in almost every tick it is enough.
             over = truncated or bool(terminated[0] and terminated.all())
         self._obs, self.over = obs, over
 
@@ -78,18 +78,18 @@ def build_env(
 def build_stack(
     scenario: ScenarioConfig, wrappers: Iterable[WrapperConfig] = (), *, reads: tuple[str, ...] | None = None
 ) -> RunRecorder:
-    """Build what `build_env` builds and put a recorder around it; the horizon must be whole recording intervals."""
+    """Build the environment by `build_env`, with a recorder around it; the horizon must be whole intervals."""
     return RunRecorder(build_env(scenario, wrappers, reads=reads))
 
 
 def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:
     """Drive a policy object through the run that `spec` describes.
 
-    For policies that cannot be named, such as a closure over a trained model; `spec.policy` is then only the name
-    under which the result is stored.
+    This is for policies without a registered name, such as a closure over a trained model. `spec.policy` is then only
+    the name under which the result is stored.
 
     Args:
-        policy: A fresh instance; it drives this one run.
+        policy: A fresh instance; it drives only this run.
         spec: The run.
     """
     started = time.perf_counter()
@@ -117,7 +117,7 @@ def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:
 
 
 def run_one(spec: RunSpec) -> RunRecord:
-    """Run a specification; a function of nothing but `spec`, the machine and the installed versions.
+    """Run a specification. The result depends only on `spec`, the machine and the installed versions.
 
     Raises:
         ValueError: no installed policy has the name, or it refuses its parameters.
@@ -128,8 +128,8 @@ def run_one(spec: RunSpec) -> RunRecord:
 def warm_up(spec: RunSpec) -> None:
     """Step a run a few ticks, so that its kernels are compiled and cached before many processes need them.
 
-    A policy may ask for nothing so early in a run, so one more tick has every robot grasp: interactions are the
-    dearest kernel to compile.
+    So early in a run a policy may not use the gripper. In one more tick every robot therefore grasps, because the
+    kernel of interactions takes longest to compile.
     """
     policy = load_policy(spec.policy, spec.parameters)
     recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))

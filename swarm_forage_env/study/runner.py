@@ -1,7 +1,7 @@
-"""Many runs: any concurrent.futures executor, records stored as they finish, restartable.
+"""Many runs on any concurrent.futures executor. Records are stored as runs finish, so a study can be restarted.
 
-The default is a pool of local processes. Past one machine, hand in another executor, for example Dask's
-`Client.get_executor()`; the code path is the same, and workers need no shared disk because records travel back.
+The default is a pool of local processes. For several machines, pass another executor, for example Dask's
+`Client.get_executor()`. The code is the same, and workers need no shared disk, because records are sent back.
 """
 
 import os
@@ -41,11 +41,11 @@ THREAD_SETTINGS = (
     "NUMBA_NUM_THREADS",
     "POLARS_MAX_THREADS",
 )
-"""Environment variables set to 1 for workers: parallelism lives at the level of runs."""
+"""Environment variables set to 1 for workers: runs are parallel, the libraries inside a run are not."""
 QUEUED_PER_WORKER = 2
-"""Runs handed to the pool per worker, so that none waits for the driver and little is lost when one crashes."""
+"""Runs given to the pool per worker: enough that no worker waits, few enough that a crash loses little."""
 WAKE_UP_EVERY_S = 0.5
-"""The driver never sleeps longer: a library's signal handler (that of polars) can make a sleep outlast Ctrl-C."""
+"""The driver never sleeps longer, because with the signal handler of a library (polars) Ctrl-C may not end a sleep."""
 
 
 class WorkerError(RuntimeError):
@@ -90,7 +90,7 @@ def run_all(
         progress: Show progress and an estimate on stderr.
 
     Raises:
-        RecordError: a stored record is damaged or foreign; nothing has been run then.
+        RecordError: a stored record is damaged or belongs to something else; then nothing has been run.
         StudyInterrupted: Ctrl-C; finished runs are kept, the others cancelled.
         WorkerError: no worker process could be started.
     """
@@ -106,7 +106,7 @@ def run_all(
     )
     display = RunProgress(total=len(planned), done=n_stored, foreign=n_foreign) if progress else nullcontext()
     try:
-        # Closing ends the workers at once, wherever the interrupt struck.
+        # Closing ends the workers at once, wherever the interrupt came.
         with display as shown, closing(run_each(todo, store=store, executor=executor, jobs=jobs)) as fresh:
             for outcome in fresh:
                 outcomes[outcome.run_id] = outcome
@@ -126,8 +126,8 @@ def run_each(
 ) -> Generator[Outcome]:
     """Run specifications and yield each outcome as it finishes, already stored.
 
-    For studies whose records should not all be in memory. Unlike `run_all` it runs whatever it is given. Closing
-    the iterator, Ctrl-C included, cancels what has not finished.
+    This is for studies whose records should not all be in memory. Unlike `run_all`, it also runs specifications that
+    are stored already. Closing the iterator, also by Ctrl-C, cancels the runs that have not finished.
 
     Args:
         specs: What to run.
@@ -174,9 +174,9 @@ def _result(planned: dict[str, RunSpec], outcomes: dict[str, Outcome], n_stored:
 def _run_on(
     executor: Executor, todo: deque[RunSpec], *, limit: int, lost: deque[RunSpec] | None = None
 ) -> Generator[Outcome]:
-    """Work `todo` off with at most `limit` runs submitted; stops early, leaving the rest, when the executor breaks.
+    """Run `todo` with at most `limit` runs submitted at a time; if the executor breaks, stop and leave the rest.
 
-    Runs that were submitted when it broke are failures, or go to `lost` where one is given.
+    Runs that were submitted when it broke are failures, or go to `lost` if it is given.
     """
     running: dict[Future[RunRecord], RunSpec] = {}
     broken = False
@@ -204,7 +204,7 @@ def _run_on(
 
 
 def _run_elsewhere(executor: Executor, todo: deque[RunSpec]) -> Generator[Outcome]:
-    """Work `todo` off on an executor that is not ours to replace."""
+    """Run `todo` on the executor of the caller, which is not replaced if it breaks."""
     yield from _run_on(executor, todo, limit=len(todo))
     if todo:
         raise WorkerError(f"The executor broke; {len(todo)} runs were not started. Run them again on a new one.")
@@ -220,10 +220,10 @@ def _failure(spec: RunSpec, error: BaseException) -> RunFailure:
 
 
 class _InProcess(Executor):
-    """Runs what is submitted at once, here. Ctrl-C passes through, every error of the run belongs to its future."""
+    """Runs submitted calls at once, in this process. Ctrl-C passes through; other errors go into the future."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Call and return a future that is done."""
+        """Make the call and return a finished future."""
         future: Future[Any] = Future()
         try:
             future.set_result(fn(*args, **kwargs))
@@ -233,10 +233,10 @@ class _InProcess(Executor):
 
 
 def _run_in_pool(todo: deque[RunSpec], n_workers: int) -> Generator[Outcome]:
-    """Work `todo` off in local processes.
+    """Run `todo` in local processes.
 
-    A pool breaks as a whole when one worker is killed (too little memory, say). It is replaced for the rest, and the
-    runs it took down are tried once more, one at a time: so only those that kill their worker fail.
+    A pool breaks as a whole when one worker is killed (for lack of memory, for example). It is replaced for the other
+    runs, and the runs that were under way are tried once more, one at a time. So only runs that kill their worker fail.
     """
     lost: deque[RunSpec] = deque()
     with _process_pool(n_workers) as pool:
@@ -253,7 +253,7 @@ def _run_in_pool(todo: deque[RunSpec], n_workers: int) -> Generator[Outcome]:
 def _warm_up_workers(pool: Executor, specs: Iterable[RunSpec]) -> None:
     """Have one run of each kind compile and cache its kernels before many processes need them.
 
-    What a run raises here it raises again, and is recorded, in its own turn.
+    Errors are ignored here: the same run raises them again later, and they are recorded then.
     """
     for spec in {_kernel_kind(spec): spec for spec in specs}.values():
         future = pool.submit(warm_up, spec)
@@ -272,10 +272,10 @@ def _kernel_kind(spec: RunSpec) -> tuple[Any, ...]:
 
 
 class _Pool(ProcessPoolExecutor):
-    """A process pool whose workers never see Ctrl-C, not even while they start: it is the driver's affair."""
+    """A process pool whose workers never see Ctrl-C, not even while they start; only the driver handles it."""
 
     def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Submit with SIGINT held back, because a worker started here inherits what is held back."""
+        """Submit with SIGINT blocked, because a worker that starts here inherits the blocked signals."""
         if not hasattr(signal, "pthread_sigmask"):  # Windows: workers ignore Ctrl-C from `_start_worker` on
             return super().submit(fn, *args, **kwargs)
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -287,7 +287,7 @@ class _Pool(ProcessPoolExecutor):
 
 @contextmanager
 def _process_pool(n_workers: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool of spawned, single-threaded processes that leave at once when the driver gives up or dies."""
+    """A pool of spawned, single-threaded processes that exit at once when the driver stops or dies."""
     context = get_context("spawn")
     lifeline, held_by_driver = context.Pipe(duplex=False)
     with _single_threaded_children():
@@ -295,7 +295,7 @@ def _process_pool(n_workers: int) -> Iterator[ProcessPoolExecutor]:
         try:
             yield pool
         except BaseException:
-            held_by_driver.close()  # workers see the end of the lifeline and leave in the middle of their runs
+            held_by_driver.close()  # workers see the end of the lifeline and exit in the middle of their runs
             pool.shutdown(wait=False, cancel_futures=True)
             raise
         pool.shutdown()
@@ -304,7 +304,7 @@ def _process_pool(n_workers: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _start_worker(lifeline: Connection) -> None:
-    """Prepare a worker process: deaf to Ctrl-C, and gone when the driver is."""
+    """Prepare a worker process: it ignores Ctrl-C, and exits when the driver is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_leave_at_end_of, args=(lifeline,), daemon=True).start()
 
@@ -318,7 +318,7 @@ def _leave_at_end_of(lifeline: Connection) -> None:
 
 @contextmanager
 def _single_threaded_children() -> Iterator[None]:
-    """Processes started meanwhile use one thread each; libraries read these settings when they are imported."""
+    """Processes started inside this context use one thread each; libraries read the settings at import."""
     before = {name: os.environ.get(name) for name in THREAD_SETTINGS}
     os.environ.update(dict.fromkeys(THREAD_SETTINGS, "1"))
     try:

@@ -26,8 +26,8 @@ class RunSpec:
     """One run as data: the scenario, who controls the swarm, what disturbs it, and the seed.
 
     Raises:
-        ConfigError: no ScenarioConfig, parameters that JSON cannot hold, two wrappers of one kind, a bad seed, or a
-            horizon that is not a whole number of recording intervals.
+        ConfigError: `scenario` is no ScenarioConfig, parameters that JSON cannot hold, two wrappers of one kind, a bad
+            seed, or a horizon that is not a whole number of recording intervals.
     """
 
     scenario: ScenarioConfig
@@ -36,7 +36,7 @@ class RunSpec:
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Keyword arguments of the policy, plain JSON values; tuples become lists."""
     wrappers: "tuple[WrapperConfig, ...]" = ()
-    """What stands between recorder and environment, in any order; kept in the documented stack order."""
+    """Wrappers between recorder and environment, in any order; stored in the documented stack order."""
     criterion: str = "none"
     """What a study varies."""
     criterion_value: float = 0.0
@@ -128,14 +128,14 @@ def chosen_caches(asked: str | None, policy: object, scenario: ScenarioConfig) -
     Every run of the package is decided here: runs, films, scores and the command line.
 
     Args:
-        asked: "none", "static" or "dynamic" where somebody asked for it; None where nobody did.
+        asked: "none", "static" or "dynamic" if the user asked for it, else None.
         policy: A policy, or its class. It may state the caches that it is made for in the attribute `caches`.
         scenario: The scenario that the run was given.
     """
     if asked is not None:
         return asked
     stated = getattr(policy, "caches", None)
-    # A property of a class is not a statement: only an object of the class could answer.
+    # On a class, a property is not a value; it has one only on an object.
     return stated if isinstance(stated, str) else scenario.caches
 
 
@@ -152,8 +152,8 @@ def plan_run(
     Args:
         scenario: The scenario; its caches are those of `chosen_caches`.
         policy: Registered name, or path of a policy file.
-        parameters: Keyword arguments of the policy, plain values; with a "digest" a file is pinned already.
-        caches: Which caches the world has; default see `chosen_caches`.
+        parameters: Keyword arguments of the policy, plain values. A "digest" says that a file was checked before.
+        caches: Which caches there are; default see `chosen_caches`.
         fields: Further fields of `RunSpec`.
 
     Raises:
@@ -162,7 +162,7 @@ def plan_run(
     """
     chosen = dict(parameters or {})
     stating: object = None
-    # A study plans thousands of runs of a policy that was looked up before; its plan says everything.
+    # A study plans thousands of runs of a policy that was looked up before, so it is not looked up again.
     if caches is None or (is_policy_file(policy) and "digest" not in chosen):
         policy, chosen, stating = pin_policy(policy, chosen)
     planned = replace(scenario, caches=chosen_caches(caches, stating, scenario))
@@ -177,8 +177,8 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
         parameters: Keyword arguments of the policy; a "digest" of a file is kept, and the file checked against it.
 
     Returns:
-        The registered name, or the whole path of the file; the parameters, with the file's digest; and what states
-        `caches`: the class of the name, or the policy that was opened.
+        The registered name, or the whole path of the file; the parameters, with the file's digest; and the class of the
+        name or the opened policy, which may state `caches`.
 
     Raises:
         ValueError: no installed policy has that name, or the file cannot be opened.
@@ -203,7 +203,7 @@ def _wrapper_from_mapping(entry: Mapping[str, Any]) -> "WrapperConfig":
 
 
 def _canonical(value: Any) -> Any:
-    """Spell equal numbers alike (2000.0 as 2000), so that they hash alike."""
+    """Write equal numbers in the same way (2000.0 as 2000), so that they have the same hash."""
     if isinstance(value, Mapping):
         return {key: _canonical(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

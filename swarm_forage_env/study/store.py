@@ -69,7 +69,7 @@ class RunStore:
         """Return a stored record.
 
         Raises:
-            RecordError: the file is missing, damaged, foreign, or holds another run than its name says.
+            RecordError: the file is missing, damaged, no record, or holds another run than its name says.
         """
         path = self.path(run_id)
         try:
@@ -83,7 +83,7 @@ class RunStore:
         return record
 
     def write(self, record: RunRecord) -> None:
-        """Store a record; an earlier failure of the same run is forgotten."""
+        """Store a record; an earlier failure of the same run is removed."""
         self.folder.mkdir(parents=True, exist_ok=True)
         record.write(self.path(record.run_id))
         self.failure_path(record.run_id).unlink(missing_ok=True)
@@ -136,7 +136,7 @@ def load(folder: str | os.PathLike[str]) -> tuple[RunRecord, ...]:
     """Return all records in a folder, in the order of their ids.
 
     Raises:
-        RecordError: the folder holds no records, or a Parquet file in it is damaged or foreign; names the file.
+        RecordError: the folder holds no records, or a Parquet file in it is damaged or no record; the message names it.
     """
     store = RunStore(folder)
     records = tuple(store.records())

@@ -1,14 +1,14 @@
 """Many arenas stepped as one batch of rows, one row per robot: what vector environments are made of.
 
-Row `a * N + i` is robot i of arena a as long as the batch exists. The life of a row:
+Row `a * N + i` is always robot i of arena a. The life of a row:
 
 * While its robot is in the world, or not yet born, the row is part of an episode.
 * When the robot dies, the row terminates once, with its last observation (zeros: it has left the world). Until its
   arena starts anew the row is absent: an observation of zeros, no reward, actions ignored.
-* When the arena ends, at its horizon or with its last robot, it starts anew within the same step and every row is
-  done: rows of robots that could have gone on are truncated, rows that die in this step terminate, and so do absent
-  rows, once more, because their next observation belongs to a new episode. For an absent row no episode ends:
-  `ArenaStep.is_episode` is false there.
+* When the arena ends, at its horizon or when its last robot dies, it starts anew within the same step and every row is
+  done. Rows of robots that could have gone on are truncated. Rows whose robots die in this step terminate. Absent rows
+  terminate once more, because their next observation belongs to a new episode; no episode of theirs ends, so
+  `ArenaStep.is_episode` is false for them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,7 +43,7 @@ class ArenaStep:
     """Result of one step of R rows. Arrays that are not empty are new and belong to the caller."""
 
     obs: ObsArray
-    """(R, d) what to act on next; rows of arenas that ended show their new run already."""
+    """(R, d) observations to act on next; rows of arenas that ended already show the new run."""
     rewards: np.ndarray
     """(R,) float32."""
     terminated: BoolArray
@@ -51,7 +51,7 @@ class ArenaStep:
     truncated: BoolArray
     """(R,) rows whose arena reached its horizon while their robot could have gone on."""
     active: BoolArray
-    """(R,) whose robot is at work in what `obs` shows."""
+    """(R,) rows whose robot is at work in `obs`."""
     ended: IntArray
     """(E,) rows that are done, ascending."""
     final_obs: ObsArray
@@ -86,14 +86,14 @@ def checked_rows(actions: Any, batch: Rows) -> np.ndarray:
 
 
 def closed_error() -> RuntimeError:
-    """Return what is raised where closed arenas are asked for something."""
+    """Return the error for a call of closed arenas."""
     return RuntimeError("Expected open arenas, but they were closed.")
 
 
 def _owner(env: ForageEnv | SwarmWrapper, name: str) -> ForageEnv | SwarmWrapper:
-    """Return the layer of a stack that has the attribute itself; wrappers also show those of the layers below."""
+    """Return the wrapper or environment of a stack that has the attribute itself and does not only pass it on."""
     while isinstance(env, SwarmWrapper) and name not in vars(env) and not hasattr(type(env), name):
-        env = cast("ForageEnv | SwarmWrapper", env.env)  # which it has checked
+        env = cast("ForageEnv | SwarmWrapper", env.env)  # checked by its constructor
     return env
 
 
@@ -109,7 +109,7 @@ class _Endings:
     outcomes: list[RunOutcome] = field(default_factory=list)
 
     def joined(self, columns: int) -> dict[str, Any]:
-        """Return the fields of an `ArenaStep` of that name; `columns` are those of an observation."""
+        """Return the fields of an `ArenaStep` with the same names; `columns` = columns of an observation."""
         return {
             "ended": _joined(self.rows, np.zeros(0, np.int32)),
             "final_obs": _joined(self.final_obs, np.zeros((0, columns), np.float32)),
@@ -159,7 +159,7 @@ class ArenaBatch:
     def reset(
         self, seeds: Sequence[int | None], options: Sequence[Mapping[str, Any] | None]
     ) -> tuple[ObsArray, BoolArray]:
-        """Start a run in every arena; returns observations (R, d) and who is at work (R,).
+        """Start a run in every arena; returns observations (R, d) and which rows are at work (R,).
 
         Args:
             seeds: One per arena; see `LearnerArena.reset`.
@@ -171,7 +171,7 @@ class ArenaBatch:
         if self._is_closed:
             raise closed_error()
         obs = np.empty((self.n_arenas, self.n_robots, self._n_columns), np.float32)
-        self._is_reset = False  # and stays False where a seed or an option is refused before every arena has started
+        self._is_reset = False  # and stays False if a seed or an option is refused before every arena has started
         for number, (seed, option) in enumerate(zip(seeds, options, strict=True)):
             self._start(number, obs[number], seed, option)
         self._is_reset = True
@@ -180,7 +180,7 @@ class ArenaBatch:
     def _start(
         self, number: int, out: ObsArray, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> None:
-        """Start a run in one arena; writes what learners see to `out`."""
+        """Start a run in one arena; writes the learner's observations to `out`."""
         arena = self.arenas[number]
         arena.reset(seed, options)
         self._present[number] = arena.forage_env.swarm.present
@@ -240,7 +240,7 @@ class ArenaBatch:
         obs, rewards, terminated, truncated = out
         arena, absent = self.arenas[number], self._absent[number]
         dead, all_dead, at_horizon = arena.step(actions, rewards)
-        self._lengths[number] += self._present[number]  # as last seen: who died in this step had begun it
+        self._lengths[number] += self._present[number]  # presence before the step: a robot that died in it had begun it
         self._present[number] = arena.forage_env.swarm.present
         self._returns[number] += rewards
         arena.observe(obs)
@@ -298,7 +298,7 @@ class ArenaBatch:
         return [getattr(self.arenas[number].env, name) for number in arenas]
 
     def set_attribute(self, name: str, value: Any, arenas: Sequence[int]) -> None:
-        """Set an attribute of the environments of some arenas, where it is: in a wrapper or at the bottom."""
+        """Set an attribute of the environments of some arenas, in the wrapper or environment that has it."""
         for number in arenas:
             setattr(_owner(self.arenas[number].env, name), name, value)
 
@@ -311,7 +311,7 @@ class ArenaBatch:
         return [member(*args, **kwargs) if callable(member) else member for member in found]
 
     def close(self) -> None:
-        """Close all environments; they take no reset or step any more."""
+        """Close all environments; afterwards `reset` and `step` raise errors."""
         self._is_closed = True
         for arena in self.arenas:
             arena.env.close()

@@ -1,4 +1,4 @@
-"""Gymnasium views of the swarm: one agent for all robots, or every robot a sub-environment of a vector environment."""
+"""The swarm as Gymnasium environments: one agent for all robots, or a vector environment of robots."""
 
 import time
 from collections.abc import Iterable, Sequence
@@ -71,12 +71,12 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
 
     @property
     def interface(self) -> LearnerInterface:
-        """Spaces and layout of one robot's row; another one after a reset that changed the scenario."""
+        """Spaces and layout of one robot's row; another object after a reset that changed the scenario."""
         return self._arena.interface
 
     @property
     def forage_env(self) -> ForageEnv:
-        """The parallel environment at the bottom; another one after a reset that changed the scenario."""
+        """The parallel environment at the bottom; another object after a reset that changed the scenario."""
         return self._arena.forage_env
 
     def reset(
@@ -96,12 +96,12 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         """Advance by one decision.
 
         Args:
-            action: (N,) or (N, k), rows of robots that are away included (and ignored).
+            action: (N,) or (N, k), also for robots that are away (ignored).
 
         Raises:
             ActionError: wrong shape, numbers outside of `action_space`, or an active robot's action that is not finite.
         """
-        rewards = np.zeros(self.forage_env.scenario.robots.n_robots)  # float64: the sum shall not depend on the order
+        rewards = np.zeros(self.forage_env.scenario.robots.n_robots)  # float64: sums do not depend on the order
         _, terminated, truncated = self._arena.step(np.asarray(action), rewards)
         return self._arena.observe(), float(rewards.sum()), terminated, truncated, self._info()
 
@@ -123,14 +123,14 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
 class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
     """Every robot of every arena as a sub-environment that one shared policy acts in.
 
-    Sub-environment `a * N + i` is robot i of arena a. How rows end, stay absent and start anew is told in
-    `views.arenas`: an arena starts anew within the step that ends it (`AutoresetMode.SAME_STEP`), so that
-    `infos["final_obs"]` holds the last observations; a dead robot terminates once and is a row of zeros until then.
+    Sub-environment `a * N + i` is robot i of arena a. `views.arenas` describes how rows end, stay absent and start
+    anew: an arena starts anew within the step that ends it (`AutoresetMode.SAME_STEP`), and `infos["final_obs"]` holds
+    the last observations. A dead robot terminates once and is a row of zeros until its arena starts anew.
 
     Infos are arrays over rows, with masks under the name with an underscore in front, as Gymnasium does it:
     `active` always; `final_obs` (objects, None elsewhere) and `final_info` ({}) of rows that are done; `episode`
-    (return "r", steps "l", seconds since creation "t") of rows whose episode ended. Gymnasium's
-    `RecordEpisodeStatistics` is therefore not needed, refuses to write over it, and under another key would count
+    (return "r", steps "l", seconds since creation "t") of rows whose episode ended. So Gymnasium's
+    `RecordEpisodeStatistics` is not needed. It refuses to overwrite this key, and under another key it would count
     absent rows as episodes.
     """
 
@@ -157,15 +157,15 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
 
         Args:
             scenario: Name of a preset, or a complete configuration.
-            num_envs: Robots in all arenas together, a multiple of the scenario's; 1, which is what
-                `gymnasium.make_vec` says when nobody asked for a number, leaves the choice to `n_arenas`.
+            num_envs: Robots in all arenas together, a multiple of the scenario's number. 1, the default of
+                `gymnasium.make_vec`, leaves the choice to `n_arenas`.
             n_arenas: Arenas that run side by side; default as many as `num_envs` needs, at least one.
             n_processes: Processes that the arenas are spread over; 0 = all in this process.
             interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
                 observations and continuous actions.
             wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
                 ("population:death_per_tick=0.01").
-            swarm_wrappers: More of them, for `gymnasium.make_vec`, which takes an argument `wrappers` for itself.
+            swarm_wrappers: The same, for `gymnasium.make_vec`, which has its own argument `wrappers`.
             max_cycles: Ticks until truncation; default the scenario's horizon.
             render_mode: None or "rgb_array".
             overrides: Scenario fields by name (`n_robots=20`).

@@ -18,13 +18,13 @@ from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_
 from swarm_forage_env.wrappers.registry import wrapper_configs
 
 SCENARIO_OPTION = "scenario"
-"""Key of the options of a reset that is read here. Others, but for misplaced scenario fields, are left to those who
-put them there: both Gymnasium and PettingZoo hand options on to everything in the stack."""
+"""Key of the reset options that is read here. Other keys are ignored, except misplaced scenario fields: Gymnasium and
+PettingZoo pass the options to everything in the stack, so they may be for something else."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ArenaPlan:
-    """What an arena is made from; picklable."""
+    """Everything that an arena is made from; picklable."""
 
     scenario: ScenarioConfig
     wrappers: tuple[WrapperConfig, ...] = ()
@@ -36,7 +36,7 @@ class ArenaPlan:
     render_mode: str | None = None
 
     def build(self, overrides: Mapping[str, Any]) -> ForageEnv | SwarmWrapper:
-        """Build the environment in its wrappers, scenario fields overridden by name.
+        """Build the environment with its wrappers, with scenario fields overridden by name.
 
         Raises:
             ConfigError: unknown fields, values that do not fit together, or another number of robots.
@@ -55,7 +55,7 @@ def plan_arena(
     max_cycles: int | None = None,
     render_mode: str | None = None,
 ) -> ArenaPlan:
-    """Plan an arena from what the constructors of environments take.
+    """Plan an arena from the arguments that the constructors of environments take.
 
     Args:
         scenario: Name of a preset, or a complete configuration.
@@ -83,7 +83,7 @@ class LearnerArena:
     Attributes:
         env: Environment and wrappers as one stack.
         forage_env: The ForageEnv at its bottom.
-        interface: Translates for the learner; its spaces stay the same, the object does not.
+        interface: Translates for the learner; its spaces stay the same, but a reset may make a new object.
     """
 
     def __init__(self, plan: ArenaPlan) -> None:
@@ -105,8 +105,8 @@ class LearnerArena:
         Args:
             seed: Seed of the run and of those that follow it; None continues the sequence of the last seed given.
             options: `{"scenario": {field: value}}` overrides fields of the plan's scenario, in this run and all later
-                ones; `{"scenario": {}}` goes back to the plan. Without that key nothing
-                changes. Keys that have nothing to do with a scenario are ignored.
+                ones; `{"scenario": {}}` goes back to the plan. Without that key nothing changes. Keys that have nothing
+                to do with a scenario are ignored.
 
         Raises:
             ConfigError: a scenario field beside `scenario`, an option that is nearly one of these, an unknown field,
@@ -123,14 +123,14 @@ class LearnerArena:
         self._obs = self.env.reset_batch(seed)
 
     def step(self, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
-        """Carry a decision out: one tick after the other, until its ticks or the run are over.
+        """Carry out a decision: step until its ticks are done or the run ends.
 
         Args:
             actions: One action of the interface per robot, see `LearnerInterface.command`.
-            rewards: (N,) what the robots earn is added here.
+            rewards: (N,) the rewards of the robots are added to this array.
 
         Returns:
-            Dead robots (N,), whether that is all of them, and whether the horizon is reached.
+            Dead robots (N,), whether all robots are dead, and whether the horizon is reached.
 
         Raises:
             RuntimeError: before the first reset.
@@ -162,7 +162,7 @@ class LearnerArena:
 
 
 _FIXED = ("interface", "wrappers")
-"""What a reset cannot change, although people may expect it to."""
+"""Arguments that a reset cannot change, although users may expect it."""
 
 
 def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | None:

@@ -18,11 +18,11 @@ Infos = dict[str, dict[str, Any]]
 
 
 class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
-    """`ForageEnv` with the observations and actions of an `InterfaceConfig`; agents live and die as there.
+    """`ForageEnv` with the observations and actions of an `InterfaceConfig`; agents appear and terminate as there.
 
     `infos[agent]` holds `active` and, for discrete actions, `action_mask`: int8 (number of actions,), 1 = makes sense.
-    A step is one decision of `decision_ticks` ticks. Dictionaries take more time than the simulation itself; where a
-    library can take vector environments, `SwarmVectorEnv` is faster.
+    A step is one decision of `decision_ticks` ticks. Dictionaries take more time than the simulation itself; if a
+    library takes vector environments, `SwarmVectorEnv` is faster.
     """
 
     metadata: dict[str, Any] = {**ForageEnv.metadata, "name": "swarm_forage_learner_v1"}  # noqa: RUF012 - as PettingZoo
@@ -68,12 +68,12 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
 
     @property
     def interface(self) -> LearnerInterface:
-        """Spaces and layout of what learners see and do; another one after a reset that changed the scenario."""
+        """Spaces and layout of what learners see and do; another object after a reset that changed the scenario."""
         return self._arena.interface
 
     @property
     def forage_env(self) -> ForageEnv:
-        """The parallel environment at the bottom; another one after a reset that changed the scenario."""
+        """The parallel environment at the bottom; another object after a reset that changed the scenario."""
         return self._arena.forage_env
 
     def observation_space(self, agent: str) -> spaces.Box:
@@ -81,7 +81,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         return self._observation_space[agent]
 
     def action_space(self, agent: str) -> spaces.Box | spaces.Discrete:
-        """What one robot chooses from."""
+        """Space of one robot's actions."""
         return self._action_space[agent]
 
     @property
@@ -112,7 +112,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         """Advance by one decision, with one action per agent in `agents`.
 
         Raises:
-            RuntimeError: not reset, or everybody is done.
+            RuntimeError: not reset, or all agents are done.
             ValueError: an agent without an action, or actions outside of its action space.
         """
         if not self.agents:
@@ -134,10 +134,10 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         return results
 
     def _chosen(self, actions: dict[str, Any]) -> np.ndarray:
-        """Return one row per robot; those of robots that are gone are zeros."""
+        """Return one row per robot; zeros for robots that have left."""
         space = self.interface.action_space
         given = {agent: np.asarray(actions[agent]) for agent in self.agents}
-        # Assigning to an array would stretch what is too small and cut what is no whole number.
+        # Assigning to an array would broadcast arrays that are too small and truncate fractions.
         for agent, action in given.items():
             if action.shape != space.shape or not np.can_cast(action.dtype, space.dtype, casting="same_kind"):
                 raise ValueError(
@@ -232,4 +232,4 @@ def parallel_env(
 def env(scenario: str | ScenarioConfig = "warehouse_small", **options: Any) -> Any:
     """Create the agent-by-agent (AEC) form by PettingZoo's own conversion; arguments as `parallel_env`."""
     parallel = parallel_env(scenario, **options)
-    return parallel_to_aec(parallel)  # pyright: ignore[reportArgumentType] - it wants an action type that may be None
+    return parallel_to_aec(parallel)  # pyright: ignore[reportArgumentType] - its type asks for actions that may be None

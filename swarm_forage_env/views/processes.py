@@ -1,4 +1,4 @@
-"""Batches of arenas in processes of their own: the same interface as `ArenaBatch`, for machines with many cores."""
+"""Batches of arenas in separate processes: the same interface as `ArenaBatch`, for machines with many cores."""
 
 import contextlib
 import multiprocessing
@@ -19,7 +19,7 @@ from swarm_forage_env.views.learner_arena import ArenaPlan
 
 _CLOSE = "close"
 _GOODBYE_S = 10.0
-"""Seconds that a process has to end after it was told to, before it is ended."""
+"""Seconds that a process gets to end by itself before it is terminated."""
 
 
 class ArenaProcessError(RuntimeError):
@@ -27,8 +27,8 @@ class ArenaProcessError(RuntimeError):
 
 
 def _serve(pipe: Connection, plan: ArenaPlan, n_arenas: int, first_arena: int) -> None:
-    """Answer numbered calls of `ArenaBatch` methods until told to close; the whole life of a process."""
-    # Ctrl-C reaches every process of a terminal. The parent decides what it means and tells by closing.
+    """Main function of a process: answer numbered calls of `ArenaBatch` methods until told to close."""
+    # Ctrl-C reaches every process of a terminal. Only the parent handles it, and closes this process if needed.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     batch: ArenaBatch | None = None
     while True:
@@ -40,16 +40,16 @@ def _serve(pipe: Connection, plan: ArenaPlan, n_arenas: int, first_arena: int) -
             if batch is None:
                 batch = ArenaBatch(plan, n_arenas, first_arena=first_arena)
             pipe.send((number, getattr(batch, method)(*args, **kwargs), None))
-        except BrokenPipeError:  # the parent does not want the answer any more
+        except BrokenPipeError:  # the parent no longer waits for the answer
             return
-        except Exception as error:  # noqa: BLE001 - whatever it is, the parent has to raise it
+        except Exception as error:  # noqa: BLE001 - the parent raises it, whatever it is
             pipe.send((number, None, (_portable(error), traceback.format_exc())))
         if method == _CLOSE:
             return
 
 
 def _portable(error: Exception) -> Exception:
-    """Return the error if it survives the way to another process, else one that says the same."""
+    """Return the error if it can be pickled and unpickled, else one with the same text."""
     try:
         pickle.loads(pickle.dumps(error))  # noqa: S301 - what was pickled right here
     except Exception:  # noqa: BLE001 - errors of others can fail to pickle in any way
@@ -58,9 +58,9 @@ def _portable(error: Exception) -> Exception:
 
 
 class ArenaProcesses:
-    """Arenas spread evenly over processes; rows and arenas count as if they were one `ArenaBatch`.
+    """Arenas spread evenly over processes; rows and arenas are numbered as in one `ArenaBatch`.
 
-    Results are those of one `ArenaBatch` bit for bit: arenas know nothing of each other. Attributes as there.
+    Results equal those of one `ArenaBatch` bit for bit, because arenas are independent. Attributes as there.
     """
 
     def __init__(self, plan: ArenaPlan, n_arenas: int, n_processes: int, *, context: str = "spawn") -> None:
@@ -84,7 +84,7 @@ class ArenaProcesses:
         self.n_rows = n_arenas * self.n_robots
         self.interface = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
         self._shares = [part.tolist() for part in np.array_split(np.arange(n_arenas), n_processes)]
-        starter: Any = multiprocessing.get_context(context)  # its declared type lacks Process, which every context has
+        starter: Any = multiprocessing.get_context(context)  # the declared type lacks Process, but every context has it
         self._pipes: list[Connection] = []
         self._processes = []
         self._n_asked = [0] * n_processes
@@ -98,7 +98,7 @@ class ArenaProcesses:
             self._pipes.append(ours)
             self._processes.append(process)
         try:
-            # The first question makes a process build its arenas. One is enough to find out whether the plan can be.
+            # The first call makes a process build its arenas. If one process can build the plan, all can.
             self.get_attribute("tick", [0])
         except BaseException:
             self.close()
@@ -125,7 +125,7 @@ class ArenaProcesses:
         return ArenaProcessError(f"{told}.")
 
     def _answer(self, process: int) -> tuple[Any, tuple[Exception, str] | None]:
-        """Wait for the answer to the last question; those nobody waited for (after Ctrl-C, say) are skipped."""
+        """Wait for the answer to the last call; answers to earlier calls that were left unread (Ctrl-C) are skipped."""
         try:
             while True:
                 number, result, failure = self._pipes[process].recv()
@@ -206,13 +206,13 @@ class ArenaProcesses:
         return [found[arena] for arena in arenas]
 
     def close(self) -> None:
-        """End all processes; answers that were not read are dropped. Closed arenas may be closed again."""
+        """End all processes; unread answers are dropped. Closing twice is allowed."""
         pipes, self._pipes = self._pipes, []
         for pipe in pipes:
             with contextlib.suppress(OSError):  # it ended by itself
                 pipe.send((0, _CLOSE, (), {}))
         for process, pipe in zip(self._processes, pipes, strict=False):
-            # A process that is still sending cannot end before somebody listens.
+            # A process that is still sending can only end when its answer is read.
             with contextlib.suppress(EOFError, OSError):
                 while pipe.poll(_GOODBYE_S):
                     pipe.recv_bytes()
@@ -224,7 +224,7 @@ class ArenaProcesses:
 
 
 def open_arenas(plan: ArenaPlan, n_arenas: int, n_processes: int) -> ArenaBatch | ArenaProcesses:
-    """Build arenas in this process (n_processes = 0) or spread over so many others; raises as their classes do."""
+    """Build arenas in this process (n_processes = 0) or in n_processes others; raises as their classes do."""
     if n_processes:
         return ArenaProcesses(plan, n_arenas, n_processes)
     return ArenaBatch(plan, n_arenas)

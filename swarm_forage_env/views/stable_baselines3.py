@@ -23,17 +23,17 @@ from swarm_forage_env.wrappers.base import WrapperConfig
 class SwarmVecEnv(VecEnv):
     """Every robot of every arena as a sub-environment that one shared policy acts in.
 
-    Sub-environment `a * N + i` is robot i of arena a. Arrays pass straight through: no per-agent dicts. How rows end,
-    stay absent and start anew is told in `views.arenas`; in terms of stable-baselines3:
+    Sub-environment `a * N + i` is robot i of arena a. It passes arrays on and makes no per-agent dicts. `views.arenas`
+    describes how rows end, stay absent and start anew. In terms of stable-baselines3:
 
     * `dones` is true when the observation returned is the first of a new episode, and when a robot dies.
-    * `infos[row]["terminal_observation"]` is there whenever `dones[row]` is; `"TimeLimit.truncated"` is true where the
-      robot could have gone on, so that the value of the terminal observation is bootstrapped there and nowhere else.
+    * `infos[row]["terminal_observation"]` is there whenever `dones[row]` is true; `"TimeLimit.truncated"` is true if
+      the robot could have gone on. Only then the value of the terminal observation is bootstrapped.
     * `infos[row]["episode"]` (return "r", steps "l", seconds since creation "t") is there when an episode ended, also
       by death; no `VecMonitor` is needed, and one would count absent rows as episodes.
     * `infos[row]["run"]`, on the first row of an arena that ended: seed, simulated seconds, collected, first_picked.
-    * Robots that are absent or in repair must not teach: build the algorithm with `ActiveRolloutBuffer` (on-policy)
-      or `PresentReplayBuffer` (off-policy).
+    * Learners must leave out robots that are absent or in repair: build the algorithm with `ActiveRolloutBuffer`
+      (on-policy) or `PresentReplayBuffer` (off-policy).
 
     Attributes:
         n_arenas, n_robots: num_envs = n_arenas * n_robots.
@@ -85,7 +85,7 @@ class SwarmVecEnv(VecEnv):
         self.active: BoolArray = np.zeros(self.num_envs, np.bool_)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Set the seeds of the next reset: arena a runs seed + a, and from there a sequence of its own.
+        """Set the seeds of the next reset: arena a runs seed + a, and later runs follow the arena's own sequence.
 
         Returns:
             One seed per row, that of its arena.
@@ -146,7 +146,7 @@ class SwarmVecEnv(VecEnv):
 
     @property
     def rollout_buffer_kwargs(self) -> dict[str, Any]:
-        """What `ActiveRolloutBuffer` wants to know of the observations; new in every call."""
+        """Arguments of `ActiveRolloutBuffer` about the observations; a new dict in every call."""
         return {"active_column": self.active_column, "n_columns": self.interface.layout.size}
 
     def action_masks(self) -> BoolArray:
@@ -185,10 +185,10 @@ class SwarmVecEnv(VecEnv):
         )
 
     def env_is_wrapped(self, wrapper_class: type[gymnasium.Wrapper], indices: VecEnvIndices = None) -> list[bool]:
-        """Return False for each row, but True for `Monitor`: rows tell their episodes as it would.
+        """Return False for each row, but True for `Monitor`, because rows report their episodes in the same way.
 
-        `evaluate_policy` and `EvalCallback` ask for it, and then count episodes instead of dones, which absent rows
-        have, too.
+        `evaluate_policy` and `EvalCallback` ask for it. They then count episodes and not dones, which absent rows have,
+        too.
         """
         return [wrapper_class is Monitor] * len(self._rows(indices))
 

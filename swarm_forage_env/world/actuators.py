@@ -1,4 +1,4 @@
-"""From actions to body motion: limits of the drive, wheel gains of wrappers, held wheels."""
+"""From actions to body motion: limits of the drive, wheel gains of wrappers, wheels that stand still."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from swarm_forage_env.world.state import SwarmState
 
 
 def drive_limits(config: ScenarioConfig) -> FloatArray:
-    """Return what the drive kernels call `limits`: wheel scale, centre-speed limit, difference limit, wheel base."""
+    """Return the array `limits` of the drive kernels: wheel scale, centre-speed limit, difference limit, wheel base."""
     robots = config.robots
     return np.array([WHEEL_SCALE_MPS, robots.max_speed_mps, robots.max_wheel_difference_mps, robots.wheel_base_m])
 

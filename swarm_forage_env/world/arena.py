@@ -1,4 +1,4 @@
-"""ForagingArena: the world behind the environment. It owns the arrays and the order of a tick, nothing else."""
+"""ForagingArena: the simulated world of an environment. It owns the state arrays and fixes the order of a tick."""
 
 from collections.abc import Collection
 
@@ -31,25 +31,25 @@ from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, Sw
 
 
 class ForagingArena:
-    """A foraging world of one scenario, reset for each run and stepped one tick at a time.
+    """The simulated world of one scenario, reset for each run and stepped one tick at a time.
 
     Attributes:
         config: The scenario.
         layout: Layout of the observation rows.
-        reads: Observation slices that are looked at; sensors of others may stay zero.
+        reads: Observation slices that are used; sensors of others may stay zero.
         tick: Ticks done since reset.
         swarm, objects, caches, events: The state; read freely, write through the methods.
     """
 
     def __init__(self, config: ScenarioConfig, *, reads: Collection[str] | None = None) -> None:
-        """Prepare a world; `reset` must be called before `step`.
+        """Prepare the arena; `reset` must be called before `step`.
 
         Args:
             config: The scenario.
-            reads: Observation slices that are looked at; the sensors of others may stay zero. Default: all.
+            reads: Observation slices that are used; the sensors of others may stay zero. Default: all.
 
         Raises:
-            ConfigError: a name in `reads` that no slice has.
+            ConfigError: `reads` holds an unknown name.
         """
         self.config = config
         arena = config.arena
@@ -97,7 +97,7 @@ class ForagingArena:
         return sense(self.swarm, self.objects, self.caches, self.events, self._suite)
 
     def _furnish(self) -> None:
-        """Place all objects and create static caches: before the clusters are drawn in the power law, else after."""
+        """Place all objects and create static caches: before the clusters if placement is "power_law", else after."""
         config = self.config
         clustered = config.objects.placement == "power_law"
         if self._static_caches and clustered:
@@ -194,7 +194,7 @@ class ForagingArena:
             self.events.counters[Counter.OBJECTS_CACHED] += self.caches.count.sum()
 
     def set_population(self, *, active: BoolArray, present: BoolArray) -> None:
-        """Say who is in the world and who is at work; takes effect in the next step.
+        """Set which robots are in the world and which are at work; takes effect in the next step.
 
         A robot that leaves the world drops its cargo where it is (into a cache, onto the floor, or re-placed) and its
         body is parked. A robot that comes (back) takes the pose in `swarm.position` and `swarm.heading`.

@@ -1,4 +1,4 @@
-"""Caches as areas of the floor: static ones that an outside process restores, dynamic ones that robots create.
+"""Caches as areas of the floor: static ones that are restored at random times, dynamic ones that robots create.
 
 What robots do with caches (adding, taking, the last pair dissolving) is in `kernels.interact`.
 """
@@ -18,7 +18,7 @@ MAX_PASSES = 100
 
 
 def n_cache_slots(config: ScenarioConfig) -> int:
-    """Slots that suffice for a world: as many disjoint cache squares as the arena can hold; 0 without caches."""
+    """Number of cache slots: as many disjoint cache squares as the arena can hold; 0 without caches."""
     if config.caches == "none":
         return 0
     nx, ny = config.arena.n_cells
@@ -73,8 +73,8 @@ def create_static_caches(
 ) -> None:
     """Create every missing static cache.
 
-    Each takes the first `static_size` objects in row order that are of status `supply` and outside all static cache
-    squares, and absorbs the free objects on its own square. With fewer than two objects there is no cache.
+    Each takes the first `static_size` objects in row order that have the status `supply` and lie outside all static
+    cache squares, and also the free objects on its own square. With fewer than two objects no cache is created.
     """
     side = config.cache_side_cells
     boxes = [square_box(centre, side) for centre in static_cache_centres(config)]
@@ -129,9 +129,10 @@ def restore_static_caches(
 
 
 def protected_boxes(config: ScenarioConfig, source: Source) -> list[Box]:
-    """Source regions and clusters, whose objects create no caches; the random placement protects nothing.
+    """Source regions and clusters, whose objects create no caches; none with random placement.
 
-    Under the quirk `dynamic_cache_merges_all` its region is protected too, so that no cache ever forms there.
+    Under the quirk `dynamic_cache_merges_all` the region of the random placement is protected, too, so that no cache
+    ever forms there.
     """
     if config.objects.placement == "random" and not config.quirks.dynamic_cache_merges_all:
         return []
@@ -150,7 +151,7 @@ def cache_members(first: int, config: ScenarioConfig, objects: ObjectState, prot
     if not config.quirks.dynamic_cache_merges_all:
         if not usable[first]:
             return np.empty(0, np.int32)
-        # In cells, where squared distances are whole: in metres an object just at the limit would fall to rounding.
+        # In cells squared distances are whole; in metres, rounding would decide about an object exactly at the limit.
         offset = objects.cell - objects.cell[first]
         usable &= (offset * offset).sum(axis=1) <= (config.min_dist_m / CELL_M) ** 2 + 1e-6
     return np.flatnonzero(usable).astype(np.int32)

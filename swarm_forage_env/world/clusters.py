@@ -34,8 +34,8 @@ def cluster_law(side_m: float) -> ClusterLaw:
     Args:
         side_m: Side of the square arena in metres (for a rectangle: of the square with its area).
     """
-    # Whole roots are recognised although X ** (1 / 3) is not exact; the study's 17 clusters at 32 m come from
-    # 32 ** 0.8 rounding to just above 16, kept on every platform by the factor.
+    # X ** (1 / 3) is not exact, so roots are rounded before `ceil`. The study's 17 clusters at 32 m come from 32 ** 0.8
+    # being rounded to just above 16; the factor gives the same result on every platform.
     return ClusterLaw(
         k_min=math.ceil(round(side_m ** (1 / 4), 9)) + 1,
         k_max=math.ceil(round(side_m ** (1 / 3), 9)) + 1,

@@ -65,12 +65,12 @@ class Interactions:
         )
 
     def serve(self, actions: ActionArray, tick: int, chance: FloatArray) -> bool:
-        """Serve all requests of this tick and write the events; returns whether there was any.
+        """Serve all requests of this tick and write the events; returns whether there was any request.
 
         Args:
             actions: (N, 3); the third column is the gripper.
             tick: Current tick, for the order of robots that want the same.
-            chance: (N,) uniform in [0, 1), which object leaves a cache.
+            chance: (N,) uniform in [0, 1), decides which object leaves a cache.
         """
         state = self.state
         busy = kernel.clear_events(
@@ -82,12 +82,12 @@ class Interactions:
         return busy
 
     def drop_cargo(self, robot: int) -> None:
-        """Let a dying robot lose its cargo where it is: into the cache, onto the floor, or re-placed."""
+        """Take the cargo of a dying robot: it goes into the cache or onto the floor there, or is placed again."""
         self.state.displaced[-1] = 0
         kernel.drop_cargo(self.state, self.rules, robot)
 
     def displaced(self) -> IntArray:
-        """Object rows that must be re-placed after the last call: delivered, or dropped without a free cell."""
+        """Object rows to place again after the last call: delivered, or dropped without a free cell."""
         return self.state.displaced[: self.state.displaced[-1]]
 
     def creators(self) -> IntArray:

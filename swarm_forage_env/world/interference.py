@@ -1,4 +1,4 @@
-"""Which robots lose time to avoidance, measured from geometry: one rule for every policy, never self-reported."""
+"""Which robots lose time to avoidance. The rule uses geometry only, so it is the same for every policy."""
 
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.world.kernels.interfere import mark

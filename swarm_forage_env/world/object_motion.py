@@ -1,4 +1,4 @@
-"""Random walk of free objects: targets that drift while nobody holds them (p_rw of the paper's scenario 2)."""
+"""Random walk of free objects: they drift while no robot carries them (p_rw of the paper's scenario 2)."""
 
 import numpy as np
 
@@ -18,9 +18,9 @@ def walk_objects(
 ) -> int:
     """Let every free object take one step with `probability`; returns how many moved.
 
-    A step goes to a uniform choice of the free cells among the eight neighbours; without one the object stays. The
-    study redraws a step of -1, 0 or 1 cells per axis up to 32 times until it fits: the accepted step is a uniform
-    choice as well, only giving up after 32 misses is left out. One number is drawn per object and tick, whatever its
+    A step goes to one of the free cells among the eight neighbours, drawn uniformly; if none is free the object stays.
+    The study redraws a step of -1, 0 or 1 cells per axis until it fits, up to 32 times. That is a uniform choice, too;
+    only the rule of giving up after 32 draws is left out here. One number is drawn per object and tick, whatever its
     status, so that runs which share a seed stay paired.
 
     Args:

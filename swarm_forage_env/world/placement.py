@@ -1,4 +1,4 @@
-"""Where objects appear: the source of a run, first placement, re-placement; and where static caches stand.
+"""Where objects appear: the source of a run, the first placement, later placements; and where static caches stand.
 
 Every object lies on its own free cell: inside the distributable box, empty, neither nest nor cache.
 """
@@ -29,7 +29,7 @@ class Source:
     regions: IntArray
     """(R, 4) boxes in cells, half-open: x low, y low, x high, y high; rows of one group are neighbours."""
     capacity: IntArray
-    """(R,) objects that a region takes, those dropped there included; `UNLIMITED` = as many as it has free cells."""
+    """(R,) most objects in a region, also counting those dropped there; `UNLIMITED` = as many as it has free cells."""
     group_start: IntArray
     """(G + 1,) first region of each group, then R."""
 
@@ -70,14 +70,14 @@ def place_objects(
     distributable_box: Box,
     rng: np.random.Generator,
 ) -> None:
-    """Bring objects (back) into the world, one after the other, each on a random free cell of the source.
+    """Place objects, at the start or again, one after the other, each on a random free cell of the source.
 
-    A random group of regions, a random region in it, both cyclically skipping full ones, then a uniform choice among
-    the free cells (study). A placed object starts anew: free, carried by nobody so far. One that finds no cell waits;
-    with every object placed, all waiting ones are tried too, longest wait first.
+    First a random group of regions is drawn, then a random region in it, both in cyclic order past full ones, then one
+    of its free cells, uniformly (study). A placed object is free, and its count of carriers starts at zero. An object
+    for which there is no cell waits. Whenever objects are placed, all waiting ones are tried, too, longest wait first.
 
     Args:
-        rows: Object rows that lie nowhere on the floor and do not wait.
+        rows: Object rows that do not lie on the floor and do not wait.
         objects: Edited in place.
         source: Regions of this run.
         distributable_box: Cells on which objects may lie, half-open.
@@ -86,8 +86,8 @@ def place_objects(
     if len(rows) == 0:
         return
     newest = [int(row) for row in rows]
-    # Trying in this order until the first failure equals trying the whole waiting list after every new object: when
-    # one finds no cell nothing behind it can, and once all waiting ones lie the list is empty.
+    # Trying in this order until the first failure is the same as trying the whole waiting list after every new object:
+    # if there is no cell for one object, there is none for the later ones, and if all are placed, the list is empty.
     queue = np.array([newest[0], *objects.waiting, *newest[1:]], np.int32)
     n_placed = _place_until_full(queue, objects, source, distributable_box, rng)
     if n_placed == 0:
@@ -122,7 +122,7 @@ def place_all(objects: ObjectState, source: Source, distributable_box: Box, rng:
 def _place_until_full(
     queue: IntArray, objects: ObjectState, source: Source, distributable_box: Box, rng: np.random.Generator
 ) -> int:
-    """Place rows in order until one finds no cell; that one and all behind it wait. Returns how many were placed."""
+    """Place rows in order until there is no cell; the other rows then wait. Returns how many were placed."""
     n_placed = 0
     for start in range(0, len(queue), _CHUNK):
         chunk = queue[start : start + _CHUNK]

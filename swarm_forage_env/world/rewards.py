@@ -1,4 +1,4 @@
-"""Reward terms, one small function each; weights in `config.RewardConfig`. Only learners use them."""
+"""Reward terms, one small function each; weights in `scenarios.config.RewardConfig`. Only learners use them."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ def delivered(events: StepEvents) -> FloatArray:
 
 
 def first_picked(events: StepEvents) -> FloatArray:
-    """1 for a robot that picked up an object nobody had carried since it was placed, (N,)."""
+    """1 for a robot that picked up an object that no robot had carried since it was placed, (N,)."""
     return events.first_picked.astype(np.float64)
 
 

@@ -1,4 +1,4 @@
-"""From the true world to observations: one function per sensor, all robots at once.
+"""From the true state to observations: one function per sensor, all robots at once.
 
 Sensor models are those of the foot-bot as configured for the paper's study. Noise is not added here: the
 `SensorNoise` wrapper perturbs the finished observation.

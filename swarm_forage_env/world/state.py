@@ -1,6 +1,6 @@
-"""The world as struct-of-arrays: robots, objects, caches, this tick's events. Row i means robot i for ever.
+"""The state of the world as arrays: robots, objects, caches, this tick's events. Row i is always robot i.
 
-No behaviour lives here; every rule is a function in another room that edits the arrays it names.
+There are no rules here; every rule is a function in another module of this folder, which edits the arrays it names.
 """
 
 from dataclasses import dataclass, field
@@ -33,7 +33,7 @@ class SwarmState:
     pending_band: CodeArray
     """(N,) gripper band that started it; another band cancels it."""
     pending_target: IntArray
-    """(N,) object row or cache serial that the interaction in progress is about, -1 = none."""
+    """(N,) object row or cache serial of the interaction in progress, -1 = none."""
     present: BoolArray
     """(N,) born and not dead: has a body."""
     active: BoolArray
@@ -94,7 +94,7 @@ class ObjectState:
 
 @dataclass(slots=True)
 class CacheState:
-    """Cache slots; a slot is reused after its cache is gone, a serial number never."""
+    """Cache slots. A slot is reused after its cache is gone; a serial number is never reused."""
 
     alive: BoolArray
     """(K,) whether the slot holds a cache."""
@@ -128,11 +128,11 @@ class StepEvents:
     event_cache: IntArray
     """(N, 4) serial, centre cell x, y, count of the event's cache; serial 0 = none."""
     first_picked: BoolArray
-    """(N,) picked up an object that nobody had carried since it was placed."""
+    """(N,) picked up an object that no robot had carried since it was placed."""
     interfering: BoolArray
     """(N,) active and the obstacle rule holds on true readings."""
     happened: BoolArray
-    """(1,) whether any robot asked for or was in an interaction: if not, no code is set."""
+    """(1,) whether any robot asked for an interaction or was in one; if not, no event code is set."""
     counters: np.ndarray
     """(len(Counter),) int64, cumulative since reset."""
     interference_sum: FloatArray
@@ -140,7 +140,7 @@ class StepEvents:
 
     @classmethod
     def empty(cls, n_robots: int) -> "StepEvents":
-        """Nothing has happened."""
+        """No events, all counters zero."""
         return cls(
             code=np.zeros(n_robots, np.int8),
             event_object=np.full(n_robots, -1, np.int32),

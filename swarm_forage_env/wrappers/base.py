@@ -1,4 +1,4 @@
-"""SwarmWrapper: wrappers that are ordinary PettingZoo wrappers outside and array-level inside.
+"""SwarmWrapper: PettingZoo wrappers that work on arrays inside.
 
 The dict API packs actions once, the whole stack runs on arrays, and observations are unpacked once, so a further
 wrapper costs microseconds, not a pass over all agents.
@@ -24,11 +24,11 @@ class SwarmWrapper(BaseParallelWrapper):
 
     Hooks of one step, each called once per tick: `before_step` and `gain` from the outermost wrapper inwards, then
     the environment steps, then `observe` and `after_step` from the innermost wrapper outwards. A reset calls
-    `on_reset` and `observe` from the innermost wrapper outwards. Wrappers never rewrite actions. They read truth
-    from `self.unwrapped` (`swarm`, `events`, `tick` ...) and write it only through `self.unwrapped.set_population`.
+    `on_reset` and `observe` from the innermost wrapper outwards. Wrappers never rewrite actions. They read the true
+    state from `self.unwrapped` (`swarm`, `events`, `tick` ...) and change it only by `self.unwrapped.set_population`.
 
     Attributes:
-        env: What is wrapped.
+        env: The wrapped environment.
     """
 
     stack_position: ClassVar[int]
@@ -38,8 +38,8 @@ class SwarmWrapper(BaseParallelWrapper):
         """Wrap `env`.
 
         Raises:
-            TypeError: `env` is neither a ForageEnv nor a SwarmWrapper. A foreign wrapper in between would be
-                skipped without notice; wrap it around the whole stack instead.
+            TypeError: `env` is neither a ForageEnv nor a SwarmWrapper. A wrapper from another library in between would
+                be skipped without notice; wrap it around the whole stack instead.
             ValueError: the stack would not be in the documented order.
         """
         if not isinstance(env, ForageEnv | SwarmWrapper):
@@ -59,7 +59,7 @@ class SwarmWrapper(BaseParallelWrapper):
     @property
     def unwrapped(self) -> ForageEnv:
         """The ForageEnv at the bottom of the stack."""
-        return self._unwrapped  # kept, because every hook of every tick asks for it
+        return self._unwrapped  # stored, because every hook of every tick needs it
 
     def on_reset(self, seed: int) -> None:
         """Prepare for a new run, after the environment was reset.
@@ -77,7 +77,7 @@ class SwarmWrapper(BaseParallelWrapper):
         Args:
             actions: (N, 3) float32, the commands of this step; read only.
             wheel_gain: (N, 2) factors on the left and right wheel speed from the wrappers outside, None = all 1.
-                Multiply into an array of your own; never change this one.
+                Write the product into your own array; never change this one.
         """
         return wheel_gain
 
@@ -90,7 +90,7 @@ class SwarmWrapper(BaseParallelWrapper):
         return obs
 
     def after_step(self, tasks: CodeArray | None, terminated: BoolArray, truncated: bool) -> None:
-        """Look at the environment after it stepped.
+        """Read the environment after its step.
 
         Args:
             tasks: (N,) `contract.codes.Task` codes as handed to `step_batch`, or None.

@@ -39,14 +39,14 @@ def _is_noisy(sigma: Sigma) -> bool:
 
 
 class SensorNoise(SwarmWrapper):
-    """Perturbs what policies see. The rules of the arena and the measure of interference use the truth.
+    """Perturbs what policies see. The rules of the arena and the measure of interference use exact readings.
 
     Unit of sigma: 1 for readings (proximity, light, ground; clamped to [0, 1]), 1 cm/s for wheel speeds and 1 m per
     axis for positions (both clamped to the ends of their range), 1 rad for the heading, whose angle is perturbed. All
     other columns stay exact, rows of robots that are not present stay zero.
 
-    In every tick a number is drawn for each robot and noisy column, whether it is used or not. So neither a death, nor
-    the policy's choice of slices, nor the size of sigma shifts anybody's noise.
+    In every tick a number is drawn for each robot and noisy column, whether it is used or not. So a death, the policy's
+    choice of slices and the size of sigma do not change the draws of other robots and columns.
     """
 
     stack_position: ClassVar[int] = 1
@@ -69,7 +69,7 @@ class SensorNoise(SwarmWrapper):
         self._heading: tuple[int, int] | None = None
         for name in (name for name in NOISE_GROUPS if name in sigmas):
             part, sigma, first = parts[name], sigmas[name], len(units)
-            # Nobody reads the other slices, and nobody rewrites them either: noise would pile up there.
+            # Other slices are not read, and the environment does not rewrite them: noise would add up there.
             is_read = part.name in self.unwrapped.arena.reads
             if name == "heading":
                 units.append(1.0)
@@ -106,7 +106,7 @@ class SensorNoise(SwarmWrapper):
 
 
 class ActuatorNoise(SwarmWrapper):
-    """Multiplies each wheel's speed by a factor of its own in every tick, with mean 1 and standard deviation sigma."""
+    """Multiplies each wheel's speed by its own factor in every tick, with mean 1 and standard deviation sigma."""
 
     stack_position: ClassVar[int] = 4
 
@@ -161,7 +161,7 @@ class SensorNoiseConfig(WrapperConfig):
     groups: tuple[str, ...] = NOISE_GROUPS
     """Which of `NOISE_GROUPS` are noisy; kept in that order."""
     sigmas: Mapping[str, Sigma] = field(default_factory=dict, hash=False)
-    """Group -> standard deviation of its own, instead of `sigma`; the group need not be among `groups`."""
+    """Group -> its own standard deviation, instead of `sigma`; the group need not be among `groups`."""
     distribution: str = "gaussian"
     """One of `DISTRIBUTIONS`; a uniform one has the same standard deviation (our choice)."""
 

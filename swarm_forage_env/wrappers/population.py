@@ -17,7 +17,7 @@ from swarm_forage_env.wrappers.population_process import (
 )
 
 BIRTH_MARGIN_M = 2.0
-"""Robots are born this far from the border of the arena (study configuration), or nearer where they start nearer."""
+"""Robots are born at least this far from the border of the arena (study configuration), or the start margin if less."""
 BIRTH_TRIALS = 1000
 """Positions that are tried in one tick (study configuration)."""
 DEATHS = ("terminate", "absorbing")
@@ -44,7 +44,7 @@ class PopulationDynamics(SwarmWrapper):
         """Wrap `env`.
 
         Raises:
-            ConfigError: more robots at the start than the scenario has, or births with nobody left to be born.
+            ConfigError: more robots at the start than the scenario has, or births although all robots are there.
         """
         super().__init__(env)
         scenario = self.unwrapped.scenario
@@ -56,7 +56,7 @@ class PopulationDynamics(SwarmWrapper):
             )
         if config.birth_per_tick > 0.0 and initial == n_robots:
             raise ConfigError(
-                f"Expected population.initial_robots below {n_robots}, the robots of the scenario, so that somebody "
+                f"Expected population.initial_robots below {n_robots}, the robots of the scenario, so that a robot "
                 f"can be born, got {config.initial_robots}."
             )
         self._config = config
@@ -66,7 +66,7 @@ class PopulationDynamics(SwarmWrapper):
         self._body_m = 2.0 * scenario.robots.radius_m
 
     def on_reset(self, seed: int) -> None:
-        """Start the clocks; robots that are not yet born leave the arena before anybody sees them."""
+        """Start the clocks; robots that are not yet born leave the arena before the first observation."""
         config = self._config
         n_robots = self.unwrapped.scenario.robots.n_robots
         self._state = PopulationState.start(
@@ -80,7 +80,7 @@ class PopulationDynamics(SwarmWrapper):
             self.unwrapped.arena.observe()
 
     def before_step(self) -> None:
-        """Let happen what is due in the coming tick."""
+        """Carry out the events that are due in the coming tick."""
         tick = self.unwrapped.tick + 1
         if tick >= self._next_tick:
             if advance_population(self._state, self._clocks, tick, self._find_place):
@@ -105,7 +105,7 @@ class PopulationDynamics(SwarmWrapper):
         return columns
 
     def _apply(self) -> None:
-        """Tell the environment who is present and active, and learners who is gone."""
+        """Tell the environment which robots are present, active and terminated."""
         state = self._state
         gone = state.dead
         if self._config.deaths == "absorbing":
@@ -113,7 +113,7 @@ class PopulationDynamics(SwarmWrapper):
         self.unwrapped.set_population(active=state.active, present=state.present, terminated=gone)
 
     def _find_place(self, row: int, rng: np.random.Generator) -> bool:
-        """Put a row that is to be born at a uniform position without overlap, if one is found."""
+        """Place a robot that is to be born at a uniform position without overlap, if one is found."""
         swarm = self.unwrapped.swarm
         others = swarm.position[swarm.present]
         for x, y in rng.uniform(self._birth_low, self._birth_high, (BIRTH_TRIALS, 2)).tolist():

@@ -1,9 +1,9 @@
-"""Population dynamics: when robots die, are born, break down and are repaired. Knows rows and ticks, not the arena.
+"""Population dynamics: when robots die, are born, break down and are repaired. It uses rows and ticks, not the arena.
 
-Four processes act on the swarm as a whole, each with a clock of its own; their rates do not depend on how many robots
-there are. Event clock: after an event at tick t the next is due at t + floor(w), w exponential with the rate of the
-process; a run starts as if an event had happened at tick 0. An event that nobody can suffer stays due and is tried
-again in every tick. In a tick each process has at most one event, in this order:
+Four processes act on the swarm as a whole, each with its own clock; their rates do not depend on the number of robots.
+After an event at tick t the next is due at t + floor(w), where w is exponential with the rate of the process; a run
+starts as if an event had happened at tick 0. An event for which there is no robot stays due and is tried again in every
+tick. In a tick each process has at most one event, in this order:
 
     death         a robot drawn from all present ones, those in repair included, leaves for good
     birth         the next row that is not yet born enters, if there is room for it
@@ -24,7 +24,7 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.types import BoolArray, IntArray
 
 FindPlace: TypeAlias = Callable[[int, np.random.Generator], bool]
-"""Puts the row that is to be born somewhere, drawing from the generator; returns False if there is no room now."""
+"""Places the robot that is to be born, drawing from the generator; returns False if there is no room now."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -48,8 +48,8 @@ class EventRates:
 class EventClock:
     """When the next event of one process is due, and the draws that belong to the event.
 
-    Processes have generators of their own, one for times and one for choices: at another rate the same choices are
-    made at times that scale, so runs of a sweep stay paired.
+    Each process has two generators, one for times and one for choices. At another rate the same choices are made, at
+    times in proportion, so runs of a sweep stay paired.
     """
 
     def __init__(self, rate: float, times: np.random.Generator, choices: np.random.Generator) -> None:
@@ -69,8 +69,8 @@ class EventClock:
     def choose(self, candidates: BoolArray) -> int:
         """Draw one row of `candidates` (N,), of which there is at least one.
 
-        A number is drawn for every row and the highest among the candidates wins, so that a robot's luck does not
-        depend on who else is a candidate.
+        A number is drawn for every row, and the highest among the candidates wins. So the number of a robot does not
+        depend on which other robots are candidates.
         """
         lots = self.choices.random(len(candidates))
         return int(np.argmax(np.where(candidates, lots, -1.0)))
@@ -101,7 +101,7 @@ class EventTally:
     births: int = 0
     malfunctions: int = 0
     repairs: int = 0
-    """Robots that returned; repairs of nobody are not counted."""
+    """Robots that returned; repair events on an empty queue are not counted."""
     stays: int = 0
     """Times at work that ended, by malfunction or by the death of an active robot."""
     stay_ticks: int = 0
@@ -112,7 +112,7 @@ class EventTally:
 
 @dataclass(slots=True)
 class PopulationState:
-    """Who is where; edited by `advance_population` only."""
+    """State of every robot; only `advance_population` edits it."""
 
     present: BoolArray
     """(N,) born and not dead."""
@@ -134,7 +134,7 @@ class PopulationState:
     def start(
         cls, n_robots: int, *, initial_robots: int | None = None, max_robots: int | None = None
     ) -> "PopulationState":
-        """All robots active (or the first `initial_robots`), nobody in repair.
+        """All robots active (or the first `initial_robots`), none in repair.
 
         Args:
             n_robots: Rows N, all robots that can ever appear.
@@ -163,7 +163,7 @@ class PopulationState:
 def advance_population(
     state: PopulationState, clocks: EventClocks, tick: int, find_place: FindPlace | None = None
 ) -> bool:
-    """Let happen what is due at `tick`; ticks may be skipped as long as nothing is due in them.
+    """Carry out the events that are due at `tick`; ticks without due events may be skipped.
 
     Args:
         state: Edited.
@@ -172,7 +172,7 @@ def advance_population(
         find_place: Places a row that is to be born; default: there is always room.
 
     Returns:
-        Whether anyone's state has changed.
+        Whether the state of any robot has changed.
     """
     changed = False
     if tick >= clocks.death.next_tick and state.present.any():
@@ -263,9 +263,9 @@ def simulate_population(
     initial_robots: int | None = None,
     max_robots: int | None = None,
 ) -> PopulationHistory:
-    """Play population dynamics alone, in milliseconds; exactly what a run with this seed will do.
+    """Simulate population dynamics alone, in milliseconds; a run with this seed does exactly the same.
 
-    Births always find room here, which in an arena they nearly always do.
+    The only difference: births always have room here; in an arena they nearly always have.
 
     Args:
         rates: Events per tick.

@@ -38,8 +38,8 @@ TICK_MEANS: dict[str, Counter] = {
 class RunRecorder(SwarmWrapper):
     """Outermost wrapper: records a run interval by interval.
 
-    The arena counts; the recorder only takes differences at interval ends, so a tick costs it next to nothing.
-    Once every robot is dead the record is complete: what is left of it stays zero, even if stepping goes on.
+    The arena counts; the recorder only takes differences at interval ends, so a tick costs almost no time. When every
+    robot is dead the record is complete: its remaining intervals stay zero, even if stepping goes on.
     """
 
     stack_position: ClassVar[int] = 0
@@ -78,7 +78,7 @@ class RunRecorder(SwarmWrapper):
                 f"(0 to {len(Task) - 1}), got shape {tasks.shape} with codes {np.unique(tasks).tolist()}."
             )
         self._ticks_left -= 1
-        # The first row is looked at alone because in almost every tick it settles the question.
+        # Checking the first row alone is fast, and in almost every tick it is enough.
         self._complete = truncated or bool(terminated[0] and terminated.all())
         if self._ticks_left == 0 or self._complete:
             self._close_interval(has_tasks=tasks is not None)

@@ -34,7 +34,7 @@ def wrapper_config_class(name: str) -> "type[WrapperConfig]":
 def parse_wrapper(text: str) -> "WrapperConfig":
     """Build a wrapper configuration from one word of a command line.
 
-    Written `name:key=value,key=value`; a dot leads into a table, "+" joins the members of a list:
+    The form is `name:key=value,key=value`. A dot names a key inside a table, "+" joins the members of a list:
 
         throttle:waveform=square,amplitude=0.2,period_s=5000,carriers=true
         sensor_noise:sigma=0.03,groups=proximity+light,sigmas.position=0.1
@@ -65,9 +65,9 @@ def wrapper_configs(given: "Iterable[WrapperConfig | str]") -> "tuple[WrapperCon
     """Return wrapper configurations, words read as on the command line; see `parse_wrapper`.
 
     Raises:
-        ConfigError: no list, something in it that is neither, or a word that is no wrapper.
+        ConfigError: `given` is no list, an item is neither a configuration nor a word, or a word names no wrapper.
     """
-    from swarm_forage_env.wrappers.base import WrapperConfig  # with it comes the whole environment
+    from swarm_forage_env.wrappers.base import WrapperConfig  # late: this import loads the whole environment
 
     expected = "Expected wrappers as a list of configurations or words such as 'sensor_noise:sigma=0.1', got"
     if isinstance(given, str | Mapping) or not isinstance(given, Iterable):
@@ -101,7 +101,7 @@ def wrappers_from_mapping(tables: Mapping[str, Any]) -> "tuple[WrapperConfig, ..
 
 
 def _plain_value(text: str) -> Any:
-    """Read a word as a truth value, a number or a text; words joined by "+" that are no number as a list."""
+    """Read a word as a truth value, a number or a text; if it is no number and has a "+", as a list."""
     if text.lower() in _WORDS:
         return _WORDS[text.lower()]
     for kind in (int, float):

@@ -22,9 +22,9 @@ IDEAL_THROTTLE = 0.10
 class Throttle(SwarmWrapper):
     """Slows robots down: both wheels of a limited command (l, r) get the factor 1 - a |l + r| / (|l| + |r|).
 
-    a = max(0, V(t)), with t the tick that is executed (the first is 1) and V the waveform. Driving straight loses the
-    share a of its speed, turning on the spot loses nothing, in between it is continuous: the study throttles the
-    steering force, which does not slow turns on the spot. Robots do not know about it.
+    a = max(0, V(t)), with t the tick that is executed (the first is 1) and V the waveform. A robot that drives straight
+    loses the share a of its speed, one that turns on the spot loses nothing, and in between the loss is continuous: the
+    study throttles the steering force, which does not slow turns on the spot. Robots do not sense the throttle.
 
     Records `throttle`, V at the last tick of an interval, and `throttle_mean`.
     """

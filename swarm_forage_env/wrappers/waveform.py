@@ -10,7 +10,7 @@ study's program, evaluated in double precision as written, with the period in ti
     step        O before start_s, O + A from then on
     table       straight lines between given points, the first and last value beyond them
 
-The last two are ours: the study's program makes steps of square waves whose period exceeds the run.
+The last two are ours: the study's program makes a step from a square wave whose period is longer than the run.
 """
 
 import bisect
@@ -42,7 +42,7 @@ class Waveform:
     """One value per tick, as a formula or a table.
 
     Raises:
-        ConfigError: an unknown kind, a field that its kind does not use, a missing one, or one that makes no sense.
+        ConfigError: an unknown kind, a field that the kind does not use, a missing field, or a wrong value.
     """
 
     kind: str

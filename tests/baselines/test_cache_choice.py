@@ -1,4 +1,4 @@
-"""Which cache and which isolated object robots go to: utilities by worked numbers, and who is left out."""
+"""Which cache and which isolated object robots go to: utilities by worked numbers, and what is left out."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Where caches are started: the allowed point nearest to half way to the nest, against a search through all points."""
+"""Where caches are started: the allowed point nearest to the midpoint on the way to the nest, against a full search."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The scripted controllers in the real world: they forage, at the rate that geometry allows."""
+"""The scripted controllers in whole runs: they forage, at the rate that geometry allows."""
 
 import numpy as np
 import pytest

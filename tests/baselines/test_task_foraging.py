@@ -1,4 +1,4 @@
-"""STOCHM and STOCHX in the real world: caches come about and are used, and nobody starves."""
+"""STOCHM and STOCHX in whole runs: caches are created and used, and deliveries go on to the end."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The task graph hangs together, and the numbers of both controllers are those of the study."""
+"""The task graph is consistent, and the numbers of both controllers are those of the study."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The bridges to other libraries carry: what their pages and scripts show trains, in processes of their own.
+"""The examples for other learning libraries work: those of the pages and scripts train, each in its own process.
 
 Each needs a library that is too heavy for every test run; `scripts/test_bridges` installs them and runs these tests.
 """

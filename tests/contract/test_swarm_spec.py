@@ -1,4 +1,4 @@
-"""The constants of a swarm come from its scenario alone, and are those that environments tell."""
+"""The constants of a swarm come from its scenario alone, and environments give the same ones."""
 
 import pytest
 

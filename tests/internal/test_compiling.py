@@ -1,4 +1,4 @@
-"""Compiled functions: nothing out of date is taken from the cache."""
+"""Compiled functions: outdated results are never taken from the cache."""
 
 import ast
 import os

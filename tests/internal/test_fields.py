@@ -1,4 +1,4 @@
-"""One check per kind of value: what passes, what is refused, and in which words."""
+"""One check per kind of value: what passes, what is refused, and with which message."""
 
 import math
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""The names and arguments that others call, and a package that stands alone."""
+"""The public names and arguments, and that the package needs nothing of the environment."""
 
 import ast
 import inspect

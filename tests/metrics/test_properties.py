@@ -1,4 +1,4 @@
-"""Laws that each measure obeys for any curves; every measure of the catalogue is listed or left out for a reason."""
+"""Rules that each measure obeys for any curves; each measure of the catalogue is listed, or left out for a reason."""
 
 import numpy as np
 import pytest

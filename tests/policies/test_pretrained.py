@@ -1,4 +1,4 @@
-"""The policies that come with the package: complete, light, and worth their name."""
+"""The policies that come with the package: files complete, import light, performance as promised."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Objects never appear, vanish or lie in two places, whatever robots do and whoever comes and goes."""
+"""Objects never appear, vanish or lie in two places, whatever robots do and whichever robots come and go."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What the documents show works: examples run, commands are one line, links lead somewhere."""
+"""The documents are right: examples run, commands are one line, links lead to files."""
 
 import importlib.util
 import json
@@ -18,7 +18,7 @@ BLOCK = re.compile(r"(<!-- not run: .+ -->\n)?^```python\n(.*?)^```", re.DOTALL 
     "page", [page for page in PAGES if "```python" in page.read_text()], ids=lambda page: page.name
 )
 def test_python_examples_run(page, tmp_path, monkeypatch):
-    """The examples of a page run one after the other, as somebody would type them."""
+    """The examples of a page run one after the other, as a user would type them."""
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     for number, (skipped, block) in enumerate(BLOCK.findall(page.read_text()), 1):

@@ -1,4 +1,4 @@
-"""Facts that `metrics` and the environment state separately, because neither may import the other: they agree."""
+"""`metrics` and the environment may not import each other, so some facts are in both; they must agree."""
 
 import numpy as np
 import pytest

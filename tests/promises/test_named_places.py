@@ -11,7 +11,7 @@ PACKAGES = ("swarm_forage_env", "baselines", "metrics")
 SOURCES = sorted(file for package in PACKAGES for file in (ROOT / package).rglob("*.py"))
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 PAGES.remove(ROOT / "CHANGELOG.md")  # it tells of names that are no more
-OTHERS = {"gymnasium", "pettingzoo", "env", "policy", "plan", "world", "scenarios", "interface", "training"}
+OTHERS = {"gymnasium", "pettingzoo", "env", "policy", "plan", "world", "scenarios", "interface", "training", "spec"}
 """Words that are also names of other packages, of arguments or of files that a run writes."""
 DOTTED = re.compile(r"`([a-z_0-9]+(?:\.[A-Za-z_0-9]+)+)")
 PATHS = re.compile(r"`?((?:swarm_forage_env|baselines|metrics|tests|scripts|docs)/[\w/.-]+\.(?:py|md|toml|npz|json))")

@@ -1,4 +1,4 @@
-"""The environment keeps PettingZoo's contract, and says what is wrong when its user does not."""
+"""The environment keeps PettingZoo's contract, and says what is wrong when a caller breaks it."""
 
 import numpy as np
 import pettingzoo

@@ -1,4 +1,4 @@
-"""What `metrics` reads by name is what records hold: the border between the two is a list of columns."""
+"""Records hold the columns that `metrics` reads by name; the two share nothing but this list of columns."""
 
 from metrics.scoring.columns import CURVE_COLUMNS
 from swarm_forage_env.study.record import schema_table

@@ -1,4 +1,4 @@
-"""Throttle, noise and population dynamics told slowly: one robot, one column, one tick at a time."""
+"""Slow twins of throttle, noise and population dynamics: one robot, one column, one tick at a time."""
 
 import math
 from collections import deque

@@ -1,4 +1,4 @@
-"""A learner's actions told slowly: commands and masks, from the observation row by its names alone."""
+"""Slow twins of a learner's actions: commands and masks, from the named slices of the observation row."""
 
 import numpy as np
 

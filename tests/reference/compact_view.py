@@ -1,4 +1,4 @@
-"""The compact view told slowly, from the observation row by its names alone."""
+"""Slow twin of the compact view, from the named slices of the observation row."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Pick-ups and drops told slowly: the rules in the words of the contract, with dictionaries and sets."""
+"""Slow twin of pick-ups and drops: the rules in the words of the contract, with dictionaries and sets."""
 
 import math
 from dataclasses import dataclass, field

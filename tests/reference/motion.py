@@ -1,4 +1,4 @@
-"""Differential drive told slowly, one robot at a time, in Python floats."""
+"""Slow twin of the differential drive: one robot at a time, in Python floats."""
 
 import math
 

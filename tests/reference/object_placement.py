@@ -1,4 +1,4 @@
-"""Object placement, told slowly: lists of cells instead of counters, and the waiting rule word by word."""
+"""Slow twin of object placement: lists of cells instead of counters, and the waiting rule word by word."""
 
 from collections.abc import Callable
 

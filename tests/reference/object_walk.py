@@ -1,4 +1,4 @@
-"""Random walk of objects, told slowly: neighbours as a list of cells."""
+"""Slow twin of the random walk of objects: neighbours as a list of cells."""
 
 import numpy as np
 

@@ -26,7 +26,7 @@ def stationary_by_null_vector(q: Matrix) -> Matrix:
 
 
 def mean_away_by_exponential(q: Matrix, horizon: float) -> float:
-    """(1 / T) times the integral of the mean number away, starting with nobody away."""
+    """(1 / T) times the integral of the mean number away, starting with no robot away."""
     size = q.shape[0]
     block = np.zeros((2 * size, 2 * size))
     block[:size, :size] = q

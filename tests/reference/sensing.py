@@ -1,4 +1,4 @@
-"""Observations told slowly: every robot, every sensor, and everything that it could sense."""
+"""Slow twin of observations: every robot, every sensor, and everything that it could sense."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Which slow, obvious twin stands beside each kernel; `tests/promises/test_kernels_have_twins.py` holds it complete.
+"""Which slow, obvious twin each kernel has; `tests/promises/test_kernels_have_twins.py` checks that none is missing.
 
 A kernel needs a twin when uncompiled code calls it, or kernels of another folder do. What is called by kernels of its
 own folder alone is part of those.

@@ -1,4 +1,4 @@
-"""Pictures of hand-built worlds: what is where, in which colour, and that nothing is written."""
+"""Pictures of hand-built states: what is where, in which colour, and that drawing changes no state."""
 
 import copy
 import sys

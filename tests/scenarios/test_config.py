@@ -1,4 +1,4 @@
-"""Configurations are complete and refuse nonsense at construction, each with a message that helps."""
+"""Configurations are complete and refuse wrong values at construction, each with a helpful message."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""What is run to score a policy: the sweeps of the paper at full budget, thinned out below it."""
+"""The runs that score a policy: the sweeps of the paper at full budget, fewer levels at smaller budgets."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""RunSpec: identity, and the way to JSON and back."""
+"""RunSpec: its identity, and its conversion to JSON and back."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""RunStore: what is in the folder, and what happens to what should not be there."""
+"""RunStore: the files in the folder, and how unexpected files are handled."""
 
 import json
 from dataclasses import replace

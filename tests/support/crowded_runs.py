@@ -1,4 +1,4 @@
-"""Crowded runs of every preset, kind of caches and policy, and fingerprints of all that they show."""
+"""Crowded runs of every preset, kind of caches and policy, and fingerprints of all their results."""
 
 import hashlib
 from typing import Any

@@ -1,4 +1,4 @@
-"""A ForageEnv without physics: counters tick as a test tells them, for wrappers and recorders."""
+"""A ForageEnv without physics: a test sets the counters, for tests of wrappers and recorders."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Worlds of every kind in which controllers pick up and deliver within minutes: crowded, with the nest near."""
+"""Scenarios of every kind in which controllers pick up and deliver within minutes: crowded, with the nest near."""
 
 from typing import Any
 

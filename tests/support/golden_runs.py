@@ -1,4 +1,4 @@
-"""Fingerprints of short runs of every kind: a change that must not change results has to leave them alone.
+"""Fingerprints of short runs of every kind. A change that must not affect results must not change them.
 
 `python -m tests.support.golden_runs` writes them anew. Do that only for a change that is meant to change results, and
 say in the changelog which ones and why.

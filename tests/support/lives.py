@@ -1,4 +1,4 @@
-"""A tiny episode told by hand: three robots, five ticks, one point per tick at work, a death and a repair.
+"""A tiny episode worked out by hand: three robots, five ticks, one point per tick at work, a death and a repair.
 
 Robot 1 dies before tick 3. Robot 2 is in repair in the ticks 2 and 3. The horizon is 5 ticks; tick 6 belongs to the
 next run.

@@ -1,4 +1,4 @@
-"""Synthetic observations, built through the layout, for tests of policies without a world."""
+"""Synthetic observations, built by the layout, for tests of policies without an environment."""
 
 import dataclasses
 import math

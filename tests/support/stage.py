@@ -1,4 +1,4 @@
-"""Small worlds arranged by hand: every object in the depot, every robot in the yard, until a test moves them.
+"""Small arenas arranged by hand: every object in the depot, every robot in the yard, until a test moves them.
 
 The stage is the small warehouse, 160 x 80 cells of 0.2 m: nest in the cells x 8 .. 23, y 8 .. 71, objects allowed in
 the cells x 24 .. 136, y 12 .. 68, source strip x 120 .. 135, y 12 .. 67.

@@ -1,4 +1,4 @@
-"""The recipe for a training: its defaults, what goes before them, and the smaller arena it begins in."""
+"""The recipe for a training: its defaults, what overrides them, and the smaller arena it begins in."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Who is not at work does not teach: buffers against returns worked out by hand."""
+"""Buffers leave out robots that are not at work: checked against returns worked out by hand."""
 
 import numpy as np
 import pytest

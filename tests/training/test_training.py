@@ -1,4 +1,4 @@
-"""Training by stable-baselines3: reproducible, resumable, judged beside a baseline, exported without loss."""
+"""Training by stable-baselines3: reproducible, resumable, compared with a baseline, exported without loss."""
 
 import contextlib
 import csv

@@ -1,4 +1,4 @@
-"""Rows of arenas live, die and start anew as the story in `lives` tells."""
+"""Rows of arenas are present, terminate and start anew as in the episode of `lives`."""
 
 import numpy as np
 import pytest

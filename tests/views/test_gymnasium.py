@@ -1,4 +1,4 @@
-"""The Gymnasium view keeps Gymnasium's contract and shows the same world as the parallel environment."""
+"""The Gymnasium environment keeps Gymnasium's contract and gives the same runs as the parallel environment."""
 
 import gymnasium
 import numpy as np

@@ -1,4 +1,4 @@
-"""The learner's interface under the PettingZoo API: its contract, and the same world as the rows of arenas."""
+"""The learner's interface under the PettingZoo API: its contract, and the same runs as the rows of arenas."""
 
 import numpy as np
 import pettingzoo

@@ -1,4 +1,4 @@
-"""Arenas in processes of their own: ends, failures and interruptions."""
+"""Arenas in separate processes: ends, failures and interruptions."""
 
 import multiprocessing
 import os

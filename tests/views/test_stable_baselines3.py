@@ -1,4 +1,4 @@
-"""The vector environment of stable-baselines3 tells the story of `lives`, and keeps that library's contract."""
+"""The vector environment of stable-baselines3 gives the episode of `lives`, and keeps that library's contract."""
 
 import warnings
 

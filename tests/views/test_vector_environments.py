@@ -1,4 +1,4 @@
-"""The vector view keeps Gymnasium's contract and tells the story of a death, a repair and a time limit."""
+"""The vector environment keeps Gymnasium's contract; a death, a repair and a time limit come as worked out by hand."""
 
 import gymnasium
 import numpy as np

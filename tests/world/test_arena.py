@@ -1,4 +1,4 @@
-"""The world as a whole: the order of a tick, who is in it, what is counted, what `state` shows."""
+"""The arena as a whole: the order of a tick, which robots are in the world, what is counted, what `state` shows."""
 
 import math
 import sys

@@ -1,4 +1,4 @@
-"""Static caches: what they are made of, and when the outside process restores them. Slots and serial numbers."""
+"""Static caches: which objects they hold, and when they are restored. Slots and serial numbers."""
 
 import itertools
 import math

@@ -1,4 +1,4 @@
-"""Dynamic caches: which objects a CREATE_CACHE drop gathers, where the cache comes to stand, when there is none."""
+"""Dynamic caches: which objects a CREATE_CACHE drop gathers, where the cache is placed, when none is created."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Interference: who loses time to avoidance, measured by one rule from true readings."""
+"""Interference: which robots lose time to avoidance, measured by one rule from true readings."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Reward terms, their weights, who receives them."""
+"""Reward terms, their weights, and which robots receive them."""
 
 from dataclasses import replace
 

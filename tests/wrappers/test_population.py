@@ -1,4 +1,4 @@
-"""PopulationDynamics in the world: the dead, the broken, the unborn, and what is recorded of them."""
+"""PopulationDynamics in an environment: robots that are dead, in repair or not yet born, and what is recorded."""
 
 import numpy as np
 import pytest
@@ -434,5 +434,5 @@ def test_populations_that_do_not_fit_the_scenario_are_refused():
     env = ForageEnv(scenario("warehouse_small", n_robots=4, n_objects=9))
     with pytest.raises(ConfigError, match="initial_robots <= 4, the robots of the scenario, got 5"):
         PopulationConfig(initial_robots=5).wrap(env)
-    with pytest.raises(ConfigError, match=r"initial_robots below 4.*somebody can be born, got None"):
+    with pytest.raises(ConfigError, match=r"initial_robots below 4.*a robot can be born, got None"):
         PopulationConfig(birth_per_tick=0.1).wrap(env)

@@ -1,4 +1,4 @@
-"""Population dynamics without a world: the event clock, the four processes, and what the study expects of them."""
+"""Population dynamics without an arena: the event clock, the four processes, and the study's expected numbers."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Throttle: what it does to wheels, whom it strikes, when, and what it records."""
+"""Throttle: what it does to wheels, which robots are throttled and when, and what it records."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Waveforms: their formulas, their samples in the study, their ways in and out of plain values."""
+"""Waveforms: their formulas, their samples in the study, their conversion from and to plain values."""
 
 import json
 import math

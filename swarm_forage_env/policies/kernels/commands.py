@@ -13,13 +13,13 @@ DELIVER = float(Grip.DELIVER)
 N_MOTIONS = 6
 """Motions by number: stand, forward, arc left, arc right, turn left, turn right."""
 ACT_GRASP, ACT_RELEASE, ACT_DELIVER, ACT_SITE, ACT_CREATE_CACHE = 6, 7, 8, 9, 10
-"""Numbers of the gripper actions; wheels stand meanwhile, as they would in the interaction."""
+"""Numbers of the gripper actions; the wheels stand still, as in the interaction."""
 N_GRIPS = 5
 
 
 @kernel
 def idle_grip(row: ObsArray, carrying: int) -> float:
-    """Gripper command that asks for nothing: hold when carrying, release when empty."""
+    """Gripper command without a request: hold when carrying, release when empty."""
     return GRASP if row[carrying] > 0.5 else RELEASE
 
 
@@ -66,8 +66,8 @@ def numbered_actions(
 def mask_actions(obs: ObsArray, starts: tuple[int, int, int, int, int], dynamic_caches: bool, mask: BoolArray) -> None:
     """Write which actions make sense, (N, N_MOTIONS) or (N, N_MOTIONS + N_GRIPS); at least one per row.
 
-    `starts` = first columns of ground, carrying, interacting, active, los_object. Without gripper actions the wheels
-    stand during an interaction; with them, only gripper actions let it go on.
+    `starts` = first columns of ground, carrying, interacting, active, los_object. During an interaction, only `stand`
+    makes sense if the gripper is automatic; otherwise only gripper actions do, because a motion would cancel it.
     """
     ground, carrying, interacting, active, window = starts
     with_grips = mask.shape[1] > N_MOTIONS

@@ -10,9 +10,9 @@ from swarm_forage_env.scenarios.units import CELLS_PER_M
 
 COMPACT_COLUMNS = 23
 VIEW_REACH_M = 1.0
-"""Distance that a direction of length 1 stands for: the side of the line-of-sight window."""
+"""Distance at which a direction gets length 1: the side of the line-of-sight window."""
 _TIE_M2 = 1e-6
-"""Squared distances this close are a tie, which rounding must not decide."""
+"""Squared distances that differ by less count as equal, so that rounding does not decide."""
 _HALF_WINDOW = WINDOW_CELLS // 2
 _WINDOW = WINDOW_CELLS * WINDOW_CELLS
 _OWN_CELL = _WINDOW // 2
@@ -32,7 +32,7 @@ def nearest_object(row: ObsArray, starts: tuple[int, int, int], half_x: float, h
     `half_x`, `half_y` = half the arena, m.
     """
     position, own_cell, window = starts
-    # Where the robot believes to be, but never outside the cell that it is known to be in.
+    # The sensed position, which noise may disturb, kept inside the robot's cell, which is exact.
     reach = 0.5 / CELLS_PER_M
     off_x = min(reach, max(-reach, (row[position] - row[own_cell]) * half_x))
     off_y = min(reach, max(-reach, (row[position + 1] - row[own_cell + 1]) * half_y))

@@ -63,7 +63,7 @@ def ground(
             y = position[i, 1] + sin * _GROUND_X[k] + cos * _GROUND_Y[k]
             cell_x = int(math.floor(x * CELLS_PER_M))
             cell_y = int(math.floor(y * CELLS_PER_M))
-            # Mostly all four sensors are over one cell; a large floor does not fit the processor's cache.
+            # Usually all four sensors are over one cell, which is then read once: a large floor does not fit the cache.
             if cell_x != last_x or cell_y != last_y:
                 inside = 0 <= cell_x < nx and 0 <= cell_y < ny
                 grey = grey_of(floor[cell_y, cell_x]) if inside else _GREY_EMPTY

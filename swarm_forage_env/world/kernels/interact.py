@@ -1,7 +1,7 @@
-"""Pick-ups and drops, one function per rule, in a fixed order; ties go round the swarm, no draw.
+"""Pick-ups and drops, one function per rule, in a fixed order; ties are resolved in rotating order, without draws.
 
-A robot's gripper command asks for something (`request_of`). A request whose condition fails is refused at once; one
-that holds starts an interaction, which takes effect one tick later if the same is still asked and still possible.
+A robot's gripper command asks for something (`request_of`). If the condition of a request fails, it is refused at once.
+If it holds, an interaction starts; it takes effect one tick later if the request is still the same and still possible.
 """
 
 from typing import NamedTuple
@@ -44,7 +44,7 @@ _DEPLETED = int(Counter.CACHES_DEPLETED)
 
 
 class InteractionState(NamedTuple):
-    """The arrays that interactions read and write; fields as in `world.state`, letters N, M, K as there."""
+    """The arrays that interactions read and write; fields and the letters N, M, K as in `world.state`."""
 
     position: FloatArray
     carried_object: IntArray
@@ -169,7 +169,7 @@ def band_of(grip: float) -> int:
 
 @kernel
 def request_of(state: InteractionState, rules: Rules, band: int, i: int) -> tuple[int, int]:
-    """What robot i asks for, given where it is, and the object row or cache slot that it is about (-1 = none)."""
+    """What robot i asks for at its place, and which object row or cache slot is meant (-1 = none)."""
     code = _floor_code(state, i)
     if state.carried_object[i] < 0:
         if band != GRASP:
@@ -224,7 +224,7 @@ def _empty_hands(state: InteractionState, i: int) -> int:
 
 @kernel
 def _displace(state: InteractionState, row: int) -> None:
-    """Hand an object over to the distributor, which re-places it later in this tick."""
+    """List an object that is placed again later in this tick."""
     state.status[row] = _WAITING
     state.object_cell[row, :] = -1
     last = state.displaced.shape[0] - 1
@@ -234,7 +234,7 @@ def _displace(state: InteractionState, row: int) -> None:
 
 @kernel
 def deliver(state: InteractionState, i: int) -> None:
-    """Robot i leaves its object in the nest; the object re-enters the state through the distributor."""
+    """Robot i leaves its object in the nest; the object is placed again later in this tick."""
     row = _empty_hands(state, i)
     _displace(state, row)
     state.counters[_COLLECTED] += 1
@@ -256,7 +256,7 @@ def drop_into_cache(state: InteractionState, i: int, slot: int) -> None:
 
 @kernel
 def lay_on_floor(state: InteractionState, rules: Rules, i: int) -> bool:
-    """Robot i lays its object on its cell if that is free, else the object is re-placed; returns whether it lies."""
+    """Robot i lays its object on its cell if that is free, else it is placed again; returns whether it lies there."""
     row = _empty_hands(state, i)
     x, y = _cell(state, i)
     inside = rules.area_x_low <= x < rules.area_x_high and rules.area_y_low <= y < rules.area_y_high
@@ -318,7 +318,7 @@ def take_from_cache(state: InteractionState, rules: Rules, i: int, slot: int, ch
 
 @kernel
 def _dissolve(state: InteractionState, rules: Rules, slot: int) -> None:
-    """Remove a cache with one object left; the orphan lies free on the centre cell."""
+    """Remove a cache with one object left; this object lies free on the centre cell."""
     cx = state.cache_cell[slot, 0]
     cy = state.cache_cell[slot, 1]
     half = rules.cache_half_side
@@ -335,7 +335,7 @@ def _dissolve(state: InteractionState, rules: Rules, slot: int) -> None:
 
 @kernel
 def drop_cargo(state: InteractionState, rules: Rules, i: int) -> None:
-    """Robot i loses its cargo here, whatever is here: the rule for dying robots (cache, floor or re-placement)."""
+    """Robot i dies and loses its cargo here: into the cache, onto the floor, or placed again."""
     _forget_pending(state, i)
     if state.carried_object[i] < 0:
         return
@@ -361,7 +361,7 @@ def _handler_of(kind: int) -> int:
 
 @kernel
 def _target_identity(state: InteractionState, kind: int, target: int) -> int:
-    """What must stay the same while an interaction runs: the object row, or the serial of the cache."""
+    """Identity of the target, which must stay the same while an interaction runs: object row or cache serial."""
     if kind == CACHE_DROP or kind == CACHE_PICKUP:
         return state.cache_serial[target]
     return target
@@ -401,7 +401,7 @@ def _continue(state: InteractionState, rules: Rules, i: int, kind: int, target: 
 
 @kernel
 def _serve(state: InteractionState, rules: Rules, band: int, i: int, chance: float) -> None:
-    """Start, continue, refuse or cancel what robot i asks, by the state of the state at its turn."""
+    """Start, continue, refuse or cancel what robot i asks, by the state of the arrays at its turn."""
     kind, target = request_of(state, rules, band, i)
     if state.pending_kind[i] != NO_REQUEST:
         if band == state.pending_band[i]:
@@ -422,7 +422,7 @@ def _serve(state: InteractionState, rules: Rules, band: int, i: int, chance: flo
 
 @kernel
 def _phase_of(kind: int, band: int) -> int:
-    """Order within a tick: deliver 0, cache drop 1, floor drops 2, pick-ups 3, those that find nothing yet included."""
+    """Order within a tick: deliver 0, cache drop 1, floor drops 2, pick-ups 3 (also those with nothing to pick up)."""
     if kind == DELIVER:
         return 0
     if kind == CACHE_DROP:
@@ -442,7 +442,7 @@ def _band_now(state: InteractionState, gripper: ActionArray, i: int) -> int:
 
 @kernel
 def interact(state: InteractionState, rules: Rules, gripper: ActionArray, tick: int, chance: FloatArray) -> None:
-    """Serve all requests of one tick, phase by phase; within a phase lowest (row - tick) mod N first.
+    """Serve all requests of one tick, phase by phase; within a phase, robots by (row - tick) mod N, lowest first.
 
     `gripper` is the (N, 3) action array; `chance` (N,) uniform in [0, 1) decides which object leaves a cache.
     """
@@ -455,7 +455,7 @@ def interact(state: InteractionState, rules: Rules, gripper: ActionArray, tick: 
         i = (tick + k) % n_robots
         idle = not state.active[i] or (state.carried_object[i] >= 0) == (gripper[i, 2] > 0.0)
         if state.pending_kind[i] == NO_REQUEST and idle:
-            continue  # not here, holding, or empty and not grasping: most robots in most ticks
+            continue  # absent, or carrying and holding, or empty and not grasping: most robots in most ticks
         band = _band_now(state, gripper, i)
         kind, _ = request_of(state, rules, band, i)
         if kind != NO_REQUEST or state.pending_kind[i] != NO_REQUEST:

@@ -19,7 +19,7 @@ DRAWS = 3 + 2 * TRIES
 
 @kernel
 def count_objects(floor: IntArray, x_low: int, y_low: int, x_high: int, y_high: int) -> int:
-    """Return how many objects lie in the half-open box, whoever put them there."""
+    """Return how many objects lie in the half-open box."""
     count = 0
     for y in range(y_low, y_high):
         for x in range(x_low, x_high):
@@ -72,8 +72,8 @@ def draw_source_cell(
 ) -> tuple[int, int]:
     """Return a free cell (x, y) of a source, or (-1, -1): a random group, then a random region of it.
 
-    Groups, and regions within a group, are gone through cyclically from the random one; regions that hold as many
-    objects as their capacity, or have no free cell inside `area`, are skipped.
+    Groups, and regions within a group, are tried in cyclic order from the random one. Regions that hold as many objects
+    as their capacity, or have no free cell inside `area`, are skipped.
     """
     n_groups = group_start.shape[0] - 1
     first_group = int(draws[0] * n_groups)
@@ -110,8 +110,8 @@ def scatter(
 ) -> int:
     """Lay the objects `rows` on the floor one by one until one finds no place; returns how many lie.
 
-    A failure is final for the rows behind it: nothing they do makes room. Writes `floor` (ny, nx) and `cell` (M, 2);
-    `draws` is (len(rows), DRAWS).
+    After a failure the later rows are not tried, because there is no room for them either. Writes `floor` (ny, nx) and
+    `cell` (M, 2); `draws` is (len(rows), DRAWS).
     """
     for i in range(rows.shape[0]):
         x, y = draw_source_cell(floor, regions, capacity, group_start, area, draws[i])

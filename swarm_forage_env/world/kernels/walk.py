@@ -56,8 +56,8 @@ def walk(
 ) -> int:
     """Move free objects one cell, in row order; each sees the moves made before it. Returns the number of moves.
 
-    `chance` (M,) decides twice: below `probability` the object moves, and then chance / probability, again uniform in
-    [0, 1), chooses among its free neighbour cells. Writes `floor` (ny, nx) and `cell` (M, 2).
+    `chance` (M,) is used twice: if it is below `probability` the object moves, and then chance / probability, which is
+    again uniform in [0, 1), chooses among its free neighbour cells. Writes `floor` (ny, nx) and `cell` (M, 2).
     """
     moves = 0
     for row in range(chance.shape[0]):

@@ -16,9 +16,9 @@ def throttle(
 ) -> None:
     """Multiply the gains (N, 2) of both wheels by 1 - strength |l + r| / (|l| + |r|).
 
-    l and r are the limited commands in m/s: with both wheels forward the gain is 1 - strength, on the spot it is 1, in
-    between it is continuous. Robots whose wheels stand, and with `only_carriers` those that carry nothing, keep theirs.
-    `limits` as in `kernels.drive.drive`.
+    l and r are the limited commands in m/s. The factor is 1 - strength with both wheels forward and 1 on the spot, and
+    continuous in between. Gains of robots with standing wheels do not change; with `only_carriers`, those of robots
+    without an object do not change either. `limits` as in `world.kernels.drive.drive`.
     """
     scale, max_speed, max_difference = limits[0], limits[1], limits[2]
     for i in range(carried_object.shape[0]):

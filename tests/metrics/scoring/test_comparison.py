@@ -1,4 +1,4 @@
-"""Which policy is better, and whether the runs can tell: pairing, families of tests, what is shown."""
+"""Which policy is better, and whether the difference is significant: pairing, families of tests, what is shown."""
 
 import math
 

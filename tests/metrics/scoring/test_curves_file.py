@@ -1,4 +1,4 @@
-"""Curves from elsewhere: a documented file goes in, a table or one clear error comes out."""
+"""Curves from a file: a documented file gives a table, a wrong one gives one clear error."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Tables of runs become arrays: which rows go where, and what is paired with what."""
+"""Tables of runs become arrays: where each row goes, and which runs are paired."""
 
 import numpy as np
 import polars as pl

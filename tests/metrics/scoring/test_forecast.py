@@ -1,4 +1,4 @@
-"""The queueing model beside runs: both sides of the table, computed by hand and from a population without a world."""
+"""The queueing model and the runs: both sides of the table, by hand and from a population without an arena."""
 
 import math
 

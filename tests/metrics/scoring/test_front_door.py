@@ -1,4 +1,4 @@
-"""The front door: any policy in, one table out, nothing run twice, nothing hidden."""
+"""Public functions of scoring: any policy gives one table, no run is made twice, failures are shown."""
 
 from dataclasses import replace
 from pathlib import Path

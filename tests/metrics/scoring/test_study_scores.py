@@ -1,4 +1,4 @@
-"""From curves to rows: which experiments are compared, what stands beside a value, what is noted."""
+"""From curves to scores: which experiments are compared, which further numbers and notes a score has."""
 
 import math
 
