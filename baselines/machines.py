@@ -96,6 +96,7 @@ ROBOT_FIELDS: list[tuple[str, type]] = [
     ("target", np.int32),  # identity of the goal: object row
     ("explore_ticks", np.int32),  # since exploration started, or NOT_EXPLORING
     ("recovery_ticks", np.int32),  # driven straight on after avoiding
+    ("turn_ticks", np.int32),  # in a row, up to now, in which it was told to turn on the spot or to stand
     ("clock", np.int32),  # ticks lived through while active
     ("n_known", np.int32),  # remembered objects
     ("window_x", np.int32),  # lower left cell of the window seen last
@@ -399,7 +400,9 @@ def home(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -
     """One tick of carrying an object into the nest: towards the light, then deeper by a random amount.
 
     The drop distance from the nest centre is drawn uniformly between 0.01 m and the distance at entry, which spreads
-    deliveries over the nest; inside, the robot also wanders.
+    deliveries over the nest; inside, the robot also wanders. So does one outside that has been turning on the spot for
+    longer than any turn takes. Two robots side by side may see each other in one heading only: each turns away, sees
+    nothing, turns back, and so on for ever. Our choice: the paper does not say how they part.
 
     Returns:
         Whether the robot has reached its place to drop, and the force.
@@ -417,6 +420,10 @@ def home(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -
         walk_x, walk_y = random_walk(robot, senses, c, draws[DRAW_WANDER])
     else:
         walk_x, walk_y = avoid(senses, c)
+        if robot.turn_ticks > c.longest_turn_ticks:
+            ahead_x, ahead_y = wander(robot, c, draws[DRAW_WANDER])
+            walk_x += ahead_x
+            walk_y += ahead_y
     return False, x + walk_x, y + walk_y
 
 
@@ -441,8 +448,10 @@ def command(robot: np.record, x: float, y: float, c: np.record, drop_grip: float
     if activity in (WAIT_PICKUP, WAIT_DROP, LET_GO):
         action[0] = 0.0
         action[1] = 0.0
+        robot.turn_ticks = 0
     else:
         drive(x, y, c, action)
+        robot.turn_ticks = 0 if action[0] + action[1] > 0.0 else robot.turn_ticks + 1
     if activity == WAIT_DROP:
         action[2] = drop_grip
     elif activity in (WAIT_PICKUP, HOMING, HOMING_IN_NEST, TRANSPORT):

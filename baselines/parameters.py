@@ -67,6 +67,9 @@ class ControllerParameters:
     """How long a robot drives straight on after avoiding; authors' program: 10 ticks."""
     standing_speed_mps: float = 0.001
     """A robot that avoids at most this fast also wanders, to break free; authors' program: 0.1 cm/s."""
+    longest_turn_s: float = 2.4
+    """A homing robot that has only turned on the spot for longer also wanders, to break free; our choice: half a turn
+    takes 2.2 s."""
     soft_turn_deg: float = 15.0
     """Force angles up to this are driven as arcs, larger ones as turns on the spot; study."""
     exploration_lock_s: float = 10.0
@@ -161,6 +164,7 @@ def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derive
     whole: dict[str, Any] = {name: layout.part(name).start for name in COLUMNS}
     whole["n_objects"] = spec.n_objects
     whole["exploration_lock_ticks"] = round(parameters.exploration_lock_s / spec.dt_s)
+    whole["longest_turn_ticks"] = round(parameters.longest_turn_s / spec.dt_s)
     whole["recovery_ticks"] = round(parameters.recovery_s / spec.dt_s)
     whole.update({name: int(is_on) for name, is_on in dataclasses.asdict(spec.quirks).items()})
     real: dict[str, Any] = {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}

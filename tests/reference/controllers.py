@@ -15,6 +15,7 @@ from swarm_forage_env.contract.policy import SwarmSpec
 RHO = 0.00001
 LOCK_TICKS = 50
 RECOVERY_TICKS = 10
+LONGEST_TURN_TICKS = 12
 SENSOR_ANGLES = np.deg2rad(7.5 + 15.0 * np.arange(24))
 
 
@@ -78,6 +79,8 @@ class ReferenceRobot:
     """Ticks of exploration; None = not exploring."""
     vector: str = "idle"
     recovery: int = 0
+    turning: int = 0
+    """Ticks in a row in which it turned on the spot."""
     slowing: bool = False
     depth: float = 0.0
     target: int = -1
@@ -106,8 +109,17 @@ class ReferenceRobot:
             force = self.wander(1) + self.avoid()
         if self.state.startswith("wait"):
             grip = Grip.GRASP if self.state == "wait for pick-up" else Grip.DELIVER
-            return 0.0, 0.0, grip
-        return (*drive(force), Grip.GRASP if self.state.startswith("homing") else Grip.RELEASE)
+            return (*self.stand(), grip)
+        return (*self.drive(force), Grip.GRASP if self.state.startswith("homing") else Grip.RELEASE)
+
+    def stand(self) -> tuple[float, float]:
+        self.turning = 0
+        return 0.0, 0.0
+
+    def drive(self, force: complex) -> tuple[float, float]:
+        left, right = drive(force)
+        self.turning = self.turning + 1 if left + right == 0.0 else 0
+        return left, right
 
     def change_state(self) -> None:
         """What the world did to the robot."""
@@ -248,7 +260,7 @@ class ReferenceRobot:
             self.state = "wait for drop"
             return 0j
         force = with_length(vector_sum(self.senses["light"]), 8.0) + self.avoid()
-        if self.state == "homing in nest":
+        if self.state == "homing in nest" or self.turning > LONGEST_TURN_TICKS:
             force += self.wander(1)
         return force
 

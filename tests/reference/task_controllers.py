@@ -11,7 +11,7 @@ import numpy as np
 
 from swarm_forage_env.contract.codes import Event, Grip
 from tests.reference import task_chain
-from tests.reference.controllers import RHO, ReferenceRobot, drive, sensed, vector_sum, visible_objects
+from tests.reference.controllers import RHO, ReferenceRobot, sensed, vector_sum, visible_objects
 
 JOBS = {
     "generalist": ("object", "nest"),
@@ -83,10 +83,7 @@ class ReferenceTaskRobot(ReferenceRobot):
         force = self.work()
         if not is_new:
             self.account()
-        if self.state in WAITS:
-            wheels = (0.0, 0.0)
-        else:
-            wheels = drive(force)
+        wheels = self.stand() if self.state in WAITS else self.drive(force)
         return (*wheels, self.grip())
 
     def grip(self) -> float:
