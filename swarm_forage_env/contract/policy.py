@@ -100,8 +100,9 @@ class SwarmSpec:
 class Policy(Protocol):
     """Controls every robot at once. An instance drives one run; its memory is created by `reset`.
 
-    Optional attributes: `task`, an (N,) int8 array of `Task` codes; the class attributes `caches` ("none", "static",
-    "dynamic": those that the policy is made for) and `reads` (names of the slices it looks at; default all).
+    Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
+    doing, for people (`study.stuck` shows it); the class attributes `caches` ("none", "static", "dynamic": those that
+    the policy is made for) and `reads` (names of the slices it looks at; default all).
     """
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:

@@ -119,6 +119,7 @@ def test_no_allowed_point_is_nearer(seed):
     width_m, height_m = robot.seen.spec.arena_size_m
     for serial in range(1, int(rng.integers(1, 6))):
         robot.know_cache(serial, (int(rng.integers(width_m * 5)), int(rng.integers(height_m * 5))), 5)
+        robot.memory.caches[serial - 1].has_refused = rng.random() < 0.3
     middle = rng.uniform((0.0, 0.0), (width_m, height_m))
     best = nearest_allowed(robot.record, *middle, 0.3, robot.constants, robot.memory)
     c, step = robot.constants, 0.1
@@ -127,10 +128,13 @@ def test_no_allowed_point_is_nearer(seed):
         for x in np.arange(c.site_x_low_m, c.site_x_high_m + 1e-9, step)
         for y in np.arange(c.site_y_low_m, c.site_y_high_m + 1e-9, step)
     ]
-    discs = [robot.seen.spec.nest_centre_m]
-    discs += [((x + 0.5) * 0.2, (y + 0.5) * 0.2) for x, y, *_ in robot.policy.remembered_caches(0).values()]
-    radius = robot.seen.spec.cache_side_nominal_m
-    allowed = [point for point in grid if all(math.dist(point, disc) >= radius for disc in discs)]
+    near = robot.seen.spec.cache_side_nominal_m
+    far = robot.seen.spec.cache_proximity_m + 0.8  # and where the robot stops short of its goal
+    discs = [(robot.seen.spec.nest_centre_m, near)]
+    for cache in robot.memory.caches[: robot.record.n_caches]:
+        centre = ((cache.cell_x + 0.5) * 0.2, (cache.cell_y + 0.5) * 0.2)
+        discs.append((centre, far if cache.has_refused else near))
+    allowed = [point for point in grid if all(math.dist(point, disc) >= radius for disc, radius in discs)]
     nearest = min((math.dist(point, middle) for point in allowed), default=math.inf)
     if best.distance == math.inf:
         assert nearest == math.inf

@@ -80,6 +80,25 @@ def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
             assert set(policy.remembered(i)) == set(twin.memory.known)
 
 
+def test_long_turns_are_as_in_the_slow_one():
+    """Lights that stay to one side for long; the runs above change them in every tick."""
+    task = make_spec(N_ROBOTS)
+    seen, policy, draws_again = Observations(task), CRWPolicy(), np.random.default_rng(9)
+    policy.reset(task, np.random.default_rng(9))
+    twins = [ReferenceRobot(task) for _ in range(N_ROBOTS)]
+    for i in range(N_ROBOTS):
+        seen.carry(i, i)
+        seen.light(math.radians(17.0 + 10.0 * i), i)
+    driving = 0
+    for _ in range(60):
+        actions = policy.act(seen.array, np.ones(N_ROBOTS, bool))
+        draws = draws_again.random((N_ROBOTS, DRAWS))
+        for i, twin in enumerate(twins):
+            assert actions[i] == pytest.approx(twin.act(seen.array[i], draws[i]), abs=2e-6)
+        driving += np.count_nonzero(actions[:, 0] + actions[:, 1] > 0.0)
+    assert 5 < driving < 60
+
+
 @pytest.mark.parametrize("policy_class", [CRWPolicy, DPOPolicy])
 def test_only_declared_slices_are_read(policy_class):
     task = make_spec(N_ROBOTS)

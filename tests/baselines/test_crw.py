@@ -118,6 +118,25 @@ def test_homing_adds_avoidance_to_phototaxis(robot):
     assert robot.act() == pytest.approx([0.5, -0.5, Grip.GRASP])
 
 
+def test_a_homing_robot_that_only_turns_for_longer_than_half_a_turn_takes_drives_on(robot):
+    robot.bring_to(Activity.HOMING)
+    robot.seen.light(math.radians(20.0))  # sensed 20 degrees to the left however long it turns
+    for _ in range(13):
+        assert robot.act() == pytest.approx([-0.5, 0.5, Grip.GRASP])
+    left, right, _ = robot.act()
+    assert left + right == pytest.approx(1.0, abs=0.02), "8 cm/s to the light and 9 cm/s ahead: at full speed"
+    assert left < right, "in an arc"
+    assert robot.act() == pytest.approx([-0.5, 0.5, Grip.GRASP]), "and patience begins anew"
+
+
+def test_waiting_is_not_turning(robot):
+    robot.bring_to(Activity.WAIT_PICKUP)
+    robot.act(20)
+    robot.seen.light(math.radians(20.0))
+    robot.take()
+    assert robot.act() == pytest.approx([-0.5, 0.5, Grip.GRASP])
+
+
 def test_exploring_avoids_obstacles(robot):
     robot.seen.obstacle(-math.pi / 2)
     assert robot.act() == pytest.approx([-0.5, 0.5, Grip.RELEASE])
