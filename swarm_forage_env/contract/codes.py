@@ -1,6 +1,6 @@
-"""The numbers that stand for things: gripper commands, events, tasks, floor codes, object states, counters.
+"""Numeric codes: gripper commands, events, tasks, floor codes, object states, counters.
 
-Policies reach the first three through `policy`, rooms the rest through `state`; compiled kernels read them here.
+Policies use the first three; the rest is for the world.
 """
 
 from enum import IntEnum

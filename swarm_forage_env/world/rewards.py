@@ -1,4 +1,4 @@
-"""Reward terms, one small function each; weights in `config.RewardConfig`. Only learners use them."""
+"""Reward terms, one small function each; weights in `scenarios.config.RewardConfig`. Only learners use them."""
 
 import numpy as np
 

@@ -18,7 +18,7 @@ def throttle(
 
     l and r are the limited commands in m/s: with both wheels forward the gain is 1 - strength, on the spot it is 1, in
     between it is continuous. Robots whose wheels stand, and with `only_carriers` those that carry nothing, keep theirs.
-    `limits` as in `kernels.drive.drive`.
+    `limits` as in `world.kernels.drive.drive`.
     """
     scale, max_speed, max_difference = limits[0], limits[1], limits[2]
     for i in range(carried_object.shape[0]):
