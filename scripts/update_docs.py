@@ -4,20 +4,26 @@
     scripts/update_docs --check          say which pages differ from what is stored; exit 1 if any does
     scripts/update_docs --remake         run all commands, store what they print, write the pages (half an hour)
     scripts/update_docs --remake run     the same for one of them
-    scripts/update_docs --compare FILE   compare the deliveries that a run of README's command printed with the stored
+    scripts/update_docs --compare FILE   compare the deliveries that a run of README's command printed with the stored;
+                                         where other versions are installed, only say that they are not compared
 
 The commands are listed below; the store is docs/results.json. A block looks like
 `<!-- generated: run.crw by scripts/update_docs -->20.45 ± 0.91<!-- end -->`; `run.table` is all that a command printed.
 --remake needs an installation with everything: pip install -e ".[plots,train]" "torch==2.13.0"
+The interpreter is $PYTHON, else that of the active environment or of .venv, else python3.
 """
 
 import argparse
 import json
+import platform
 import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 STORE = ROOT / "docs/results.json"
@@ -27,6 +33,7 @@ BLOCK = re.compile(
     r"(<!-- generated: (?P<source>\w+)\.(?P<field>\w+) by scripts/update_docs -->)(?P<text>.*?)(<!-- end -->)",
     re.DOTALL,
 )
+PACKAGES = ("numpy", "scipy", "numba", "pymunk")
 FIVE = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
 SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": ((f"swarm-forage run --scenario warehouse_small --policy {','.join(FIVE)} --robots 50 --seeds 4",), FIVE),
@@ -43,7 +50,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "cleanrl": (
         (
-            f"{sys.executable} {ROOT}/scripts/cleanrl_ppo.py --total-timesteps 3000000 --out cleanrl_ppo.npz",
+            f"python {ROOT}/scripts/cleanrl_ppo.py --total-timesteps 3000000 --out cleanrl_ppo.npz",
             "swarm-forage run --policy crw,cleanrl_ppo.npz --seeds 4",
         ),
         ("crw", "policy"),
@@ -51,25 +58,37 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 }
 """Name -> commands, of which the last prints the table, and what its rows are called in blocks."""
 
+PROGRAMS = {"swarm-forage": (sys.executable, "-m", "swarm_forage_env.cli"), "python": (sys.executable,)}
+"""First word of a command -> the program of this interpreter, whatever PATH says."""
+
+
+def made_with() -> dict[str, str]:
+    """Return what the last bits of a result depend on besides this package."""
+    return {"machine": platform.machine(), **{name: version(name) for name in PACKAGES}}
+
 
 def deliveries(table: str) -> list[str]:
     """Return the deliveries per 1,000 s of each row of a printed table, such as "20.45 ± 0.91"."""
     return re.findall(r"^│.*?│\s+(\d[\d,.]* ± [\d.]+) │", table, re.MULTILINE)
 
 
-def make(name: str) -> dict[str, str]:
-    """Run the commands of a source in an empty folder; returns its fields.
+def make(name: str) -> dict[str, Any]:
+    """Run the commands of a source in an empty folder; returns its fields and what they were made with.
 
     Raises:
         ValueError: The table has another number of rows than expected.
+        CalledProcessError: A command failed.
     """
     commands, labels = SOURCES[name]
     printed = ""
     with tempfile.TemporaryDirectory() as folder:
         for command in commands:
             print(f"{name}: {command}", file=sys.stderr)
-            printed = subprocess.run(command.split(), cwd=folder, stdout=subprocess.PIPE, text=True, check=True).stdout
-    return fields(printed, labels)
+            program, *words = command.split()
+            printed = subprocess.run(
+                [*PROGRAMS[program], *words], cwd=folder, stdout=subprocess.PIPE, text=True, check=True
+            ).stdout
+    return {"made_with": made_with(), **fields(printed, labels)}
 
 
 def fields(printed: str, labels: tuple[str, ...]) -> dict[str, str]:
@@ -88,7 +107,29 @@ def fields(printed: str, labels: tuple[str, ...]) -> dict[str, str]:
     return {"table": table, **dict(zip(labels, found, strict=True))}
 
 
-def written(text: str, store: dict[str, dict[str, str]]) -> str:
+def compare(printed: str, stored: dict[str, Any]) -> int:
+    """Say how the printed deliveries of README's command differ from the stored ones; returns the exit code.
+
+    The last bits of a result differ between versions of what it is made with, and a run of 10,000 s makes other
+    deliveries of them. So the numbers are compared only where these versions are those of the stored numbers.
+
+    Raises:
+        ValueError: The table has another number of rows than expected.
+    """
+    found, here = fields(printed, FIVE), made_with()
+    others = [f"{name} {was} then, {here[name]} now" for name, was in stored["made_with"].items() if here[name] != was]
+    if others:
+        print(f"Deliveries are not compared with the stored ones: {'; '.join(others)}. Last bits differ between them.")
+        return 0
+    differing = [name for name in FIVE if found[name] != stored[name]]
+    for name in differing:
+        print(f"{name}: {stored[name]} stored, {found[name]} now; if that is meant to be: scripts/update_docs --remake")
+    if not differing:
+        print("Deliveries are the stored ones.")
+    return 1 if differing else 0
+
+
+def written(text: str, store: dict[str, dict[str, Any]]) -> str:
     """Return a page with its blocks as they are stored."""
 
     def block(match: re.Match[str]) -> str:
@@ -99,24 +140,16 @@ def written(text: str, store: dict[str, dict[str, str]]) -> str:
     return BLOCK.sub(block, text)
 
 
-def main() -> int:
-    """Do what the options say; returns the exit code."""
+def main(words: Sequence[str] | None = None) -> int:
+    """Do what the options say, those of the command line where none are given; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="write nothing, exit 1 if a page differs")
     parser.add_argument("--remake", nargs="*", choices=list(SOURCES), metavar="NAME", help=", ".join(SOURCES))
     parser.add_argument("--compare", type=Path, metavar="FILE", help="what README's command printed")
-    arguments = parser.parse_args()
+    arguments = parser.parse_args(words)
     store = json.loads(STORE.read_text(encoding="utf-8"))
     if arguments.compare:
-        found = fields(arguments.compare.read_text(encoding="utf-8"), SOURCES["run"][1])
-        differing = {
-            name: f"{store['run'][name]} stored, {found[name]} now"
-            for name in FIVE
-            if found[name] != store["run"][name]
-        }
-        for name, text in differing.items():
-            print(f"{name}: {text}; if that is meant to be: scripts/update_docs --remake")
-        return 1 if differing else 0
+        return compare(arguments.compare.read_text(encoding="utf-8"), store["run"])
     if arguments.remake is not None:
         for name in arguments.remake or SOURCES:
             store[name] = make(name)

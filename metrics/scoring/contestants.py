@@ -48,7 +48,7 @@ def contestants_of(
         policies: As in `compare_policies`.
         parameters: Keyword arguments of registered policies and classes.
         scenario: Where they run.
-        caches: Which caches were asked for; default see `study.spec.chosen_caches`.
+        caches: Which caches were asked for; default see `swarm_forage_env.study.spec.chosen_caches`.
 
     Raises:
         TypeError: something that is no policy.

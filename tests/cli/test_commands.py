@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -250,10 +251,14 @@ def test_ctrl_c_with_worker_processes(tmp_path):
     program = [sys.executable, "-m", "swarm_forage_env.cli", *words]
     pipe = subprocess.PIPE
     with subprocess.Popen(program, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as process:
-        while not list(tmp_path.glob("*.parquet")) and process.poll() is None:
-            time.sleep(0.1)
-        os.killpg(process.pid, signal.SIGINT)
-        out, err = process.communicate(timeout=10)
+        try:
+            while not list(tmp_path.glob("*.parquet")) and process.poll() is None:
+                time.sleep(0.1)
+            os.killpg(process.pid, signal.SIGINT)
+            out, err = process.communicate(timeout=10)
+        finally:  # whatever went wrong, nothing stays behind
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 130
     assert out == ""
     assert "runs are finished and kept" in err

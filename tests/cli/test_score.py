@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -216,10 +217,14 @@ def test_ctrl_c_with_worker_processes_and_going_on(tmp_path):
     program += ["--measures", "noise_robustness", "--jobs", "2", "--out", str(tmp_path), "--horizon", "2000"]
     pipe = subprocess.PIPE
     with subprocess.Popen(program, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as process:
-        while not list(tmp_path.glob("*.parquet")) and process.poll() is None:
-            time.sleep(0.1)
-        os.killpg(process.pid, signal.SIGINT)
-        _, err = process.communicate(timeout=10)
+        try:
+            while not list(tmp_path.glob("*.parquet")) and process.poll() is None:
+                time.sleep(0.1)
+            os.killpg(process.pid, signal.SIGINT)
+            _, err = process.communicate(timeout=10)
+        finally:  # whatever went wrong, nothing stays behind
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == 130
     assert "the same command does the rest" in err
     kept = set(RunStore(tmp_path).run_ids())

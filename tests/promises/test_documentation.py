@@ -1,11 +1,13 @@
 """The documents are right: examples run, commands are one line, links lead to files."""
 
-import importlib.util
 import json
 import re
 from pathlib import Path
 
 import pytest
+
+from scripts import update_docs
+from scripts.update_docs import FIVE
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -65,32 +67,77 @@ def test_readme_table_names_every_scenario():
     ]
 
 
-@pytest.fixture(scope="module")
-def update_docs():
-    spec = importlib.util.spec_from_file_location("update_docs", ROOT / "scripts/update_docs.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_numbers_of_runs_are_those_of_the_store(update_docs):
+def test_numbers_of_runs_are_those_of_the_store():
     store = json.loads(update_docs.STORE.read_text())
     for page in update_docs.PAGES:
         text = page.read_text()
         assert update_docs.written(text, store) == text, f"{page}: scripts/update_docs"
         by_hand = update_docs.BLOCK.sub("", text)
-        numbers = {value for values in store.values() for name, value in values.items() if name != "table"}
+        numbers = {values[name] for source, values in store.items() for name in update_docs.SOURCES[source][1]}
         assert [number for number in numbers if number in by_hand] == [], f"{page}: a number outside of a block"
 
 
-def test_a_block_is_written_from_the_store(update_docs):
+def test_a_block_is_written_from_the_store():
     page = "before <!-- generated: run.crw by scripts/update_docs -->1.00 ± 0.10<!-- end --> after"
     assert update_docs.written(page, {"run": {"crw": "2.00 ± 0.20"}}) == page.replace("1.00 ± 0.10", "2.00 ± 0.20")
 
 
-def test_deliveries_are_read_from_a_printed_table(update_docs):
-    printed = json.loads(update_docs.STORE.read_text())["run"]["table"]
-    stored = update_docs.fields(f"said before\n{printed}\nsaid after\n", update_docs.FIVE)
-    assert stored == json.loads(update_docs.STORE.read_text())["run"]
+def test_deliveries_are_read_from_a_printed_table():
+    stored = json.loads(update_docs.STORE.read_text())["run"]
+    printed = stored["table"]
+    assert {"made_with": stored["made_with"], **update_docs.fields(f"before\n{printed}\nafter\n", FIVE)} == stored
     with pytest.raises(ValueError, match="deliveries of crw"):
         update_docs.fields(printed, ("crw",))
+
+
+def test_every_source_is_stored_with_what_made_it():
+    store = json.loads(update_docs.STORE.read_text())
+    assert list(store) == list(update_docs.SOURCES)
+    assert [set(values["made_with"]) for values in store.values()] == [set(update_docs.made_with())] * len(store)
+
+
+def test_commands_of_the_store_are_those_that_the_pages_show():
+    readme = (ROOT / "README.md").read_text()
+    assert [
+        command for name in ("run", "trained") for command in update_docs.SOURCES[name][0] if command not in readme
+    ] == []
+
+
+def test_deliveries_are_compared_where_the_versions_are_the_same(capsys):
+    stored = json.loads(update_docs.STORE.read_text())["run"] | {"made_with": update_docs.made_with()}
+    other = stored["table"].replace(stored["dpo"], "11.11 ± 1.11")
+    assert update_docs.compare(stored["table"], stored) == 0
+    assert "are the stored ones" in capsys.readouterr().out
+    assert update_docs.compare(other, stored) == 1
+    assert f"dpo: {stored['dpo']} stored, 11.11 ± 1.11 now" in capsys.readouterr().out
+    stored["made_with"]["numpy"] = "0.1"
+    assert update_docs.compare(other, stored) == 0
+    assert "not compared with the stored ones: numpy 0.1 then" in capsys.readouterr().out
+
+
+@pytest.mark.compiled
+def test_remake_runs_the_command_and_writes_store_and_pages(tmp_path, monkeypatch):
+    """README's command itself, with a short horizon behind it."""
+    (command,), labels = update_docs.SOURCES["run"]
+    store, page = tmp_path / "results.json", tmp_path / "page.md"
+    store.write_text(json.dumps({"run": {}, "medium": {"crw": "as it was"}}))
+    block = "<!-- generated: {} by scripts/update_docs -->{}<!-- end -->"
+    page.write_text(block.format("run.table", "") + block.format("run.crw", "") + block.format("medium.crw", ""))
+    monkeypatch.setitem(
+        update_docs.SOURCES, "run", ((f"{command} --robots 10 --horizon 200 --seeds 2 --jobs 1",), labels)
+    )
+    monkeypatch.setattr(update_docs, "STORE", store)
+    monkeypatch.setattr(update_docs, "PAGES", [page])
+    monkeypatch.setattr(update_docs, "ROOT", tmp_path)
+    assert update_docs.main(["--remake", "run"]) == 0
+    made = json.loads(store.read_text())
+    assert made["medium"] == {"crw": "as it was"}
+    assert set(made["run"]) == {"made_with", "table", *labels}
+    assert made["run"]["made_with"] == update_docs.made_with()
+    assert "10 robots, 200 objects, 200 s" in made["run"]["table"]
+    assert page.read_text() == (
+        block.format("run.table", f"\n```\n{made['run']['table']}\n```\n")
+        + block.format("run.crw", made["run"]["crw"])
+        + block.format("medium.crw", "as it was")
+    )
+    assert update_docs.main(["--check"]) == 0

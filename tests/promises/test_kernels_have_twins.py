@@ -2,12 +2,15 @@
 
 import ast
 import importlib
+import pkgutil
+import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
 
-from tests.reference.twins import TWINS, WITHOUT
+from tests.reference.twins import TWINS, WITHOUT, Twin
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("swarm_forage_env", "baselines", "metrics")
@@ -78,12 +81,71 @@ def test_a_new_kernel_is_found(tmp_path):
     assert kernels_that_need_a_twin(tmp_path) == {"metrics.fast.outer", "metrics.fast.other", "metrics.fast.shared"}
 
 
-@pytest.mark.parametrize("twin", sorted(set(TWINS.values())))
-def test_a_test_compares_with_the_twin(twin):
-    """The twin is there, and a test module takes it from where it is."""
-    module, name = twin.split(".")
-    assert callable(getattr(importlib.import_module(f"tests.reference.{module}"), name))
-    tests = [path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py") if path != Path(__file__)]
-    assert any(f"tests.reference.{module} import" in text and name in text for text in tests) or any(
-        f"from tests.reference import {module}" in text for text in tests
-    )
+def calls_in(tree: ast.AST) -> set[str]:
+    """Return the last names of everything that is called: "act" for `policy.act(...)`."""
+    called = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    return {f.attr if isinstance(f, ast.Attribute) else f.id for f in called if isinstance(f, ast.Attribute | ast.Name)}
+
+
+@cache
+def calls_of_functions() -> dict[str, set[str]]:
+    """Return what every function of the packages calls, by the last names of both."""
+    found: dict[str, set[str]] = {}
+    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                found.setdefault(node.name, set()).update(calls_in(node))
+    return found
+
+
+def leads_to(caller: str, kernel: str) -> bool:
+    """Whether `caller` may call `kernel`, itself or through others."""
+    todo, seen = [caller], set[str]()
+    while todo:
+        name = todo.pop()
+        if name == kernel:
+            return True
+        new = calls_of_functions().get(name, set()) - seen
+        seen |= new
+        todo += new
+    return False
+
+
+def faults(kernel: str, twin: Twin, root: Path = ROOT) -> list[str]:
+    """Say what is wrong with an entry of the table."""
+    module, name = twin.name.split(".")
+    path, last = root / "tests" / twin.test, twin.caller.rpartition(".")[2]
+    found = []
+    if not callable(getattr(importlib.import_module(f"tests.reference.{module}"), name, None)):
+        found.append(f"tests.reference has no {twin.name}")
+    if not callable(pkgutil.resolve_name(twin.caller)):
+        found.append(f"{twin.caller} is nothing to call")
+    if not leads_to(last, kernel.rpartition(".")[2]):
+        found.append(f"{twin.caller} does not lead to {kernel}")
+    if not path.is_file():
+        return [*found, f"there is no {twin.test}"]
+    text = path.read_text(encoding="utf-8")
+    called = calls_in(ast.parse(text))
+    if not re.search(rf"^from tests\.reference(\.{module} import|\b.* import .*\b{module}\b)", text, re.MULTILINE):
+        found.append(f"{twin.test} does not import tests.reference.{module}")
+    return found + [f"{twin.test} does not call {wanted}" for wanted in (name, last) if wanted not in called]
+
+
+@pytest.mark.parametrize("kernel", TWINS)
+def test_the_named_test_compares_with_the_twin(kernel):
+    assert faults(kernel, TWINS[kernel]) == []
+
+
+def test_a_wrong_entry_is_found(tmp_path):
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests/test_other.py").write_text("from tests.reference.motion import free_motion\nfree_motion()\n")
+    kernel = "swarm_forage_env.world.kernels.walk.walk"
+    wrong = Twin("sensing.observe", "test_other.py", "baselines.crw.CRWPolicy.act")
+    assert faults(kernel, wrong, tmp_path) == [
+        f"baselines.crw.CRWPolicy.act does not lead to {kernel}",
+        "test_other.py does not import tests.reference.sensing",
+        "test_other.py does not call observe",
+        "test_other.py does not call act",
+    ]
+    gone = Twin("sensing.gone", "test_gone.py", kernel)
+    assert faults(kernel, gone, tmp_path) == ["tests.reference has no sensing.gone", "there is no test_gone.py"]

@@ -11,8 +11,13 @@ PACKAGES = ("swarm_forage_env", "baselines", "metrics")
 SOURCES = sorted(file for package in PACKAGES for file in (ROOT / package).rglob("*.py"))
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 PAGES.remove(ROOT / "CHANGELOG.md")  # it tells of names that are no more
-OTHERS = {"gymnasium", "pettingzoo", "env", "policy", "plan", "world", "scenarios", "interface", "training", "spec"}
-"""Words that are also names of other packages, of arguments or of files that a run writes."""
+CHANGELOG = (ROOT / "CHANGELOG.md").read_text()
+OBJECTS = {"env", "interface", "layout", "plan", "policy", "rng", "spec", "state", "training", "world", "wrapper"}
+"""Old and new modules whose names are also those of objects: of these, only classes and what has moved count."""
+FOREIGN = {"gymnasium", "pettingzoo"}
+"""Other packages of which a module of ours has the name."""
+SPELLINGS = (r"reset\((?:self, )?task\b", r"\btask\.(?:layout|n_robots)\b", r"\benv\.task\b", r"\bSwarmTask\b")
+"""Old names that are no module's."""
 DOTTED = re.compile(r"`([a-z_0-9]+(?:\.[A-Za-z_0-9]+)+)")
 PATHS = re.compile(r"`?((?:swarm_forage_env|baselines|metrics|tests|scripts|docs)/[\w/.-]+\.(?:py|md|toml|npz|json))")
 
@@ -30,37 +35,99 @@ def names_in(file: Path) -> set[str]:
     return names
 
 
-def modules() -> dict[str, list[Path]]:
-    """Files by the last part of their module's name."""
-    found: dict[str, list[Path]] = {}
-    for file in SOURCES:
-        name = file.parent.name if file.name == "__init__.py" else file.stem
-        found.setdefault(name, []).append(file)
-    return found
+def old_names(changelog: str = CHANGELOG) -> set[str]:
+    """Modules and contents of modules that have moved, by the first column of the table of moves.
+
+    `` `policy`: `Task` `` gives "policy" and "policy.Task", `` `learning.plan` `` gives itself and "learning".
+    """
+    found: set[str] = set()
+    for cell in re.findall(r"^\| ([^|]*`[^|]*) \|", changelog.split("\n## 0.1.0")[0], re.MULTILINE):
+        for part in cell.split(";"):
+            module = re.match(r"`([a-z_.0-9]+)`: ", part)
+            names = re.findall(r"`([A-Za-z_.0-9]+)`", part[module.end() :] if module else part)
+            found |= {f"{module[1]}.{name}" for name in names} | {module[1]} if module else set(names)
+    return found | {name.split(".")[0] for name in found if "." in name}
 
 
-MODULES = modules()
+OLD = old_names()
 
 
-def resolves(dotted: str) -> bool:
-    """Whether `module.name` or `folder.module.name` is there; anything that begins with no module of ours is."""
+def inside(folder: Path, rest: list[str]) -> bool:
+    """Whether `module.name` or `folder.module.name` is there, seen from a folder."""
+    first, *rest = rest
+    file = folder / f"{first}.py"
+    if file.is_file():
+        return not rest or rest[0] in names_in(file)
+    if not (folder / first).is_dir():
+        return False
+    return not rest or inside(folder / first, rest) or rest[0] in names_in(folder / first / "__init__.py")
+
+
+def resolves(dotted: str, file: Path) -> bool:
+    """Whether a dotted name leads somewhere from the folder of a file or from one above it.
+
+    What begins with no module, old or new, is of another package or no name of a place at all.
+    """
     first, *rest = dotted.split(".")
-    if first in OTHERS or first not in MODULES or rest[0] in ("py", "md", "toml", "npz", "json"):
+    if first in FOREIGN or rest[0] in ("py", "md", "toml", "npz", "json", "zip"):
         return True
-    for file in MODULES[first]:
-        if file.name == "__init__.py":
-            inner = file.parent / f"{rest[0]}.py"
-            if inner.is_file() and (len(rest) == 1 or rest[1] in names_in(inner)):
-                return True
-            if (file.parent / rest[0]).is_dir():
-                return True
-        if rest[0] in names_in(file):
-            return True
-    return False
+    if first in OBJECTS and rest[0].islower() and dotted not in OLD:
+        return True
+    folders = [folder for folder in file.parents if ROOT in (folder, *folder.parents)]
+    if not any(folder.name in PACKAGES for folder in folders):
+        folders = [ROOT, *(ROOT / package for package in PACKAGES)]
+    if any(inside(folder, [first, *rest]) for folder in folders):
+        return True
+    return first not in OLD and first not in NEW
+
+
+NEW = {path.stem for path in SOURCES} | {path.parent.name for path in SOURCES}
+"""Modules and folders of today."""
+
+
+def stale(text: str, file: Path) -> list[str]:
+    """Return what a text names that is not there."""
+    found = [name for name in DOTTED.findall(text) if not resolves(name, file)]
+    found += [path for path in PATHS.findall(text) if not (ROOT / path).exists()]
+    return found + [match[0] for old in SPELLINGS for match in re.finditer(old, text)]
 
 
 @pytest.mark.parametrize("file", [*SOURCES, *PAGES], ids=lambda file: file.relative_to(ROOT).as_posix())
 def test_names_of_modules_and_files_are_those_of_today(file):
-    text = file.read_text()
-    assert [name for name in DOTTED.findall(text) if not resolves(name)] == []
-    assert [path for path in PATHS.findall(text) if not (ROOT / path).exists()] == []
+    assert stale(file.read_text(), file) == []
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "learning.interface",
+        "policy_models.open_network",
+        "signals.Waveform",
+        "recording.RunRecord",
+        "policy.Task",
+        "env.parallel_env",
+        "config.ScenarioConfig",
+        "caches.found_caches",
+        "scenarios.config.Gone",
+        "metrics/gone.py",
+    ],
+)
+@pytest.mark.parametrize("file", ["README.md", "swarm_forage_env/world/rewards.py"])
+def test_a_name_that_has_moved_is_found(name, file):
+    assert stale(f"See `{name}`.", ROOT / file) == [name]
+
+
+@pytest.mark.parametrize(
+    "text", ["reset(task, rng)", "def reset(self, task, rng):", "task.layout", "env.task", "SwarmTask"]
+)
+def test_an_old_spelling_is_found(text):
+    assert len(stale(text, ROOT / "README.md")) == 1
+
+
+def test_names_of_today_are_left_alone():
+    page, room = ROOT / "docs/policies.md", ROOT / "swarm_forage_env/world/rewards.py"
+    assert (
+        stale("`scenarios.config.RewardConfig` `policy.act` `numpy.ndarray` `metrics.scalability` `a.toml`", page) == []
+    )
+    assert stale("`scenarios.config.RewardConfig` `kernels.drive.drive` `contract.codes.Task`", room) == []
+    assert stale("`kernels.drive.drive`", ROOT / "swarm_forage_env/wrappers/throttle.py") == ["kernels.drive.drive"]

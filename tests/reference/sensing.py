@@ -1,5 +1,6 @@
 """Slow twin of observations: every robot, every sensor, and everything that it could sense."""
 
+import cmath
 import math
 
 import numpy as np
@@ -41,6 +42,15 @@ def proximity(env: ForageEnv, robot: int) -> list[float]:
                 nearest = min(nearest, ahead - math.sqrt(RADIUS_M**2 - miss**2))
         readings.append(reading(nearest - RADIUS_M))
     return readings
+
+
+def interferes(env: ForageEnv, robot: int) -> bool:
+    """Whether a robot at work is in interference: its beams add up to more than 0.1, or point behind it."""
+    beams = zip(proximity(env, robot), RING_DEG, strict=True)
+    away = sum(cmath.rect(value, math.radians(ring_deg)) for value, ring_deg in beams)
+    if not env.active[robot] or abs(away) < 1e-12:
+        return False
+    return abs(away) > 0.1 or abs(cmath.phase(away)) > 2.61
 
 
 def light(env: ForageEnv, robot: int) -> list[float]:

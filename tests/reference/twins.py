@@ -1,46 +1,105 @@
-"""Which slow, obvious twin each kernel has; `tests/promises/test_kernels_have_twins.py` checks that none is missing.
+"""Which slow, obvious twin stands beside each kernel, and where the two are compared.
 
 A kernel needs a twin when uncompiled code calls it, or kernels of another folder do. What is called by kernels of its
-own folder alone is part of those.
+own folder alone is part of those. `tests/promises/test_kernels_have_twins.py` holds the table complete and true.
 """
 
+from typing import NamedTuple
+
+
+class Twin(NamedTuple):
+    """Where a kernel is compared with what."""
+
+    name: str
+    """The twin, a name in a module of `tests.reference`; the test calls it."""
+    test: str
+    """File below `tests/` that compares the two."""
+    caller: str
+    """What the test calls: the kernel itself, or a function that leads to it."""
+
+
+CRW = Twin("controllers.ReferenceRobot", "baselines/test_controller_twins.py", "baselines.crw.CRWPolicy.act")
+TASKS = Twin(
+    "task_controllers.ReferenceTaskRobot", "baselines/test_task_twins.py", "baselines.task_policy.TaskPolicy.act"
+)
+COMPACT_VIEW = Twin(
+    "compact_view.compact_row",
+    "policies/test_interface.py",
+    "swarm_forage_env.policies.interface.LearnerInterface.observe",
+)
+INTERFERENCE = Twin("sensing.interferes", "world/test_interference.py", "swarm_forage_env.env.ForageEnv.step_batch")
+OBSERVED = Twin("sensing.observe", "world/test_sensors.py", "swarm_forage_env.world.arena.ForagingArena.observe")
+MOTION = Twin("motion.free_motion", "world/test_physics.py", "swarm_forage_env.env.ForageEnv.step_batch")
+INTERACTIONS = Twin(
+    "interacting.SlowWorld", "world/test_interactions_twin.py", "swarm_forage_env.world.interactions.Interactions.serve"
+)
+NOISE = Twin("adversity.noisy_row", "wrappers/test_noise.py", "swarm_forage_env.wrappers.noise.SensorNoise.observe")
+
 TWINS = {
-    "baselines.crw.step_crw": "controllers.ReferenceRobot",
-    "baselines.dpo.step_dpo": "controllers.ReferenceRobot",
-    "baselines.memory.density": "controllers.ObjectDictionary",
-    "baselines.stoch_n1.partition_probability": "task_chain.partition",
-    "baselines.task_machines.step_tasks": "task_controllers.ReferenceTaskRobot",
-    "swarm_forage_env.contract.detection.is_obstacle_vector": "controllers.ReferenceRobot",
-    "swarm_forage_env.contract.detection.ring_sum": "compact_view.compact_row",
-    "swarm_forage_env.contract.detection.sees_cache": "compact_view.compact_row",
-    "swarm_forage_env.contract.detection.sees_nest": "compact_view.compact_row",
-    "swarm_forage_env.contract.detection.sees_object": "controllers.ReferenceRobot",
-    "swarm_forage_env.contract.detection.sees_obstacle": "controllers.ReferenceRobot",
-    "swarm_forage_env.policies.kernels.commands.automatic_grip": "commands.automatic_grip",
-    "swarm_forage_env.policies.kernels.commands.mask_actions": "commands.allowed_actions",
-    "swarm_forage_env.policies.kernels.commands.numbered_actions": "commands.numbered_action",
-    "swarm_forage_env.policies.kernels.compact.compact_view": "compact_view.compact_row",
-    "swarm_forage_env.world.kernels.beams.proximity": "sensing.proximity",
-    "swarm_forage_env.world.kernels.drive.drive": "motion.free_motion",
-    "swarm_forage_env.world.kernels.drive.limit_command": "motion.limited_wheels",
-    "swarm_forage_env.world.kernels.drive.unpack_poses": "motion.free_motion",
-    "swarm_forage_env.world.kernels.floor.ground": "sensing.ground",
-    "swarm_forage_env.world.kernels.floor.light": "sensing.light",
-    "swarm_forage_env.world.kernels.floor.line_of_sight": "sensing.objects_in_sight",
-    "swarm_forage_env.world.kernels.interact.clear_events": "interacting.SlowWorld",
-    "swarm_forage_env.world.kernels.interact.interact": "interacting.SlowWorld",
-    "swarm_forage_env.world.kernels.interfere.mark": "sensing.proximity",
-    "swarm_forage_env.world.kernels.neighbours.bin_robots": "sensing.proximity",
-    "swarm_forage_env.world.kernels.proprioception.own_motion": "sensing.observe",
-    "swarm_forage_env.world.kernels.proprioception.own_status": "sensing.observe",
-    "swarm_forage_env.world.kernels.scatter.scatter": "object_placement.scatter_slowly",
-    "swarm_forage_env.world.kernels.walk.walk": "object_walk.walk_slowly",
-    "swarm_forage_env.wrappers.kernels.noise.perturb_readings": "adversity.noisy_row",
-    "swarm_forage_env.wrappers.kernels.noise.turn_heading": "adversity.noisy_row",
-    "swarm_forage_env.wrappers.kernels.task_shares.add_task_shares": "task_shares.task_shares",
-    "swarm_forage_env.wrappers.kernels.throttle.throttle": "adversity.throttle_gain",
+    "baselines.crw.step_crw": CRW,
+    "baselines.dpo.step_dpo": Twin(
+        "controllers.ReferenceRobot", "baselines/test_controller_twins.py", "baselines.dpo.DPOPolicy.act"
+    ),
+    "baselines.memory.density": Twin(
+        "controllers.ObjectDictionary", "baselines/test_memory.py", "baselines.dpo.DPOPolicy.remembered"
+    ),
+    "baselines.stoch_n1.partition_probability": TASKS,
+    "baselines.task_machines.step_tasks": TASKS,
+    "swarm_forage_env.contract.detection.is_obstacle_vector": CRW,
+    "swarm_forage_env.contract.detection.ring_sum": COMPACT_VIEW,
+    "swarm_forage_env.contract.detection.sees_cache": COMPACT_VIEW,
+    "swarm_forage_env.contract.detection.sees_nest": COMPACT_VIEW,
+    "swarm_forage_env.contract.detection.sees_object": CRW,
+    "swarm_forage_env.contract.detection.sees_obstacle": INTERFERENCE,
+    "swarm_forage_env.policies.kernels.commands.automatic_grip": Twin(
+        "commands.automatic_grip",
+        "policies/test_interface_twins.py",
+        "swarm_forage_env.policies.interface.LearnerInterface.command",
+    ),
+    "swarm_forage_env.policies.kernels.commands.mask_actions": Twin(
+        "commands.allowed_actions",
+        "policies/test_interface_twins.py",
+        "swarm_forage_env.policies.interface.LearnerInterface.mask",
+    ),
+    "swarm_forage_env.policies.kernels.commands.numbered_actions": Twin(
+        "commands.numbered_action",
+        "policies/test_interface_twins.py",
+        "swarm_forage_env.policies.interface.LearnerInterface.command",
+    ),
+    "swarm_forage_env.policies.kernels.compact.compact_view": COMPACT_VIEW,
+    "swarm_forage_env.world.kernels.beams.proximity": OBSERVED,
+    "swarm_forage_env.world.kernels.drive.drive": MOTION,
+    "swarm_forage_env.world.kernels.drive.limit_command": Twin(
+        "motion.limited_wheels", "world/test_drive.py", "swarm_forage_env.env.ForageEnv.step_batch"
+    ),
+    "swarm_forage_env.world.kernels.drive.unpack_poses": MOTION,
+    "swarm_forage_env.world.kernels.floor.ground": OBSERVED,
+    "swarm_forage_env.world.kernels.floor.light": OBSERVED,
+    "swarm_forage_env.world.kernels.floor.line_of_sight": OBSERVED,
+    "swarm_forage_env.world.kernels.interact.clear_events": INTERACTIONS,
+    "swarm_forage_env.world.kernels.interact.interact": INTERACTIONS,
+    "swarm_forage_env.world.kernels.interfere.mark": INTERFERENCE,
+    "swarm_forage_env.world.kernels.neighbours.bin_robots": OBSERVED,
+    "swarm_forage_env.world.kernels.proprioception.own_motion": OBSERVED,
+    "swarm_forage_env.world.kernels.proprioception.own_status": OBSERVED,
+    "swarm_forage_env.world.kernels.scatter.scatter": Twin(
+        "object_placement.scatter_slowly", "world/test_placement.py", "swarm_forage_env.world.kernels.scatter.scatter"
+    ),
+    "swarm_forage_env.world.kernels.walk.walk": Twin(
+        "object_walk.walk_slowly", "world/test_object_motion.py", "swarm_forage_env.world.object_motion.walk_objects"
+    ),
+    "swarm_forage_env.wrappers.kernels.noise.perturb_readings": NOISE,
+    "swarm_forage_env.wrappers.kernels.noise.turn_heading": NOISE,
+    "swarm_forage_env.wrappers.kernels.task_shares.add_task_shares": Twin(
+        "task_shares.task_shares",
+        "wrappers/test_recorder.py",
+        "swarm_forage_env.wrappers.kernels.task_shares.add_task_shares",
+    ),
+    "swarm_forage_env.wrappers.kernels.throttle.throttle": Twin(
+        "adversity.throttle_gain", "wrappers/test_throttle.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
+    ),
 }
-"""Kernel -> its twin, a name in a module of `tests.reference`."""
+"""Kernel -> its twin."""
 
 WITHOUT = {
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "

@@ -6,13 +6,12 @@ say in the changelog which ones and why.
 
 import hashlib
 import json
-import platform
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from scripts.update_docs import made_with
 from swarm_forage_env import AUTHORS_PROGRAM, SCENARIO_NAMES, Quirks
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
@@ -30,12 +29,6 @@ INTERFACES: dict[str, dict[str, Any]] = {
     "full": {},
     "compact": {"observation": "compact", "actions": "discrete", "automatic_gripper": True, "decision_ticks": 5},
 }
-
-
-def machine() -> dict[str, str]:
-    """What the last bits of a result depend on besides this package."""
-    packages = ("numpy", "numba", "pymunk")
-    return {"machine": platform.machine(), **{name: version(name) for name in packages}}
 
 
 def golden_specs() -> dict[str, RunSpec]:
@@ -91,7 +84,7 @@ def write_all() -> None:
     """Run everything and write the file of fingerprints."""
     runs = {name: run_fingerprint(spec) for name, spec in golden_specs().items()}
     runs |= {f"batch/{name}": batch_fingerprint(interface) for name, interface in INTERFACES.items()}
-    FILE.write_text(json.dumps({"made_with": machine(), "fingerprints": runs}, indent=1) + "\n", encoding="utf-8")
+    FILE.write_text(json.dumps({"made_with": made_with(), "fingerprints": runs}, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

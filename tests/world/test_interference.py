@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.contract.codes import Counter, Grip
-from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from tests.reference import sensing
@@ -89,15 +88,20 @@ def test_counters_are_sums_over_ticks():
     assert env.events.interference_sum[0] == pytest.approx(5 * 2 / 4)
 
 
-def test_flags_follow_the_rule_on_slow_readings():
+def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings():
     env = ForageEnv(scenario("warehouse_small", n_robots=60, n_objects=5, start_margin_m=6.5))
     env.reset_batch(2)
+    present, active = np.arange(60) % 12 != 0, np.arange(60) % 6 != 0
+    env.set_population(active=active, present=present)
     rng = np.random.default_rng(2)
-    flagged = 0
-    for tick in range(40):
+    flagged, share = 0, 0.0
+    for _ in range(40):
         env.step_batch(rng.uniform(-1, 1, (60, 3)).astype(np.float32))
-        if tick % 5 == 0:
-            expected = [sees_obstacle(np.array(sensing.proximity(env, robot), np.float32)) for robot in range(60)]
-            assert env.events.interfering.tolist() == expected
-            flagged += sum(expected)
+        expected = [sensing.interferes(env, robot) for robot in range(60)]
+        assert env.events.interfering.tolist() == expected
+        flagged += sum(expected)
+        share += sum(expected) / 50
     assert flagged > 20
+    assert env.events.counters[Counter.INTERFERING] == flagged
+    assert env.events.interference_sum[0] == pytest.approx(share)
+    assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [40 * 50, 40 * 55]

@@ -27,7 +27,7 @@ TOO_NEAR = 9
 """Asked for a cache site too near an existing cache."""
 
 GRASP, RELEASE, DELIVER_ONLY, SITE, CREATE_CACHE = range(1, 6)
-"""Gripper bands from the top, in the order of `codes.GRIP_LOWER_ENDS`."""
+"""Gripper bands from the top, in the order of `contract.codes.GRIP_LOWER_ENDS`."""
 
 FREE_PICKUP_HANDLER, NEST_HANDLER, CACHE_HANDLER, SITE_HANDLER, CREATE_HANDLER = range(5)
 
