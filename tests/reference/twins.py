@@ -68,6 +68,9 @@ TWINS = {
     ),
     "swarm_forage_env.policies.kernels.compact.compact_view": COMPACT_VIEW,
     "swarm_forage_env.world.kernels.beams.proximity": OBSERVED,
+    "swarm_forage_env.world.kernels.contact.press": Twin(
+        "contact.pressed_velocities", "world/test_contact.py", "swarm_forage_env.world.contact.Contact.apply"
+    ),
     "swarm_forage_env.world.kernels.drive.drive": MOTION,
     "swarm_forage_env.world.kernels.drive.limit_command": Twin(
         "motion.limited_wheels", "world/test_drive.py", "swarm_forage_env.env.ForageEnv.step_batch"
