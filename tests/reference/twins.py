@@ -72,6 +72,9 @@ TWINS = {
         "contact.pressed_velocities", "world/test_contact.py", "swarm_forage_env.world.contact.Contact.apply"
     ),
     "swarm_forage_env.world.kernels.drive.drive": MOTION,
+    "swarm_forage_env.world.kernels.drive.hold_inside": Twin(
+        "motion.held_inside", "world/test_physics.py", "swarm_forage_env.world.kernels.drive.hold_inside"
+    ),
     "swarm_forage_env.world.kernels.drive.limit_command": Twin(
         "motion.limited_wheels", "world/test_drive.py", "swarm_forage_env.env.ForageEnv.step_batch"
     ),

@@ -9,10 +9,11 @@ from scipy.spatial.distance import pdist
 
 from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.world.kernels.drive import hold_inside
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.state import SwarmState
 from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig
-from tests.reference.motion import WHEEL_BASE_M, WHEEL_SCALE_MPS, free_motion, limited_wheels
+from tests.reference.motion import WHEEL_BASE_M, WHEEL_SCALE_MPS, free_motion, held_inside, limited_wheels
 from tests.support.stage import put, tidy_world
 
 RADIUS_M = 0.085036758
@@ -245,3 +246,18 @@ def test_a_parked_body_can_be_placed_again():
 
 def test_the_fastest_wheel_moves_less_than_a_radius_per_tick():
     assert WHEEL_SCALE_MPS * 0.2 < RADIUS_M
+
+
+def test_bodies_are_held_inside_as_the_twin_says():
+    rng = np.random.default_rng(5)
+    room = np.array([0.3, 0.3, 4.0, 3.0])
+    poses = rng.uniform(-1.0, 5.0, (200, 3))
+    present = rng.random(199) < 0.8  # the last body is the static one
+    before = poses.copy()
+    expected = np.array(held_inside([(x, y) for x, y, _ in before[:-1].tolist()], tuple(room.tolist())))
+    expected[~present] = before[:-1][~present, :2]
+    n_moved = hold_inside(poses, present, room)
+    np.testing.assert_array_equal(poses[:-1, :2], expected)
+    np.testing.assert_array_equal(poses[:, 2], before[:, 2])
+    np.testing.assert_array_equal(poses[-1], before[-1])
+    assert n_moved == np.count_nonzero((expected != before[:-1, :2]).any(axis=1)) > 50
