@@ -14,11 +14,12 @@ import numpy as np
 from gymnasium import spaces
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, whole
-from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.layout import ObservationLayout, ObservationSlice
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.kernels.commands import (
+    GRIP_COMMANDS,
+    MOTION_WHEELS,
     N_GRIPS,
     N_MOTIONS,
     automatic_grip,
@@ -30,12 +31,10 @@ from swarm_forage_env.policies.kernels.compact import COMPACT_COLUMNS, compact_v
 OBSERVATIONS = ("full", "compact")
 ACTIONS = ("continuous", "discrete")
 
-MOTIONS = ("stand", "forward", "arc left", "arc right", "turn left", "turn right")
+MOTIONS = tuple(MOTION_WHEELS)
 """Discrete actions that move, in order."""
-GRIPS = ("grasp", "release", "deliver", "site", "create_cache")
+GRIPS = tuple(GRIP_COMMANDS)
 """Discrete actions of the gripper, in order after the motions; the wheels stand."""
-_WHEELS = ((0.0, 0.0), (0.5, 0.5), (0.4, 0.6), (0.6, 0.4), (-0.25, 0.25), (0.25, -0.25))
-"""Wheel commands of the motions (our choice): full speed, arcs of 0.35 m radius, turns of 8 degrees per tick."""
 _COMPACT_READS = (
     "proximity",
     "light",
@@ -118,8 +117,8 @@ class LearnerInterface:
             start["active"],
             start["los_object"],
         )
-        self._wheels = np.array(_WHEELS, np.float32)
-        self._grips = np.array([Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.CREATE_CACHE], np.float32)
+        self._wheels = np.array(list(MOTION_WHEELS.values()), np.float32)
+        self._grips = np.array(list(GRIP_COMMANDS.values()), np.float32)
         self._commands = np.zeros((spec.n_robots, 3), np.float32)
         self.layout = compact_layout(self._half_x, self._half_y) if self._is_compact else source
         self.observation_space = self.new_observation_space()
