@@ -15,15 +15,13 @@ from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.rendering.paint import Colour
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.scenarios.units import CELL_M, WALL_M
 
 if TYPE_CHECKING:
     from PIL import ImageFont
 
 MIN_SIZE_PX = 240
 MAX_SIZE_PX = 4000
-WALL_M = 0.2
-"""Walls are drawn this far beyond the arena border, where they stand."""
 _REFERENCE_PX = 900.0
 """Picture width for which text and symbol sizes are given; other widths scale them."""
 
