@@ -41,7 +41,7 @@ def task_constants(parameters: TaskParameters, spec: SwarmSpec, n_tabs: int) -> 
         spec,
         **parameters.derived(),
         n_tabs=n_tabs,
-        cache_half_cells=round(spec.cache_side_m / spec.cell_m) // 2,
+        cache_half_cells=spec.cache_half_side_cells,
         cache_side_m=spec.cache_side_m,
         proximity_m=spec.cache_side_nominal_m,
         creation_tolerance_m=loose_m if is_loose else parameters.creation_distance_m,
