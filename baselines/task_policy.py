@@ -42,7 +42,7 @@ def task_constants(parameters: TaskParameters, spec: SwarmSpec, n_tabs: int) -> 
         spec,
         **parameters.derived(),
         n_tabs=n_tabs,
-        cache_half_cells=round(spec.cache_side_m / spec.cell_m) // 2,
+        cache_half_cells=spec.cache_half_side_cells,
         cache_side_m=spec.cache_side_m,
         proximity_m=spec.cache_side_nominal_m,
         # The world measures from where the robot stands, which is this far from its goal at most.
@@ -134,7 +134,7 @@ class TaskPolicy:
 
     @property
     def task_estimates(self) -> FloatArray:
-        """(N, 8) expected execution times in ticks, by `Task` code, a copy."""
+        """(N, 8) expected execution times in ticks, by `Task` code, a copy; for inspection."""
         return self._allocation.estimate.copy()
 
     @property
@@ -163,7 +163,10 @@ class TaskPolicy:
         return remembered_objects(self._memory.objects, self._robots, robot_index, self._constants[0].log_keep)
 
     def remembered_caches(self, robot_index: int) -> dict[int, tuple[int, int, int, float]]:
-        """Return the caches that one robot remembers: serial -> (centre cell x, y, objects, pheromone density)."""
+        """Return the caches that one robot remembers: serial -> (centre cell x, y, objects, pheromone density).
+
+        For inspection; nothing in a run needs it.
+        """
         robot = self._robots[robot_index]
         caches = self._memory.caches[robot_index, : robot["n_caches"]]
         log_keep = self._constants[0].log_keep

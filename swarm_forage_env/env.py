@@ -86,6 +86,11 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     # Spaces and constants
 
     @property
+    def unwrapped(self) -> "ForageEnv":
+        """The environment itself, at the bottom of every stack."""
+        return self
+
+    @property
     def layout(self) -> ObservationLayout:
         """Named slices of an observation row."""
         return self.arena.layout

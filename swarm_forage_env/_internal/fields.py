@@ -75,20 +75,22 @@ def whole(
         raise ConfigError(f"Expected {where} to be {wanted}, got {value!r}{hint}.")
 
 
-def as_whole(where: str, value: Any, *, at_least: int, or_none: bool = False) -> int:
+def as_whole(where: str, value: Any, *, at_least: int, at_most: int | None = None, or_none: bool = False) -> int:
     """Return a whole number, one of numpy's included, as an int; for arguments that no configuration stores.
 
     Args:
         where: Name of the value, for the message.
         value: What was given.
         at_least: Smallest allowed value.
+        at_most: Largest allowed value.
         or_none: Whether the message says that the caller takes None, too.
 
     Raises:
-        ConfigError: no whole number, or a smaller one.
+        ConfigError: no whole number, or one out of range.
     """
-    if isinstance(value, bool) or not isinstance(value, Integral) or operator.index(value) < at_least:
-        raise ConfigError(f"Expected {where} to be {_whole_in_range(at_least, None, or_none)}, got {value!r}.")
+    is_whole = not isinstance(value, bool) and isinstance(value, Integral)
+    if not (is_whole and _is_between(operator.index(value), at_least, at_most)):
+        raise ConfigError(f"Expected {where} to be {_whole_in_range(at_least, at_most, or_none)}, got {value!r}.")
     return operator.index(value)
 
 

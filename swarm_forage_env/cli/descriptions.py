@@ -18,6 +18,7 @@ from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.registry import is_policy_file, policy_class, policy_names
 from swarm_forage_env.scenarios import presets
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.study.spec import stated_caches
 
 
 def overview() -> tuple[Table, Table]:
@@ -31,7 +32,7 @@ def overview() -> tuple[Table, Table]:
     policies = Table("policy", "caches", "what it is", title="policies")
     for name in policy_names():
         policy = policy_class(name)
-        policies.add_row(name, getattr(policy, "caches", "none"), _first_line(policy))
+        policies.add_row(name, _caches(policy), _first_line(policy))
     return scenarios, policies
 
 
@@ -85,8 +86,13 @@ def _policy_lines(name: str) -> Iterator[str]:
     yield ""
     yield f"  defined in  {policy.__module__}"
     yield f"  parameters  {inspect.signature(policy)}"
-    yield f"  caches      {getattr(policy, 'caches', 'none')} (which it is made for)"
+    yield f"  caches      {_caches(policy, ' (the caches it is made for)')}"
     yield f"  reads       {'all slices' if reads is None else ', '.join(reads) or 'nothing'}"
+
+
+def _caches(policy: object, if_stated: str = "") -> str:
+    stated = stated_caches(policy)
+    return "those of the scenario" if stated is None else f"{stated}{if_stated}"
 
 
 def _file_lines(file: Path) -> Iterator[str]:
@@ -105,7 +111,7 @@ def _file_lines(file: Path) -> Iterator[str]:
     yield ""
     for name, value in dataclasses.asdict(about.interface).items():
         yield f"  {name:<20}{_plain(value)}"
-    yield f"  {'caches':<20}{about.caches} (which it is made for)"
+    yield f"  {'caches':<20}{about.caches} (the caches it is made for)"
     for part, values in about.card.items():
         if part != "plan":  # shown on its own page
             yield ""

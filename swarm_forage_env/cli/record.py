@@ -31,7 +31,7 @@ def record(
     """Film a run."""
     from rich.progress import Progress
 
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, described_world
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.rendering.view import RenderError
@@ -47,29 +47,38 @@ def record(
         wrappers=tuple(wrappers or ()),
         config_file=config,
     )
-    spec = plan_runs(options, (policy,), n_seeds=1, first_seed=seed)[0]
+    world, asked_caches, disturbances = described_world(options)
+    _refuse_unknown(policy)
     film = out or _film_in_results(f"{scenario}_{Path(policy).stem}.gif")
     try:
         screen = Console(stderr=True)
         with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
             task = bar.add_task("pictures")
             written = record_run(
-                spec.scenario,
-                spec.policy,
+                world,
+                policy,
                 film,
                 seconds=seconds,
                 seed=seed,
                 speedup=speedup,
                 fps=fps,
                 size_px=size,
-                caches=spec.scenario.caches,
-                parameters=spec.parameters,
-                wrappers=spec.wrappers,
+                caches=asked_caches,
+                wrappers=disturbances,
                 progress=lambda done, total: bar.update(task, completed=done, total=total),
             )
     except (RenderError, ModelError, NetworkError) as error:
         raise typer.BadParameter(str(error)) from error
     typer.echo(f"wrote {written}")
+
+
+def _refuse_unknown(policy: str) -> None:
+    from swarm_forage_env.policies.registry import policy_class
+
+    try:
+        policy_class(policy)
+    except ValueError as error:  # an unknown name is a mistake in the words; a ValueError of the run is not
+        raise typer.BadParameter(str(error)) from error
 
 
 def _film_in_results(name: str) -> Path:

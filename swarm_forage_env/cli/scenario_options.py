@@ -130,6 +130,17 @@ def build_wrappers(options: ScenarioOptions, file_wrappers: Sequence[WrapperConf
     return (*wrappers, *(wrapper for wrapper in file_wrappers if wrapper.name not in named))
 
 
+def described_world(options: ScenarioOptions) -> tuple[ScenarioConfig, str | None, tuple[WrapperConfig, ...]]:
+    """Return the scenario, which caches were asked for (None = nobody asked), and the wrappers.
+
+    Raises:
+        ConfigError: see `build_scenario`, `build_wrappers` and `read_config`.
+    """
+    file_fields, file_wrappers = ({}, ()) if options.config_file is None else read_config(options.config_file)
+    config, caches = build_scenario(options, file_fields)
+    return config, caches, build_wrappers(options, file_wrappers)
+
+
 def plan_runs(
     options: ScenarioOptions, policies: Sequence[str], *, n_seeds: int, first_seed: int
 ) -> tuple[RunSpec, ...]:
@@ -139,9 +150,7 @@ def plan_runs(
         ConfigError: see `build_scenario` and `read_config`; an unknown policy or wrapper, or a policy file that
             cannot be opened.
     """
-    file_fields, file_wrappers = ({}, ()) if options.config_file is None else read_config(options.config_file)
-    config, caches = build_scenario(options, file_fields)
-    wrappers = build_wrappers(options, file_wrappers)
+    config, caches, wrappers = described_world(options)
     try:
         planned = [plan_run(config, name, caches=caches, wrappers=wrappers) for name in policies]
     except ValueError as error:  # of a policy or its file

@@ -6,6 +6,16 @@ from typing import Annotated
 import typer
 
 from swarm_forage_env.cli.options import ConfigFile, Objects, Robots, Settings, Side, Wrappers
+from swarm_forage_env.training.defaults import (
+    DECISION_TICKS,
+    DEFAULT_ARENAS,
+    DEFAULT_HIDDEN,
+    DEFAULT_STEPS,
+    EPISODE_S,
+    EVALUATE_EVERY,
+)
+
+_HIDDEN = ",".join(map(str, DEFAULT_HIDDEN))
 
 
 def train(  # long: one parameter per option
@@ -16,8 +26,10 @@ def train(  # long: one parameter per option
     ] = None,
     scenario: Annotated[str | None, typer.Option(help="Preset; default warehouse_small.")] = None,
     algorithm: Annotated[str | None, typer.Option("--algo", help="ppo, a2c, dqn or sac; default ppo.")] = None,
-    steps: Annotated[int | None, typer.Option(min=1, help="Decisions of single robots; default 5,000,000.")] = None,
-    arenas: Annotated[int | None, typer.Option(min=1, help="Arenas side by side; default 8.")] = None,
+    steps: Annotated[
+        int | None, typer.Option(min=1, help=f"Decisions of single robots; default {DEFAULT_STEPS:,}.")
+    ] = None,
+    arenas: Annotated[int | None, typer.Option(min=1, help=f"Arenas side by side; default {DEFAULT_ARENAS}.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything; default 0.")] = None,
     observation: Annotated[str | None, typer.Option(help="compact or full; default compact.")] = None,
     actions: Annotated[
@@ -27,9 +39,12 @@ def train(  # long: one parameter per option
         bool | None,
         typer.Option("--automatic-gripper/--own-gripper", help="Whether the gripper is automatic; default yes."),
     ] = None,
-    decision_ticks: Annotated[int | None, typer.Option(min=1, help="Ticks per decision; default 5.")] = None,
+    decision_ticks: Annotated[
+        int | None, typer.Option(min=1, help=f"Ticks per decision; default {DECISION_TICKS}.")
+    ] = None,
     evaluate_every: Annotated[
-        int | None, typer.Option(min=1, help="Decisions between evaluations and checkpoints; default 1,000,000.")
+        int | None,
+        typer.Option(min=1, help=f"Decisions between evaluations and checkpoints; default {EVALUATE_EVERY:,}."),
     ] = None,
     small_start: Annotated[
         bool | None,
@@ -38,12 +53,14 @@ def train(  # long: one parameter per option
             help="Spend the first third in a smaller arena with short ways; default if deliveries count.",
         ),
     ] = None,
-    hidden: Annotated[str | None, typer.Option(help="Sizes of the hidden layers; default 64,64.")] = None,
+    hidden: Annotated[str | None, typer.Option(help=f"Sizes of the hidden layers; default {_HIDDEN}.")] = None,
     arguments: Annotated[
         list[str] | None,
         typer.Option("--arg", metavar="KEY=NUMBER", help="Argument of the algorithm; may be repeated."),
     ] = None,
-    horizon: Annotated[float | None, typer.Option(help="Seconds per episode of the training; default 1,000.")] = None,
+    horizon: Annotated[
+        float | None, typer.Option(help=f"Seconds per episode of the training; default {EPISODE_S:,.0f}.")
+    ] = None,
     robots: Robots = None,
     objects: Objects = None,
     side: Side = None,

@@ -1,8 +1,9 @@
 """ObservationLayout: the named slices of an observation row. Sensors write them, policies read them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from typing import TypeAlias
 
 from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 
@@ -18,6 +19,9 @@ CACHE_FIELDS = 4
 SERIAL_SCALE = 2.0**24
 """Cache serial numbers below this are exact in float32."""
 EVENT_SCALE = 16.0
+
+LayoutRow: TypeAlias = tuple[str, tuple[float, ...], str, str]
+"""Name, scale, noise group and meaning of a slice, as in `ObservationSlice`; the columns follow from the order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +48,11 @@ class ObservationSlice:
     def stop(self) -> int:
         """One past the last column."""
         return self.start + self.size
+
+    @property
+    def row(self) -> LayoutRow:
+        """What `layout_of` takes, to give another layout the same slice."""
+        return self.name, self.scale, self.noise_group, self.meaning
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +97,16 @@ class ObservationLayout:
         return "\n".join(lines)
 
 
+def layout_of(rows: Iterable[LayoutRow]) -> ObservationLayout:
+    """Lay out slices one after the other, from column 0."""
+    slices: list[ObservationSlice] = []
+    start = 0
+    for name, scale, noise_group, meaning in rows:
+        slices.append(ObservationSlice(name, start, len(scale), scale, noise_group, meaning))
+        start += len(scale)
+    return ObservationLayout(tuple(slices))
+
+
 @cache
 def observation_layout(width_m: float, height_m: float, n_objects: int) -> ObservationLayout:
     """Build the layout of an arena of `width_m` x `height_m` metres with `n_objects` objects.
@@ -97,7 +116,7 @@ def observation_layout(width_m: float, height_m: float, n_objects: int) -> Obser
     half_x, half_y, rows = width_m / 2.0, height_m / 2.0, float(n_objects)
     cache_scale = (SERIAL_SCALE, half_x, half_y, rows)
     window = WINDOW_CELLS * WINDOW_CELLS
-    table: list[tuple[str, tuple[float, ...], str, str]] = [
+    table: list[LayoutRow] = [
         ("proximity", (1.0,) * RING_SENSORS, "proximity", "beam k at 7.5 + 15 k deg: 0 nothing, 1 contact"),
         ("light", (1.0,) * RING_SENSORS, "light", "nest light, sensor k at 7.5 + 15 k deg"),
         ("ground", (1.0,) * GROUND_SENSORS, "ground", "floor grey: object 0, cache 0.4, nest 0.7, empty 1"),
@@ -115,9 +134,4 @@ def observation_layout(width_m: float, height_m: float, n_objects: int) -> Obser
         ("los_object", (rows,) * window, "", "(row + 1) / M per cell of the 5 x 5 window, row-major from lower left"),
         ("los_cache", cache_scale * VISIBLE_CACHES, "", "up to 4 caches meeting the window, nearest first"),
     ]
-    slices: list[ObservationSlice] = []
-    start = 0
-    for name, scale, noise_group, meaning in table:
-        slices.append(ObservationSlice(name, start, len(scale), scale, noise_group, meaning))
-        start += len(scale)
-    return ObservationLayout(tuple(slices))
+    return layout_of(table)

@@ -47,6 +47,8 @@ class SwarmSpec:
     """"none", "static" or "dynamic"."""
     cache_side_m: float
     """Side of a cache as built, an odd number of cells."""
+    cache_half_side_cells: int
+    """Cells of a cache on either side of its centre cell."""
     cache_side_nominal_m: float
     """0.2 max(X, Y); distances are derived from it."""
     min_dist_m: float
@@ -89,6 +91,7 @@ class SwarmSpec:
             placement=scenario.objects.placement,
             caches=scenario.caches,
             cache_side_m=scenario.cache_side_cells / CELLS_PER_M,
+            cache_half_side_cells=scenario.cache_half_side_cells,
             cache_side_nominal_m=scenario.cache_side_nominal_m,
             min_dist_m=scenario.min_dist_m,
             cache_proximity_m=scenario.cache_proximity_m,

@@ -14,11 +14,12 @@ import numpy as np
 from gymnasium import spaces
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, whole
-from swarm_forage_env.contract.codes import Grip
-from swarm_forage_env.contract.layout import ObservationLayout, ObservationSlice
+from swarm_forage_env.contract.layout import LayoutRow, ObservationLayout, layout_of
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.kernels.commands import (
+    GRIP_COMMANDS,
+    MOTION_WHEELS,
     N_GRIPS,
     N_MOTIONS,
     automatic_grip,
@@ -30,26 +31,13 @@ from swarm_forage_env.policies.kernels.compact import COMPACT_COLUMNS, compact_v
 OBSERVATIONS = ("full", "compact")
 ACTIONS = ("continuous", "discrete")
 
-MOTIONS = ("stand", "forward", "arc left", "arc right", "turn left", "turn right")
+MOTIONS = tuple(MOTION_WHEELS)
 """Discrete actions that move, in order."""
-GRIPS = ("grasp", "release", "deliver", "site", "create_cache")
-"""Discrete actions of the gripper, in order after the motions; the wheels stand still."""
-_WHEELS = ((0.0, 0.0), (0.5, 0.5), (0.4, 0.6), (0.6, 0.4), (-0.25, 0.25), (0.25, -0.25))
-"""Wheel commands of the motions (our choice): full speed, arcs of 0.35 m radius, turns of 8 degrees per tick."""
-_COMPACT_READS = (
-    "proximity",
-    "light",
-    "ground",
-    "wheel_speed",
-    "position",
-    "heading",
-    "carrying",
-    "interacting",
-    "active",
-    "los_cell",
-    "los_object",
-    "los_cache",
-)
+GRIPS = tuple(GRIP_COMMANDS)
+"""Discrete actions of the gripper, in order after the motions; the wheels stand."""
+_SHARED = ("wheel_speed", "position", "heading", "carrying", "interacting", "active")
+"""Slices that the compact view takes as they are, in order."""
+_COMPACT_READS = ("proximity", "light", "ground", *_SHARED, "los_cell", "los_object", "los_cache")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -118,10 +106,10 @@ class LearnerInterface:
             start["active"],
             start["los_object"],
         )
-        self._wheels = np.array(_WHEELS, np.float32)
-        self._grips = np.array([Grip.GRASP, Grip.RELEASE, Grip.DELIVER, Grip.SITE, Grip.CREATE_CACHE], np.float32)
+        self._wheels = np.array(list(MOTION_WHEELS.values()), np.float32)
+        self._grips = np.array(list(GRIP_COMMANDS.values()), np.float32)
         self._commands = np.zeros((spec.n_robots, 3), np.float32)
-        self.layout = compact_layout(self._half_x, self._half_y) if self._is_compact else source
+        self.layout = compact_layout(source) if self._is_compact else source
         self.observation_space = self.new_observation_space()
         self.action_space = self.new_action_space()
         self._actions_shape = (spec.n_robots, *(self.action_space.shape or ()))
@@ -213,32 +201,27 @@ class LearnerInterface:
 
 
 @lru_cache(maxsize=64)  # a curriculum may ask for a new size in every run
-def compact_layout(half_width_m: float, half_height_m: float) -> ObservationLayout:
-    """Build the layout of the compact view (its columns are our choice); directions are forward and left."""
+def compact_layout(source: ObservationLayout) -> ObservationLayout:
+    """Build the layout of the compact view (our choice of what a driver needs); directions are forward and left.
+
+    Args:
+        source: Layout of the environment's observations, from which some slices are taken as they are.
+    """
     reach = (1.0, 1.0, 1.0)
-    table: list[tuple[str, tuple[float, ...], str, str]] = [
+    table: list[LayoutRow] = [
         ("proximity", (1.0, 1.0), "proximity", "sum of the 24 readings as vectors, cut to length 1"),
         ("obstacle", (1.0,), "proximity", "1 when that sum means an obstacle"),
         ("light", (1.0, 1.0), "light", "direction of the nest lights, length 1; zeros in the dark"),
         ("on_object", (1.0,), "", "1 when a free object lies in the robot's cell"),
         ("on_nest", (1.0,), "ground", "1 when the ground sensors see the nest"),
         ("on_cache", (1.0,), "ground", "1 when the ground sensors see a cache"),
-        ("wheel_speed", (0.2, 0.2), "wheel_speed", "applied left, right wheel speed / 0.20 m/s"),
-        ("position", (half_width_m, half_height_m), "position", "2 x / X - 1, 2 y / Y - 1"),
-        ("heading", (1.0, 1.0), "heading", "cos, sin of the heading"),
-        ("carrying", (1.0,), "", "1 while carrying an object"),
-        ("interacting", (1.0,), "", "1 while a pick-up or drop is in progress"),
-        ("active", (1.0,), "", "1 while part of the tasked swarm"),
+        *(source.part(name).row for name in _SHARED),
         ("object", reach, "", "nearest object in view: m forward, m left, at most 1 m long; 1 if there is one"),
         ("cache", reach, "", "nearest cache in view: m forward, m left, cut to 1 m; 1 if there is one"),
     ]
-    slices: list[ObservationSlice] = []
-    start = 0
-    for name, scale, noise_group, meaning in table:
-        slices.append(ObservationSlice(name, start, len(scale), scale, noise_group, meaning))
-        start += len(scale)
-    assert start == COMPACT_COLUMNS
-    return ObservationLayout(tuple(slices))
+    layout = layout_of(table)
+    assert layout.size == COMPACT_COLUMNS
+    return layout
 
 
 GivenInterface: TypeAlias = InterfaceConfig | Mapping[str, Any] | None

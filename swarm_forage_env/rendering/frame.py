@@ -24,7 +24,6 @@ from swarm_forage_env.rendering.view import (
     NEST_OPACITY,
     PALETTE,
     SOURCE_OPACITY,
-    WALL_M,
     RenderError,
     View,
     arena_view,
@@ -35,7 +34,7 @@ from swarm_forage_env.rendering.view import (
 )
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.regions import source_boxes
-from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.scenarios.units import CELL_M, WALL_M
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
 if TYPE_CHECKING:

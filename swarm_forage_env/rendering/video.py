@@ -1,6 +1,5 @@
 """Writing pictures as a film: GIF with Pillow, MP4 with imageio and ffmpeg."""
 
-import math
 from collections.abc import Iterable, Iterator
 from itertools import product
 from pathlib import Path
@@ -10,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_forage_env._internal.extras import install_command
-from swarm_forage_env.rendering.view import CACHE_OPACITY, NEST_OPACITY, PALETTE, SOURCE_OPACITY, RenderError
+from swarm_forage_env._internal.fields import number
+from swarm_forage_env.rendering.view import CACHE_OPACITY, NEST_OPACITY, PALETTE, SOURCE_OPACITY, RenderError, refusing
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -36,8 +36,8 @@ def check_film(path: str | Path, fps: float, n_frames: int) -> Path:
         raise RenderError(f"Expected a path ending in {' or '.join(SUFFIXES)}, got {str(path)!r}.")
     if not path.parent.is_dir():
         raise RenderError(f"Expected {str(path.parent)!r} to be an existing folder; create it or choose another.")
-    if not (math.isfinite(fps) and 1 <= fps <= MAX_FPS[suffix]):
-        raise RenderError(f"Expected fps from 1 to {MAX_FPS[suffix]} for {suffix}, got {fps!r}.")
+    with refusing():
+        number(f"fps of a {suffix}", fps, at_least=1, at_most=MAX_FPS[suffix])
     if suffix == ".gif" and n_frames > MAX_GIF_FRAMES:
         raise RenderError(
             f"Expected at most {MAX_GIF_FRAMES} frames for a GIF, got {n_frames}; "

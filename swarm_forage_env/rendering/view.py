@@ -4,6 +4,8 @@ Design (our choice): robots, objects and caches are bright on a dark floor. The 
 common forms of colour blindness, too, and shape is a second sign (interference is a ring, repair a hollow disc).
 """
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -12,24 +14,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarm_forage_env._internal.extras import install_command
+from swarm_forage_env._internal.fields import ConfigError, as_whole
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.rendering.paint import Colour
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.scenarios.units import CELL_M, WALL_M
 
 if TYPE_CHECKING:
     from PIL import ImageFont
 
 MIN_SIZE_PX = 240
 MAX_SIZE_PX = 4000
-WALL_M = 0.2
-"""Walls are drawn this far beyond the arena border, where they stand."""
 _REFERENCE_PX = 900.0
 """Picture width for which text and symbol sizes are given; other widths scale them."""
 
 
 class RenderError(ValueError):
     """A picture or film that cannot be made as asked; the message says what was expected and what came."""
+
+
+@contextmanager
+def refusing() -> Generator[None]:
+    """Let the checks of `_internal.fields` raise RenderError."""
+    try:
+        yield
+    except ConfigError as error:
+        raise RenderError(str(error)) from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,11 +111,8 @@ def arena_view(scenario: ScenarioConfig, size_px: int = 900) -> View:
         RenderError: `size_px` is not a whole number in [240, 4000].
         ImportError: Pillow is not installed (the legend's height depends on its text).
     """
-    whole = isinstance(size_px, (int, np.integer)) and not isinstance(size_px, bool)
-    if not whole or not MIN_SIZE_PX <= size_px <= MAX_SIZE_PX:
-        raise RenderError(
-            f"Expected size_px to be a whole number from {MIN_SIZE_PX} to {MAX_SIZE_PX} pixels, got {size_px!r}."
-        )
+    with refusing():
+        as_whole("size_px", size_px, at_least=MIN_SIZE_PX, at_most=MAX_SIZE_PX)
     arena = scenario.arena
     width_m, height_m = arena.width_m + 2 * WALL_M, arena.height_m + 2 * WALL_M
     scale = size_px / max(width_m, height_m)

@@ -14,12 +14,8 @@ from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, capacity, distributable_box
-from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, WHEEL_SCALE_MPS
+from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, EAST_WALL_M, WALL_M, WHEEL_SCALE_MPS
 
-WALL_M = 0.2
-"""How far the walls in the west, south and north reach into the arena: half of their 0.4 m."""
-EAST_WALL_M = 0.4
-"""How far the wall in the east reaches into the arena: all of it."""
 CACHE_KINDS = ("none", "static", "dynamic")
 PERFORMANCE_MEASURES = ("collected", "first_picked")
 MAX_DISC_SHARE = 0.4
@@ -318,6 +314,11 @@ class ScenarioConfig:
         """Side of a cache as built: the nominal one made an odd number of cells."""
         cells = round(self.cache_side_nominal_m / CELL_M)
         return cells if cells % 2 else cells - 1
+
+    @property
+    def cache_half_side_cells(self) -> int:
+        """Cells of a cache on either side of its centre cell."""
+        return self.cache_side_cells // 2
 
     @property
     def min_dist_m(self) -> float:

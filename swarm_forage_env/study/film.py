@@ -15,7 +15,7 @@ from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import is_policy_file, load_policy
 from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.rendering.video import Frame, check_film, write_film
-from swarm_forage_env.rendering.view import RenderError, arena_view
+from swarm_forage_env.rendering.view import RenderError, arena_view, refusing
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.study.run import LiveRun, build_env
 from swarm_forage_env.study.spec import chosen_caches, pin_policy
@@ -68,7 +68,8 @@ def record_run(
         ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
     """
     ticks = _picture_ticks(scenario, seconds, speedup, fps)
-    _check_number("trail_s", trail_s, at_least=0.0)
+    with refusing():
+        number("trail_s", trail_s, at_least=0.0)
     path = check_film(path, fps, len(ticks))
     arena_view(scenario, size_px)  # refuses a bad size before the run starts
     stating: object = policy
@@ -101,17 +102,11 @@ def record_run(
     return write_film(frames(), path, fps=fps, n_frames=len(ticks))
 
 
-def _check_number(where: str, value: float, **limits: float) -> None:
-    try:
-        number(where, value, **limits)
-    except ConfigError as error:
-        raise RenderError(str(error)) from error
-
-
 def _picture_ticks(scenario: ScenarioConfig, seconds: float, speedup: float, fps: float) -> list[int]:
     """Return the ticks to draw, 0 first, evenly spaced up to rounding."""
-    for label, value in (("seconds", seconds), ("speedup", speedup), ("fps", fps)):
-        _check_number(label, value, above=0.0)
+    with refusing():
+        for label, value in (("seconds", seconds), ("speedup", speedup), ("fps", fps)):
+            number(label, value, above=0.0)
     if seconds > scenario.horizon_s:
         raise RenderError(
             f"Expected seconds <= {scenario.horizon_s:g}, the scenario's horizon_s, got {seconds:g}; "

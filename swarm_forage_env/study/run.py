@@ -41,7 +41,7 @@ class LiveRun:
             policy: A policy that drives no other run.
             seed: Seed of the environment, of its wrappers and of the policy.
         """
-        self.forage_env: ForageEnv = stack if isinstance(stack, ForageEnv) else stack.unwrapped
+        self.forage_env: ForageEnv = stack.unwrapped
         self.over = False
         self._stack = stack
         self._policy = policy

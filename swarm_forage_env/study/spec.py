@@ -25,6 +25,8 @@ _KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion
 class RunSpec:
     """One run as data: the scenario, who controls the swarm, what disturbs it, and the seed.
 
+    The scenario is taken as it is; `plan_run` also looks at the caches that the policy states.
+
     Raises:
         ConfigError: `scenario` is no ScenarioConfig, parameters that JSON cannot hold, two wrappers of one kind, a bad
             seed, or a horizon that is not a whole number of recording intervals.
@@ -125,7 +127,7 @@ class RunSpec:
 def chosen_caches(asked: str | None, policy: object, scenario: ScenarioConfig) -> str:
     """Return which caches a run has: what was asked for, else what the policy states, else what the scenario has.
 
-    Every run of the package is decided here: runs, films, scores and the command line.
+    `plan_run`, and by it scores and the command line, and `record_run` ask here. `RunSpec` takes its scenario as it is.
 
     Args:
         asked: "none", "static" or "dynamic" if the user asked for it, else None.
@@ -134,9 +136,14 @@ def chosen_caches(asked: str | None, policy: object, scenario: ScenarioConfig) -
     """
     if asked is not None:
         return asked
+    return stated_caches(policy) or scenario.caches
+
+
+def stated_caches(policy: object) -> str | None:
+    """Return which caches a policy, or its class, states that it is made for; None where it states nothing."""
     stated = getattr(policy, "caches", None)
     # On a class, a property is not a value; it has one only on an object.
-    return stated if isinstance(stated, str) else scenario.caches
+    return stated if isinstance(stated, str) else None
 
 
 def plan_run(

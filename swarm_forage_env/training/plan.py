@@ -16,13 +16,12 @@ from swarm_forage_env.scenarios.config import ScenarioConfig, scenario_of_same_s
 from swarm_forage_env.scenarios.config import from_mapping as config_from_mapping
 from swarm_forage_env.scenarios.presets import scenario as preset
 from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.training.defaults import DEFAULT_ARENAS, DEFAULT_HIDDEN, DEFAULT_STEPS, EVALUATE_EVERY
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
 ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
 """Algorithms of stable-baselines3 that train; the first two on rollouts, the others from replay."""
-DEFAULT_STEPS = 5_000_000
-DEFAULT_HIDDEN = (64, 64)
 _COUNTS = ("n_steps", "batch_size", "n_epochs", "buffer_size")
 _RANGES: dict[str, dict[str, float]] = {
     "gamma": {"above": 0.0, "at_most": 1.0},
@@ -64,7 +63,7 @@ class Stage:
 class EvaluationPlan:
     """How the policy is judged meanwhile: whole runs of the plan's scenario, beside a scripted controller."""
 
-    every_steps: int = 1_000_000
+    every_steps: int = EVALUATE_EVERY
     """Decisions between two evaluations; there is one more at the end."""
     horizon_s: float = 2000.0
     """Length of a run, s."""
@@ -108,7 +107,7 @@ class TrainingPlan:
     """What disturbs the swarm, in training and in evaluations."""
     algorithm: str = "ppo"
     interface: InterfaceConfig = field(default_factory=InterfaceConfig)
-    n_arenas: int = 8
+    n_arenas: int = DEFAULT_ARENAS
     hidden: tuple[int, ...] = DEFAULT_HIDDEN
     """Sizes of the hidden layers of actor and critic."""
     options: Mapping[str, Any] = field(default_factory=dict, hash=False)

@@ -12,7 +12,15 @@ from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig,
 from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
 from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.scenarios.units import CELLS_PER_M
-from swarm_forage_env.training.plan import DEFAULT_HIDDEN, DEFAULT_STEPS, EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.training.defaults import (
+    DECISION_TICKS,
+    DEFAULT_ARENAS,
+    DEFAULT_HIDDEN,
+    DEFAULT_REWARDS,
+    DEFAULT_STEPS,
+    EPISODE_S,
+)
+from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_configs
 
@@ -31,13 +39,6 @@ DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
     "sac": {"buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 1024},
 }
 """Arguments that suit hundreds of robots at once; our choice, the rest is the library's."""
-DEFAULT_REWARDS = {"first_pickup": 1.0, "nest_progress": 0.05}
-"""Rewards where deliveries count; our choice: deliveries alone are too rare to learn from. The whole way home is worth
-about one delivery."""
-EPISODE_S = 1000.0
-"""Length of an episode, s; our choice: a start puts robots all over the arena, which teaches more than a long run."""
-DECISION_TICKS = 5
-"""Ticks per decision, one second; our choice."""
 SMALL_START = 0.4
 """Share of its size that an arena has in a small start; our choice."""
 
@@ -47,7 +48,7 @@ def recipe(
     *,
     algorithm: str = "ppo",
     steps: int = DEFAULT_STEPS,
-    n_arenas: int = 8,
+    n_arenas: int = DEFAULT_ARENAS,
     interface: GivenInterface = None,
     wrappers: Iterable[WrapperConfig | str] = (),
     hidden: tuple[int, ...] = DEFAULT_HIDDEN,

@@ -17,6 +17,7 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
+from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import BoolArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
@@ -138,10 +139,9 @@ class ArenaBatch:
             first_arena: Number of the first of them, where this is part of a larger batch.
 
         Raises:
-            ValueError: n_arenas below 1, or a plan that cannot be built.
+            ConfigError: n_arenas below 1, or a plan that cannot be built.
         """
-        if n_arenas < 1:
-            raise ValueError(f"Expected n_arenas >= 1, got {n_arenas}.")
+        n_arenas = as_whole("n_arenas", n_arenas, at_least=1)
         self._first_arena = first_arena
         self.arenas = [LearnerArena(plan) for _ in range(n_arenas)]
         self.interface = self.arenas[0].interface

@@ -95,7 +95,7 @@ class LearnerArena:
 
     def _adopt(self, env: ForageEnv | SwarmWrapper) -> None:
         self.env = env
-        self.forage_env: ForageEnv = env.unwrapped if isinstance(env, SwarmWrapper) else env
+        self.forage_env: ForageEnv = env.unwrapped
         self.interface = LearnerInterface(self._plan.interface, self.forage_env.swarm_spec)
         self._obs: ObsArray | None = None  # of the environment, (N, D)
 

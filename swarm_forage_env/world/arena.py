@@ -4,9 +4,8 @@ from collections.abc import Collection
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import known_name
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.codes import Counter, ObjectStatus
 from swarm_forage_env.contract.layout import observation_layout
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
@@ -56,11 +55,7 @@ class ForagingArena:
         self.layout = observation_layout(arena.width_m, arena.height_m, config.objects.n_objects)
         self.reads = self.layout.names if reads is None else tuple(reads)
         for name in self.reads:
-            if name not in self.layout.names:
-                hint = suggestion(name, self.layout.names)
-                raise ConfigError(
-                    f"Unknown observation slice {name!r} in reads.{hint} Known: {', '.join(self.layout.names)}."
-                )
+            known_name("entry of reads", name, self.layout.names)
         self._drive = Drive(config)
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
         self._scratch = np.zeros(config.objects.n_objects)

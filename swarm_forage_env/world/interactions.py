@@ -51,14 +51,14 @@ class Interactions:
             displaced=np.zeros(n_robots + 1, np.int32),
             creators=np.zeros(n_robots + 1, np.int32),
             queue=np.zeros(2 * n_robots, np.int32),
-            handler_used=np.zeros(5, np.bool_),
+            handler_used=np.zeros(kernel.N_HANDLERS, np.bool_),
         )
         nest = config.arena.nest_box_m
         area = config.arena.distributable_cells
         self.rules = kernel.Rules(
             *nest,
             *area,
-            cache_half_side=config.cache_side_cells // 2,
+            cache_half_side=config.cache_half_side_cells,
             cache_proximity_m=config.cache_proximity_m,
             dynamic_caches=config.caches == "dynamic",
             serialized=config.quirks.serialized_interactions,

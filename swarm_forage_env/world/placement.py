@@ -159,7 +159,7 @@ def static_cache_centres(config: ScenarioConfig) -> tuple[tuple[int, int], ...]:
     """
     nx, ny = config.arena.n_cells
     nest = config.arena.nest_cells
-    half = config.cache_side_cells // 2
+    half = config.cache_half_side_cells
     boxes = source_boxes(config.objects.placement, nx, ny)
     centres: tuple[tuple[int, int], ...]
     if config.objects.placement in ("single_source", "dual_source"):

@@ -56,7 +56,7 @@ class SensorSuite:
             radius_m=config.robots.radius_m,
             scales=np.array([WHEEL_SCALE_MPS, config.arena.width_m, config.arena.height_m]),
             sizes=(*config.arena.n_cells, config.objects.n_objects),
-            cache_half_side=config.cache_side_cells // 2,
+            cache_half_side=config.cache_half_side_cells,
             bins=(
                 2 * config.robots.radius_m + PROXIMITY_RANGE_M,
                 np.full(n_bins, -1, np.int32),

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 from pettingzoo.utils import BaseParallelWrapper
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.scenarios import config as configs
@@ -40,7 +41,7 @@ class SwarmWrapper(BaseParallelWrapper):
         Raises:
             TypeError: `env` is neither a ForageEnv nor a SwarmWrapper. A wrapper from another library in between would
                 be skipped without notice; wrap it around the whole stack instead.
-            ValueError: the stack would not be in the documented order.
+            ConfigError: the stack would not be in the documented order.
         """
         if not isinstance(env, ForageEnv | SwarmWrapper):
             raise TypeError(
@@ -48,13 +49,13 @@ class SwarmWrapper(BaseParallelWrapper):
                 "put other wrappers outside of the swarm wrappers."
             )
         if isinstance(env, SwarmWrapper) and self.stack_position >= env.stack_position:
-            raise ValueError(
+            raise ConfigError(
                 f"Expected {type(env).__name__} not inside of {type(self).__name__}; the order, outermost first and "
                 f"each at most once, is {', '.join(STACK_ORDER)}."
             )
         super().__init__(env)
         self._inner = env
-        self._unwrapped: ForageEnv = env.unwrapped if isinstance(env, SwarmWrapper) else env
+        self._unwrapped: ForageEnv = env.unwrapped
 
     @property
     def unwrapped(self) -> ForageEnv:

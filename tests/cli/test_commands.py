@@ -353,6 +353,13 @@ def test_info_describes_a_controller(command, name):
         assert word in out
 
 
+@pytest.mark.parametrize(
+    ("name", "caches"), [("stochm", "static (the caches it is made for)"), ("random", "those of the scenario")]
+)
+def test_info_tells_the_caches_that_a_run_would_have(command, name, caches):
+    assert re.search(rf"^  caches +{re.escape(caches)}$", command("info", name)[1], re.MULTILINE)
+
+
 def test_schema_lists_the_columns(command):
     _, out, _ = command("schema")
     assert "interference_fraction" in out
@@ -395,6 +402,12 @@ def test_record_films_the_caches_that_were_asked_for(command, monkeypatch, asked
     monkeypatch.setattr(film, "build_env", note)
     assert command("record", "--policy", "stochm", *asked, *SHORT_FILM)[0] == 0
     assert built == [filmed]
+
+
+def test_record_films_a_world_whose_horizon_is_not_whole_intervals(command):
+    pytest.importorskip("PIL")
+    code, out, err = command("record", "--policy", "random", "--set", "horizon_s=30", *SHORT_FILM)
+    assert (code, out, err) == (0, "wrote results/warehouse_small_random.gif\n", "")
 
 
 def test_record_names_a_file_without_the_way_there(command, monkeypatch):
@@ -455,6 +468,8 @@ def test_record_says_when_a_network_does_not_fit(command):
         (("run", "--out", "file"), "Expected a folder for run records, got the file file"),
         (("record", "--out", "x.avi"), "ending in .gif or .mp4"),
         (("info", "crv"), "Did you mean 'crw'?"),
+        (("record", "--policy", "crv"), "Did you mean 'crw'?"),
+        (("record", *("--wrapper", "throttle:waveform=constant,amplitude=0.2") * 2), "each at most once"),
         (("rerun", "missing.parquet"), "Cannot read missing.parquet: No such file or directory"),
         (("rerun", "file"), "Cannot read file: it is no Parquet file or a damaged one"),
         (("bogus",), "No such command 'bogus'"),

@@ -1,6 +1,7 @@
 """`swarm-forage train`, as a person uses it."""
 
 import builtins
+import inspect
 import json
 import subprocess
 import sys
@@ -13,7 +14,9 @@ from swarm_forage_env import cli
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.scenario_options import ScenarioOptions
+from swarm_forage_env.cli.train import train
 from swarm_forage_env.cli.training_plan import TrainOptions, build_plan
+from swarm_forage_env.training.defaults import DEFAULT_REWARDS
 from swarm_forage_env.training.plan import EvaluationPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 
@@ -25,6 +28,12 @@ needs_training = pytest.mark.skipif(
     find_spec("stable_baselines3") is None or find_spec("torch") is None, reason="needs the train extra"
 )
 NARROW = ("--set", "width_m=12", "--set", "nest_centre_m=1.2,8", "--set", "nest_size_m=1.2,12.8")
+
+
+def test_help_tells_the_rewards_of_the_recipe():
+    documented = inspect.getdoc(train)
+    assert documented is not None
+    assert all(f"{name}={value:g}" in documented for name, value in DEFAULT_REWARDS.items())
 
 
 @pytest.fixture

@@ -39,6 +39,7 @@ def make_spec(n_robots: int = 1, **changes: Any) -> SwarmSpec:
         placement="single_source",
         caches="none",
         cache_side_m=6.2,
+        cache_half_side_cells=round(changes.get("cache_side_m", 6.2) / CELL_M) // 2,
         cache_side_nominal_m=6.4,
         min_dist_m=3.2,
         cache_proximity_m=12.8,

@@ -208,7 +208,7 @@ def test_refuses_too_few_rows_and_steps_before_a_reset():
         batch.step(np.float32(0.0))
     with pytest.raises(ValueError, match="6 rows"):
         batch.step(np.zeros((3, 3), np.float32))
-    with pytest.raises(ValueError, match="n_arenas >= 1"):
+    with pytest.raises(ValueError, match="n_arenas to be a whole number >= 1"):
         ArenaBatch(plan(), 0)
 
 

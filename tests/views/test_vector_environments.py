@@ -56,7 +56,7 @@ def test_the_number_of_sub_environments_is_a_whole_number_of_swarms():
             gymnasium.make_vec(env_id, n_robots=4, num_envs=wrong)
     with pytest.raises(ValueError, match=r"num_envs = 12 for n_arenas = 3 .* got 8"):
         gymnasium.make_vec(env_id, n_robots=4, num_envs=8, n_arenas=3)
-    with pytest.raises(ValueError, match="n_arenas >= 1"):
+    with pytest.raises(ValueError, match="n_arenas to be a whole number >= 1"):
         gymnasium.make_vec(env_id, n_robots=4, n_arenas=0)
 
 

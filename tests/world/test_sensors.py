@@ -198,7 +198,7 @@ def test_reading_nothing_leaves_the_dear_slices_out():
 
 
 def test_unknown_slice_to_read_is_refused():
-    with pytest.raises(ConfigError, match=r"'lidr' in reads.*Known: proximity, light"):
+    with pytest.raises(ConfigError, match=r"entry of reads 'lidr'.*Known: proximity, light"):
         ForageEnv(scenario("warehouse_small", n_robots=3), reads=("lidr",))
     with pytest.raises(ConfigError, match="Did you mean 'proximity'"):
         ForageEnv(scenario("warehouse_small", n_robots=3), reads=("proximty",))

@@ -10,11 +10,31 @@ from swarm_forage_env.policies.kernels.compact import is_over_object
 GRASP = float(Grip.GRASP)
 RELEASE = float(Grip.RELEASE)
 DELIVER = float(Grip.DELIVER)
-N_MOTIONS = 6
-"""Motions by number: stand, forward, arc left, arc right, turn left, turn right."""
-ACT_GRASP, ACT_RELEASE, ACT_DELIVER, ACT_SITE, ACT_CREATE_CACHE = 6, 7, 8, 9, 10
-"""Numbers of the gripper actions; the wheels stand still, as in the interaction."""
-N_GRIPS = 5
+MOTION_WHEELS = {
+    "stand": (0.0, 0.0),
+    "forward": (0.5, 0.5),
+    "arc left": (0.4, 0.6),
+    "arc right": (0.6, 0.4),
+    "turn left": (-0.25, 0.25),
+    "turn right": (0.25, -0.25),
+}
+"""Discrete actions that move, in order, and their wheel commands (our choice): full speed, arcs of 0.35 m radius, turns
+of 8 degrees per tick."""
+GRIP_COMMANDS = {
+    "grasp": Grip.GRASP,
+    "release": Grip.RELEASE,
+    "deliver": Grip.DELIVER,
+    "site": Grip.SITE,
+    "create_cache": Grip.CREATE_CACHE,
+}
+"""Discrete actions of the gripper, in order after the motions; wheels stand meanwhile, as they would in the
+interaction."""
+N_MOTIONS = len(MOTION_WHEELS)
+N_GRIPS = len(GRIP_COMMANDS)
+_NUMBERS = {name: number for number, name in enumerate((*MOTION_WHEELS, *GRIP_COMMANDS))}
+_STAND = _NUMBERS["stand"]
+_GRASP, _RELEASE, _DELIVER = _NUMBERS["grasp"], _NUMBERS["release"], _NUMBERS["deliver"]
+_SITE, _CREATE_CACHE = _NUMBERS["site"], _NUMBERS["create_cache"]
 
 
 @kernel
@@ -76,19 +96,19 @@ def mask_actions(obs: ObsArray, starts: tuple[int, int, int, int, int], dynamic_
         allowed = mask[i]
         allowed[:] = False
         if row[active] < 0.5:
-            allowed[0] = True
+            allowed[_STAND] = True
             continue
         busy = row[interacting] > 0.5
         allowed[:N_MOTIONS] = not busy
         if not with_grips:
-            allowed[0] = True
+            allowed[_STAND] = True
             continue
         below = row[ground : ground + GROUND_SENSORS]
         if row[carrying] > 0.5:
             in_nest = sees_nest(below)
-            allowed[ACT_RELEASE] = True
-            allowed[ACT_DELIVER] = in_nest or sees_cache(below)
-            allowed[ACT_SITE] = dynamic_caches and not in_nest
-            allowed[ACT_CREATE_CACHE] = allowed[ACT_SITE]
+            allowed[_RELEASE] = True
+            allowed[_DELIVER] = in_nest or sees_cache(below)
+            allowed[_SITE] = dynamic_caches and not in_nest
+            allowed[_CREATE_CACHE] = allowed[_SITE]
         else:
-            allowed[ACT_GRASP] = busy or is_over_object(row, window) or sees_cache(below)
+            allowed[_GRASP] = busy or is_over_object(row, window) or sees_cache(below)

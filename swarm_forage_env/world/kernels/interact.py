@@ -30,6 +30,7 @@ GRASP, RELEASE, DELIVER_ONLY, SITE, CREATE_CACHE = range(1, 6)
 """Gripper bands from the top, in the order of `contract.codes.GRIP_LOWER_ENDS`."""
 
 FREE_PICKUP_HANDLER, NEST_HANDLER, CACHE_HANDLER, SITE_HANDLER, CREATE_HANDLER = range(5)
+N_HANDLERS = CREATE_HANDLER + 1
 
 _PICKED_UP, _PICKED_FROM_CACHE, _DELIVERED = int(Event.PICKED_UP), int(Event.PICKED_FROM_CACHE), int(Event.DELIVERED)
 _DROPPED, _ELSEWHERE, _JOINED_CACHE = int(Event.DROPPED), int(Event.DROPPED_ELSEWHERE), int(Event.JOINED_CACHE)
@@ -74,7 +75,7 @@ class InteractionState(NamedTuple):
     queue: IntArray
     """(2 N,) scratch: robots with a request and what they ask."""
     handler_used: BoolArray
-    """(5,) scratch: kinds of interaction that finished this tick."""
+    """(N_HANDLERS,) scratch: kinds of interaction that finished this tick."""
 
 
 class Rules(NamedTuple):

@@ -5,11 +5,12 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import CELL_EMPTY, ObjectStatus
 from swarm_forage_env.contract.types import CodeArray, FloatArray, IntArray
+from swarm_forage_env.scenarios.units import CELL_M
 
 _FREE = int(ObjectStatus.FREE)
 _STUDY_CELLS = 640
 """Cells along the largest arena of the study, 128 m."""
-OPEN_BORDERS = np.array([i * 0.2 + 0.2 < (i + 1) * 0.2 for i in range(_STUDY_CELLS)])
+OPEN_BORDERS = np.array([i * CELL_M + CELL_M < (i + 1) * CELL_M for i in range(_STUDY_CELLS)])
 """(640,) bool: whether the border after cell i opens a gap when rectangles are compared in floating point.
 
 The end of cell i computed as i 0.2 + 0.2 falls one rounding error short of the start of its neighbour, (i + 1) 0.2,

@@ -1,0 +1,20 @@
+"""Numbers of the training recipe that the help of the command line tells, too; nothing is imported here.
+
+All are our choice: values that were seen to learn.
+"""
+
+DEFAULT_STEPS = 5_000_000
+"""Decisions of single robots in all stages."""
+DEFAULT_HIDDEN = (64, 64)
+"""Sizes of the hidden layers."""
+DEFAULT_ARENAS = 8
+"""Arenas side by side."""
+DEFAULT_REWARDS = {"first_pickup": 1.0, "nest_progress": 0.05}
+"""Rewards where deliveries count: deliveries alone are too rare to learn from. The whole way home is worth about one
+delivery."""
+EPISODE_S = 1000.0
+"""Length of an episode, s: a start puts robots all over the arena, which teaches more than a long run."""
+DECISION_TICKS = 5
+"""Ticks per decision, one second."""
+EVALUATE_EVERY = 1_000_000
+"""Decisions of single robots between two evaluations."""
