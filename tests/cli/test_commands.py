@@ -11,24 +11,19 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from swarm_forage_env import cli
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
-from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import RandomPolicy, policy_names
 from swarm_forage_env.scenarios.config import field_sections
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.study import film
 from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.store import load
 
 SHORT = ("--robots", "3", "--objects", "20", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
 RUN = ("run", "--policy", "random", *SHORT)
-SHORT_FILM = ("--robots", "3", "--seconds", "4", "--size", "240", "--fps", "5")
 
 
 @pytest.fixture
@@ -378,59 +373,6 @@ def test_help_loads_neither_physics_nor_tables():
     program = f"import sys; from swarm_forage_env import cli; print({heavy} & set(sys.modules))"
     answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert answer.stdout == "set()\n"
-
-
-def test_record_films_a_run(command):
-    pytest.importorskip("PIL")
-    words = ("--policy", "random", "--robots", "3", "--seconds", "8", "--size", "240", "--fps", "5")
-    code, out, _ = command("record", "--out", "film.gif", *words)
-    assert (code, out) == (0, "wrote film.gif\n")
-    assert Path("film.gif").read_bytes().startswith(b"GIF8")
-    assert command("record", *words)[1] == "wrote results/warehouse_small_random.gif\n"
-    assert Path("results/warehouse_small_random.gif").read_bytes() == Path("film.gif").read_bytes()
-
-
-@pytest.mark.parametrize(("asked", "filmed"), [((), "static"), (("--caches", "none"), "none")])
-def test_record_films_the_caches_that_were_asked_for(command, monkeypatch, asked, filmed):
-    pytest.importorskip("PIL")
-    build, built = film.build_env, []
-
-    def note(config, *args, **options):
-        built.append(config.caches)
-        return build(config, *args, **options)
-
-    monkeypatch.setattr(film, "build_env", note)
-    assert command("record", "--policy", "stochm", *asked, *SHORT_FILM)[0] == 0
-    assert built == [filmed]
-
-
-def test_record_films_a_world_whose_horizon_is_not_whole_intervals(command):
-    pytest.importorskip("PIL")
-    code, out, err = command("record", "--policy", "random", "--set", "horizon_s=30", *SHORT_FILM)
-    assert (code, out, err) == (0, "wrote results/warehouse_small_random.gif\n", "")
-
-
-def test_record_names_a_file_without_the_way_there(command, monkeypatch):
-    pytest.importorskip("PIL")
-    shutil.copy(Path(pretrained.__file__).with_name("ppo_warehouse_small.npz"), "mine.npz")
-    render, titles = film.render_frame, set()
-
-    def note(*args, title, **options):
-        titles.add(title)
-        return render(*args, title=title, **options)
-
-    monkeypatch.setattr(film, "render_frame", note)
-    assert command("record", "--policy", "mine.npz", *SHORT_FILM)[0] == 0
-    assert titles == {"warehouse small, mine, 32 x 16 m"}
-
-
-def test_record_says_when_a_network_does_not_fit(command):
-    pytest.importorskip("PIL")
-    about = NetworkAbout(interface=InterfaceConfig())
-    Network((np.zeros((2, 3), np.float32),), (np.zeros(3, np.float32),), about).save("mine.npz")
-    code, _, err = command("record", "--policy", "mine.npz", *SHORT_FILM)
-    assert (code, err.count("\n")) == (2, 1)
-    assert "Expected a network from 111 columns to 3 actions" in err
 
 
 @pytest.mark.parametrize(
