@@ -28,7 +28,7 @@ def conflicts_of_run(name: str, seed: int, seconds: float, overrides: dict[str, 
     """Deliveries of one run of DPO, and of each conflict its ticks, its ticks in touch, its last tick in touch."""
     world = scenario(name, horizon_s=seconds, interval_s=seconds, **overrides)
     policy = DPOPolicy()
-    env = build_stack(world, reads=policy.reads).world
+    env = build_stack(world, reads=policy.reads).unwrapped
     policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
     obs, done = env.reset_batch(seed), False
     touch_m = 2 * world.robots.radius_m + TOUCH_SLACK_M

@@ -1,0 +1,34 @@
+"""Scripts of measurements run: short, to see that they still fit the packages."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def run(*words: str, cwd: Path) -> str:
+    done = subprocess.run([sys.executable, *words], cwd=cwd, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.compiled
+def test_conflicts_over_one_object_are_counted(tmp_path):
+    words = ("--scenario", "warehouse_small", "--seeds", "1", "--seconds", "20")
+    assert "unresolved" in run(str(ROOT / "scripts/contact_conflicts.py"), *words, cwd=tmp_path)
+
+
+@pytest.mark.compiled
+def test_two_versions_are_drawn_beside_each_other(tmp_path):
+    pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
+    for robots in ("2", "4"):
+        run(
+            "-m", "swarm_forage_env.cli", "run", "--policy", "crw", "--robots", robots, "--horizon", "4",
+            "--set", "interval_s=4", "--jobs", "1", "--out", "runs/warehouse_small", cwd=tmp_path,
+        )  # fmt: skip
+    printed = run(str(ROOT / "scripts/compare_versions.py"), "runs", "runs", "picture.png", cwd=tmp_path)
+    assert "| crw | 4 |" in printed
+    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
