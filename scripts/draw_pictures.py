@@ -1,6 +1,7 @@
 """Draw the pictures of robots at work that README and docs show.
 
     python scripts/draw_pictures.py
+
 Each shows the small warehouse with trails of 40 s. Needs the render extra.
 """
 
