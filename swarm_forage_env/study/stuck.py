@@ -7,6 +7,7 @@ from typing import cast
 
 import numpy as np
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.contract.types import BoolArray, FloatArray
@@ -99,7 +100,7 @@ def find_stuck(spec: RunSpec, *, window_s: float = 600.0, moved_m: float = 0.05)
 
     Args:
         spec: The run.
-        window_s: Seconds in which every robot should get away; shorter than the run, else nothing is found.
+        window_s: Seconds in which every robot should get away; at most the run's length less `SAMPLE_S`.
         moved_m: How far that is.
 
     Returns:
@@ -107,7 +108,7 @@ def find_stuck(spec: RunSpec, *, window_s: float = 600.0, moved_m: float = 0.05)
 
     Raises:
         ValueError: no installed policy has the name, or it refuses its parameters; a window or distance that is not
-            positive.
+            positive; a window that does not fit into the run.
     """
     return find_stuck_under(load_policy(spec.policy, spec.parameters), spec, window_s=window_s, moved_m=moved_m)
 
@@ -118,6 +119,12 @@ def find_stuck_under(
     """As `find_stuck`, for a policy object, which must be fresh; `spec.policy` does not matter."""
     if not (window_s > 0.0 and moved_m > 0.0):
         raise ValueError(f"Expected window_s > 0 and moved_m > 0, got {window_s} and {moved_m}.")
+    longest_s = spec.scenario.horizon_s - SAMPLE_S
+    if window_s > longest_s:
+        raise ConfigError(
+            f"Expected a window of at most {longest_s:g} s in a run of {spec.scenario.horizon_s:g} s, "
+            f"got {window_s:g} s. Give a longer run or a shorter window."
+        )
     stack = build_env(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
     run = LiveRun(stack, policy, spec.seed)
     env = run.forage_env

@@ -316,6 +316,12 @@ def test_stuck_shows_a_table_and_fails(command):
     assert len(re.findall(r"│ +0 +│ +195 +│", out)) == 12, "three robots, two policies, two seeds"
 
 
+def test_stuck_refuses_a_window_that_no_run_can_fill(command):
+    code, _, err = command(*STUCK[:-2])
+    assert code == 2
+    assert "Expected a window of at most 195 s in a run of 200 s, got 600 s." in err
+
+
 def test_stuck_wants_sensible_numbers(command):
     code, _, err = command(*STUCK, "--moved", "0")
     assert code == 2

@@ -152,6 +152,11 @@ def test_windows_and_distances_are_positive():
         find(lambda _: [STAND, STAND], window_s=0.0)
 
 
+def test_a_window_longer_than_the_run_is_refused():
+    with pytest.raises(ValueError, match="Expected a window of at most"):
+        find(lambda _: [STAND, STAND], window_s=100_000.0)
+
+
 class TestWatch:
     """The watch alone, one robot on a line, a window of four samples and 1 m."""
 
