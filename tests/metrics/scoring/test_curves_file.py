@@ -249,7 +249,7 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
 
 
 def test_the_page_lists_every_column():
-    _, _, section = PAGE.read_text().partition("## Curves from elsewhere")
+    _, _, section = PAGE.read_text().partition("## Curves from other sources")
     listed = re.findall(r"^\| `(\w+)`( \\\*)? \|", section, re.MULTILINE)
     assert [name for name, _ in listed] == list(CURVE_COLUMNS)
     assert {name for name, star in listed if star} == {name for name, c in CURVE_COLUMNS.items() if c.is_required}
