@@ -78,7 +78,8 @@ class ControllerParameters:
     """Lower end of the uniform drop distance from the nest centre; authors' program."""
 
     def __post_init__(self) -> None:
-        # Checked here and not by `_internal.fields`: baselines know the contract and two small tools, nothing else.
+        # Checked here and not by `swarm_forage_env._internal.fields`: baselines know the contract and two small tools,
+        # nothing else.
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
             is_number = isinstance(value, (int, float)) and not isinstance(value, bool)

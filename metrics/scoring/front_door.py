@@ -52,7 +52,7 @@ def score_policy(
         name: Name in tables and stored runs. A policy given as object or function needs one for `out`; it then stands
             for the code: give another name when the code has changed.
         parameters: Keyword arguments of a registered policy or a class.
-        caches: "none", "static", "dynamic"; default see `study.spec.chosen_caches`.
+        caches: "none", "static", "dynamic"; default see `swarm_forage_env.study.spec.chosen_caches`.
         out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
         jobs: Processes; default one per core.
         executor: Runs the work instead, for example Dask's `client.get_executor()`.
