@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from swarm_forage_env import cli
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.registry import RandomPolicy, policy_names
@@ -24,21 +23,6 @@ from swarm_forage_env.study.store import load
 
 SHORT = ("--robots", "3", "--objects", "20", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
 RUN = ("run", "--policy", "random", *SHORT)
-
-
-@pytest.fixture
-def command(tmp_path, monkeypatch, capsys):
-    """Run swarm-forage in an empty folder; returns exit code, stdout, stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["swarm-forage", *words])
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-        shown = capsys.readouterr()
-        return end.value.code or 0, shown.out, shown.err
-
-    return call
 
 
 def test_run_shows_a_table_and_keeps_records_and_a_picture(command):

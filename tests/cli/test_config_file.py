@@ -1,12 +1,10 @@
 """`swarm-forage run --config FILE.toml`: scenario fields and wrappers from a file."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
 
-from swarm_forage_env import cli
 from swarm_forage_env.study.store import load
 
 CONFIG = """
@@ -27,17 +25,12 @@ sigma = 0.1
 
 
 @pytest.fixture
-def command(tmp_path, monkeypatch, capsys):
+def command(command):
     """Run with world.toml in an empty folder; returns exit code, stdout, stderr."""
-    monkeypatch.chdir(tmp_path)
 
     def call(text, *words):
         Path("world.toml").write_text(text)
-        monkeypatch.setattr(sys, "argv", ["swarm-forage", "run", "--policy", "random", "--jobs", "1", *words])
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-        shown = capsys.readouterr()
-        return end.value.code or 0, shown.out, shown.err
+        return command("run", "--policy", "random", "--jobs", "1", *words)
 
     return call
 

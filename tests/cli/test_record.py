@@ -1,34 +1,17 @@
 """The command `record`: films of runs."""
 
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from swarm_forage_env import cli
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.study import film
 
 SHORT_FILM = ("--robots", "3", "--seconds", "4", "--size", "240", "--fps", "5")
-
-
-@pytest.fixture
-def command(tmp_path, monkeypatch, capsys):
-    """Run swarm-forage in an empty folder; returns exit code, stdout, stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["swarm-forage", *words])
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-        shown = capsys.readouterr()
-        return end.value.code or 0, shown.out, shown.err
-
-    return call
 
 
 def test_record_films_a_run(command):

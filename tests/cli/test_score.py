@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from swarm_forage_env import cli
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.study.experiments import BUDGETS, Budget
 from swarm_forage_env.study.store import RunStore, load
@@ -24,21 +23,11 @@ FEW = ("--measures", "t_lost_fraction,adaptability")
 CURVES = "n_robots,seed,interval,performance\n2,0,0,3\n4,0,0,5\n"
 
 
-@pytest.fixture
-def command(tmp_path, monkeypatch, capsys):
-    """Run swarm-forage in an empty folder with a tiny budget; returns exit code, stdout, stderr."""
-    monkeypatch.chdir(tmp_path)
+@pytest.fixture(autouse=True)
+def tiny_budget(monkeypatch):
+    """Offer a budget called tiny."""
     tiny = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=2, n_sizes=2, n_levels=1)
     monkeypatch.setitem(BUDGETS, "tiny", tiny)
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["swarm-forage", *words])
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-        shown = capsys.readouterr()
-        return end.value.code or 0, shown.out, shown.err
-
-    return call
 
 
 def test_score_shows_every_measure_keeps_records_and_draws_a_picture(command):

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from swarm_forage_env import cli
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.scenario_options import ScenarioOptions
@@ -34,21 +33,6 @@ def test_help_tells_the_rewards_of_the_recipe():
     documented = inspect.getdoc(train)
     assert documented is not None
     assert all(f"{name}={value:g}" in documented for name, value in DEFAULT_REWARDS.items())
-
-
-@pytest.fixture
-def command(tmp_path, monkeypatch, capsys):
-    """Run swarm-forage in an empty folder; returns exit code, stdout, stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["swarm-forage", *words])
-        with pytest.raises(SystemExit) as end:
-            cli.main()
-        shown = capsys.readouterr()
-        return end.value.code or 0, shown.out, shown.err
-
-    return call
 
 
 @needs_training
