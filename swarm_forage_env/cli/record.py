@@ -49,7 +49,7 @@ def record(
     )
     world, asked_caches, disturbances = described_world(options)
     _refuse_unknown(policy)
-    film = out or _film_in_results(f"{scenario}_{Path(policy).stem}.gif")
+    film = out or Path("results", f"{scenario}_{Path(policy).stem}.gif")
     try:
         screen = Console(stderr=True)
         with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
@@ -79,9 +79,3 @@ def _refuse_unknown(policy: str) -> None:
         policy_class(policy)
     except ValueError as error:  # an unknown name is a mistake in the words; a ValueError of the run is not
         raise typer.BadParameter(str(error)) from error
-
-
-def _film_in_results(name: str) -> Path:
-    folder = Path("results")
-    folder.mkdir(exist_ok=True)
-    return folder / name

@@ -27,15 +27,16 @@ def check_film(path: str | Path, fps: float, n_frames: int) -> Path:
     """Return `path` if a film can be written there.
 
     Raises:
-        RenderError: unknown suffix, missing folder, impossible rate, or a GIF of too many frames.
+        RenderError: unknown suffix, a file in place of the folder, impossible rate, or a GIF of too many frames.
         ImportError: the library that writes this kind of film is not installed.
     """
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise RenderError(f"Expected a path ending in {' or '.join(SUFFIXES)}, got {str(path)!r}.")
-    if not path.parent.is_dir():
-        raise RenderError(f"Expected {str(path.parent)!r} to be an existing folder; create it or choose another.")
+    existing = next(folder for folder in path.absolute().parents if folder.exists())
+    if not existing.is_dir():
+        raise RenderError(f"Expected {str(path.parent)!r} to be a folder, but {str(existing)!r} is a file.")
     with refusing():
         number(f"fps of a {suffix}", fps, at_least=1, at_most=MAX_FPS[suffix])
     if suffix == ".gif" and n_frames > MAX_GIF_FRAMES:
@@ -51,9 +52,10 @@ def check_film(path: str | Path, fps: float, n_frames: int) -> Path:
 def write_film(frames: Iterable[Frame], path: str | Path, *, fps: float, n_frames: int) -> Path:
     """Write pictures as a film; the suffix of `path` chooses the format.
 
-    The file appears under its name only when it is complete. GIFs use one palette made for this package's pictures,
-    without dithering, and store only what changed from frame to frame, so they stay small. Identical consecutive
-    pictures become one longer frame of a GIF. GIF rates are rounded to whole hundredths of a second per frame.
+    A missing folder is made. The file appears under its name only when it is complete. GIFs use one palette made for
+    this package's pictures, without dithering, and store only what changed from frame to frame, so they stay small.
+    Identical consecutive pictures become one longer frame of a GIF. GIF rates are rounded to whole hundredths of a
+    second per frame.
 
     Args:
         frames: (H, W, 3) uint8 pictures of equal size, consumed one at a time.
@@ -69,6 +71,7 @@ def write_film(frames: Iterable[Frame], path: str | Path, *, fps: float, n_frame
         ImportError: the library that writes this kind of film is not installed.
     """
     path = check_film(path, fps, n_frames)
+    path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.stem}.partial{path.suffix.lower()}")
     try:
         if path.suffix.lower() == ".gif":

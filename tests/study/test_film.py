@@ -102,7 +102,7 @@ def test_a_film_that_fails_leaves_nothing_behind(tmp_path):
     [
         ("film.avi", 20, 10, r"ending in .gif or .mp4, got"),
         ("film", 20, 10, r"ending in .gif or .mp4, got"),
-        ("missing/film.gif", 20, 10, "existing folder"),
+        ("file/film.gif", 20, 10, "to be a folder, but .*file' is a file"),
         ("film.gif", 51, 10, r"fps of a \.gif to be a number in \[1, 50\]"),
         ("film.mp4", 61, 10, r"fps of a \.mp4 to be a number in \[1, 60\]"),
         ("film.gif", 0.5, 10, "fps"),
@@ -111,8 +111,16 @@ def test_a_film_that_fails_leaves_nothing_behind(tmp_path):
     ],
 )
 def test_impossible_films_are_refused(tmp_path, name, fps, n_frames, expected):
+    (tmp_path / "file").write_text("no folder")
     with pytest.raises(RenderError, match=expected):
         check_film(tmp_path / name, fps, n_frames)
+
+
+def test_a_missing_folder_is_made_when_the_film_is_written(tmp_path):
+    path = check_film(tmp_path / "new" / "films" / "film.gif", 20, 3)
+    assert list(tmp_path.iterdir()) == []
+    write_film(pictures(3), path, fps=20, n_frames=3)
+    assert path.is_file()
 
 
 def test_without_ffmpeg_the_message_tells_what_to_install(tmp_path, monkeypatch):
