@@ -20,7 +20,14 @@ if TYPE_CHECKING:
     from .environment import environment_distance, environment_scaling, waveform
     from .flexibility import adaptability, reactivity
     from .interference import fractional_loss, performance_lost, t_lost_fraction
-    from .population import availability, population_robustness, population_weight, ratio_for_availability
+    from .population import (
+        availability,
+        availability_curves,
+        population_robustness,
+        population_weight,
+        ratio_for_availability,
+        ratio_for_team,
+    )
     from .queues import PopulationRates, QueueStats, mean_away, queue_statistics
     from .robustness import mean_signed_difference, noise_robustness
     from .scaling import efficiency, raw_performance, scalability, skipped_intervals
@@ -79,7 +86,9 @@ __all__ = [
     "population_robustness",
     "population_weight",
     "availability",
+    "availability_curves",
     "ratio_for_availability",
+    "ratio_for_team",
     # statistics
     "normalize",
     "Summary",
@@ -117,9 +126,11 @@ _HOMES = {
     "performance_lost": "interference",
     "t_lost_fraction": "interference",
     "availability": "population",
+    "availability_curves": "population",
     "population_robustness": "population",
     "population_weight": "population",
     "ratio_for_availability": "population",
+    "ratio_for_team": "population",
     "PopulationRates": "queues",
     "QueueStats": "queues",
     "mean_away": "queues",

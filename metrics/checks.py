@@ -102,6 +102,16 @@ def check_availability(p_v: float) -> None:
         raise PopulationError(f"Expected an availability p_v in [0, 1], got {p_v}.")
 
 
+def check_team(team: float) -> None:
+    """Check a mean number of robots at work.
+
+    Raises:
+        PopulationError: Not positive and finite.
+    """
+    if not (math.isfinite(team) and team > 0.0):
+        raise PopulationError(f"Expected a mean team of more than 0 robots at work, finite, got {team}.")
+
+
 def check_needed(n_min: int, n: int) -> None:
     """Check a number of robots that are needed at work.
 

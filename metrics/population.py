@@ -1,6 +1,7 @@
 """Robustness to a changing population, Eq. (12), and availability of enough robots, Eq. (13)."""
 
 import math
+from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -14,6 +15,7 @@ from .checks import (
     check_option,
     check_ratio,
     check_size,
+    check_team,
     check_whole,
 )
 from .curves import FloatArray, Reduction, as_curves, last_interval_only, reduce_intervals
@@ -179,6 +181,51 @@ def ratio_for_availability(n: int, n_min: int, p_v: float) -> float:
             high = middle
         middle = 0.5 * (low + high)
     return math.exp(middle)
+
+
+def ratio_for_team(team: float) -> float:
+    """Ratio q = lambda / mu = (1 + L) / L at which L robots are at work on average, if the swarm had no size limit.
+
+    Then k robots are at work with probability (1 - rho) rho^k, rho = mu / lambda = L / (1 + L), with mean L. A swarm of
+    N robots cannot have more than N at work, so its own mean is below L:
+    N - `queue_statistics(PopulationRates(lambda_bd=q, mu_bd=1.0), N).truncated_length`.
+
+    Args:
+        team: L > 0, robots; need not be whole.
+
+    Raises:
+        PopulationError: L is not positive and finite.
+
+    Source: our choice of the reading that gives the 0.40 of the paper's availability figure (N = 50, N_min = 5, L = 5);
+    the length printed in Eq. (10) gives 0.454.
+    """
+    check_team(team)
+    return 1.0 + 1.0 / team
+
+
+def availability_curves(n: int, teams: Sequence[float], n_min: Sequence[int] | None = None) -> FloatArray:
+    """Availability p_v over the number of robots needed, one curve per mean team: the paper's availability figure.
+
+        p_v = sum_{k=N_min}^{N} rho^k / sum_{k=0}^{N} rho^k,    rho = L / (1 + L)
+
+    This is `availability` at the ratio `ratio_for_team(L)`.
+
+    Args:
+        n: Swarm size N.
+        teams: Mean numbers of robots at work L, K of them; see `ratio_for_team`.
+        n_min: Numbers of robots needed, M of them. Default: 1, 2, ..., N.
+
+    Returns:
+        p_v in [0, 1], shape (K, M). Higher is better.
+
+    Raises:
+        CurveError: n < 1, or a number in n_min is not whole.
+        PopulationError: A team is not positive and finite.
+    """
+    needed = range(1, check_size("n", n) + 1) if n_min is None else n_min
+    ratios = [ratio_for_team(team) for team in teams]
+    curves = [[availability(n, demand, ratio) for demand in needed] for ratio in ratios]
+    return np.array(curves, dtype=np.float64).reshape(len(ratios), len(needed))
 
 
 def _availability(n: int, n_min: int, log_q: float) -> float:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from swarm_forage_env.cli.availability import availability
 from swarm_forage_env.cli.compare import compare
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE, complain
 from swarm_forage_env.cli.record import record
@@ -48,7 +49,7 @@ def _options(
 for command in (run, score, compare, train):
     app.command()(command)
 app.command("list")(list_everything)
-for command in (info, schema, rerun, record, stuck):
+for command in (info, schema, rerun, record, stuck, availability):
     app.command()(command)
 
 

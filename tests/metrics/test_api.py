@@ -35,7 +35,9 @@ SIGNATURES = {
     "population_robustness": "perf, perf_ideal, rates, *, horizon, n=None, ideal_rates=None, weight='transient', "
     "reduce='sum'",
     "availability": "n, n_min, ratio_out",
+    "availability_curves": "n, teams, n_min=None",
     "ratio_for_availability": "n, n_min, p_v",
+    "ratio_for_team": "team",
     "normalize": "theta, *, distance=False",
     "aggregate": "values, *, method='t', level=0.95, seed=None",
 }

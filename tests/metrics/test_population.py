@@ -10,9 +10,12 @@ from metrics import (
     PopulationError,
     PopulationRates,
     availability,
+    availability_curves,
     population_robustness,
     population_weight,
+    queue_statistics,
     ratio_for_availability,
+    ratio_for_team,
 )
 from tests.reference.population_chain import generator, stationary_by_null_vector
 
@@ -188,11 +191,41 @@ PAPER_TABLE = {
 """(robots, desired mean at work L) -> availability of 1, 5, 10, 20, 40 robots with rho_S = L / (1 + L)."""
 
 
-@pytest.mark.parametrize(("swarm", "expected"), PAPER_TABLE.items())
-def test_availability_of_the_papers_teams(swarm, expected):
-    n, length = swarm
-    values = [availability(n, n_min, (1 + length) / length) for n_min in (1, 5, 10, 20, 40)]
-    assert values == pytest.approx(expected, abs=0.0005)
+@pytest.mark.parametrize("n", [50, 200])
+def test_availability_of_the_papers_teams(n):
+    teams = (5, 10, 20)
+    curves = availability_curves(n, teams, (1, 5, 10, 20, 40))
+    assert curves == pytest.approx(np.array([PAPER_TABLE[n, team] for team in teams]), abs=0.0005)
+
+
+def test_availability_curve_by_hand():
+    # L = 1: rho = 1/2. Two robots: weights 1, 1/2, 1/4 of 0, 1, 2 at work.
+    assert ratio_for_team(1) == 2.0
+    assert availability_curves(2, [1]) == pytest.approx(np.array([[3 / 7, 1 / 7]]), abs=1e-12)
+    assert availability_curves(2, [1], [0, 1, 3]) == pytest.approx(np.array([[1.0, 3 / 7, 0.0]]), abs=1e-12)
+
+
+def test_availability_curves_fall_with_the_demand_and_rise_with_the_team():
+    curves = availability_curves(50, [2.5, 5, 10])
+    assert curves.shape == (3, 50)
+    assert (np.diff(curves, axis=1) < 0).all()
+    assert (np.diff(curves, axis=0) > 0).all()
+    assert availability_curves(50, [], [1, 2]).shape == (0, 2)
+
+
+@pytest.mark.parametrize("n", [2, 50, 200])
+def test_the_area_under_an_availability_curve_is_the_mean_number_at_work(n):
+    # Mean = sum over k >= 1 of the probability of at least k; below L, which a swarm without a size limit would have.
+    queue = queue_statistics(PopulationRates(lambda_bd=ratio_for_team(20), mu_bd=1.0), n)
+    at_work = n - queue.truncated_length
+    assert availability_curves(n, [20]).sum() == pytest.approx(at_work, rel=1e-9)
+    assert at_work < 20
+
+
+@pytest.mark.parametrize("team", [0.0, -1.0, math.inf, math.nan])
+def test_teams_are_positive_and_finite(team):
+    with pytest.raises(PopulationError, match="more than 0 robots at work"):
+        availability_curves(50, [5, team])
 
 
 def test_the_paper_took_the_queue_length_for_the_number_at_work():

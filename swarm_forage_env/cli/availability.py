@@ -1,0 +1,90 @@
+"""The command `availability`."""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+
+import typer
+
+from swarm_forage_env.cli.options import NO_PICTURE, AsJson
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+_FORMATS = (".png", ".svg", ".pdf")
+_Number = TypeVar("_Number", int, float)
+
+
+def availability(
+    robots: Annotated[str, typer.Option("--robots", help="Swarm sizes, separated by commas.")] = "50,200",
+    teams: Annotated[str, typer.Option("--teams", help="Mean numbers of robots at work.")] = "5,10,20",
+    needed: Annotated[str, typer.Option("--needed", help="Numbers of robots needed, for the table.")] = "1,5,10,20,40",
+    out: Annotated[Path | None, typer.Option("--out", help="Picture to draw: .png, .svg or .pdf.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Show how likely enough robots are at work, over how many are needed. Computed in equilibrium, without runs."""
+    from metrics import availability_curves
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.cli.terminal import notes, output
+
+    sizes = _numbers("--robots", robots, int)
+    means = _numbers("--teams", teams, float)
+    demands = _numbers("--needed", needed, int)
+    if out is not None and out.suffix not in _FORMATS:
+        raise ConfigError(f"Expected --out as a file ending in {', '.join(_FORMATS)}, got {str(out)!r}.")
+    try:
+        rows = [
+            {"robots": n, "team": team, "at_work": _mean_at_work(n, team), "needed": demands, "availability": curve}
+            for n in sizes
+            for team, curve in zip(means, availability_curves(n, means, demands).tolist(), strict=True)
+        ]
+        curves = {} if out is None else {n: availability_curves(n, means) for n in sizes}
+    except ValueError as error:  # a size or a team that cannot be
+        raise ConfigError(str(error)) from error
+    if as_json:
+        typer.echo(json.dumps({"curves": rows, "picture": None if out is None else str(out)}))
+    else:
+        output().print(_table(rows, demands))
+    if out is not None:
+        from swarm_forage_env.rendering.plots import draw_availability
+
+        out.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            draw_availability(out, curves, means)
+        except ImportError as error:
+            raise ImportError(NO_PICTURE) from error
+        notes().print(f"picture {out}", markup=False)
+
+
+def _numbers(option: str, text: str, kind: Callable[[str], _Number]) -> list[_Number]:
+    """Return the numbers of an option; raises ConfigError where one is none."""
+    from swarm_forage_env._internal.fields import ConfigError
+
+    try:
+        return [kind(word) for word in text.split(",")]
+    except ValueError as error:
+        whole = "whole numbers" if kind is int else "numbers"
+        raise ConfigError(f"Expected {option} as {whole} separated by commas, such as 5,20, got {text!r}.") from error
+
+
+def _mean_at_work(n: int, team: float) -> float:
+    """Mean number at work of a swarm of n robots, which cannot have more than n there."""
+    from metrics import PopulationRates, queue_statistics, ratio_for_team
+
+    away = queue_statistics(PopulationRates(lambda_bd=ratio_for_team(team), mu_bd=1.0), n).truncated_length
+    assert away is not None, "it is there whenever a size is given"
+    return n - away
+
+
+def _table(rows: Sequence[dict[str, Any]], demands: Sequence[int]) -> "Table":
+    from rich.table import Table
+
+    title = "probability that at least so many robots are at work"
+    table = Table("robots", "mean team", "mean at work", *map(str, demands), title=title)
+    for column in table.columns:
+        column.justify = "right"
+    for row in rows:
+        values = (f"{value:.3f}" for value in row["availability"])
+        table.add_row(str(row["robots"]), f"{row['team']:g}", f"{row['at_work']:.1f}", *values)
+    return table
