@@ -99,7 +99,7 @@ METRICS: dict[str, Measure] = {
     "reactivity": Measure(
         function=reactivity,
         symbol="R(N)",
-        equation="Eqs. (5) to (7)",
+        equation="Eqs. (5) and (6)",
         higher_is_better=False,
         neutral=0.0,
         lowest=0.0,
@@ -110,7 +110,7 @@ METRICS: dict[str, Measure] = {
     "adaptability": Measure(
         function=adaptability,
         symbol="A(N)",
-        equation="Eqs. (5) to (7)",
+        equation="Eq. (7)",
         higher_is_better=False,
         neutral=0.0,
         lowest=0.0,

@@ -1,4 +1,7 @@
-"""Measures of the authors' earlier papers and programs: kept for comparison, not part of the paper."""
+"""Measures of the authors' earlier papers and programs: kept for comparison, not part of the paper.
+
+`docs/references.md` lists these papers.
+"""
 
 from typing import Literal, TypeAlias
 

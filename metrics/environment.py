@@ -79,7 +79,7 @@ def _period(frequency: float) -> float:
 def environment_scaling(
     v: ArrayLike, i_ec: ArrayLike, *, model: ScalingModel = "linear", clip: bool = False
 ) -> FloatArray:
-    """Factor c_t by which a perfectly reactive swarm's performance follows the environment, Eqs. (5) to (7).
+    """Factor c_t by which a perfectly reactive swarm's performance follows the environment, Eqs. (5) and (6).
 
         linear        c_t = 1 - (V - I_ec)        throttles: fractions of speed lost
         reciprocal    c_t = I_ec / V              penalties: ticks lost

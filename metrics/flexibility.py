@@ -17,7 +17,7 @@ def reactivity(
     variant: Variant = "corrected",
     clock: ArrayLike | None = None,
 ) -> FloatArray:
-    """Reactivity R(N): distance from a swarm whose performance changes exactly as the environment does.
+    """Reactivity R(N), Eqs. (5) and (6): distance from a swarm whose performance changes just as the environment does.
 
         P_R*(t) = c_t P_ideal(t)        R = DTW( P_R*, P )
 
@@ -54,7 +54,7 @@ def reactivity(
 def adaptability(
     perf_ideal: ArrayLike, perf: ArrayLike, *, variant: Variant = "corrected", clock: ArrayLike | None = None
 ) -> FloatArray:
-    """Adaptability A(N): distance from a swarm whose performance does not change at all.
+    """Adaptability A(N), Eq. (7): distance from a swarm whose performance does not change at all.
 
         P_A*(t) = P_ideal(t)        A = DTW( P_A*, P )
 

@@ -197,18 +197,18 @@ def ratio_for_team(team: float) -> float:
         PopulationError: L is not positive and finite.
 
     Source: our choice of the reading that gives the 0.40 of the paper's availability figure (N = 50, N_min = 5, L = 5);
-    the length printed in Eq. (10) gives 0.454.
+    the queue length that the paper prints gives 0.454.
     """
     check_team(team)
     return 1.0 + 1.0 / team
 
 
 def availability_curves(n: int, teams: Sequence[float], n_min: Sequence[int] | None = None) -> FloatArray:
-    """Availability p_v over the number of robots needed, one curve per mean team: the paper's availability figure.
+    """Availability p_v over the number of robots needed, one curve per mean team, Eq. (13).
 
         p_v = sum_{k=N_min}^{N} rho^k / sum_{k=0}^{N} rho^k,    rho = L / (1 + L)
 
-    This is `availability` at the ratio `ratio_for_team(L)`.
+    This is `availability` at the ratio `ratio_for_team(L)`, and the paper's availability figure.
 
     Args:
         n: Swarm size N.

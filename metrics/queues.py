@@ -66,13 +66,13 @@ class QueueStats:
     stable: bool
     """Whether rho < 1. A finite swarm is always stable."""
     length_printed: float
-    """Number away as printed, rho^2 / (1 - rho), which is `waiting`."""
+    """Number away as printed in Eq. (10), rho^2 / (1 - rho), which is `waiting`."""
     length: float
     """Number away in an unlimited M/M/1 queue, rho / (1 - rho)."""
     waiting: float
     """Number waiting, without the one in service, rho^2 / (1 - rho)."""
     time_printed: float
-    """Time away per visit as printed, 1 / (mu - lambda) + 1 / mu."""
+    """Time away per visit as printed in Eq. (11), 1 / (mu - lambda) + 1 / mu."""
     time: float
     """Time away per visit, W = 1 / (mu - lambda)."""
     waiting_time: float
@@ -84,7 +84,7 @@ class QueueStats:
 
 
 def queue_statistics(rates: PopulationRates, n: int | None = None, *, per_robot: bool = False) -> QueueStats:
-    """Equilibrium quantities of the queue of robots away from work, Eqs. (9) and (10) and what they should be.
+    """Equilibrium quantities of the queue of robots away from work, Eqs. (9) to (11) and what they should be.
 
     A swarm of n robots cannot have more than n away. With constant rates cut off at 0 and n (which is how the study's
     population process works), n robots are away with probability rho^n / sum_k rho^k, for every rho. The paper writes

@@ -1,6 +1,7 @@
 """The command `availability`: its table, its picture, and what it refuses."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from metrics import availability_curves
 
 PNG = b"\x89PNG"
+PAGE = Path(__file__).resolve().parents[2] / "docs/equations.md"
 
 
 def rows(out):
@@ -28,6 +30,14 @@ def test_the_table_has_the_papers_number_and_each_swarms_own_mean(command):
         [200, 20, 20.0, 0.952, 0.784, 0.614, 0.377, 0.142],
     ]
     assert list(Path.cwd().iterdir()) == []
+
+
+def test_the_page_shows_what_its_command_prints(command):
+    page = PAGE.read_text()
+    (words,) = re.findall(r"^swarm-forage (availability .*?) --out docs/images/availability.png$", page, re.MULTILINE)
+    _, out, _ = command(*words.split())
+    lines = [line.rstrip() for line in out.rstrip().splitlines()]
+    assert "\n".join(lines) in page
 
 
 def test_sizes_teams_and_demands_are_chosen(command):
