@@ -77,13 +77,15 @@ def test_docstrings_cite_the_equations_of_the_page(function):
 
 @pytest.mark.parametrize("name", METRICS)
 def test_the_catalog_cites_the_equations_of_the_page(name):
-    assert cited(METRICS[name].equation) == numbers_of(name)
+    """A measure that the page does not list is not the paper's, and does not claim to be."""
+    source = METRICS[name].equation
+    assert cited(source) == numbers_of(name) if numbers_of(name) else not source.startswith("Eq")
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: path.relative_to(ROOT / "metrics").as_posix())
-def test_modules_cite_what_their_functions_define(path):
+@pytest.mark.parametrize("name", sorted({metrics._HOMES[function] for function in FUNCTIONS}))
+def test_modules_cite_what_their_functions_define(name):
     """A module's own docstring names no equation that none of its functions cites."""
-    tree = ast.parse(path.read_text())
+    tree = ast.parse((ROOT / f"metrics/{name}.py").read_text())
     inside = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -93,7 +95,8 @@ def test_modules_cite_what_their_functions_define(path):
 
 @pytest.mark.parametrize("erratum", sorted(HEADS))
 def test_errata_cite_the_equations_of_the_page(erratum):
-    assert cited(HEADS[erratum]) == {number for number, _, _, errata in ROWS if erratum in errata}
+    listed = {number for number, _, _, errata in ROWS if erratum in errata}
+    assert cited(HEADS[erratum]) == listed, "the column of errata in docs/equations.md says otherwise"
 
 
 def test_symbols_beside_a_citation_in_the_errata_are_those_of_the_equation():

@@ -1,6 +1,7 @@
 """The list of references: what is cited is there, links are those of the numbers, and what they are used for exists."""
 
 import re
+from calendar import month_name
 from pathlib import Path
 
 import pytest
@@ -17,8 +18,9 @@ SOURCES = [
     for path in sorted((ROOT / folder).rglob("*"))
     if path.suffix in (".py", ".md") and path.name != "references.md"
 ]
-AUTHORS_AND_YEAR = re.compile(r"\b([A-Z][a-z]+(?: and [A-Z][a-z]+)? (?:19|20)\d\d)\b")
-MONTHS = ("May", "June")
+YEAR = r"(?:19|20)\d\d"
+AUTHORS_AND_YEAR = re.compile(rf"\b([A-Z][a-z]+ and [A-Z][a-z]+ {YEAR})\b|\(([A-Z][a-z]+ {YEAR})\)")
+"""Hecker and Moses 2015, or (Holm 1979); but not June 2021, nor 2000 after any capitalised word."""
 
 
 def test_there_are_entries_and_each_has_a_link():
@@ -27,8 +29,8 @@ def test_there_are_entries_and_each_has_a_link():
 
 
 def test_works_cited_by_authors_and_year_are_listed():
-    cited = {name for path in SOURCES for name in AUTHORS_AND_YEAR.findall(path.read_text())}
-    cited = {name for name in cited if not name.startswith(MONTHS)}
+    found = {name for path in SOURCES for pair in AUTHORS_AND_YEAR.findall(path.read_text()) for name in pair if name}
+    cited = {name for name in found if name.split()[0] not in month_name}
     assert {"Holm 1979", "Hecker and Moses 2015"} <= cited
     assert cited - {name for name, _ in ENTRIES} == set()
 
