@@ -43,14 +43,21 @@ def is_large_enough(cache: np.record, c: np.record) -> bool:
 
 
 @kernel
+def from_nest_m(x: float, y: float, c: np.record) -> float:
+    """Distance of a point (m) from the nest's centre, m."""
+    return math.sqrt((x - c.nest_x_m) ** 2 + (y - c.nest_y_m) ** 2)
+
+
+@kernel
 def select_cache(robot: np.record, senses: Senses, c: np.record, draws: Row, memory: OneTaskMemory) -> bool:
     """Choose the remembered cache of highest utility; the goal is a random point in it.
 
     Not chosen are: the cache that the robot stands in, so that a robot which has just dropped its object leaves before
-    it comes back; caches to be left alone in this task; and, for taking, caches with too few objects.
+    it comes back; caches to be left alone in this task; for taking, caches with too few objects; and for a Cache
+    Transferer's object, caches not nearer to the nest than the one it comes from.
 
     Returns:
-        Whether there is one; then goal and tolerance of the robot are set.
+        Whether there is one; then goal, tolerance and target (the cache's serial) of the robot are set.
     """
     takes = robot.activity == ACQUIRE
     best = 0.0
@@ -63,6 +70,8 @@ def select_cache(robot: np.record, senses: Senses, c: np.record, draws: Row, mem
             continue
         centre_x = (cache.cell_x + 0.5) * c.cell_m
         centre_y = (cache.cell_y + 0.5) * c.cell_m
+        if not takes and from_nest_m(centre_x, centre_y, c) >= robot.cargo_from_nest_m:
+            continue
         pheromone = density(robot.clock - cache.seen, c.log_keep)
         utility = cache_utility(centre_x, centre_y, cache.count, senses.x, senses.y, pheromone, c)
         if utility > best:
@@ -70,6 +79,7 @@ def select_cache(robot: np.record, senses: Senses, c: np.record, draws: Row, mem
             best_entry = entry
     if best_entry < 0:
         return False
+    robot.target = memory.caches[best_entry].serial
     spread = max(0.0, c.cache_side_m - 2.0 * c.cache_margin_m)
     robot.goal_x_m = (memory.caches[best_entry].cell_x + 0.5) * c.cell_m + spread * (draws[DRAW_POINT_X] - 0.5)
     robot.goal_y_m = (memory.caches[best_entry].cell_y + 0.5) * c.cell_m + spread * (draws[DRAW_POINT_Y] - 0.5)
@@ -79,10 +89,15 @@ def select_cache(robot: np.record, senses: Senses, c: np.record, draws: Row, mem
 
 @kernel
 def cache_is_known(robot: np.record, c: np.record, memory: OneTaskMemory) -> bool:
-    """Whether the goal still lies in a remembered cache, which has enough objects if the robot wants one."""
+    """Whether the goal still lies in a remembered cache, which has enough objects if the robot wants one.
+
+    A cache that is there again serves as well. Quirk `cache_goal_by_identity`: it must be the one that was chosen.
+    """
     for entry in range(robot.n_caches):
         cache = memory.caches[entry]
         if covers(cache, robot.goal_x_m, robot.goal_y_m, c):
+            if c.cache_goal_by_identity and cache.serial != robot.target:
+                return False
             return robot.activity == TRANSPORT or is_large_enough(cache, c)
     return False
 

@@ -123,6 +123,8 @@ def remember_cache(robot: np.record, memory: OneTaskMemory, fields: Row, c: np.r
     entry = find_cache(robot, caches, cell_x, cell_y)
     if entry < 0:
         entry = _new_entry(robot, caches)
+    elif c.last_cache_at_every_sight and robot.n_caches == 1:  # quirk: not only when it is forgotten
+        _keep_last_place(robot, caches[entry], c)
     cache = caches[entry]
     if cache.serial != serial:
         cache.serial = serial
@@ -163,13 +165,19 @@ def _forget_objects_under(robot: np.record, objects: OneMemory, cache: np.record
 
 
 @kernel
+def _keep_last_place(robot: np.record, cache: np.record, c: np.record) -> None:
+    """Remember a cache's centre as the place where a search for caches begins."""
+    robot.last_cache_x_m = (cache.cell_x + 0.5) * c.cell_m
+    robot.last_cache_y_m = (cache.cell_y + 0.5) * c.cell_m
+    robot.knows_last_cache = True
+
+
+@kernel
 def forget_cache(robot: np.record, caches: Row, entry: int, c: np.record) -> None:
     """Remove a cache; the last list entry takes its place. If none is left, its position stays known."""
     last = robot.n_caches - 1
     if last == 0:
-        robot.last_cache_x_m = (caches[entry].cell_x + 0.5) * c.cell_m
-        robot.last_cache_y_m = (caches[entry].cell_y + 0.5) * c.cell_m
-        robot.knows_last_cache = True
+        _keep_last_place(robot, caches[entry], c)
     caches[entry] = caches[last]
     robot.n_caches = last
 

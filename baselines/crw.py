@@ -6,8 +6,9 @@ States and exits (`machines.Activity`):
     WAIT_PICKUP     stand, ask; cargo -> HOMING; refused or vanished         -> ACQUIRE
     HOMING          towards the nest light; sees the nest                    -> HOMING_IN_NEST
     HOMING_IN_NEST  light and wander; nearer to the centre than a random depth -> WAIT_DROP
-    WAIT_DROP       stand, ask to deliver; delivered -> LEAVE_NEST; refused  -> HOMING
-    LEAVE_NEST      random walk; no longer sees the nest                     -> ACQUIRE
+    WAIT_DROP       stand, ask to deliver; delivered -> ACQUIRE; refused     -> HOMING
+
+Under the quirk `nest_left_at_random` a delivery leads to LEAVE_NEST: a random walk, until the nest is no longer seen.
 
 Source: CRW of the paper, section "Candidate Algorithms"; numbers in `parameters`.
 """
@@ -25,8 +26,8 @@ from .machines import (
     DELIVER,
     DRAWS,
     HOMING,
-    LEAVE_NEST,
     WAIT_PICKUP,
+    after_delivery,
     command,
     deliver_and_leave,
     describe_robot,
@@ -60,7 +61,7 @@ def step_crw(
         robot = robots[i]
         row = obs[i]
         senses = sense(row, c)
-        follow_cargo(robot, senses, HOMING, LEAVE_NEST)
+        follow_cargo(robot, senses, HOMING, after_delivery(c))
         if robot.activity == ACQUIRE:
             found, x, y = explore_for_object(robot, senses, row, c, draws[i])
             if found:

@@ -17,9 +17,9 @@ from .machines import (
     DELIVER,
     DRAWS,
     HOMING,
-    LEAVE_NEST,
     WAIT_PICKUP,
     acquire,
+    after_delivery,
     command,
     deliver_and_leave,
     describe_robot,
@@ -58,7 +58,7 @@ def step_dpo(
         known = memory_of(memory, i)
         senses = sense(row, c)
         look_around(robot, row, c, known)
-        if follow_cargo(robot, senses, HOMING, LEAVE_NEST):
+        if follow_cargo(robot, senses, HOMING, after_delivery(c)):
             forget(robot, known, object_row_of(row[c.cargo], c))
         if robot.activity == ACQUIRE:
             found, x, y = acquire(

@@ -93,7 +93,7 @@ ROBOT_FIELDS: list[tuple[str, type]] = [
     ("goal_x_m", np.float64),
     ("goal_y_m", np.float64),
     ("goal_tolerance_m", np.float64),
-    ("target", np.int32),  # identity of the goal: object row
+    ("target", np.int32),  # identity of the goal: row of an object, or serial of a cache
     ("explore_ticks", np.int32),  # since exploration started, or NOT_EXPLORING
     ("recovery_ticks", np.int32),  # driven straight on after avoiding
     ("turn_ticks", np.int32),  # in a row, up to now, in which it was told to turn on the spot or to stand
@@ -158,7 +158,7 @@ def sense(row: Row, c: np.record) -> Senses:
     """Read one observation row."""
     obstacle_x, obstacle_y = ring_sum(row[c.proximity : c.proximity + RING_SENSORS])
     return Senses(
-        is_obstacle_vector(obstacle_x, obstacle_y),
+        is_obstacle_vector(obstacle_x, obstacle_y, c.obstacle_behind_counts != 0),
         obstacle_x,
         obstacle_y,
         sees_nest(row[c.ground : c.ground + GROUND_SENSORS]),
@@ -197,7 +197,7 @@ def follow_cargo(robot: np.record, senses: Senses, loaded: int, emptied: int) ->
         robot: Record of the robot.
         senses: What it senses.
         loaded: Activity after a pick-up: HOMING or TRANSPORT.
-        emptied: Activity after a drop: LEAVE_NEST or FINISHED.
+        emptied: Activity after a drop: ACQUIRE, LEAVE_NEST or FINISHED.
 
     Returns:
         Whether the robot has just got its cargo.
@@ -211,13 +211,22 @@ def follow_cargo(robot: np.record, senses: Senses, loaded: int, emptied: int) ->
         if activity == WAIT_DROP and failed:
             start_carrying(robot, loaded)
         return False
-    if activity in (HOMING, HOMING_IN_NEST, TRANSPORT, LET_GO) or (activity == WAIT_PICKUP and failed):
-        restart_acquiring(robot)
-    elif activity == WAIT_DROP:
+    if activity == WAIT_DROP and emptied != ACQUIRE:
         robot.activity = emptied
+    elif activity in (HOMING, HOMING_IN_NEST, TRANSPORT, WAIT_DROP, LET_GO) or (activity == WAIT_PICKUP and failed):
+        restart_acquiring(robot)
     if robot.activity == LEAVE_NEST and not senses.in_nest:
         restart_acquiring(robot)
     return False
+
+
+@kernel
+def after_delivery(c: np.record) -> int:
+    """Activity of CRW and DPO after a delivery: look for the next object at once, as the other two do.
+
+    Quirk `nest_left_at_random`: walk at random until the nest is left.
+    """
+    return LEAVE_NEST if c.nest_left_at_random else ACQUIRE
 
 
 @kernel
@@ -292,7 +301,7 @@ def go_to_goal(robot: np.record, senses: Senses, row: Row, c: np.record, draws: 
     """One tick on the way to the goal: arrival force, avoidance, then 2 s straight on before turning back.
 
     A change of state acts in the same tick. If the robot was within the slowing radius at its last arrival force, it
-    ignores obstacles; otherwise it avoids them first.
+    ignores obstacles (`approach_ignores_obstacles`); otherwise it avoids them first.
 
     Returns:
         Whether the robot is within tolerance of its goal, and the force.
@@ -310,7 +319,7 @@ def go_to_goal(robot: np.record, senses: Senses, row: Row, c: np.record, draws: 
             robot.recovery_ticks = 0
             robot.vector_state = VECTOR
     if robot.vector_state == VECTOR:
-        if senses.obstacle and not robot.is_slowing:
+        if senses.obstacle and not (robot.is_slowing and c.approach_ignores_obstacles != 0):
             robot.vector_state = VECTOR_AVOIDANCE
         else:
             seek_x, seek_y = arrival(robot, senses.x, senses.y, float(row[c.heading]), float(row[c.heading + 1]), c)

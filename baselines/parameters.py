@@ -60,7 +60,9 @@ class ControllerParameters:
     slowest_arrival_mps: float = 0.01
     """Shortest force towards a point; study: 1 cm/s."""
     slowing_radius_m: float = 0.2
-    """Within this distance of its goal a robot slows down and ignores obstacles; study."""
+    """Within this distance of its goal a robot slows down; study."""
+    approach_ignores_obstacles: bool = True
+    """Whether a robot that slows down at its goal ignores obstacles; authors' program, the paper has no such rule."""
     recovery_speed_mps: float = 0.07
     """Length of the straight-ahead force after avoiding; authors' program: 0.7 of the maximum speed."""
     recovery_s: float = 2.0
@@ -82,6 +84,10 @@ class ControllerParameters:
         # nothing else.
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
+            if field.name == "approach_ignores_obstacles":
+                if not isinstance(value, bool):
+                    raise ParameterError(f"Expected {field.name} to be True or False, got {value!r}.")
+                continue
             is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
             if not is_number or not math.isfinite(value) or value < 0:
                 raise ParameterError(f"Expected {field.name} to be a finite number >= 0, got {value!r}.")

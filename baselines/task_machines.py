@@ -21,7 +21,7 @@ from swarm_forage_env.contract.detection import sees_cache
 from swarm_forage_env.contract.layout import CACHE_FIELDS, GROUND_SENSORS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray, Row
 
-from .cache_choice import cache_is_known, object_is_near, select_cache, select_isolated_object
+from .cache_choice import cache_is_known, from_nest_m, object_is_near, select_cache, select_isolated_object
 from .cache_memory import (
     OneTaskMemory,
     TaskMemory,
@@ -84,6 +84,7 @@ def new_task_robots(n_robots: int) -> np.ndarray:
         [
             ("last_cache_x_m", np.float64),  # where the last remembered cache was, once none is left
             ("last_cache_y_m", np.float64),
+            ("cargo_from_nest_m", np.float64),  # a Cache Transferer's: how far from the nest its cache is; else inf
             ("n_caches", np.int32),  # remembered caches
             ("shun_round", np.int32),  # objects stamped with this number are left alone
             ("goal_kind", np.int8),  # `tasks.Goal` code of what it acquires
@@ -93,6 +94,7 @@ def new_task_robots(n_robots: int) -> np.ndarray:
         ],
     )
     robots["shun_round"] = 1
+    robots["cargo_from_nest_m"] = np.inf
     return robots
 
 
@@ -188,11 +190,16 @@ def follow_events(
     loaded = HOMING if DESTINATION[task] == _NEST else TRANSPORT
     if follow_cargo(robot, senses, loaded, FINISHED):
         forget(robot, memory.objects, object_row_of(row[c.cargo], c))
+        robot.cargo_from_nest_m = np.inf
         if task == _TRANSFERER:
             entry = event_cache_entry(robot, row, c, memory.caches)
             if entry >= 0:
-                memory.caches[entry].no_drop = True
+                cache = memory.caches[entry]
+                cache.no_drop = True
                 robot.shunned_cache_in_task = True
+                if not c.transferer_goes_anywhere:
+                    x, y = (cache.cell_x + 0.5) * c.cell_m, (cache.cell_y + 0.5) * c.cell_m
+                    robot.cargo_from_nest_m = from_nest_m(x, y, c)
     elif robot.activity == FINISHED:
         if task in (_STARTER, _FINISHER):
             shun_object(robot, memory, event_object_row(row, c))

@@ -90,6 +90,8 @@ def parse_setting(word: str) -> tuple[str, Any]:
     name, equals, text = word.partition("=")
     if not equals:
         raise ConfigError(f"Expected --set key=value, got {word!r}.")
+    if name == "quirks":
+        return name, text
     types = field_types()
     if name not in types:
         raise ConfigError(f"Unknown scenario field {name!r}.{suggestion(name, types)} See: swarm-forage info SCENARIO.")

@@ -1,6 +1,5 @@
 """The command `stuck`."""
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -38,7 +37,6 @@ def stuck(
     horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
     window: Annotated[float, typer.Option(help="Seconds in which every robot should get away.")] = 600.0,
     moved: Annotated[float, typer.Option(help="How far that is, in m.")] = 0.05,
-    quirks: Annotated[bool, typer.Option("--quirks", help="The authors' program: all quirks on.")] = False,
     objects: Objects = None,
     side: Side = None,
     caches: Caches = None,
@@ -51,8 +49,6 @@ def stuck(
 
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs, split_names
-    from swarm_forage_env.scenarios.config import with_overrides
-    from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
     from swarm_forage_env.study.stuck import find_stuck
 
     if not (window > 0.0 and moved > 0.0):
@@ -69,8 +65,6 @@ def stuck(
         config_file=config,
     )
     specs = plan_runs(options, split_names(policy), n_seeds=seeds, first_seed=first_seed)
-    if quirks:
-        specs = tuple(replace(spec, scenario=with_overrides(spec.scenario, quirks=AUTHORS_PROGRAM)) for spec in specs)
     found = [(spec, one) for spec in specs for one in find_stuck(spec, window_s=window, moved_m=moved)]
     if not found:
         typer.echo(f"nobody is stuck in {len(specs)} run{'s' * (len(specs) > 1)}")

@@ -14,9 +14,9 @@ from swarm_forage_env.contract.layout import GROUND_SENSORS, RING_SENSORS
 from swarm_forage_env.contract.types import ObsArray
 
 OBSTACLE_ANGLE_RAD = 2.61
-"""A summed proximity vector that points outside [-2.61, 2.61] rad counts as an obstacle whatever its length."""
+"""Half the field of view: what a summed proximity vector outside [-2.61, 2.61] rad shows is behind the robot."""
 OBSTACLE_LENGTH = 0.1
-"""A summed proximity vector longer than this counts as an obstacle."""
+"""A summed proximity vector longer than this, within the field of view, is an obstacle."""
 NEST_GREY = (0.6, 0.8)
 OBJECT_GREY = (-0.05, 0.05)
 CACHE_GREY = (0.3, 0.5)
@@ -42,21 +42,23 @@ def ring_sum(readings: ObsArray) -> tuple[float, float]:
 
 
 @kernel
-def is_obstacle_vector(x: float, y: float) -> bool:
-    """Obstacle rule on a summed proximity vector: too long, or pointing straight back."""
+def is_obstacle_vector(x: float, y: float, behind_counts: bool) -> bool:
+    """Obstacle rule on a summed proximity vector (x, y): long, and within the field of view.
+
+    Under the quirk `obstacle_behind_counts` anything behind is an obstacle, too, however weak.
+    """
     length_squared = x * x + y * y
-    if length_squared > OBSTACLE_LENGTH * OBSTACLE_LENGTH:
-        return True
-    if length_squared < _CANCELLED:  # equal obstacles on opposite sides cancel up to rounding
-        return False
-    return abs(math.atan2(y, x)) > OBSTACLE_ANGLE_RAD
+    # Equal obstacles on opposite sides cancel up to rounding; what is left points anywhere.
+    if x < 0.0 and length_squared > _CANCELLED and abs(math.atan2(y, x)) > OBSTACLE_ANGLE_RAD:
+        return behind_counts
+    return length_squared > OBSTACLE_LENGTH * OBSTACLE_LENGTH
 
 
 @kernel
-def sees_obstacle(proximity: ObsArray) -> bool:
-    """Return whether one ring of proximity readings means an obstacle."""
+def sees_obstacle(proximity: ObsArray, behind_counts: bool) -> bool:
+    """Return whether one ring of proximity readings means an obstacle; see `is_obstacle_vector`."""
     x, y = ring_sum(proximity)
-    return is_obstacle_vector(x, y)
+    return is_obstacle_vector(x, y, behind_counts)
 
 
 @kernel

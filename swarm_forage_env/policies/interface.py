@@ -97,6 +97,7 @@ class LearnerInterface:
         self._heading = source["heading"]
         self._half_x, self._half_y = (float(scale) for scale in source.part("position").scale)
         self._view_starts = tuple(start[name] for name in _COMPACT_READS)
+        self._behind_counts = spec.quirks.obstacle_behind_counts
         self._carrying = start["carrying"]
         self._grip_starts = (start["ground"], start["carrying"], start["los_object"])
         self._mask_starts = (
@@ -139,7 +140,7 @@ class LearnerInterface:
         if out is None:
             out = np.empty((len(obs), self.layout.size), np.float32)
         if self._is_compact:
-            compact_view(obs, self._view_starts, self._half_x, self._half_y, out)
+            compact_view(obs, self._view_starts, self._half_x, self._half_y, self._behind_counts, out)
         else:
             np.copyto(out, obs)
         return out

@@ -12,7 +12,7 @@ from typing import Any, TypeVar, cast
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.scenarios.quirks import READINGS, Quirks
 from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, capacity, distributable_box
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, EAST_WALL_M, WALL_M, WHEEL_SCALE_MPS
 
@@ -380,7 +380,7 @@ def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
     """Return `config` with single fields replaced by name, wherever they live.
 
     Example: `with_overrides(config, n_robots=20, width_m=48.0)`. A section may be replaced whole
-    (`quirks=AUTHORS_PROGRAM`).
+    (`quirks=AUTHORS_PROGRAM`), the quirks also by the name of a reading (`quirks="AUTHORS_PROGRAM"`).
 
     Raises:
         ConfigError: unknown name (with the nearest known one), or values that do not fit together.
@@ -390,7 +390,10 @@ def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
     per_section: dict[str, dict[str, Any]] = {}
     top: dict[str, Any] = {}
     for name, value in overrides.items():
-        if name in SECTIONS:
+        if name == "quirks" and isinstance(value, str):
+            fields.known_name("reading", value, READINGS)
+            top[name] = READINGS[value]
+        elif name in SECTIONS:
             own = ", ".join(item.name for item in dataclasses.fields(SECTIONS[name]))
             fields.instance(name, value, SECTIONS[name], hint=f"; single fields of it are given by their names: {own}")
             top[name] = value

@@ -4,10 +4,13 @@ The default is always the description. `AUTHORS_PROGRAM` turns every switch on, 
 the two gives a published result. A quirk is a single `if` at the place where it acts.
 
 Not reproduced at all: two-cell ramp objects, the rule that objects may not touch, throttling before the speed
-cap, and interference counted from each controller's machine state.
+cap, and interference counted from each controller's machine state. (Under sensor noise the program counts false
+obstacles, too: records have that share in a column of its own, `believed_interference_fraction`.) Contact between
+robots is the same in both readings, and so is the rule that a robot ignores obstacles close to its goal, a parameter
+of the controllers (`approach_ignores_obstacles`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -22,10 +25,20 @@ class Quirks:
     """An abort leaves the task interface marked active for that task's next execution."""
     transferer_interface_never_leaves: bool = False
     """A Cache Transferer's destination interface is never left and its source interface never becomes active."""
+    transferer_goes_anywhere: bool = False
+    """A Cache Transferer brings its object to any other cache, not only to one nearer to the nest."""
     cache_forget_unit_mismatch: bool = False
     """The rule for forgetting a cache compares metres with cell indices, and one axis suffices."""
+    cache_goal_by_identity: bool = False
+    """A cache created again in the place of the old one is not the goal that a robot had; it chooses again."""
+    last_cache_at_every_sight: bool = False
+    """The place where a search for caches begins is stored whenever the only known cache is seen again."""
     finisher_tolerance_mismatch: bool = False
     """A Cache Finisher arrives at one distance and is accepted at another; starting within tolerance is no arrival."""
+    obstacle_behind_counts: bool = False
+    """A summed proximity vector that points straight back is an obstacle whatever its length."""
+    nest_left_at_random: bool = False
+    """After a delivery robots of CRW and DPO walk at random until they have left the nest."""
     explore_double_start: bool = False
     """The exploration strategy runs twice in its first tick."""
     site_box_truncated: bool = False
@@ -34,6 +47,8 @@ class Quirks:
     """A new dynamic cache collects all usable objects, wherever they lie, and never forms in the random placement."""
     dynamic_cache_avoids_clusters: bool = False
     """A new dynamic cache never stands on a power-law cluster; where clusters leave it no room, there is none."""
+    large_clusters_likelier: bool = False
+    """Power-law clusters are of one or two sizes, the larger one likelier; else of several, smaller ones likelier."""
     motion_self_conflict: bool = False
     """A randomly walking object conflicts with its own old place, so only few cell borders can be crossed."""
     serialized_interactions: bool = False
@@ -45,13 +60,24 @@ AUTHORS_PROGRAM = Quirks(
     exec_time_since_last_completion=True,
     interface_flag_survives_abort=True,
     transferer_interface_never_leaves=True,
+    transferer_goes_anywhere=True,
     cache_forget_unit_mismatch=True,
+    cache_goal_by_identity=True,
+    last_cache_at_every_sight=True,
     finisher_tolerance_mismatch=True,
+    obstacle_behind_counts=True,
+    nest_left_at_random=True,
     explore_double_start=True,
     site_box_truncated=True,
     dynamic_cache_merges_all=True,
     dynamic_cache_avoids_clusters=True,
+    large_clusters_likelier=True,
     motion_self_conflict=True,
     serialized_interactions=True,
 )
 """All quirks on: the authors' program as far as this package reproduces it."""
+
+QUIRK_NAMES = tuple(field.name for field in fields(Quirks))
+"""Every switch, in the order of the class."""
+READINGS = {"DESCRIBED": Quirks(), "AUTHORS_PROGRAM": AUTHORS_PROGRAM}
+"""The two readings by name."""

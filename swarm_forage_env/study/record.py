@@ -234,6 +234,10 @@ KNOWN_CONTRIBUTIONS: dict[str, tuple[str, str]] = {
     "task_share_cache_collector": ("1", "the same for the task Cache Collector"),
     "throttle": ("1", "waveform V(t) of the throttle at the last tick of the interval"),
     "throttle_mean": ("1", "waveform V(t) of the throttle, mean over the ticks of the interval"),
+    "believed_interference_fraction": (
+        "1",
+        "share of active robots that see an obstacle under sensor noise, false ones included, mean over ticks",
+    ),
     "deaths": ("robots", "that died in the interval"),
     "births": ("robots", "that were born"),
     "malfunctions": ("robots", "that went into repair"),

@@ -125,7 +125,8 @@ class ForagingArena:
         self._contact.apply(swarm, suite.near, suite.bins, self._physics.twist)
         self._physics.advance(swarm)
         sense_proximity(swarm, suite)
-        mark_interference(swarm, events, suite.obs, suite.columns["proximity"], suite.near)
+        behind_counts = self.config.quirks.obstacle_behind_counts
+        mark_interference(swarm, events, suite.obs, suite.columns["proximity"], suite.near, behind_counts=behind_counts)
         if self._serve_requests(actions):
             self._create_dynamic_caches()
             self._replace_displaced()

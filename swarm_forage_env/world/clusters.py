@@ -1,4 +1,9 @@
-"""Power-law clusters of objects: how many, how large, where. Sizes and counts follow the paper's study."""
+"""Power-law clusters of objects: how many, how large, where.
+
+The paper speaks of groups of various sizes. Here they follow a power law: small groups are many, large ones few. The
+authors' program draws from the same exponents with the weights turned round, so that six of its eight arenas have
+clusters of one size, and the others more large ones than small ones: quirk `large_clusters_likelier`.
+"""
 
 import math
 from dataclasses import dataclass
@@ -21,7 +26,7 @@ _PADDING = (4, 2)
 
 @dataclass(frozen=True, slots=True)
 class ClusterLaw:
-    """Law of the clusters in an arena: `n_clusters` sizes 2^k, k_min <= k < k_max, larger ones more likely."""
+    """Exponents k of the cluster sizes 2^k in an arena, and the number of clusters in the authors' program."""
 
     k_min: int
     k_max: int
@@ -30,6 +35,8 @@ class ClusterLaw:
 
 def cluster_law(side_m: float) -> ClusterLaw:
     """Return the law for an arena of side X: k from ceil(X^(1/4)) + 1 to ceil(X^(1/3)) + 1, ceil(X^0.8) clusters.
+
+    Source: the study.
 
     Args:
         side_m: Side of the square arena in metres (for a rectangle: of the square with its area).
@@ -43,8 +50,26 @@ def cluster_law(side_m: float) -> ClusterLaw:
     )
 
 
-def draw_sizes(law: ClusterLaw, rng: np.random.Generator) -> IntArray:
-    """Return (n_clusters,) cluster sizes in objects, largest first.
+def draw_sizes(law: ClusterLaw, n_objects: int, rng: np.random.Generator) -> IntArray:
+    """Return the sizes of clusters that hold exactly `n_objects` together, largest first.
+
+    Sizes are 2^k with probability proportional to 2^-k, k_min - 1 <= k <= k_max: twice as large is half as likely, so
+    each size holds the same share of the objects. Clusters are drawn until they hold all objects; the last is cut.
+    Our choice: the paper names the law and gives no exponent.
+    """
+    exponents = np.arange(law.k_min - 1, law.k_max + 1)
+    weights = 0.5**exponents
+    most = math.ceil(n_objects / 2 ** exponents[0])
+    sizes = 2 ** rng.choice(exponents, size=most, p=weights / weights.sum())
+    held = np.cumsum(sizes)
+    n_clusters = int(np.searchsorted(held, n_objects)) + 1
+    sizes = sizes[:n_clusters]
+    sizes[-1] -= held[n_clusters - 1] - n_objects
+    return np.sort(sizes)[::-1].astype(np.int32)
+
+
+def draw_program_sizes(law: ClusterLaw, rng: np.random.Generator) -> IntArray:
+    """Return (n_clusters,) cluster sizes of the authors' program, k_min <= k < k_max, largest first.
 
     A size is 2^floor(v) with v = (k_min^3 + (k_max^3 - k_min^3) u)^(1/3) and u uniform: the density of v grows with
     v^2, so that 2^k has probability ((k + 1)^3 - k^3) / (k_max^3 - k_min^3).
@@ -78,7 +103,11 @@ def draw_clusters(config: ScenarioConfig, floor: IntArray, rng: np.random.Genera
         ConfigError: the clusters found no room in `LAYOUTS` layouts.
     """
     arena = config.arena
-    sizes = draw_sizes(cluster_law(math.sqrt(arena.width_m * arena.height_m)), rng)
+    law = cluster_law(math.sqrt(arena.width_m * arena.height_m))
+    if config.quirks.large_clusters_likelier:
+        sizes = draw_program_sizes(law, rng)
+    else:
+        sizes = draw_sizes(law, config.objects.n_objects, rng)
     for _ in range(LAYOUTS):
         boxes = _draw_layout(sizes, floor, arena.distributable_cells, rng)
         if boxes is not None:

@@ -5,7 +5,9 @@ from swarm_forage_env.world.kernels.interfere import mark
 from swarm_forage_env.world.state import StepEvents, SwarmState
 
 
-def mark_interference(swarm: SwarmState, events: StepEvents, obs: ObsArray, proximity: int, near: BoolArray) -> None:
+def mark_interference(
+    swarm: SwarmState, events: StepEvents, obs: ObsArray, proximity: int, near: BoolArray, *, behind_counts: bool
+) -> None:
     """Flag active robots for which the obstacle rule holds in this tick, walls included.
 
     Args:
@@ -14,7 +16,16 @@ def mark_interference(swarm: SwarmState, events: StepEvents, obs: ObsArray, prox
         obs: (N, D) with true proximity readings.
         proximity: Column of the first of them.
         near: (N,) whether any beam may have hit something; others are skipped.
+        behind_counts: Quirk `obstacle_behind_counts`.
     """
     mark(
-        obs, proximity, near, swarm.active, swarm.present, events.interfering, events.counters, events.interference_sum
+        obs,
+        proximity,
+        near,
+        behind_counts,
+        swarm.active,
+        swarm.present,
+        events.interfering,
+        events.counters,
+        events.interference_sum,
     )

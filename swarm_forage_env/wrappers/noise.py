@@ -9,12 +9,17 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import known_name, number, one_of, several, table
 from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env.contract.types import ActionArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.kernels.gaussian import to_normal
-from swarm_forage_env.wrappers.kernels.noise import noisy_gain, perturb_readings, turn_heading
+from swarm_forage_env.wrappers.kernels.noise import (
+    noisy_gain,
+    perturb_readings,
+    share_that_sees_obstacles,
+    turn_heading,
+)
 from swarm_forage_env.wrappers.waveform import Signal, Waveform, gather_waveform
 
 NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
@@ -47,6 +52,9 @@ class SensorNoise(SwarmWrapper):
 
     In every tick a number is drawn for each robot and noisy column, whether it is used or not. So a death, the policy's
     choice of slices and the size of sigma do not change the draws of other robots and columns.
+
+    Adds a column to the run record: `believed_interference_fraction`, the obstacle rule on what robots see. The
+    authors' program counts this as interference, false obstacles included; the measures count true ones only.
     """
 
     stack_position: ClassVar[int] = 1
@@ -90,9 +98,12 @@ class SensorNoise(SwarmWrapper):
     def on_reset(self, seed: int) -> None:
         """Start the random stream."""
         self._rng = stream_rng(seed, Stream.SENSOR_NOISE)
+        self._believing = 0.0
+        self._n_ticks = 0
 
     def observe(self, obs: ObsArray) -> ObsArray:
         """Perturb `obs` in place."""
+        self._seen = obs
         if not len(self._factors):
             return obs
         centre = _draw(self._rng, self._draws, is_uniform=self._is_uniform)
@@ -103,6 +114,21 @@ class SensorNoise(SwarmWrapper):
         if self._heading is not None:
             turn_heading(obs, present, self._draws, centre, self._factors, *self._heading)
         return obs
+
+    def after_step(self, tasks: CodeArray | None, terminated: BoolArray, truncated: bool) -> None:
+        """Count who believes in an obstacle."""
+        env = self.unwrapped
+        behind_counts = env.scenario.quirks.obstacle_behind_counts
+        proximity = env.layout.part("proximity").start
+        self._believing += share_that_sees_obstacles(self._seen, proximity, env.active, behind_counts)
+        self._n_ticks += 1
+
+    def interval_columns(self) -> dict[str, float]:
+        """Return the mean over ticks of the share of active robots that believed in an obstacle."""
+        mean = self._believing / self._n_ticks
+        self._believing = 0.0
+        self._n_ticks = 0
+        return {"believed_interference_fraction": mean}
 
 
 class ActuatorNoise(SwarmWrapper):

@@ -107,6 +107,18 @@ def test_the_place_of_the_last_cache_is_kept():
     assert (robot.record.last_cache_x_m, robot.record.last_cache_y_m) == pytest.approx((14.5, 8.1))
 
 
+@pytest.mark.parametrize("at_every_sight", [False, True])
+def test_quirk_last_cache_at_every_sight(at_every_sight):
+    robot = TaskRobot(quirks=Quirks(last_cache_at_every_sight=at_every_sight))
+    stand(robot, (56, 40), CACHE_SEEN)
+    assert not robot.record.knows_last_cache, "seen once"
+    stand(robot, (56, 40), CACHE_SEEN, (8, (30, 40), 5))
+    assert robot.record.knows_last_cache == at_every_sight
+    robot.record.knows_last_cache = False
+    stand(robot, (56, 40), CACHE_SEEN, (8, (30, 40), 5))
+    assert not robot.record.knows_last_cache, "two are known"
+
+
 def test_a_full_memory_gives_up_the_cache_unseen_for_longest():
     robot = TaskRobot()
     room = len(robot.memory.caches)

@@ -70,6 +70,12 @@ def robot() -> Robot:
     return Robot()
 
 
+@pytest.fixture
+def leaver() -> Robot:
+    """A robot that walks out of the nest after a delivery."""
+    return Robot(quirks=Quirks(nest_left_at_random=True))
+
+
 def test_starts_exploring_at_9_cm_per_second_with_an_empty_gripper(robot):
     action = robot.act()
     assert robot.activity is Activity.ACQUIRE
@@ -193,7 +199,19 @@ def test_a_refused_delivery_resumes_homing(robot, event):
     assert action[2] == Grip.GRASP
 
 
-def test_leaves_the_nest_wandering_then_explores_with_a_new_lock(robot):
+def test_looks_for_the_next_object_at_once_after_a_delivery(robot):
+    robot.bring_to(Activity.WAIT_DROP)
+    robot.deliver()
+    assert robot.activity is Activity.ACQUIRE
+    robot.seen.ground("object")
+    robot.act(49)
+    assert robot.activity is Activity.ACQUIRE, "with a new lock"
+    robot.act()
+    assert robot.activity is Activity.WAIT_PICKUP
+
+
+def test_quirk_nest_left_at_random_wanders_out_then_explores_with_a_new_lock(leaver):
+    robot = leaver
     robot.bring_to(Activity.LEAVE_NEST)
     left, right, grip = robot.act(5)
     assert (left + right) / 2 * 20.0 == pytest.approx(9.0, abs=1e-5)
@@ -223,7 +241,8 @@ def test_a_robot_that_lost_its_cargo_while_waiting_outside_the_nest_explores(rob
 
 
 @pytest.mark.parametrize("activity", [Activity.ACQUIRE, Activity.WAIT_PICKUP, Activity.LEAVE_NEST])
-def test_a_robot_that_finds_itself_carrying_goes_home(robot, activity):
+def test_a_robot_that_finds_itself_carrying_goes_home(leaver, activity):
+    robot = leaver
     robot.bring_to(activity)
     robot.seen.pose(4.7, 8.0)
     robot.seen.carry(9)

@@ -21,10 +21,10 @@ GOAL = (10.5, 10.1)
 class Robot:
     """A single robot under DPO that faces +x, at (10.1, 10.1)."""
 
-    def __init__(self, **changes):
+    def __init__(self, parameters=None, **changes):
         self.seen = Observations(make_spec(**changes))
         self.seen.pose(10.1, 10.1)
-        self.policy = DPOPolicy()
+        self.policy = DPOPolicy(**(parameters or {}))
         self.policy.reset(self.seen.spec, np.random.default_rng(5))
 
     def act(self, ticks: int = 1, active: bool = True) -> np.ndarray:
@@ -204,7 +204,8 @@ def test_an_obstacle_during_recovery_starts_it_over(robot):
     assert robot.stage is VectorState.VECTOR
 
 
-def test_a_spinning_robot_adds_a_wander_force_while_avoiding(robot):
+def test_a_spinning_robot_adds_a_wander_force_while_avoiding():
+    robot = Robot(quirks=Quirks(obstacle_behind_counts=True))
     robot.go()
     robot.keep(9.0, 10.1)
     robot.act()
@@ -227,10 +228,20 @@ def test_obstacles_are_ignored_near_the_goal(robot):
     assert robot.stage is VectorState.VECTOR
 
 
+def test_near_the_goal_obstacles_are_avoided_if_approach_ignores_obstacles_is_off():
+    robot = Robot(parameters={"approach_ignores_obstacles": False})
+    robot.go()
+    robot.keep(GOAL[0] - 0.1, GOAL[1])
+    robot.act()
+    robot.seen.obstacle(0.0)
+    robot.act()
+    assert robot.stage is VectorState.AVOIDANCE
+
+
 def test_an_obstacle_wins_over_arriving(robot):
     robot.go()
     robot.seen.ground("object")
-    robot.seen.obstacle(math.pi)
+    robot.seen.obstacle(math.pi / 2)
     robot.keep(*GOAL)  # from afar at once: the last arrival force was outside the slowing radius
     robot.act()
     assert robot.stage is VectorState.AVOIDANCE

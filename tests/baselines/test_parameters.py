@@ -35,11 +35,20 @@ def test_unknown_parameter_names_the_nearest_one():
         CRWPolicy(wander_speed=0.1)
 
 
-@pytest.mark.parametrize("field", [field.name for field in dataclasses.fields(MemoryParameters)])
+NUMBERS = [field.name for field in dataclasses.fields(MemoryParameters) if not isinstance(field.default, bool)]
+
+
+@pytest.mark.parametrize("field", NUMBERS)
 @pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf"), True, "1"])
 def test_every_parameter_must_be_a_finite_number_from_zero(field, value):
     with pytest.raises(ParameterError, match=field):
         MemoryParameters(**{field: value})
+
+
+@pytest.mark.parametrize("value", [1, 0.0, "yes", None])
+def test_a_switch_must_be_true_or_false(value):
+    with pytest.raises(ParameterError, match="approach_ignores_obstacles to be True or False"):
+        MemoryParameters(approach_ignores_obstacles=value)
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,8 @@ CACHE = (72, 40)
 """Centre cell of the cache at (14.5, 8.1) m; its square is 11.4 .. 17.6 m by 5.0 .. 11.2 m."""
 CACHE_SEEN = (7, CACHE, 12)
 HARVESTS = [Task.GENERALIST, Task.HARVESTER, Task.STARTER, Task.FINISHER]
+NEARER = (36, 40)
+"""Centre cell of a cache at (7.3, 8.1) m, nearer to the nest than the other."""
 COLLECTS = [Task.COLLECTOR, Task.TRANSFERER, Task.CACHE_COLLECTOR]
 TO_NEST = [Task.GENERALIST, Task.COLLECTOR, Task.CACHE_COLLECTOR]
 
@@ -75,7 +77,7 @@ def wait_for_drop(robot: TaskRobot, task: Task) -> np.ndarray:
         robot.act()
         robot.seen.pose(16.1, 2.7)  # the object at (16.1, 2.1) is out of the window, but near
     else:
-        cell = (120, 40) if task is Task.TRANSFERER else CACHE
+        cell = NEARER if task is Task.TRANSFERER else CACHE
         robot.seen.pose(20.5, 8.1)
         robot.seen.caches((8, cell, 5))
         robot.act()
@@ -425,12 +427,60 @@ def test_a_transferer_adds_to_another_cache_than_it_took_from(robot):
     assert robot.stage is VectorState.IDLE, "the only cache known is the one it came from"
 
 
+@pytest.mark.parametrize(
+    ("cell", "quirks", "goes"),
+    [
+        (NEARER, Quirks(), True),
+        ((120, 40), Quirks(), False),
+        ((-1, 0), Quirks(), False),
+        ((120, 40), Quirks(transferer_goes_anywhere=True), True),
+    ],
+)
+def test_a_transferer_goes_towards_the_nest(cell, quirks, goes):
+    robot = TaskRobot(quirks=quirks)
+    pick_up(robot, Task.TRANSFERER)
+    robot.seen.pose(20.5, 8.1)
+    if cell != (-1, 0):  # else only its own is known
+        robot.know_cache(8, cell, 5)
+    robot.act()
+    assert (robot.stage is VectorState.VECTOR) == goes
+    if goes:
+        assert robot.record.target == 8
+
+
+def test_only_transferers_mind_the_way_to_the_nest(robot):
+    pick_up(robot, Task.TRANSFERER)
+    assert robot.record.cargo_from_nest_m == pytest.approx(math.dist((14.5, 8.1), (3.2, 8.0)))
+    robot.seen.carry(None)
+    robot.act()
+    pick_up(robot, Task.HARVESTER)
+    assert robot.record.cargo_from_nest_m == math.inf
+
+
+@pytest.mark.parametrize("by_identity", [False, True])
+def test_quirk_cache_goal_by_identity(by_identity):
+    robot = TaskRobot(quirks=Quirks(cache_goal_by_identity=by_identity))
+    robot.start(Task.COLLECTOR)
+    robot.finish_soon()
+    robot.seen.pose(22.0, 8.1)
+    robot.seen.caches(CACHE_SEEN)
+    robot.act(3)
+    goal = robot.goal
+    assert robot.record.target == CACHE_SEEN[0]
+    robot.seen.caches((CACHE_SEEN[0] + 1, *CACHE_SEEN[1:]))  # used up and created again in the same place
+    robot.act()
+    assert robot.stage is (VectorState.IDLE if by_identity else VectorState.VECTOR)
+    robot.act()
+    assert robot.stage is VectorState.VECTOR
+    assert (robot.goal == goal) != by_identity, "chosen anew, so another point in it"
+
+
 @pytest.mark.parametrize("next_task", [Task.TRANSFERER, Task.COLLECTOR])
 def test_caches_of_a_transfer_are_left_alone_by_the_next_transfer_only(robot, next_task):
     wait_for_drop(robot, Task.TRANSFERER)
     robot.policy._constants["partition_gamma"] = 1e9 if next_task is Task.TRANSFERER else 0.0
     robot.policy._constants["tab_gamma"] = 0.0
-    drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, (120, 40), 6))
+    drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, NEARER, 6))
     assert robot.task is next_task
     shunned = next_task is Task.TRANSFERER
     marks = {int(cache.serial): (bool(cache.no_pickup), bool(cache.no_drop)) for cache in robot.memory.caches[:2]}
@@ -441,7 +491,7 @@ def test_a_transfer_that_moved_nothing_ends_the_shielding_of_caches(robot):
     wait_for_drop(robot, Task.TRANSFERER)
     robot.policy._constants["partition_gamma"] = 1e9
     robot.policy._constants["tab_gamma"] = 0.0
-    drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, (120, 40), 6))
+    drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, NEARER, 6))
     assert any(cache.no_drop for cache in robot.memory.caches[:2])
     give_up(robot)
     assert robot.task is Task.TRANSFERER

@@ -293,7 +293,7 @@ def test_stuck_finds_nobody_and_says_so(command):
 
 
 def test_stuck_shows_a_table_and_fails(command):
-    code, out, _ = command(*STUCK, "--moved", "100", "--seeds", "2", "--quirks")
+    code, out, _ = command(*STUCK, "--moved", "100", "--seeds", "2", "--set", "quirks=AUTHORS_PROGRAM")
     assert code == 1
     for word in ("policy", "seed", "robot", "place m", "dpo", "acquire, exploring for"):
         assert word in out
@@ -387,6 +387,7 @@ def test_help_loads_neither_physics_nor_tables():
         (("run", "--scenario", "search_and_rescue", "--side", "33"), "Expected side_m to be one of"),
         (("run", "--caches", "foo"), "Expected caches to be one of none, static, dynamic, got 'foo'"),
         (("run", "--set", "n_robot=5"), "Unknown scenario field 'n_robot'. Did you mean 'n_robots'?"),
+        (("run", "--set", "quirks=PROGRAM"), "Unknown reading 'PROGRAM'. Did you mean 'AUTHORS_PROGRAM'?"),
         (("run", "--set", "n_robots"), "Expected --set key=value, got 'n_robots'"),
         (("run", "--set", "n_robots=x"), "Expected n_robots to be a whole number, got 'x'"),
         (("run", "--set", "dt_s=fast"), "Expected dt_s to be a number, got 'fast'"),

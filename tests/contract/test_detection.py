@@ -40,38 +40,43 @@ def test_ring_sum_adds_polar_vectors(readings):
 
 
 @given(readings=ring, scale=st.sampled_from([1.0, 0.1, 0.02]))
-def test_obstacle_is_a_long_vector_or_one_that_points_back(readings, scale):
+def test_obstacle_is_a_long_vector_within_the_field_of_view(readings, scale):
     readings = readings * np.float32(scale)
     vector = vector_of(readings)
     length, angle = abs(vector), abs(math.atan2(vector.imag, vector.real))
     if length > 1e-5 and abs(length - OBSTACLE_LENGTH) > 1e-6 and abs(angle - FAR_BEHIND_RAD) > 1e-6:
-        assert sees_obstacle(readings) == (length > OBSTACLE_LENGTH or angle > FAR_BEHIND_RAD)
+        assert sees_obstacle(readings, False) == (length > OBSTACLE_LENGTH and angle <= FAR_BEHIND_RAD)
+        # The authors' program takes anything behind for an obstacle, too.
+        assert sees_obstacle(readings, True) == (length > OBSTACLE_LENGTH or angle > FAR_BEHIND_RAD)
 
 
 @pytest.mark.parametrize(
-    ("length", "angle", "obstacle"),
+    ("length", "angle", "described", "program"),
     [
-        (0.0, 0.0, False),
-        (0.0999, 0.0, False),
-        (0.1001, 0.0, True),
-        (0.1001, -1.5, True),
-        (0.001, 2.60, False),
-        (0.001, 2.62, True),
-        (0.001, -2.60, False),
-        (0.001, -2.62, True),
-        (0.001, math.pi, True),
+        (0.0, 0.0, False, False),
+        (0.0999, 0.0, False, False),
+        (0.1001, 0.0, True, True),
+        (0.1001, -1.5, True, True),
+        (0.1001, 2.60, True, True),
+        (0.5, 2.62, False, True),
+        (0.001, 2.60, False, False),
+        (0.001, 2.62, False, True),
+        (0.001, -2.60, False, False),
+        (0.001, -2.62, False, True),
+        (0.001, math.pi, False, True),
     ],
 )
-def test_obstacle_thresholds(length, angle, obstacle):
-    assert is_obstacle_vector(length * math.cos(angle), length * math.sin(angle)) == obstacle
+def test_obstacle_thresholds(length, angle, described, program):
+    vector = (length * math.cos(angle), length * math.sin(angle))
+    assert [is_obstacle_vector(*vector, behind_counts) for behind_counts in (False, True)] == [described, program]
 
 
 def test_one_reading_at_full_range_is_an_obstacle():
     readings = np.zeros(24, np.float32)
     readings[3] = 0.1004
-    assert sees_obstacle(readings)
+    assert sees_obstacle(readings, False)
     readings[3] = 0.0996
-    assert not sees_obstacle(readings)
+    assert not sees_obstacle(readings, False)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +162,7 @@ def test_facing_robots_see_each_other_from_27_cm(stage, apart, obstacle):
     put(stage, 0, 16.0, 8.0, 0.0)
     put(stage, 1, 16.0 + apart, 8.0, math.pi)
     put(stage, 2, 20.0, 8.0)
-    assert [sees_obstacle(sensed(stage, "proximity", robot)) for robot in (0, 1)] == [obstacle, obstacle]
+    assert [sees_obstacle(sensed(stage, "proximity", robot), False) for robot in (0, 1)] == [obstacle, obstacle]
     assert stage.events.interfering.tolist() == [obstacle, obstacle, False]
 
 
@@ -165,17 +170,17 @@ def test_facing_robots_see_each_other_from_27_cm(stage, apart, obstacle):
 def test_walls_are_seen_from_a_reach_beyond_the_body(stage, gap, obstacle):
     # Beam 0 points 7.5 degrees off; turned by that it meets the wall at a right angle.
     put(stage, 0, 31.6 - 0.085036758 - gap, 8.0, -math.radians(7.5))
-    assert sees_obstacle(sensed(stage, "proximity")) == obstacle
+    assert sees_obstacle(sensed(stage, "proximity"), False) == obstacle
 
 
 @pytest.mark.parametrize("apart", [0.18, 0.2, 0.22, 0.25])
 @pytest.mark.parametrize("heading", np.linspace(0.0, 3.0, 13))
 def test_equal_obstacles_on_opposite_sides_cancel(stage, heading, apart):
     put(stage, 0, 16.0, 8.0, heading)
-    put(stage, 1, 16.0 + apart, 8.0)
-    put(stage, 2, 16.0 - apart, 8.0)
+    put(stage, 1, 16.0 + apart, 8.0, math.pi)
+    put(stage, 2, 16.0 - apart, 8.0, 0.0)
     readings = sensed(stage, "proximity")
     assert readings.max() > 0.1
-    assert not sees_obstacle(readings)
+    assert not sees_obstacle(readings, True)
     assert not stage.events.interfering[0]
     assert stage.events.interfering[1:].all()

@@ -18,6 +18,7 @@ from swarm_forage_env.policies.interface import (
 )
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.reference.compact_view import compact_row
 from tests.support.stage import NEST_CELL, OPEN_CELL, build_cache, cell_centre, lay, load, put, stand, tidy_world
@@ -32,10 +33,11 @@ def bound(env: ForageEnv, **choices) -> LearnerInterface:
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
-@pytest.mark.parametrize("noise", [0.0, 0.05])
-def test_the_compact_view_matches_its_twin_along_runs(caches, noise):
+@pytest.mark.parametrize(("noise", "behind_counts"), [(0.0, False), (0.05, False), (0.05, True)])
+def test_the_compact_view_matches_its_twin_along_runs(caches, noise, behind_counts):
     env = ForageEnv(scenario("warehouse_small", n_robots=30, n_objects=300, width_m=16.0, nest_centre_m=(1.6, 8.0),
-                             nest_size_m=(1.6, 12.8), caches=caches))  # fmt: skip
+                             nest_size_m=(1.6, 12.8), caches=caches,
+                             quirks=Quirks(obstacle_behind_counts=behind_counts)))  # fmt: skip
     stack = parse_wrapper(f"sensor_noise:sigma={noise}").wrap(env) if noise else env
     policy = load_policy({"none": "dpo", "static": "stochm", "dynamic": "stochx"}[caches])
     policy.reset(env.swarm_spec, stream_rng(0, Stream.POLICY))
@@ -49,7 +51,7 @@ def test_the_compact_view_matches_its_twin_along_runs(caches, noise):
             env.set_population(active=~away & (np.arange(30) != 5), present=~away)
         if tick % 7 == 0:
             view = interface.observe(obs)
-            expected = np.array([compact_row(row, env.layout) for row in obs])
+            expected = np.array([compact_row(row, env.layout, behind_counts=behind_counts) for row in obs])
             np.testing.assert_allclose(view, expected, atol=1e-5)
             assert view.min() >= -1.0
             assert view.max() <= 1.0

@@ -28,7 +28,7 @@ def direction(dx: float, dy: float, cos: float, sin: float) -> list[float]:
     return [(dx * cos + dy * sin) / length, (dy * cos - dx * sin) / length, 1.0]
 
 
-def compact_row(row: np.ndarray, layout: ObservationLayout) -> list[float]:
+def compact_row(row: np.ndarray, layout: ObservationLayout, *, behind_counts: bool = False) -> list[float]:
     """One robot's compact view."""
     part = {name: row[layout[name]] for name in layout.names}
     cos, sin = (float(value) for value in part["heading"])
@@ -40,7 +40,8 @@ def compact_row(row: np.ndarray, layout: ObservationLayout) -> list[float]:
 
     px, py = ring_vector(part["proximity"])
     length = math.hypot(px, py)
-    obstacle = length > 0.1 or (length > 1e-6 and abs(math.atan2(py, px)) > 2.61)
+    is_behind = abs(math.atan2(py, px)) > 2.61
+    obstacle = length > 1e-6 if is_behind and behind_counts else length > 0.1 and not is_behind
     lx, ly = ring_vector(part["light"])
     light = math.hypot(lx, ly)
 

@@ -135,7 +135,9 @@ class ReferenceRobot:
         elif not carrying and (self.state.startswith("homing") or (self.state == "wait for pick-up" and failed)):
             self.restart()
         elif not carrying and self.state == "wait for drop":
-            self.state = "leave nest"
+            self.restart()
+            if self.spec.quirks.nest_left_at_random:
+                self.state = "leave nest"
         if self.state == "leave nest" and not self.sees(0.6, 0.8, 3):
             self.restart()
 
@@ -152,9 +154,10 @@ class ReferenceRobot:
         return self.sees(-0.05, 0.05, 4)
 
     def obstacle(self) -> bool:
-        if abs(self.away) < 1e-12:
-            return False
-        return abs(self.away) > 0.1 or abs(cmath.phase(self.away)) > 2.61
+        is_behind = abs(cmath.phase(self.away)) > 2.61
+        if self.spec.quirks.obstacle_behind_counts and abs(self.away) > 1e-6 and is_behind:
+            return True
+        return abs(self.away) > 0.1 and not is_behind
 
     def avoid(self) -> complex:
         return with_length(-self.away, 8.0) if self.obstacle() else 0j

@@ -45,12 +45,14 @@ def proximity(env: ForageEnv, robot: int) -> list[float]:
 
 
 def interferes(env: ForageEnv, robot: int) -> bool:
-    """Whether a robot at work is in interference: its beams add up to more than 0.1, or point behind it."""
+    """Whether a robot at work is in interference: its beams add up to more than 0.1 in its field of view."""
     beams = zip(proximity(env, robot), RING_DEG, strict=True)
     away = sum(cmath.rect(value, math.radians(ring_deg)) for value, ring_deg in beams)
-    if not env.active[robot] or abs(away) < 1e-12:
+    if not env.active[robot] or abs(away) < 1e-6:
         return False
-    return abs(away) > 0.1 or abs(cmath.phase(away)) > 2.61
+    if abs(cmath.phase(away)) > 2.61:
+        return env.scenario.quirks.obstacle_behind_counts
+    return abs(away) > 0.1
 
 
 def light(env: ForageEnv, robot: int) -> list[float]:

@@ -59,6 +59,9 @@ class ReferenceTaskRobot(ReferenceRobot):
     job: str = ""
     caches: dict[Cell, RememberedCache] = field(default_factory=dict)
     last_cache: Cell | None = None
+    cargo_from: Cell | None = None
+    """Cache of the object that a Cache Transferer carries."""
+    goal_serial: int = 0
     shunned: set[int] = field(default_factory=set)
     shunned_now: bool = False
     shunned_cache_now: bool = False
@@ -125,6 +128,8 @@ class ReferenceTaskRobot(ReferenceRobot):
         return all(abs(cell[k] - own_cell[k]) <= half + 2 for k in range(2))
 
     def know(self, serial: int, cell: Cell, count: int, density: float = 1.0) -> None:
+        if self.spec.quirks.last_cache_at_every_sight and list(self.caches) == [cell]:
+            self.last_cache = cell
         if cell not in self.caches or self.caches[cell].serial != serial:
             self.caches[cell] = RememberedCache(serial, count, density)
             for row, (lies, _) in list(self.memory.known.items()):
@@ -144,8 +149,10 @@ class ReferenceTaskRobot(ReferenceRobot):
         if self.carrying and self.state in ("acquire", "wait for pick-up"):
             self.set_out(onward)
             self.memory.known.pop(round(self.senses["cargo"][0] * self.spec.n_objects) - 1, None)
+            self.cargo_from = None
             if self.job == "transferer" and known:
                 known.no_drop = self.shunned_cache_now = True
+                self.cargo_from = cell
             return
         if self.carrying and self.state == "wait for drop" and failed:
             self.set_out(onward)
@@ -304,18 +311,25 @@ class ReferenceTaskRobot(ReferenceRobot):
             return goal is not None
         return self.choose_cache() if self.kind == "cache" else self.choose_isolated()
 
+    def nest_distance(self, cell: Cell) -> float:
+        return math.dist(((cell[0] + 0.5) * 0.2, (cell[1] + 0.5) * 0.2), self.spec.nest_centre_m)
+
     def choose_cache(self) -> bool:
-        utilities = {}
+        utilities, serials = {}, {}
         for cell, cache in self.caches.items():
             centre = ((cell[0] + 0.5) * 0.2, (cell[1] + 0.5) * 0.2)
             taking = self.state == "acquire"
             unwanted = cache.no_pickup or cache.count < self.smallest_cache if taking else cache.no_drop
+            if not taking and self.cargo_from and not self.spec.quirks.transferer_goes_anywhere:
+                unwanted = unwanted or self.nest_distance(cell) >= self.nest_distance(self.cargo_from)
             if not unwanted and not self.covered(cell, tuple(self.position)):
                 away = math.dist(centre, self.position) * math.dist(centre, self.spec.nest_centre_m)
                 utilities[centre] = math.exp(cache.density) * cache.count / away
+                serials[centre] = cache.serial
         if not utilities:
             return False
         centre = max(utilities, key=lambda key: utilities[key])
+        self.goal_serial = serials[centre]
         spread = self.spec.cache_side_m - 0.4
         self.goal = (centre[0] + spread * (self.draws[8] - 0.5), centre[1] + spread * (self.draws[9] - 0.5))
         self.tolerance = 0.02
@@ -347,7 +361,9 @@ class ReferenceTaskRobot(ReferenceRobot):
             return self.target in self.memory.known
         if self.kind == "cache":
             holding = [cache for cell, cache in self.caches.items() if self.covered(cell, self.goal)]
-            return bool(holding) and (self.state == "transport" or holding[0].count >= self.smallest_cache)
+            if not holding or (self.spec.quirks.cache_goal_by_identity and holding[0].serial != self.goal_serial):
+                return False
+            return self.state == "transport" or holding[0].count >= self.smallest_cache
         return True
 
     def reached(self) -> bool:

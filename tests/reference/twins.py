@@ -95,6 +95,9 @@ TWINS = {
         "object_walk.walk_slowly", "world/test_object_motion.py", "swarm_forage_env.world.object_motion.walk_objects"
     ),
     "swarm_forage_env.wrappers.kernels.noise.perturb_readings": NOISE,
+    "swarm_forage_env.wrappers.kernels.noise.share_that_sees_obstacles": Twin(
+        "sensing.interferes", "wrappers/test_noise.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
+    ),
     "swarm_forage_env.wrappers.kernels.noise.turn_heading": NOISE,
     "swarm_forage_env.wrappers.kernels.task_shares.add_task_shares": Twin(
         "task_shares.task_shares",

@@ -1,15 +1,19 @@
 """Interference: which robots lose time to avoidance, measured by one rule from true readings."""
 
+import math
+
 import numpy as np
 import pytest
 
 from swarm_forage_env.contract.codes import Counter, Grip
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import Quirks
 from tests.reference import sensing
 from tests.support.stage import act, lay, load, put, stand, tidy_world
 
-PAIR = ((16.0, 8.0), (16.25, 8.0))
+PAIR = ((16.0, 8.0, 0.0), (16.25, 8.0, math.pi))
+"""Places and headings of two robots that face each other."""
 
 
 def met(env: ForageEnv, *rows: int) -> None:
@@ -29,6 +33,15 @@ def test_robots_that_meet_interfere_and_others_do_not():
     assert env.events.interference_sum[0] == pytest.approx(2 / 4)
 
 
+@pytest.mark.parametrize("quirks", [Quirks(), Quirks(obstacle_behind_counts=True)], ids=["described", "program"])
+def test_who_is_behind_interferes_in_the_program_only(quirks):
+    env = tidy_world(quirks=quirks)
+    met(env, 0, 1)
+    put(env, 1, 16.25, 8.0, 0.0)  # turns its back to robot 0
+    act(env, {})
+    assert env.events.interfering.tolist() == [True, quirks.obstacle_behind_counts, False, False]
+
+
 def test_walls_interfere_too():
     env = tidy_world()
     put(env, 0, 31.6 - 0.1, 8.0)
@@ -41,7 +54,7 @@ def test_every_state_counts():
     met(env, 0, 1)
     lay(env, 0, (80, 40))
     stand(env, 0, (80, 40))
-    put(env, 1, 16.35, 8.1)
+    put(env, 1, 16.35, 8.1, math.pi)
     load(env, 1, 1)
     act(env, {0: Grip.GRASP})
     assert env.swarm.pending_kind[0] != 0
@@ -88,8 +101,9 @@ def test_counters_are_sums_over_ticks():
     assert env.events.interference_sum[0] == pytest.approx(5 * 2 / 4)
 
 
-def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings():
-    env = ForageEnv(scenario("warehouse_small", n_robots=60, n_objects=5, start_margin_m=6.5))
+@pytest.mark.parametrize("quirks", [Quirks(), Quirks(obstacle_behind_counts=True)], ids=["described", "program"])
+def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings(quirks):
+    env = ForageEnv(scenario("warehouse_small", n_robots=60, n_objects=5, start_margin_m=6.5, quirks=quirks))
     env.reset_batch(2)
     present, active = np.arange(60) % 12 != 0, np.arange(60) % 6 != 0
     env.set_population(active=active, present=present)

@@ -1,6 +1,7 @@
 """Power-law clusters: how many, how large, where."""
 
 import itertools
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -11,7 +12,15 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, scenario
-from swarm_forage_env.world.clusters import ClusterLaw, cluster_law, draw_clusters, draw_sizes, footprint
+from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.world.clusters import (
+    ClusterLaw,
+    cluster_law,
+    draw_clusters,
+    draw_program_sizes,
+    draw_sizes,
+    footprint,
+)
 from swarm_forage_env.world.kernels.scatter import count_objects
 from swarm_forage_env.world.placement import draw_source, place_all, static_cache_centres
 from swarm_forage_env.world.state import ObjectState
@@ -26,7 +35,8 @@ LAW_TABLE = {
     112: (5, 6, {32}, 44),
     128: (5, 7, {32, 64}, 49),
 }
-"""Side in metres: k_min, k_max, possible sizes, number of clusters."""
+"""Side in metres: k_min, k_max, sizes and number of clusters in the authors' program."""
+PROGRAM = Quirks(large_clusters_likelier=True)
 
 
 def painted(config: ScenarioConfig) -> ObjectState:
@@ -43,7 +53,7 @@ def test_cluster_law_table(side):
     k_min, k_max, sizes, n_clusters = LAW_TABLE[side]
     law = cluster_law(side)
     assert law == ClusterLaw(k_min, k_max, n_clusters)
-    drawn = np.concatenate([draw_sizes(law, np.random.default_rng(seed)) for seed in range(20)])
+    drawn = np.concatenate([draw_program_sizes(law, np.random.default_rng(seed)) for seed in range(20)])
     assert set(drawn.tolist()) == sizes
 
 
@@ -53,9 +63,9 @@ def test_object_counts_are_what_the_smallest_clusters_hold():
 
 
 @pytest.mark.parametrize(("k_min", "k_max"), [(4, 6), (5, 7), (3, 8)])
-def test_larger_sizes_are_more_likely(k_min, k_max):
+def test_larger_sizes_are_more_likely_in_the_program(k_min, k_max):
     n_clusters = 20_000
-    sizes = draw_sizes(ClusterLaw(k_min, k_max, n_clusters), np.random.default_rng(1))
+    sizes = draw_program_sizes(ClusterLaw(k_min, k_max, n_clusters), np.random.default_rng(1))
     exponents = np.arange(k_min, k_max)
     observed = [np.count_nonzero(sizes == 2**k) for k in exponents]
     expected = n_clusters * ((exponents + 1) ** 3 - exponents**3) / (k_max**3 - k_min**3)
@@ -68,13 +78,45 @@ def test_a_single_possible_size():
     # 20 m: both roots round up to the same k, whose cube root must not fall below it.
     law = cluster_law(20.0)
     assert law.k_min == law.k_max == 4
-    assert set(draw_sizes(law, np.random.default_rng(0)).tolist()) == {16}
+    assert set(draw_program_sizes(law, np.random.default_rng(0)).tolist()) == {16}
+    assert set(draw_sizes(law, 2400, np.random.default_rng(0)).tolist()) == {8, 16}
 
 
 def test_sizes_come_largest_first():
-    sizes = draw_sizes(cluster_law(128), np.random.default_rng(3))
-    assert np.all(np.diff(sizes) <= 0)
-    assert len(set(sizes.tolist())) == 2
+    law = cluster_law(128)
+    for sizes in (draw_program_sizes(law, np.random.default_rng(3)), draw_sizes(law, 1568, np.random.default_rng(3))):
+        assert np.all(np.diff(sizes) <= 0)
+        assert len(set(sizes.tolist())) >= 2
+
+
+def test_twice_as_large_is_half_as_likely():
+    law = ClusterLaw(4, 6, 34)
+    sizes = draw_sizes(law, 400_000, np.random.default_rng(1))
+    observed = [np.count_nonzero(sizes == size) for size in (8, 16, 32, 64)]
+    assert len(sizes) - sum(observed) <= 1  # the last one is cut
+    expected = np.array([8, 4, 2, 1]) / 15 * sum(observed)
+    assert chisquare(observed, expected).pvalue > 0.001
+
+
+@pytest.mark.parametrize("n_objects", [1, 3, 4, 5, 80, 81, 368])
+def test_clusters_hold_exactly_the_objects_that_there_are(n_objects):
+    for seed in range(20):
+        sizes = draw_sizes(cluster_law(16), n_objects, np.random.default_rng(seed))
+        assert sizes.sum() == n_objects
+        assert sizes.min() > 0
+
+
+@pytest.mark.parametrize("side", LAW_TABLE)
+def test_every_arena_has_clusters_of_several_sizes_smaller_ones_likelier(side):
+    counts = Counter()
+    for seed in range(40):
+        counts.update(
+            draw_sizes(cluster_law(side), SEARCH_AND_RESCUE_OBJECTS[side], np.random.default_rng(seed)).tolist()
+        )
+    k_min, k_max, *_ = LAW_TABLE[side]
+    whole = [counts[2**k] for k in range(k_min - 1, k_max + 1)]
+    assert len(whole) >= 3
+    assert np.all(np.diff(whole) < 0)
 
 
 @pytest.mark.parametrize(("size", "cells"), [(8, (7, 5)), (16, (8, 6)), (32, (10, 8)), (64, (12, 10))])
@@ -83,14 +125,17 @@ def test_footprint_leaves_space_around_the_objects(size, cells):
 
 
 @pytest.mark.parametrize("side", LAW_TABLE)
+@pytest.mark.parametrize("quirks", [Quirks(), PROGRAM], ids=["described", "program"])
 @pytest.mark.parametrize("caches", ["none", "static"])
-def test_clusters_keep_off_nest_caches_and_each_other(side, caches):
-    config = scenario("search_and_rescue", side_m=side, caches=caches)
+def test_clusters_keep_off_nest_caches_and_each_other(side, caches, quirks):
+    config = scenario("search_and_rescue", side_m=side, caches=caches, quirks=quirks)
     floor = (painted(config) if caches == "static" else ObjectState.empty(config)).floor
     x_low, y_low, x_high, y_high = config.arena.distributable_cells
     for seed in range(5):
         boxes, sizes = draw_clusters(config, floor, np.random.default_rng(seed))
-        assert len(boxes) == len(sizes) == LAW_TABLE[side][3]
+        assert len(boxes) == len(sizes)
+        if quirks == PROGRAM:
+            assert len(boxes) == LAW_TABLE[side][3]
         for box, size in zip(boxes.tolist(), sizes.tolist(), strict=True):
             assert (box[2] - box[0], box[3] - box[1]) == footprint(size)
             assert x_low <= box[0] < box[2] <= x_high
@@ -101,8 +146,9 @@ def test_clusters_keep_off_nest_caches_and_each_other(side, caches):
 
 
 @pytest.mark.parametrize("side", LAW_TABLE)
-def test_preset_counts_always_fit(side):
-    config = scenario("search_and_rescue", side_m=side)
+@pytest.mark.parametrize("quirks", [Quirks(), PROGRAM], ids=["described", "program"])
+def test_preset_counts_always_fit(side, quirks):
+    config = scenario("search_and_rescue", side_m=side, quirks=quirks)
     floor = ObjectState.empty(config).floor
     for seed in range(25):
         source = draw_source(config, floor, stream_rng(seed, Stream.PLACEMENT))
@@ -124,7 +170,7 @@ def test_every_object_lies_in_a_cluster_within_its_capacity(side, seed):
 
 
 def test_source_groups_hold_equal_capacities():
-    config = scenario("search_and_rescue", side_m=128)
+    config = scenario("search_and_rescue", side_m=128, quirks=PROGRAM)
     source = draw_source(config, ObjectState.empty(config).floor, stream_rng(0, Stream.PLACEMENT))
     assert source.group_start[0] == 0
     assert source.group_start[-1] == len(source.regions) == len(source.capacity)
@@ -134,8 +180,8 @@ def test_source_groups_hold_equal_capacities():
         assert (box[2] - box[0], box[3] - box[1]) == footprint(capacity)
 
 
-def test_too_many_objects_for_the_clusters():
-    config = scenario("search_and_rescue", n_objects=369)
+def test_too_many_objects_for_the_clusters_of_the_program():
+    config = scenario("search_and_rescue", n_objects=369, quirks=PROGRAM)
     with pytest.raises(ConfigError, match=r"Expected at most 368 objects for the 23 power-law clusters .* got 369"):
         draw_source(config, ObjectState.empty(config).floor, stream_rng(0, Stream.PLACEMENT))
 
@@ -143,7 +189,7 @@ def test_too_many_objects_for_the_clusters():
 def test_no_room_for_the_clusters():
     config = scenario("search_and_rescue")
     floor = np.full((240, 240), CELL_NEST, np.int32)
-    with pytest.raises(ConfigError, match=r"room for 23 clusters of 16 to 16 objects .* found none in 100 random"):
+    with pytest.raises(ConfigError, match=r"room for \d+ clusters of \d+ to 32 objects .* found none in 100 random"):
         draw_clusters(config, floor, np.random.default_rng(0))
 
 
@@ -158,6 +204,7 @@ def test_an_arena_narrower_than_a_cluster():
         start_margin_m=0.5,
         n_objects=5,
         n_robots=1,
+        quirks=PROGRAM,
     )
     # 8 distributable cells across; a cluster of 32 objects needs 10.
     with pytest.raises(ConfigError, match="Expected room for 29 clusters of 16 to 32 objects"):

@@ -21,6 +21,7 @@ from swarm_forage_env.wrappers.noise import (
 )
 from swarm_forage_env.wrappers.waveform import Waveform
 from tests.reference.adversity import by_group, noisy_row
+from tests.reference.sensing import interferes
 from tests.support.fake_arena import FakeArena
 from tests.support.stage import assert_same_world, snapshot, tidy_world
 
@@ -252,11 +253,11 @@ def test_sigma_may_follow_a_waveform():
 
 STUDY_TABLE = [
     # sigma, false obstacle per tick, all four sensors show the object, three of four show the nest or a cache
-    (0.0043, 0.16, 1.00, 1.00),
-    (0.0129, 0.16, 1.00, 1.00),
-    (0.017, 0.175, 0.99, 1.00),
+    (0.0043, 0.168, 1.00, 1.00),
+    (0.0129, 0.170, 1.00, 1.00),
+    (0.0171, 0.184, 0.99, 1.00),
     (0.021, 0.22, 0.96, 1.00),
-    (0.030, 0.37, 0.82, 1.00),
+    (0.030, 0.379, 0.82, 1.00),
     (0.043, 0.57, 0.60, 1.00),
     (0.050, 0.66, 0.50, 0.99),
     (0.071, 0.81, 0.33, 0.88),
@@ -279,7 +280,17 @@ def test_decisions_under_the_noise_of_the_study(world, sigma, obstacle, object_s
         """Half a unit of the last printed place, and four standard errors."""
         return 0.0051 + 4 * np.sqrt(probability * (1 - probability) / (samples * ROBOTS))
 
-    assert share(sees_obstacle, "proximity", 0.0) == pytest.approx(obstacle, abs=tolerance(obstacle))
+    def described(row):
+        return sees_obstacle(row, False)
+
+    def program(row):
+        return sees_obstacle(row, True)
+
+    # A sum of 24 clamped draws is nearly normal along each axis, with this variance; the field of view is 2.61 of pi.
+    variance = 12 * sigma**2 * (1 / 2 - 1 / (2 * np.pi))
+    long_ahead = 2.61 / np.pi * np.exp(-(0.1**2) / (2 * variance))
+    assert share(described, "proximity", 0.0) == pytest.approx(long_ahead, abs=tolerance(long_ahead))
+    assert share(program, "proximity", 0.0) == pytest.approx(obstacle, abs=tolerance(obstacle))
     assert share(sees_object, "ground", 0.0) == pytest.approx(object_seen, abs=tolerance(object_seen))
     assert share(sees_nest, "ground", 179 / 255) == pytest.approx(area_seen, abs=tolerance(area_seen))
     assert share(sees_cache, "ground", 102 / 255) == pytest.approx(area_seen, abs=tolerance(area_seen))
@@ -451,3 +462,30 @@ def test_nonsense_about_sensors_is_refused(fields, message):
 def test_nonsense_about_actuators_is_refused(fields, message):
     with pytest.raises(ConfigError, match=message):
         ActuatorNoiseConfig(**fields)
+
+
+def test_the_believed_share_of_interference_counts_false_obstacles():
+    env = ForageEnv(scenario("warehouse_small", n_robots=40, n_objects=5, start_margin_m=6.5, interval_s=2.0))
+    stack = SensorNoise(env, SensorNoiseConfig(sigma=0.03, groups=("proximity",)))
+    stack.reset_batch(0)
+    believed, true = [], []
+    for _ in range(10):
+        obs, *_ = stack.step_batch(np.zeros((40, 3), np.float32))
+        rings = obs[:, env.layout["proximity"]]
+        believed.append(np.mean([sees_obstacle(ring, False) for ring in rings]))
+        true.append(np.mean([interferes(env, robot) for robot in range(40)]))
+    assert stack.interval_columns() == {"believed_interference_fraction": pytest.approx(np.mean(believed))}
+    assert np.mean(believed) > np.mean(true) + 0.1
+    # The next interval starts anew, and robots in repair do not count.
+    env.set_population(active=np.arange(40) < 10, present=np.ones(40, bool))
+    obs, *_ = stack.step_batch(np.zeros((40, 3), np.float32))
+    expected = np.mean([sees_obstacle(ring, False) for ring in obs[:10, env.layout["proximity"]]])
+    assert stack.interval_columns()["believed_interference_fraction"] == pytest.approx(expected)
+
+
+def test_without_noise_on_proximity_robots_believe_what_is_true():
+    env = ForageEnv(scenario("warehouse_small", n_robots=40, n_objects=5, start_margin_m=6.5))
+    stack = SensorNoise(env, SensorNoiseConfig(sigma=0.03, groups=("light", "position")))
+    stack.reset_batch(0)
+    stack.step_batch(np.zeros((40, 3), np.float32))
+    assert stack.interval_columns()["believed_interference_fraction"] == env.events.interference_sum[0] > 0

@@ -77,11 +77,14 @@ def write_direction(out: ObsArray, at: int, x: float, y: float, cos: float, sin:
 
 
 @kernel
-def compact_view(obs: ObsArray, starts: tuple[int, ...], half_x: float, half_y: float, out: ObsArray) -> None:
+def compact_view(
+    obs: ObsArray, starts: tuple[int, ...], half_x: float, half_y: float, behind_counts: bool, out: ObsArray
+) -> None:
     """Write the compact view (N, COMPACT_COLUMNS) of observations (N, D); rows of zeros stay zeros.
 
     `starts` = first columns of proximity, light, ground, wheel_speed, position, heading, carrying, interacting,
-    active, los_cell, los_object, los_cache; `half_x`, `half_y` = half the arena, m.
+    active, los_cell, los_object, los_cache; `half_x`, `half_y` = half the arena, m; `behind_counts` = quirk
+    `obstacle_behind_counts`.
     """
     for i in range(obs.shape[0]):
         row = obs[i]
@@ -96,7 +99,7 @@ def compact_view(obs: ObsArray, starts: tuple[int, ...], half_x: float, half_y: 
         share = 1.0 / max(1.0, math.sqrt(x * x + y * y))
         view[0] = x * share
         view[1] = y * share
-        view[2] = 1.0 if is_obstacle_vector(x, y) else 0.0
+        view[2] = 1.0 if is_obstacle_vector(x, y, behind_counts) else 0.0
         x, y = ring_sum(row[starts[1] : starts[1] + RING_SENSORS])
         length = math.sqrt(x * x + y * y)
         share = 1.0 / length if length > 0.0 else 0.0

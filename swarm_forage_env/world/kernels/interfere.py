@@ -16,6 +16,7 @@ def mark(
     obs: ObsArray,
     proximity: int,
     near: BoolArray,
+    behind_counts: bool,
     active: BoolArray,
     present: BoolArray,
     interfering: BoolArray,
@@ -27,7 +28,8 @@ def mark(
     n_active = 0
     n_present = 0
     for i in range(active.shape[0]):
-        flag = active[i] and near[i] and sees_obstacle(obs[i, proximity : proximity + RING_SENSORS])
+        ring = obs[i, proximity : proximity + RING_SENSORS]
+        flag = active[i] and near[i] and sees_obstacle(ring, behind_counts)
         interfering[i] = flag
         n_interfering += flag
         n_active += active[i]

@@ -3,6 +3,8 @@
 import math
 
 from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.detection import sees_obstacle
+from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 
 
@@ -62,6 +64,25 @@ def turn_heading(
         # Rounding to float32 can leave the unit circle by one unit in the last place.
         obs[i, start] = min(1.0, max(-1.0, x * cos - y * sin))
         obs[i, start + 1] = min(1.0, max(-1.0, x * sin + y * cos))
+
+
+@kernel
+def share_that_sees_obstacles(obs: ObsArray, proximity: int, active: BoolArray, behind_counts: bool) -> float:
+    """Share of active robots that see an obstacle in (N, D) observations; 0 if no robot is active.
+
+    Args:
+        obs: (N, D).
+        proximity: First column of the proximity readings.
+        active: (N,) robots at work.
+        behind_counts: Quirk `obstacle_behind_counts`.
+    """
+    n_active = 0
+    n_seeing = 0
+    for i in range(obs.shape[0]):
+        if active[i]:
+            n_active += 1
+            n_seeing += sees_obstacle(obs[i, proximity : proximity + RING_SENSORS], behind_counts)
+    return n_seeing / n_active if n_active > 0 else 0.0
 
 
 @kernel
