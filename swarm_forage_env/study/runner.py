@@ -83,8 +83,8 @@ def run_all(
 
     Args:
         specs: What to run; equal ones count once.
-        store: Where records and failures go as they happen. Runs it already holds are read, not repeated;
-            failed ones are tried again.
+        store: Where records and failures go as they happen. Runs it already holds are read, not repeated, and have
+            the performance that their specification asks for; failed ones are tried again.
         executor: Runs the work; default a pool of local processes. It is not shut down.
         jobs: Processes of the default pool, default one per available core; 1 = in this process.
         progress: Show progress and an estimate on stderr.
@@ -97,7 +97,8 @@ def run_all(
     planned = {spec.run_id: spec for spec in specs}
     outcomes: dict[str, Outcome] = {}
     if store is not None:
-        outcomes |= {run_id: store.read(run_id) for run_id in planned if run_id in store}
+        stored = {run_id: spec for run_id, spec in planned.items() if run_id in store}
+        outcomes |= {run_id: store.read(run_id).read_as(spec.scenario.performance) for run_id, spec in stored.items()}
     n_stored = len(outcomes)
     todo = [spec for run_id, spec in planned.items() if run_id not in outcomes]
     versions = software_versions()

@@ -9,12 +9,20 @@ def mark_interference(swarm: SwarmState, events: StepEvents, obs: ObsArray, prox
     """Flag active robots for which the obstacle rule holds in this tick, walls included.
 
     Args:
-        swarm: Read: active, present.
+        swarm: Read: active, present, carried_object.
         events: Written: interfering, counters, interference_sum (share of active robots, 0/0 = 0).
         obs: (N, D) with true proximity readings.
         proximity: Column of the first of them.
         near: (N,) whether any beam may have hit something; others are skipped.
     """
     mark(
-        obs, proximity, near, swarm.active, swarm.present, events.interfering, events.counters, events.interference_sum
+        obs,
+        proximity,
+        near,
+        swarm.active,
+        swarm.present,
+        swarm.carried_object,
+        events.interfering,
+        events.counters,
+        events.interference_sum,
     )
