@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .scaling import efficiency, raw_performance, scalability, skipped_intervals
     from .scoring import (
         Comparison,
+        Performance,
         Score,
         ScoreTable,
         compare_policies,
@@ -44,6 +45,7 @@ __all__ = [
     "Score",
     "ScoreTable",
     "Comparison",
+    "Performance",
     # interference
     "t_lost_fraction",
     "performance_lost",
@@ -132,6 +134,7 @@ _HOMES = {
     "skipped_intervals": "scaling",
     "Comparison": "scoring",
     "Score": "scoring",
+    "Performance": "scoring",
     "ScoreTable": "scoring",
     "compare_policies": "scoring",
     "compare_tables": "scoring",

@@ -66,6 +66,10 @@ class StudyCurves:
     experiments: tuple[RunCurves, ...]
     t_end_s: FloatArray | None
     """Ends of the intervals, (T,); None if the table has no such column."""
+    amount: str = "objects"
+    """What there is so and so much of in a performance."""
+    is_total: bool = True
+    """Whether performance is a total over its interval, like deliveries; else it is a mean, a ratio, a share."""
     where: str = "the table"
     """Name of the table in error messages."""
 
@@ -73,6 +77,13 @@ class StudyCurves:
     def horizon_s(self) -> float | None:
         """Length of a run in seconds, where known."""
         return None if self.t_end_s is None else float(self.t_end_s[-1])
+
+    @property
+    def span(self) -> str:
+        """What the sum of performance over a run is a sum over, in words for units: "objects in 4,000 s"."""
+        if not self.is_total:
+            return "summed over intervals"
+        return "per run" if self.horizon_s is None else f"in {self.horizon_s:,.0f} s"
 
     def sizes(self) -> tuple[RunCurves, ...]:
         """Return the experiments that vary the swarm size, smallest first."""
