@@ -86,6 +86,9 @@ _READINGS = (
 PERFORMANCE_COLUMNS = {reading.name: reading for reading in _READINGS}
 """Columns of a record that can be its performance: all numbers but the clock (`interval`, `t_end_s`)."""
 
+_NAME_OF_WORDS = {entry.title.replace("-", "").replace(" ", "_"): entry.name for entry in _READINGS}
+"""What people may type who know a column from tables, "deliveries" or "first_pickups" -> its name."""
+
 ABSENT = {"task_share_none": 1.0}
 """What a column counts as that a run does not have, because nothing in it writes one; others 0. Without a population
 wrapper nobody dies; if a policy tells no tasks, all of its robots are without one."""
@@ -140,9 +143,10 @@ def reading(name: str) -> Reading:
     found = _FORMULAS[own][0] if own in _FORMULAS else PERFORMANCE_COLUMNS.get(own)
     if found is None:
         known = [sign + each for each in (*PERFORMANCE_COLUMNS, *_FORMULAS)]
+        meant = sign + _NAME_OF_WORDS.get(own, own)
         raise ConfigError(
             f"Expected performance to be a recorded column (swarm-forage schema), {', '.join(_FORMULAS)}, or one of "
-            f"them after {INVERTED!r}, got {name!r}.{suggestion(str(name), known)}"
+            f"them after {INVERTED!r}, got {name!r}.{suggestion(meant, known)}"
         )
     if not sign:
         return found
@@ -168,7 +172,7 @@ def performance_curve(name: str, columns: Columns) -> Curve:
     values = _FORMULAS[own][1](columns) if own in _FORMULAS else _column(own, columns)
     if not sign:
         return values
-    # 1/0 is 0, because distances between curves cannot take infinities.
+    # 1/0 is 0, because distances between curves cannot take infinities. It suits columns that are rarely 0.
     return np.divide(1.0, values, out=np.zeros_like(values), where=values != 0.0)
 
 

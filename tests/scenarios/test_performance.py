@@ -92,6 +92,8 @@ def test_every_name_has_a_curve_and_an_inverse(name):
         ("colected", "'colected'. Did you mean 'collected'?"),
         ("1/interference_fractoin", "Did you mean '1/interference_fraction'?"),
         ("task_blance", "Did you mean 'task_balance'?"),
+        ("first_pickups", "Did you mean 'first_picked'?"),
+        ("1/deliveries", "Did you mean '1/collected'?"),
         ("1/1/collected", "got '1/1/collected'"),
         ("interval", "got 'interval'"),
         ("", "got ''"),
