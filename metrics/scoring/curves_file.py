@@ -31,11 +31,8 @@ def read_curves(path: str | Path, performance: PerformanceLike | None = None) ->
     if performance is None:
         studies = study_curves(frame, where=str(file), controller=file.stem)
     else:
-        frame, amount, is_total = with_performance(frame, performance, str(file))
-        studies = tuple(
-            replace(study, amount=amount, is_total=is_total)
-            for study in study_curves(frame, where=str(file), controller=file.stem)
-        )
+        frame, told = with_performance(frame, performance, str(file))
+        studies = tuple(replace(study, **told) for study in study_curves(frame, where=str(file), controller=file.stem))
     for study in studies:
         _check_comparable(study)
     return studies

@@ -37,6 +37,10 @@ class Performance:
     is_total: bool = False
     """Whether a number is a total over its interval, like deliveries; else it is a mean, a ratio, a share."""
 
+    adds_up: bool = True
+    """Whether a swarm has what its robots have together, so that twice the swarm could have twice of it. False for
+    shares and ratios; measures that compare with growth in proportion then have a note."""
+
     @property
     def amount(self) -> str:
         """What there is so and so much of, in tables: the unit, or the name where the unit is 1."""
@@ -106,7 +110,9 @@ def checked_performance(values: ArrayLike, name: str, n_intervals: int, where: s
     return curve
 
 
-def with_performance(frame: "pl.DataFrame", given: PerformanceLike, where: str) -> tuple["pl.DataFrame", str, bool]:
+def with_performance(
+    frame: "pl.DataFrame", given: PerformanceLike, where: str
+) -> tuple["pl.DataFrame", dict[str, Any]]:
     """Replace the column `performance` of a table of curves.
 
     Args:
@@ -115,8 +121,7 @@ def with_performance(frame: "pl.DataFrame", given: PerformanceLike, where: str) 
         where: Name of the table in error messages.
 
     Returns:
-        The table with its rows in the same order; what there is so and so much of; and whether it is known to be a
-        total over the interval.
+        The table with its rows in the same order; `amount`, `is_total` and `adds_up` of its studies (`StudyCurves`).
 
     Raises:
         CurveError: there is no such column, or no such numbers.
@@ -126,8 +131,8 @@ def with_performance(frame: "pl.DataFrame", given: PerformanceLike, where: str) 
     own = own_performance(given)
     if own is None:
         assert isinstance(given, str), "own_performance returns None for names only"
-        curve, amount = _column(frame, given, where)
-        return frame.with_columns(pl.Series("performance", curve)), amount, False
+        curve, told = _column(frame, given, where)
+        return frame.with_columns(pl.Series("performance", curve)), told
     keys = [name for name in RUN_KEYS if name in frame.columns]
     ordered = frame.with_row_index(_ROW).sort("interval") if "interval" in frame.columns else frame.with_row_index(_ROW)
     parts = ordered.partition_by(keys, maintain_order=True) if keys else [ordered]
@@ -135,7 +140,8 @@ def with_performance(frame: "pl.DataFrame", given: PerformanceLike, where: str) 
         part.with_columns(pl.Series("performance", own.curve(part.drop(_ROW), _run(part, keys, where))))
         for part in parts
     ]
-    return pl.concat(runs).sort(_ROW).drop(_ROW), own.amount, own.is_total
+    told = {"amount": own.amount, "is_total": own.is_total, "adds_up": own.adds_up}
+    return pl.concat(runs).sort(_ROW).drop(_ROW), told
 
 
 _ROW = "row of the table"
@@ -148,7 +154,7 @@ def _run(part: "pl.DataFrame", keys: list[str], where: str) -> str:
     return f"{', '.join(f'{key} {first[key]}' for key in keys)} in {where}"
 
 
-def _column(frame: "pl.DataFrame", name: str, where: str) -> tuple[FloatArray, str]:
+def _column(frame: "pl.DataFrame", name: str, where: str) -> tuple[FloatArray, dict[str, Any]]:
     import polars as pl
 
     own = name.removeprefix(INVERTED)
@@ -162,4 +168,10 @@ def _column(frame: "pl.DataFrame", name: str, where: str) -> tuple[FloatArray, s
         curve = np.divide(1.0, curve, out=np.zeros_like(curve), where=curve != 0.0)
     curve = checked_performance(curve, name, len(frame), where)
     known = CURVE_COLUMNS.get(name)
-    return curve, name if known is None or known.unit in ("", "1") else known.unit
+    amount = name if known is None or known.unit in ("", "1") else known.unit
+    # Of a column of one's own nobody knows whether it is a total, or adds up; a share and an inverse do not.
+    return curve, {
+        "amount": amount,
+        "is_total": False,
+        "adds_up": own == name and (known is None or known.kind == "amount"),
+    }

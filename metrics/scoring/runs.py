@@ -100,6 +100,7 @@ def _study(plan: ScoringPlan, contestant: Contestant, records: "Sequence[RunReco
         t_end_s=plan.budget.interval_s * np.arange(1.0, n_intervals + 1.0),
         amount=plan.read_as.amount,
         is_total=plan.read_as.is_total,
+        adds_up=plan.read_as.adds_up,
     )
 
 

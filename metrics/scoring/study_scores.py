@@ -1,6 +1,7 @@
 """From the curves of a study to scores of all measures that they allow."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from .by_adversity import BY_ADVERSITY
 from .by_size import BY_SIZE
@@ -8,6 +9,17 @@ from .draft import Uncomputable
 from .measures import check_measures
 from .studies import StudyCurves
 from .table import Score
+
+_IN_PROPORTION = (
+    "efficiency",
+    "performance_lost",
+    "spatial_emergence",
+    "task_emergence",
+    "scalability",
+    "population_robustness",
+)
+"""Measures that compare with performance in proportion to the robots."""
+_NO_SUM = "this performance is no sum over robots, and the measure compares with growth in proportion to them"
 
 _SCORES = BY_SIZE | BY_ADVERSITY
 """Measure -> what computes its scores."""
@@ -30,7 +42,11 @@ def score_study(study: StudyCurves, measures: Sequence[str] | None = None) -> tu
     missing: dict[str, str] = {}
     for measure in check_measures(measures):
         try:
-            scores += list(_SCORES[measure](measure, study))
+            found = list(_SCORES[measure](measure, study))
         except Uncomputable as reason:
             missing[measure] = str(reason)
+            continue
+        if not study.adds_up and measure in _IN_PROPORTION:
+            found = [replace(score, note="; ".join(filter(None, (score.note, _NO_SUM)))) for score in found]
+        scores += found
     return tuple(scores), missing

@@ -22,6 +22,8 @@ Columns = Mapping[str, np.ndarray]
 
 INVERTED = "1/"
 """What stands before a column of which less is better."""
+_COUNTS = ("objects", "robots", "caches", "cells", "robot-ticks")
+"""Units of what is counted; shares, ratios and lengths of time have others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +41,11 @@ class Reading:
     def amount(self) -> str:
         """What there is so and so much of, in tables: the unit, or the name where the unit is 1."""
         return self.name if self.unit == "1" else self.unit
+
+    @property
+    def adds_up(self) -> bool:
+        """Whether a swarm has what its robots have together, so that twice the swarm could have twice of it."""
+        return self.unit in _COUNTS
 
     @property
     def title(self) -> str:

@@ -78,6 +78,14 @@ def test_units_and_words(name, unit, amount, title, is_total):
     assert (found.name, found.unit, found.amount, found.title, found.is_total) == (name, unit, amount, title, is_total)
 
 
+def test_counts_add_up_over_robots_and_shares_do_not():
+    assert all(
+        reading(name).adds_up for name in ("collected", "n_carrying", "n_caches", "interference_ticks", "deaths")
+    )
+    others = ("task_balance", "cache_load", "interference_fraction", "time_at_work_s", "1/collected", "adversity")
+    assert not any(reading(name).adds_up for name in others)
+
+
 @pytest.mark.parametrize("name", [*PERFORMANCE_COLUMNS, *DERIVED_PERFORMANCES])
 def test_every_name_has_a_curve_and_an_inverse(name):
     given = dict.fromkeys(PERFORMANCE_COLUMNS, np.array([0.5, 0.0]))

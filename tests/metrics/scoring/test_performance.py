@@ -91,6 +91,20 @@ def test_units_follow(folder, no_runs):
     assert units(performance=own)[0] == "heads in 4 s"
 
 
+def test_shares_are_noted_where_growth_in_proportion_is_the_scale(folder, no_runs):
+    """Two swarms in full balance are no worse than one; a swarm of four is not expected to have four times of it."""
+    measures = ["raw_performance", "efficiency", "t_lost_fraction", "task_emergence", "scalability"]
+
+    def noted(performance):
+        found = scored(out=folder, measures=measures, performance=performance)
+        return {score.measure for score in found.scores if "no sum over robots" in score.note}
+
+    assert noted("task_balance") == noted("1/n_active") == {"efficiency", "task_emergence", "scalability"}
+    assert noted("n_active") == noted("collected") == noted(lambda record: record["n_active"]) == set()
+    share = Performance(function=lambda record: record["interference_fraction"], name="lost", adds_up=False)
+    assert noted(share) == {"efficiency", "task_emergence", "scalability"}
+
+
 def test_units_of_measures_of_adversity_follow():
     found = scored("random", measures=["noise_robustness", "population_robustness"], performance="n_active")
     assert {score.unit for score in found.scores} == {"robots (DTW)", "robots summed over intervals"}
