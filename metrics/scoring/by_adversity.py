@@ -75,9 +75,7 @@ def _distance_scores(name: str, study: StudyCurves) -> Iterator[Score]:
         raise Uncomputable("there is no column adversity for the reference run and every level")
     for reference, level in levels:
         floor = float(noise_floor(reference.performance).mean()) if len(reference.seeds) > 1 else None
-        draft = _draft(
-            name, (reference, level), unit=f"{study.amount} (DTW)", beside=_beside_distance(reference, level)
-        )
+        draft = _draft(name, (reference, level), unit="objects (DTW)", beside=_beside_distance(reference, level))
         yield draft.score(_DISTANCES[name], floor=floor, order_matters=True)
 
 
@@ -112,7 +110,7 @@ def _population_scores(name: str, study: StudyCurves) -> Iterator[Score]:
                 ideal_rates=ideal.rates,
             )
 
-        draft = _draft(name, (reference, level), unit=f"{study.amount} {study.span}", beside={"weight": weight})
+        draft = _draft(name, (reference, level), unit=f"objects in {horizon_s:,.0f} s", beside={"weight": weight})
         yield draft.score(values)
 
 

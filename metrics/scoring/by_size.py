@@ -60,7 +60,7 @@ class _SizeMeasure:
     """Computes it. Arguments: the runs of one robot if `from_one`, of the next smaller swarm if `of_neighbours`, and of
     the swarm itself."""
     unit: str
-    """Unit of the value; {amount} stands for what performance counts, {span} for the length of a run."""
+    """Unit of the value; {span} stands for the length of a run."""
     from_one: bool = False
     of_neighbours: bool = False
     needs_interference: bool = False
@@ -71,21 +71,21 @@ class _SizeMeasure:
 
 
 _SIZE_MEASURES: dict[str, _SizeMeasure] = {
-    "raw_performance": _SizeMeasure(values=_raw_performance, unit="{amount} {span}"),
-    "efficiency": _SizeMeasure(values=_efficiency, unit="{amount} per robot {span}"),
+    "raw_performance": _SizeMeasure(values=_raw_performance, unit="objects {span}"),
+    "efficiency": _SizeMeasure(values=_efficiency, unit="objects per robot {span}"),
     "t_lost_fraction": _SizeMeasure(values=_t_lost_fraction, unit="share of robot time", needs_interference=True),
     "performance_lost": _SizeMeasure(
-        values=_performance_lost, unit="{amount} {span}", from_one=True, needs_interference=True, is_gain=True
+        values=_performance_lost, unit="objects {span}", from_one=True, needs_interference=True, is_gain=True
     ),
     "spatial_emergence": _SizeMeasure(
         values=_spatial_emergence,
-        unit="{amount} {span}",
+        unit="objects {span}",
         from_one=True,
         of_neighbours=True,
         needs_interference=True,
         is_gain=True,
     ),
-    "task_emergence": _SizeMeasure(values=_task_emergence, unit="{amount} {span}", of_neighbours=True, is_gain=True),
+    "task_emergence": _SizeMeasure(values=_task_emergence, unit="objects {span}", of_neighbours=True, is_gain=True),
     "scalability": _SizeMeasure(values=_scalability, unit="1 = linear", of_neighbours=True, order_matters=True),
 }
 
@@ -94,6 +94,7 @@ def _size_scores(name: str, study: StudyCurves) -> Iterator[Score]:
     measure = _SIZE_MEASURES[name]
     sizes = _sizes(study, measure)
     one = sizes[0]
+    span = "per run" if study.horizon_s is None else f"in {study.horizon_s:,.0f} s"
     for smaller, larger in zip((None, *sizes), sizes, strict=False):
         if smaller is None and (measure.from_one or measure.of_neighbours):
             continue  # the first size has nothing to be compared with
@@ -108,7 +109,7 @@ def _size_scores(name: str, study: StudyCurves) -> Iterator[Score]:
             measure=name,
             at=at,
             x=larger.n_robots,
-            unit=measure.unit.format(amount=study.amount, span=study.span),
+            unit=measure.unit.format(span=span),
             experiments=experiments,
             compared_with=len(experiments) - 1 if measure.is_gain else None,
         ).score(measure.values, order_matters=measure.order_matters)

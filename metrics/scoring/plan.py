@@ -24,19 +24,12 @@ class ScoringPlan:
     contestants: tuple[Contestant, ...]
     experiments: "tuple[Experiment, ...]"
     seeds: tuple[int, ...]
+    performance: Performance | None = None
+    """A function of records that is the performance; None = what the scenario names."""
     measures: tuple[str, ...]
     scenario: "ScenarioConfig"
     budget: "Budget"
     budget_name: str
-    performance: Performance | None = None
-    """A function of records that is the performance; None = what the scenario names."""
-
-    @property
-    def read_as(self) -> "Reading | Performance":
-        """What the performance is: name, unit, and whether it is a total over the interval."""
-        from swarm_forage_env.scenarios.performance import reading
-
-        return self.performance or reading(self.scenario.performance)
 
     def specs_of(self, contestant: Contestant) -> "tuple[RunSpec, ...]":
         """Return the runs of one policy, seed by seed."""
@@ -54,6 +47,13 @@ class ScoringPlan:
     def specs(self) -> "tuple[RunSpec, ...]":
         """All runs, those of the first policy first."""
         return tuple(spec for contestant in self.contestants for spec in self.specs_of(contestant))
+
+    @property
+    def read_as(self) -> "Reading | Performance":
+        """What the performance is: its name and unit, and whether it is a total and adds up over robots."""
+        from swarm_forage_env.scenarios.performance import reading
+
+        return self.performance or reading(self.scenario.performance)
 
 
 def plan_scores(

@@ -80,13 +80,6 @@ class StudyCurves:
         """Length of a run in seconds, where known."""
         return None if self.t_end_s is None else float(self.t_end_s[-1])
 
-    @property
-    def span(self) -> str:
-        """What the sum of performance over a run is a sum over, in words for units: "objects in 4,000 s"."""
-        if not self.is_total:
-            return "summed over intervals"
-        return "per run" if self.horizon_s is None else f"in {self.horizon_s:,.0f} s"
-
     def sizes(self) -> tuple[RunCurves, ...]:
         """Return the experiments that vary the swarm size, smallest first."""
         return tuple(sorted((e for e in self.experiments if e.criterion == SIZE), key=lambda e: e.n_robots))
