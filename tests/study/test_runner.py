@@ -79,6 +79,8 @@ def test_a_stored_run_is_read_with_the_performance_that_is_asked_for(tmp_path):
     assert found.records[0].performance.tolist() == [3.0, 3.0]
     assert RunSpec.from_json(found.records[0].spec) == other
     assert found.records[0].same_results(run_one(other))
+    (last,) = run_all([other, SPECS[0]], store=store, executor=Refusing()).records
+    assert last.performance.tolist() == last.collected.tolist()
 
 
 def test_a_run_is_a_function_of_its_specification():

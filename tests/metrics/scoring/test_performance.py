@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import metrics
-from metrics import CurveError, Performance, compare_policies, score_curves, score_policy
+from metrics import CurveError, Performance, compare_policies, compare_tables, score_curves, score_policy
 from metrics.scoring.performance import checked_performance
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.performance import DERIVED_PERFORMANCES, PERFORMANCE_COLUMNS
@@ -133,6 +133,15 @@ def test_policies_are_compared_by_a_function():
     )
     assert "performance bodies" in str(compared).splitlines()[0]
     assert {score.summary.mean for each in compared.tables for score in each.scores} == {2.0, 8.0}
+
+
+def test_tables_of_different_performances_are_not_compared(folder, no_runs):
+    tables = [
+        scored(out=folder),
+        dataclasses.replace(scored(out=folder, performance="n_active"), policy="other"),
+    ]
+    with pytest.raises(CurveError, match="one performance to compare, got collected of stochm, n_active of other"):
+        compare_tables(tables)
 
 
 @pytest.mark.parametrize(
