@@ -82,7 +82,7 @@ def run_all(
     """Run every specification once and return all outcomes.
 
     Args:
-        specs: What to run; equal ones count once, also those that differ in performance alone, read as the last of them.
+        specs: What to run; equal ones count once. So do those that differ in performance alone, read as the last asks.
         store: Where records and failures go as they happen. Runs it already holds are read, not repeated, and have
             the performance that their specification asks for; failed ones are tried again.
         executor: Runs the work; default a pool of local processes. It is not shut down.
