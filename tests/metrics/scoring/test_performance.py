@@ -192,6 +192,26 @@ def test_curves_from_a_file_have_any_performance(performance, expected, tmp_path
     assert [score.summary.std for score in found.scores] == [0.0, 0.0]
 
 
+def test_units_of_known_columns_of_a_file_follow(tmp_path):
+    frame = table(*(rows(n, [[9.0]], n_active=float(n), interference_fraction=0.5) for n in (1, 2)))
+    frame.write_csv(tmp_path / "c.csv")
+
+    def score(performance):
+        (found,) = score_curves(tmp_path / "c.csv", measures=["task_emergence"], performance=performance)
+        assert found.settings["performance"] == performance
+        return found.scores[0].unit, "no sum over robots" in found.scores[0].note
+
+    assert score("n_active") == ("robots summed over intervals", False)
+    assert score("interference_fraction") == ("interference_fraction summed over intervals", True)
+    assert score("1/n_active") == ("1/n_active summed over intervals", True)
+
+
+def test_a_function_does_not_hide_what_a_file_lacks(tmp_path):
+    CURVES.select("carried").write_csv(tmp_path / "c.csv")
+    with pytest.raises(CurveError, match="Expected the columns n_robots, seed, interval in"):
+        score_curves(tmp_path / "c.csv", performance=lambda run: run["carried"])
+
+
 @pytest.mark.parametrize(
     ("performance", "message"),
     [
