@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from .scaling import efficiency, raw_performance, scalability, skipped_intervals
     from .scoring import (
         Comparison,
+        Performance,
         Score,
         ScoreTable,
         compare_policies,
@@ -51,6 +52,7 @@ __all__ = [
     "Score",
     "ScoreTable",
     "Comparison",
+    "Performance",
     # interference
     "t_lost_fraction",
     "performance_lost",
@@ -142,6 +144,7 @@ _HOMES = {
     "scalability": "scaling",
     "skipped_intervals": "scaling",
     "Comparison": "scoring",
+    "Performance": "scoring",
     "Score": "scoring",
     "ScoreTable": "scoring",
     "compare_policies": "scoring",

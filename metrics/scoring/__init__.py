@@ -2,6 +2,7 @@
 
 from .comparison import Comparison, compare_tables
 from .front_door import compare_policies, score_curves, score_policy
+from .performance import Performance
 from .plan import ScoringPlan, plan_scores
 from .plots import draw_scores
 from .runs import run_scores
@@ -19,4 +20,5 @@ __all__ = [
     "ScoreTable",
     "Comparison",
     "ScoringPlan",
+    "Performance",
 ]

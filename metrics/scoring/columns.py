@@ -31,7 +31,7 @@ CURVE_COLUMNS: dict[str, Column] = {
     "n_robots": Column("whole", "robots", "swarm size N", is_required=True),
     "seed": Column("whole", "", "number of the run; runs of equal number are paired", is_required=True),
     "interval": Column("whole", "", "index of the interval, 0, 1, 2, ...", is_required=True),
-    "performance": Column("amount", "objects", "P(N, t), larger is better", is_required=True),
+    "performance": Column("amount", "", "P(N, t), larger is better", is_required=True),
     "t_end_s": Column("amount", "s", "end of the interval"),
     "interference_fraction": Column("fraction", "1", "t_lost(N, t), share of active robots avoiding others or walls"),
     "n_active": Column("amount", "robots", "mean number of robots at work"),

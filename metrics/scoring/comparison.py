@@ -174,11 +174,15 @@ def compare_tables(tables: Sequence[ScoreTable]) -> Comparison:
     """Compare score tables of the same experiments: all pairs of policies, row by row, runs paired by seed.
 
     Raises:
-        CurveError: fewer than two tables, or two of the same name.
+        CurveError: fewer than two tables, two of the same name, or tables of different performances.
     """
     names = [table.policy for table in tables]
     if len(names) < 2 or len(set(names)) < len(names):
         raise CurveError(f"Expected two or more policies of different names to compare, got {', '.join(names)}.")
+    performances = [table.settings.get("performance") for table in tables]
+    if len(set(performances)) > 1:
+        told = ", ".join(f"{named} of {name}" for name, named in zip(names, performances, strict=True))
+        raise CurveError(f"Expected tables of one performance to compare, got {told}; score them by the same.")
     scores = {table.policy: {score.key: score for score in table.scores} for table in tables}
     found: list[_Pair] = []
     for first, second in combinations(names, 2):

@@ -1,5 +1,6 @@
 """Curves from a CSV or Parquet file."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -7,21 +8,31 @@ from metrics.checks import CurveError
 
 from .columns import NOISE, POPULATION, THROTTLE
 from .curves_table import study_curves
+from .performance import PerformanceLike, with_performance
 from .studies import StudyCurves, shared_seeds
 
 if TYPE_CHECKING:
     import polars as pl
 
 
-def read_curves(path: str | Path) -> tuple[StudyCurves, ...]:
+def read_curves(path: str | Path, performance: PerformanceLike | None = None) -> tuple[StudyCurves, ...]:
     """Read curves from a CSV or Parquet file with the columns of `CURVE_COLUMNS`; one study per policy in it.
+
+    Args:
+        path: The file.
+        performance: What is read as performance; default the column of that name. See `with_performance`.
 
     Raises:
         CurveError: whatever is wrong with the file, in one line: as `study_curves`, a file that cannot be read, no
             reference run for what is varied, no runs that can be paired.
     """
     file = Path(path)
-    studies = study_curves(_read_frame(file), where=str(file), controller=file.stem)
+    frame = _read_frame(file)
+    if performance is None:
+        studies = study_curves(frame, where=str(file), controller=file.stem)
+    else:
+        frame, told = with_performance(frame, performance, str(file))
+        studies = tuple(replace(study, **told) for study in study_curves(frame, where=str(file), controller=file.stem))
     for study in studies:
         _check_comparable(study)
     return studies

@@ -11,6 +11,7 @@ from .contestants import PolicyLike
 from .curves_file import read_curves
 from .forecast import forecast_population
 from .measures import check_measures
+from .performance import PerformanceLike, own_performance
 from .plan import plan_scores
 from .runs import run_scores
 from .study_scores import score_study
@@ -31,6 +32,7 @@ def score_policy(
     budget: "str | Budget" = "standard",
     seeds: int | Sequence[int] | None = None,
     horizon_s: float | None = None,
+    performance: PerformanceLike | None = None,
     name: str | None = None,
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
@@ -49,6 +51,9 @@ def score_policy(
         budget: "quick", "standard", "paper" (`swarm_forage_env.study.experiments.BUDGETS`), or one of your own.
         seeds: How many, or which; default those of the budget. Experiments share them, so runs are paired.
         horizon_s: Length of a run in seconds, whole intervals; default that of the budget.
+        performance: What P(N, t) is: a recorded column ("n_carrying"), "1/" and a column of which less is better
+            ("1/interference_fraction"), "task_balance", "cache_load", or a function of a record (`Performance`).
+            Default that of the scenario. It changes how runs are read, so those in `out` are not repeated.
         name: Name in tables and stored runs. A policy given as object or function needs one for `out`; it then stands
             for the code: give another name when the code has changed.
         parameters: Keyword arguments of a registered policy or a class.
@@ -62,8 +67,8 @@ def score_policy(
         The table. Scores that lack runs say so in their note, and `failures` says why runs failed.
 
     Raises:
-        CurveError: unknown measures.
-        ValueError: an unknown policy, scenario, budget, or values that describe no run.
+        CurveError: unknown measures, or a performance that is negative or no number.
+        ValueError: an unknown policy, performance, scenario, budget, or values that describe no run.
         ImportError: the policy is a model, and stable-baselines3 is not installed.
         swarm_forage_env.study.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
     """
@@ -74,6 +79,7 @@ def score_policy(
         budget=budget,
         seeds=seeds,
         horizon_s=horizon_s,
+        performance=performance,
         parameters=parameters,
         caches=caches,
     )
@@ -88,6 +94,7 @@ def compare_policies(
     budget: "str | Budget" = "standard",
     seeds: int | Sequence[int] | None = None,
     horizon_s: float | None = None,
+    performance: PerformanceLike | None = None,
     caches: str | None = None,
     out: str | Path | None = None,
     jobs: int | None = None,
@@ -99,24 +106,37 @@ def compare_policies(
     Args and errors as in `score_policy`; `policies` are two or more, or a mapping from names to policies.
     """
     plan = plan_scores(
-        policies, scenario, measures=measures, budget=budget, seeds=seeds, horizon_s=horizon_s, caches=caches
+        policies,
+        scenario,
+        measures=measures,
+        budget=budget,
+        seeds=seeds,
+        horizon_s=horizon_s,
+        performance=performance,
+        caches=caches,
     )
     return compare_tables(run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress))
 
 
-def score_curves(path: str | Path, *, measures: Sequence[str] | None = None) -> tuple[ScoreTable, ...]:
+def score_curves(
+    path: str | Path, *, measures: Sequence[str] | None = None, performance: PerformanceLike | None = None
+) -> tuple[ScoreTable, ...]:
     """Score curves from any simulator, one table per policy in the file.
 
     Args:
         path: CSV or Parquet file with the columns of `CURVE_COLUMNS`.
         measures: Default all that the columns allow; the table says which others are missing, and why.
+        performance: Another column of the file than `performance`, "1/" and a column, or a function of the rows of a
+            run (`Performance`).
 
     Raises:
         CurveError: whatever is wrong with the file, or a measure that was asked for and cannot be computed.
     """
     wanted = check_measures(measures)
+    own = own_performance(performance)
+    told = {} if performance is None else {"performance": performance if own is None else own.name}
     tables: list[ScoreTable] = []
-    for study in read_curves(path):
+    for study in read_curves(path, performance):
         scores, missing = score_study(study, wanted)
         if missing and (measures is not None or not scores):
             measure, reason = next(iter(missing.items()))
@@ -128,7 +148,7 @@ def score_curves(path: str | Path, *, measures: Sequence[str] | None = None) -> 
                 scores=scores,
                 forecasts=forecast_population(study),
                 missing=missing,
-                settings={"curves": str(path), "horizon_s": study.horizon_s},
+                settings={"curves": str(path), "horizon_s": study.horizon_s, **told},
             )
         )
     return tuple(tables)

@@ -8,9 +8,11 @@ from metrics.checks import chosen_seeds
 
 from .contestants import Contestant, PolicyLike, contestants_of
 from .measures import MEASURE_CRITERIA, check_measures
+from .performance import Performance, PerformanceLike, own_performance
 
 if TYPE_CHECKING:
     from swarm_forage_env.scenarios.config import ScenarioConfig
+    from swarm_forage_env.scenarios.performance import Quantity
     from swarm_forage_env.study.experiments import Budget, Experiment
     from swarm_forage_env.study.spec import RunSpec
 
@@ -22,6 +24,8 @@ class ScoringPlan:
     contestants: tuple[Contestant, ...]
     experiments: "tuple[Experiment, ...]"
     seeds: tuple[int, ...]
+    performance: Performance | None = None
+    """A function of records that is the performance; None = what the scenario names."""
     measures: tuple[str, ...]
     scenario: "ScenarioConfig"
     budget: "Budget"
@@ -44,6 +48,13 @@ class ScoringPlan:
         """All runs, those of the first policy first."""
         return tuple(spec for contestant in self.contestants for spec in self.specs_of(contestant))
 
+    @property
+    def read_as(self) -> "Quantity | Performance":
+        """What the performance is: its name and unit, and whether it is a total and adds up over robots."""
+        from swarm_forage_env.scenarios.performance import quantity
+
+        return self.performance or quantity(self.scenario.performance)
+
 
 def plan_scores(
     policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
@@ -53,6 +64,7 @@ def plan_scores(
     budget: "str | Budget" = "standard",
     seeds: int | Sequence[int] | None = None,
     horizon_s: float | None = None,
+    performance: PerformanceLike | None = None,
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
 ) -> ScoringPlan:
@@ -66,6 +78,8 @@ def plan_scores(
     if horizon_s is not None:
         allowed = replace(allowed, horizon_s=horizon_s)
     chosen = preset(scenario) if isinstance(scenario, str) else scenario
+    if isinstance(performance, str):
+        chosen = replace(chosen, performance=performance)
     return ScoringPlan(
         contestants=contestants_of(policies, parameters or {}, chosen, caches),
         experiments=experiments.plan_experiments(chosen, {MEASURE_CRITERIA[name] for name in wanted}, allowed),
@@ -74,4 +88,5 @@ def plan_scores(
         scenario=chosen,
         budget=allowed,
         budget_name=budget_name,
+        performance=own_performance(performance),
     )

@@ -12,6 +12,7 @@ from metrics.queues import PopulationRates
 from .contestants import Contestant
 from .curves_table import study_curves
 from .forecast import forecast_population
+from .performance import checked_performance
 from .plan import ScoringPlan
 from .studies import RunCurves, StudyCurves
 from .study_scores import score_study
@@ -74,6 +75,7 @@ def _table(
             "horizon_s": plan.budget.horizon_s,
             "interval_s": plan.budget.interval_s,
             "seeds": list(plan.seeds),
+            "performance": plan.read_as.name,
             "n_robots": plan.scenario.robots.n_robots,
             "out": None if out is None else str(out),
         },
@@ -84,7 +86,7 @@ def _study(plan: ScoringPlan, contestant: Contestant, records: "Sequence[RunReco
     """All planned experiments, those without a finished run included."""
     found: dict[tuple[str, float, int], RunCurves] = {}
     if records:
-        (study,) = study_curves(_frame(records), where="the run records")
+        (study,) = study_curves(_frame(plan, records), where="the run records")
         found = {(e.criterion, e.value, e.n_robots): e for e in study.experiments}
     experiments: list[RunCurves] = []
     for experiment in plan.experiments:
@@ -96,13 +98,24 @@ def _study(plan: ScoringPlan, contestant: Contestant, records: "Sequence[RunReco
         controller=contestant.label,
         experiments=tuple(experiments),
         t_end_s=plan.budget.interval_s * np.arange(1.0, n_intervals + 1.0),
+        amount=plan.read_as.amount,
+        is_total=plan.read_as.is_total,
+        adds_up=plan.read_as.adds_up,
     )
 
 
-def _frame(records: "Sequence[RunRecord]") -> "pl.DataFrame":
+def _frame(plan: ScoringPlan, records: "Sequence[RunRecord]") -> "pl.DataFrame":
+    """All records in one table, with the performance that the plan asks for."""
     import polars as pl
 
-    frames = [record.to_frame() for record in records]
+    frames: list[pl.DataFrame] = []
+    for record in records:
+        frame, where = record.to_frame(), f"run {record.run_id}"
+        if plan.performance is None:
+            curve = checked_performance(record.performance, plan.read_as.name, len(frame), where)
+        else:
+            curve = plan.performance.curve(frame, where)
+        frames.append(frame.with_columns(pl.Series("performance", curve)))
     return pl.concat(frames, how="diagonal").sort("criterion", "criterion_value", "n_robots", maintain_order=True)
 
 

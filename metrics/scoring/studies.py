@@ -66,6 +66,12 @@ class StudyCurves:
     experiments: tuple[RunCurves, ...]
     t_end_s: FloatArray | None
     """Ends of the intervals, (T,); None if the table has no such column."""
+    amount: str = "objects"
+    """What there is so and so much of in a performance."""
+    is_total: bool = True
+    """Whether performance is a total over its interval, like deliveries; else it is a mean, a ratio, a share."""
+    adds_up: bool = True
+    """Whether a swarm has what its robots have together, so that twice the swarm could have twice of it."""
     where: str = "the table"
     """Name of the table in error messages."""
 

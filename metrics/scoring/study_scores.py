@@ -1,6 +1,10 @@
 """From the curves of a study to scores of all measures that they allow."""
 
+import re
 from collections.abc import Sequence
+from dataclasses import replace
+
+from metrics.catalog import METRICS
 
 from .by_adversity import BY_ADVERSITY
 from .by_size import BY_SIZE
@@ -11,6 +15,11 @@ from .table import Score
 
 _SCORES = BY_SIZE | BY_ADVERSITY
 """Measure -> what computes its scores."""
+_OVER_A_RUN = re.compile(r"(per run|in [\d,]+ s)$")
+"""End of a unit of what is summed over a run."""
+_NO_SUM = "this performance is no sum over robots, and the measure compares with growth in proportion to them"
+_OTHER_SWARMS = {"one robot", "two sizes", "rates"}
+"""Input of measures that know how many robots made a performance, and expect it of as many others."""
 
 
 def score_study(study: StudyCurves, measures: Sequence[str] | None = None) -> tuple[tuple[Score, ...], dict[str, str]]:
@@ -33,4 +42,25 @@ def score_study(study: StudyCurves, measures: Sequence[str] | None = None) -> tu
             scores += list(_SCORES[measure](measure, study))
         except Uncomputable as reason:
             missing[measure] = str(reason)
-    return tuple(scores), missing
+    return tuple(_told(score, study) for score in scores), missing
+
+
+def _told(score: Score, study: StudyCurves) -> Score:
+    """Return the score in the unit of the performance, with a note if the measure expects another kind.
+
+    Measures write units for deliveries, "objects in 4,000 s". With robots carrying, a mean over each interval, it is
+    "robots summed over intervals".
+    """
+    unit = score.unit.replace("objects", study.amount)
+    if not study.is_total:
+        unit = _OVER_A_RUN.sub("summed over intervals", unit)
+    note = score.note
+    if not study.adds_up and _is_in_proportion(score.measure):
+        note = f"{note}; {_NO_SUM}" if note else _NO_SUM
+    return replace(score, unit=unit, note=note)
+
+
+def _is_in_proportion(measure: str) -> bool:
+    """Whether a measure compares with performance in proportion to the robots: of other sizes, at work, or each."""
+    needs = METRICS[measure].needs
+    return measure == "efficiency" or ("performance" in needs and not _OTHER_SWARMS.isdisjoint(needs))

@@ -200,6 +200,8 @@ def title(tables: Sequence[ScoreTable]) -> str:
     scenario, settings = tables[0].scenario, tables[0].settings
     if scenario:
         words += f" in {scenario}"
+    if settings.get("performance", "collected") != "collected":
+        words += f", performance {settings['performance']}"
     if "budget" in settings:
         seeds = counted(len(settings["seeds"]), "seed")
         words += f", budget {settings['budget']}, {seeds}, {settings['horizon_s']:,g} s"

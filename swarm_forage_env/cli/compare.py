@@ -13,6 +13,7 @@ from swarm_forage_env.cli.options import (
     Measures,
     Objects,
     Out,
+    Performance,
     Robots,
     Scenario,
     ScoreHorizon,
@@ -38,6 +39,7 @@ def compare(
     objects: Objects = None,
     side: Side = None,
     caches: Caches = None,
+    performance: Performance = None,
     settings: Settings = None,
     out: Out = None,
     jobs: Jobs = None,
@@ -50,7 +52,13 @@ def compare(
     from swarm_forage_env.cli.score_report import run_and_show
 
     chosen = ScenarioOptions(
-        scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
+        scenario=scenario,
+        robots=robots,
+        objects=objects,
+        side=side,
+        caches=caches,
+        performance=performance,
+        settings=tuple(settings or ()),
     )
     options = ScoreOptions(policies=policies, measures=measures, budget=budget, seeds=seeds, horizon=horizon)
     plan = build_plan(chosen, options, at_least=2)

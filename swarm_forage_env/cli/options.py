@@ -22,6 +22,15 @@ Caches = Annotated[
     str | None,
     typer.Option("--caches", help="none, static or dynamic; default: those of the policy, else of the scenario."),
 ]
+Performance = Annotated[
+    str | None,
+    typer.Option(
+        "--performance",
+        metavar="COLUMN",
+        help="What performance is: a recorded column (see 'swarm-forage schema'), 1/COLUMN where less is better, "
+        "task_balance or cache_load; default the scenario's. Stored runs are read again, not repeated.",
+    ),
+]
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Any scenario field; may be repeated.")
 ]

@@ -13,6 +13,7 @@ from rich.table import Table
 from metrics.scoring.texts import counted
 from metrics.statistics import aggregate
 from swarm_forage_env.rendering.plots import Curve, draw_curves
+from swarm_forage_env.scenarios.performance import Quantity, quantity
 from swarm_forage_env.study.progress import duration
 from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.runner import StudyResult
@@ -24,7 +25,6 @@ LEVEL = 0.95
 ASSUMED_ROBOT_TICKS_PER_S = 0.5e6
 """Speed that estimates assume per core, in robots times ticks per second; our choice: the low end of what scripted
 controllers reach."""
-PERFORMANCE_WORDS = {"collected": "deliveries", "first_picked": "first pick-ups"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +47,8 @@ class ControllerSummary:
     controller: str
     caches: str
     n_runs: int
+    performance: Estimate
+    """Of what the scenario names: per 1,000 s for totals, else the mean over intervals."""
     deliveries_per_1000_s: Estimate
     first_pickups_per_1000_s: Estimate
     interference_fraction: float
@@ -57,6 +59,7 @@ class ControllerSummary:
 def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[ControllerSummary, ...]:
     """Return one summary per controller that has a record, in the order of `specs`."""
     caches = {spec.policy: spec.scenario.caches for spec in specs}
+    read_as = quantity(specs[0].scenario.performance)
     summaries = []
     for controller, kind in caches.items():
         own = [record for record in records if record.controller == controller]
@@ -67,8 +70,9 @@ def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[C
                     controller=controller,
                     caches=kind,
                     n_runs=len(own),
-                    deliveries_per_1000_s=_estimate(own, "collected"),
-                    first_pickups_per_1000_s=_estimate(own, "first_picked"),
+                    performance=_estimate([_performance(record, read_as) for record in own]),
+                    deliveries_per_1000_s=_estimate([record.rate_per_1000_s("collected") for record in own]),
+                    first_pickups_per_1000_s=_estimate([record.rate_per_1000_s("first_picked") for record in own]),
                     interference_fraction=float(np.mean([record.interference_fraction.mean() for record in own])),
                     simulated_s_per_wall_s=sum(record.horizon_s for record in own) / wall_s if wall_s else math.nan,
                 )
@@ -87,14 +91,15 @@ def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummar
         title=f"{headline}, with {disturbed}" if disturbed else headline,
         caption=f"{interval}; interference: share of active robot time",
     )
-    picks = first.performance == "first_picked"
+    # Deliveries are always there; what else the scenario calls performance stands before them.
+    other = None if first.performance == "collected" else quantity(first.performance)
     for name in ("controller", "caches"):
         table.add_column(name)
-    numbers = ["runs", *(["first pick-ups\nper 1,000 s"] if picks else []), "deliveries\nper 1,000 s"]
+    numbers = ["runs", *([f"{other.title}\n{_span(other)}"] if other else []), "deliveries\nper 1,000 s"]
     for name in (*numbers, "interference", "simulated s\nper wall s"):
         table.add_column(name, justify="right")
     for row in summaries:
-        rates = [*([str(row.first_pickups_per_1000_s)] if picks else []), str(row.deliveries_per_1000_s)]
+        rates = [*([str(row.performance)] if other else []), str(row.deliveries_per_1000_s)]
         tail = [f"{row.interference_fraction:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
         table.add_row(shown(row.controller), row.caches, str(row.n_runs), *rates, *tail)
     return table
@@ -127,9 +132,11 @@ def plan_json(specs: Sequence[RunSpec], store: RunStore, seconds: float) -> str:
 
 def results_json(specs: Sequence[RunSpec], result: StudyResult, store: RunStore, plot: Path | None) -> str:
     """Return the results as a JSON document; numbers that do not exist are null."""
+    read_as = quantity(specs[0].scenario.performance)
     runs = [
         {
             **record.keys(),
+            "performance": _performance(record, read_as),
             "deliveries_per_1000_s": record.rate_per_1000_s("collected"),
             "first_pickups_per_1000_s": record.rate_per_1000_s("first_picked"),
             "interference_fraction": float(record.interference_fraction.mean()),
@@ -144,6 +151,7 @@ def results_json(specs: Sequence[RunSpec], result: StudyResult, store: RunStore,
     ]
     document = {
         "scenario": specs[0].scenario.name,
+        "performance": {"name": read_as.name, "unit": read_as.unit, "is_per_1000_s": read_as.is_total},
         "out": str(store.folder),
         "plot": None if plot is None else str(plot),
         "controllers": [asdict(summary) for summary in summarize(specs, result.records)],
@@ -166,13 +174,13 @@ def draw_performance(specs: Sequence[RunSpec], records: Sequence[RunRecord], pat
         per_interval = [aggregate(column, level=LEVEL) for column in runs.T]
         mean, low, high = np.array([(point.mean, point.lower, point.upper) for point in per_interval]).T
         curves.append(Curve(shown(controller), mean, low, high))
-    words = PERFORMANCE_WORDS[scenario.performance]
+    read_as = quantity(scenario.performance)
     draw_curves(
         path,
         records[0].t_end_s,
         curves,
         title=f"{scenario.name}, {scenario.robots.n_robots} robots",
-        ylabel=f"{words} per {scenario.interval_s:g} s",
+        ylabel=f"{read_as.title} per {scenario.interval_s:g} s" if read_as.is_total else read_as.title,
         band=f"{LEVEL:.0%} t interval over seeds",
     )
 
@@ -200,8 +208,18 @@ def estimate(seconds: float, jobs: int, *, any_left: bool) -> str:
     )
 
 
-def _estimate(records: Sequence[RunRecord], column: str) -> Estimate:
-    summary = aggregate([record.rate_per_1000_s(column) for record in records], level=LEVEL)
+def _performance(record: RunRecord, read_as: Quantity) -> float:
+    """Return the performance of a run as one number: per 1,000 s for totals, else the mean over intervals."""
+    return record.rate_per_1000_s("performance") if read_as.is_total else float(record.performance.mean())
+
+
+def _span(read_as: Quantity) -> str:
+    """Return what `_performance` is, in words."""
+    return "per 1,000 s" if read_as.is_total else "mean"
+
+
+def _estimate(values: Sequence[float]) -> Estimate:
+    summary = aggregate(values, level=LEVEL)
     return Estimate(summary.mean, summary.lower, summary.upper)
 
 

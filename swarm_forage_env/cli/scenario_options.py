@@ -27,6 +27,7 @@ class ScenarioOptions:
     side: float | None = None
     caches: str | None = None
     horizon: float | None = None
+    performance: str | None = None
     settings: tuple[str, ...] = ()
     """Words of the form key=value."""
     wrappers: tuple[str, ...] = ()
@@ -67,7 +68,7 @@ def scenario_overrides(options: ScenarioOptions, file_fields: Mapping[str, Any] 
     """Return the scenario fields that the options and the file set, by name; see `build_scenario`."""
     overrides = dict(parse_setting(word) for word in options.settings)
     named = {"n_robots": options.robots, "n_objects": options.objects, "horizon_s": options.horizon}
-    named |= {"side_m": options.side, "caches": options.caches}
+    named |= {"side_m": options.side, "caches": options.caches, "performance": options.performance}
     for name, value in named.items():
         if value is not None and name in overrides:
             raise ConfigError(f"Expected {name} once, got it from an option and from --set.")

@@ -14,6 +14,7 @@ from swarm_forage_env.cli.options import (
     Measures,
     Objects,
     Out,
+    Performance,
     Robots,
     Scenario,
     ScoreHorizon,
@@ -22,7 +23,7 @@ from swarm_forage_env.cli.options import (
     Side,
 )
 
-_OF_CURVES = ("curves", "measures", "as_json")
+_OF_CURVES = ("curves", "measures", "performance", "as_json")
 """Options of `score` that go with --curves."""
 
 
@@ -41,6 +42,7 @@ def score(
     objects: Objects = None,
     side: Side = None,
     caches: Caches = None,
+    performance: Performance = None,
     settings: Settings = None,
     out: Out = None,
     jobs: Jobs = None,
@@ -60,10 +62,16 @@ def score(
         raise typer.BadParameter("Expected either --policy or --curves.")
     if curves is not None:
         _refuse_options_of_runs(context)
-        show_scores(tables_of_file(curves, measures), None, as_json=as_json)
+        show_scores(tables_of_file(curves, measures, performance), None, as_json=as_json)
         return
     chosen = ScenarioOptions(
-        scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
+        scenario=scenario,
+        robots=robots,
+        objects=objects,
+        side=side,
+        caches=caches,
+        performance=performance,
+        settings=tuple(settings or ()),
     )
     options = ScoreOptions(policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon)
     folder = out or default_folder(scenario)
@@ -80,6 +88,6 @@ def _refuse_options_of_runs(context: typer.Context) -> None:
     ]
     if given:
         raise typer.BadParameter(
-            f"Expected --curves with no other options than --measures and --json, got {', '.join(given)}, which are "
-            "about runs."
+            "Expected --curves with no other options than --measures, --performance and --json, got "
+            f"{', '.join(given)}, which are about runs."
         )

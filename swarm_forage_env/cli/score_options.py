@@ -61,9 +61,9 @@ def build_plan(
         raise ConfigError(str(error)) from error
 
 
-def tables_of_file(path: Path, measures: str | None) -> tuple[ScoreTable, ...]:
+def tables_of_file(path: Path, measures: str | None, performance: str | None) -> tuple[ScoreTable, ...]:
     """Return the scores of a file of curves; raises ConfigError whatever is wrong with it."""
     try:
-        return score_curves(path, measures=None if measures is None else split_names(measures))
+        return score_curves(path, measures=None if measures is None else split_names(measures), performance=performance)
     except ValueError as error:
         raise ConfigError(str(error)) from error

@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from swarm_forage_env.cli.options import NO_PICTURE
-from swarm_forage_env.cli.report import PERFORMANCE_WORDS
 from swarm_forage_env.rendering.plots import draw_training
+from swarm_forage_env.scenarios.performance import quantity
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.training.status import Evaluation, TrainingStatus
 
@@ -62,7 +62,7 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
             baseline=(plan.evaluation.baseline, evaluations[-1].baseline),
             stage_ends=np.cumsum([stage.steps for stage in plan.stages]).tolist(),
             title=f"{plan.algorithm} in {plan.scenario.name}, {plan.scenario.robots.n_robots} robots",
-            ylabel=f"{PERFORMANCE_WORDS[plan.scenario.performance]} per 1,000 s",
+            ylabel=f"{quantity(plan.scenario.performance).title} per 1,000 s",
         )
     except ImportError:
         console.print(NO_PICTURE, markup=False)

@@ -100,3 +100,5 @@ class Counter(IntEnum):
     """Cache-ticks."""
     OBJECTS_CACHED = 14
     """Object-ticks inside caches."""
+    CARRYING = 15
+    """Robot-ticks of active robots that carry an object, counted before the grippers of the tick move."""

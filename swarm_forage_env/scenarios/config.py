@@ -12,12 +12,12 @@ from typing import Any, TypeVar, cast
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.performance import quantity
 from swarm_forage_env.scenarios.quirks import READINGS, Quirks
 from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, capacity, distributable_box
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, EAST_WALL_M, WALL_M, WHEEL_SCALE_MPS
 
 CACHE_KINDS = ("none", "static", "dynamic")
-PERFORMANCE_MEASURES = ("collected", "first_picked")
 MAX_DISC_SHARE = 0.4
 """Robot discs may cover at most this share of the start area; with more, random start poses cannot be drawn."""
 MAX_CELLS = 200_000_000
@@ -218,7 +218,8 @@ class ScenarioConfig:
     cache: CacheConfig = field(default_factory=CacheConfig)
     reward: RewardConfig = field(default_factory=RewardConfig)
     performance: str = "collected"
-    """Which count is the performance curve: "collected" or "first_picked"."""
+    """What of a run is its performance: a recorded column ("n_carrying"), "1/" and a column of which less is better, or
+    "task_balance", "cache_load" (`scenarios.performance`). It changes how a run is read, not the run."""
     dt_s: float = 0.2
     """Length of a control step (tick)."""
     horizon_s: float = 10_000.0
@@ -237,7 +238,7 @@ class ScenarioConfig:
         for name, value in dataclasses.asdict(self.quirks).items():
             fields.switch(f"quirks.{name}", value)
         fields.one_of("caches", self.caches, CACHE_KINDS)
-        fields.one_of("performance", self.performance, PERFORMANCE_MEASURES)
+        quantity(self.performance)  # refuses unknown names
         for name in ("dt_s", "horizon_s", "interval_s"):
             fields.number(f"scenario.{name}", getattr(self, name), above=0.0)
         fields.shares("scenario.physics_substeps", self.physics_substeps)

@@ -10,7 +10,7 @@ import json
 import os
 import subprocess
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.contract.types import FloatArray, IntArray
+from swarm_forage_env.scenarios.performance import performance_curve
 
 if TYPE_CHECKING:
     import polars as pl
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Version of the file layout; raised whenever a column changes its name, type or meaning."""
 PACKAGES = ("swarm-forage-env", "numpy", "numba", "pymunk", "pettingzoo")
 """Distributions whose versions are part of every record."""
@@ -65,7 +66,7 @@ class RunRecord:
 
     interval: Annotated[IntArray, Column("", "index of the interval, from 0")]
     t_end_s: Annotated[FloatArray, Column("s", "end of the interval")]
-    performance: Annotated[FloatArray, Column("objects", "collected or first_picked, as the scenario says")]
+    performance: Annotated[FloatArray, Column("", "what `performance` of the scenario names, in its unit")]
     collected: Annotated[CountArray, Column("objects", "delivered to the nest")]
     first_picked: Annotated[CountArray, Column("objects", "picked up that no robot had carried since they were placed")]
     free_pickups: Annotated[CountArray, Column("objects", "picked up from the floor")]
@@ -80,6 +81,7 @@ class RunRecord:
     interference_fraction: Annotated[FloatArray, Column("1", "share of active robots in interference, mean over ticks")]
     n_active: Annotated[FloatArray, Column("robots", "mean over ticks of the tasked swarm: present and not in repair")]
     n_present: Annotated[FloatArray, Column("robots", "mean over ticks of robots that are born and alive")]
+    n_carrying: Annotated[FloatArray, Column("robots", "mean over ticks of active robots that carry an object")]
     n_caches: Annotated[FloatArray, Column("caches", "mean over ticks")]
     n_objects_cached: Annotated[FloatArray, Column("objects", "mean over ticks of objects inside caches")]
     adversity: Annotated[FloatArray, Column("1", "mean over ticks of the conditions V(t); 0 = nothing adverse")]
@@ -130,6 +132,22 @@ class RunRecord:
     def rate_per_1000_s(self, column: str) -> float:
         """Return the sum of a column over the run, per 1,000 simulated seconds."""
         return float(self.columns()[column].sum()) * 1000.0 / self.horizon_s
+
+    def read_as(self, performance: str) -> "RunRecord":
+        """Return the same run with another performance; column and specification say so, the identity stays.
+
+        Args:
+            performance: As in `swarm_forage_env.scenarios.performance.reading`.
+
+        Raises:
+            ConfigError: there is no such performance.
+        """
+        spec = json.loads(self.spec)
+        if spec["scenario"]["performance"] == performance:
+            return self
+        spec["scenario"]["performance"] = performance
+        curve = performance_curve(performance, self.columns())
+        return replace(self, performance=curve, spec=json.dumps(spec, sort_keys=True))
 
     def made_by(self, versions: Mapping[str, str]) -> bool:
         """Return whether the run was made by these `software_versions`, the commit included."""

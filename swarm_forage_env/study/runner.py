@@ -82,9 +82,9 @@ def run_all(
     """Run every specification once and return all outcomes.
 
     Args:
-        specs: What to run; equal ones count once.
-        store: Where records and failures go as they happen. Runs it already holds are read, not repeated;
-            failed ones are tried again.
+        specs: What to run; equal ones count once. So do those that differ in performance alone, read as the last asks.
+        store: Where records and failures go as they happen. Runs it already holds are read, not repeated, and have
+            the performance that their specification asks for; failed ones are tried again.
         executor: Runs the work; default a pool of local processes. It is not shut down.
         jobs: Processes of the default pool, default one per available core; 1 = in this process.
         progress: Show progress and an estimate on stderr.
@@ -97,7 +97,8 @@ def run_all(
     planned = {spec.run_id: spec for spec in specs}
     outcomes: dict[str, Outcome] = {}
     if store is not None:
-        outcomes |= {run_id: store.read(run_id) for run_id in planned if run_id in store}
+        stored = {run_id: spec for run_id, spec in planned.items() if run_id in store}
+        outcomes |= {run_id: store.read(run_id).read_as(spec.scenario.performance) for run_id, spec in stored.items()}
     n_stored = len(outcomes)
     todo = [spec for run_id, spec in planned.items() if run_id not in outcomes]
     versions = software_versions()

@@ -63,8 +63,13 @@ class RunSpec:
 
     @property
     def run_id(self) -> str:
-        """Short hexadecimal hash of the specification; equal specifications have equal ids."""
-        canonical = json.dumps(_canonical(self.to_mapping()), sort_keys=True, separators=(",", ":"))
+        """Short hexadecimal hash of all that can change a run; equal specifications have equal ids.
+
+        `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
+        """
+        mapping = self.to_mapping()
+        del mapping["scenario"]["performance"]
+        canonical = json.dumps(_canonical(mapping), sort_keys=True, separators=(",", ":"))
         return hashlib.blake2b(canonical.encode(), digest_size=RUN_ID_DIGITS // 2).hexdigest()
 
     def describe(self) -> str:

@@ -42,6 +42,10 @@ def _check_options(name: str, options: Any) -> None:
             number(f"{name}.{key}", value, **_RANGES[key])
 
 
+COUNTED = ("collected", "first_picked")
+"""Performances by which a training can be followed: arenas for learners count these."""
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Stage:
     """A part of the training with a scenario of its own: a step of a curriculum."""
@@ -97,8 +101,8 @@ class TrainingPlan:
     """Everything that decides a training run, but for the machine and the installed versions.
 
     Raises:
-        ConfigError: an unknown algorithm or baseline, sizes below 1, a stage whose scenario cannot be or has
-            another number of robots, or actions that the algorithm cannot choose.
+        ConfigError: an unknown algorithm or baseline, a performance that arenas do not count, sizes below 1, a stage
+            whose scenario cannot be or has another number of robots, or actions that the algorithm cannot choose.
     """
 
     scenario: ScenarioConfig
@@ -118,6 +122,7 @@ class TrainingPlan:
 
     def __post_init__(self) -> None:
         one_of("algorithm", self.algorithm, ALGORITHMS)
+        one_of("performance of a scenario to train in", self.scenario.performance, COUNTED)
         unfit = {"dqn": "continuous", "sac": "discrete"}.get(self.algorithm)
         if self.interface.actions == unfit:
             raise ConfigError(f"Expected actions that {self.algorithm} can choose, got {unfit} ones.")

@@ -11,7 +11,7 @@ def mark_interference(
     """Flag active robots for which the obstacle rule holds in this tick, walls included.
 
     Args:
-        swarm: Read: active, present.
+        swarm: Read: active, present, carried_object.
         events: Written: interfering, counters, interference_sum (share of active robots, 0/0 = 0).
         obs: (N, D) with true proximity readings.
         proximity: Column of the first of them.
@@ -25,6 +25,7 @@ def mark_interference(
         behind_counts,
         swarm.active,
         swarm.present,
+        swarm.carried_object,
         events.interfering,
         events.counters,
         events.interference_sum,

@@ -9,6 +9,7 @@ from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import whole_intervals
+from swarm_forage_env.scenarios.performance import performance_curve
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.kernels.task_shares import add_task_shares
 
@@ -29,6 +30,7 @@ TOTALS: dict[str, Counter] = {
 TICK_MEANS: dict[str, Counter] = {
     "n_active": Counter.ACTIVE,
     "n_present": Counter.PRESENT,
+    "n_carrying": Counter.CARRYING,
     "n_caches": Counter.CACHES_ALIVE,
     "n_objects_cached": Counter.OBJECTS_CACHED,
 }
@@ -100,7 +102,7 @@ class RunRecorder(SwarmWrapper):
         }
         columns |= {name: self._counts[:, counter] for name, counter in TOTALS.items()}
         columns |= {name: self._counts[:, counter] / self._interval_ticks for name, counter in TICK_MEANS.items()}
-        columns["performance"] = columns[scenario.performance].astype(np.float64)
+        columns["performance"] = performance_curve(scenario.performance, columns | self._contributed)
         return columns
 
     def contributed(self) -> dict[str, np.ndarray]:

@@ -51,6 +51,19 @@ def test_first_pickups_are_shown_where_they_are_the_performance(command):
     assert "12 robots, 80 objects" in out
 
 
+def test_any_column_is_the_performance_and_the_runs_stay(command, monkeypatch):
+    command(*RUN, "--seeds", "2")
+    monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))
+    code, out, _ = command(*RUN, "--seeds", "2", "--performance", "n_active")
+    assert code == 0
+    assert "robots at" in out
+    assert "3.00 ± 0.00" in out
+    _, out, _ = command(*RUN, "--set", "performance=n_active", "--json")
+    answer = json.loads(out)
+    assert answer["performance"] == {"name": "n_active", "unit": "robots", "is_per_1000_s": False}
+    assert (answer["runs"][0]["performance"], answer["controllers"][0]["performance"]["mean"]) == (3.0, 3.0)
+
+
 def test_the_same_command_again_runs_nothing(command, monkeypatch):
     command(*RUN, "--seeds", "2")
     monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))

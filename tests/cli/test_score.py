@@ -75,6 +75,15 @@ def test_the_same_command_again_runs_nothing(command, monkeypatch):
     assert (code, again) == (0, first)
 
 
+def test_another_performance_reads_the_same_runs(command, monkeypatch):
+    command(*SCORE, *FEW)
+    monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))
+    code, out, _ = command(*SCORE, *FEW, "--performance", "1/interference_fraction")
+    assert code == 0
+    assert out.startswith("random in warehouse_small, performance 1/interference_fraction, budget tiny")
+    assert "1/interference_fraction (DTW)" in out
+
+
 def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
     code, out, _ = command(*COMPARE, "--dry-run")
     assert code == 0
@@ -122,6 +131,12 @@ def test_seeds_length_and_world_can_be_chosen(command):
         (("score", "--policy", "crw", "--measures", "reactivty"), "Did you mean 'reactivity'?"),
         (("score", "--policy", "crw", "--measures", ","), "Expected one or more names"),
         (("score", "--policy", "crw", "--budget", "huge"), "Unknown budget 'huge'"),
+        (("score", "--policy", "crw", "--performance", "n_carying"), "Did you mean 'n_carrying'?"),
+        (("compare", "--policy", "crw,dpo", "--set", "performance=colected"), "Did you mean 'collected'?"),
+        (
+            ("score", "--curves", "curves.csv", "--performance", "x"),
+            "Expected a column x for performance in curves.csv",
+        ),
         (("score", "--policy", "crw", "--seeds", "0"), "seeds"),
         (("score", "--policy", "crw", "--horizon", "150"), "whole number of intervals"),
         (("score", "--policy", "crw", "--robots", "1"), "at least 2 robots"),

@@ -1,6 +1,7 @@
 """Records hold the columns that `metrics` reads by name; the two share nothing but this list of columns."""
 
 from metrics.scoring.columns import CURVE_COLUMNS
+from swarm_forage_env.scenarios.performance import PERFORMANCE_COLUMNS
 from swarm_forage_env.study.record import schema_table
 
 NOT_RECORDED = {"deaths_per_s", "malfunctions_per_s", "births_per_s", "repairs_per_s"}
@@ -15,6 +16,13 @@ def recorded_units() -> dict[str, str]:
 
 def test_every_column_that_measures_read_is_recorded():
     assert set(CURVE_COLUMNS) - recorded_units().keys() == NOT_RECORDED
+
+
+def test_units_of_performances_agree():
+    units = recorded_units()
+    assert {name: reading.unit for name, reading in PERFORMANCE_COLUMNS.items()} == {
+        name: units[name] for name in PERFORMANCE_COLUMNS
+    }
 
 
 def test_units_agree():

@@ -189,7 +189,7 @@ def test_mapping_refuses_a_value_where_a_section_belongs():
         ({"team": "yes"}, ("reward.team to be True or False", "got 'yes'")),
         ({"integer_estimates": 1}, ("quirks.integer_estimates to be True or False", "got 1")),
         ({"caches": "dinamic"}, ("none, static, dynamic", "got 'dinamic'", "Did you mean 'dynamic'?")),
-        ({"performance": "score"}, ("collected, first_picked", "got 'score'")),
+        ({"performance": "colected"}, ("performance to be a recorded column", "Did you mean 'collected'?")),
         ({"name": ""}, ("scenario.name to be a non-empty text", "got ''")),
         ({"dt_s": 0.0}, ("scenario.dt_s to be a finite number > 0", "got 0.0")),
         ({"horizon_s": 100.1}, ("horizon_s to be a whole number of ticks of 0.2 s", "got 100.1")),

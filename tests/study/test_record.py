@@ -120,7 +120,7 @@ def rewritten(file: Path, change, **stamp) -> None:
 
 def test_another_schema_version_is_refused(file):
     rewritten(file, lambda table: table, schema_version="999")
-    with pytest.raises(RecordError, match=r"record\.parquet: it has schema version 999, this version .* reads 1"):
+    with pytest.raises(RecordError, match=r"record\.parquet: it has schema version 999, this version .* reads 2"):
         RunRecord.read(file)
 
 
@@ -136,7 +136,7 @@ def test_another_schema_version_is_refused(file):
 )
 def test_content_that_breaks_the_schema_is_refused(file, change):
     rewritten(file, change)
-    with pytest.raises(RecordError, match=r"record\.parquet: its content does not match schema 1"):
+    with pytest.raises(RecordError, match=r"record\.parquet: its content does not match schema 2"):
         RunRecord.read(file)
 
 
@@ -191,6 +191,19 @@ def test_one_different_bit_is_another_result(record):
     assert not record.same_results(replace(record, performance=nudged))
     assert not record.same_results(replace(record, seed=1))
     assert not record.same_results(replace(record, contributed={}))
+
+
+def test_a_run_is_read_with_another_performance(record, tmp_path):
+    again = record.read_as("n_caches")
+    np.testing.assert_array_equal(again.performance, record.n_caches)
+    assert (again.run_id, RunSpec.from_json(again.spec).run_id) == (record.run_id, record.run_id)
+    assert RunSpec.from_json(again.spec).scenario.performance == "n_caches"
+    np.testing.assert_array_equal(again.read_as("throttle").performance, record.contributed["throttle"])
+    again.write(tmp_path / "again.parquet")
+    assert RunRecord.read(tmp_path / "again.parquet").same_results(again)
+    assert record.read_as("collected") is record
+    with pytest.raises(ConfigError, match="Did you mean 'n_caches'"):
+        record.read_as("n_cache")
 
 
 def test_rates_and_lengths(record):

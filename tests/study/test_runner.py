@@ -70,6 +70,19 @@ def refuse(self, obs, active):
     raise RuntimeError("I would rather not")
 
 
+def test_a_stored_run_is_read_with_the_performance_that_is_asked_for(tmp_path):
+    store = RunStore(tmp_path)
+    run_all(SPECS[:1], store=store, jobs=1)
+    other = replace(SPECS[0], scenario=replace(WORLD, performance="n_active"))
+    found = run_all([other], store=store, executor=Refusing())
+    assert found.n_stored == 1
+    assert found.records[0].performance.tolist() == [3.0, 3.0]
+    assert RunSpec.from_json(found.records[0].spec) == other
+    assert found.records[0].same_results(run_one(other))
+    (last,) = run_all([other, SPECS[0]], store=store, executor=Refusing()).records
+    assert last.performance.tolist() == last.collected.tolist()
+
+
 def test_a_run_is_a_function_of_its_specification():
     first, second = run_one(SPECS[0]), run_one(SPECS[0])
     assert first.same_results(second)

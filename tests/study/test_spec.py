@@ -83,6 +83,12 @@ def test_equal_numbers_give_equal_ids_however_they_are_spelt():
     assert whole.run_id == real.run_id
 
 
+def test_another_performance_is_the_same_run():
+    other = replace(BASE, scenario=scenario("warehouse_small", performance="n_carrying"))
+    assert other != BASE
+    assert other.run_id == BASE.run_id
+
+
 @pytest.mark.parametrize("seed", [-1, 2**63, 1.0, True, "1"])
 def test_bad_seeds_are_refused(seed):
     with pytest.raises(ConfigError, match="Expected seed to be a whole number"):

@@ -59,6 +59,7 @@ class FakeArena(ForageEnv):
         counters[Counter.OBJECTS_MOVED] += 1
         counters[Counter.ACTIVE] += swarm.active.sum()
         counters[Counter.PRESENT] += swarm.present.sum()
+        counters[Counter.CARRYING] += np.count_nonzero(swarm.active & (swarm.carried_object >= 0))
         counters[Counter.INTERFERING] += 1
         self.events.interference_sum[0] += 0.25
         dead = np.full(len(swarm.active), self.tick >= self.dies_at)

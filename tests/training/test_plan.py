@@ -127,6 +127,11 @@ def test_a_plan_has_stages_and_a_readable_file(tmp_path):
         read_plan(tmp_path / "nothing.toml")
 
 
+def test_performances_that_arenas_do_not_count_are_refused(plan):
+    with pytest.raises(ConfigError, match="to be one of collected, first_picked, got 'n_carrying'"):
+        replace(plan, scenario=replace(plan.scenario, performance="n_carrying"))
+
+
 def test_a_file_without_a_table_is_no_plan(tmp_path):
     (tmp_path / "plan.json").write_text("[1]")
     with pytest.raises(ConfigError, match=r"the plan to be a table of values by name, got \[1\]"):

@@ -72,6 +72,19 @@ def test_robots_in_repair_are_obstacles_but_never_interfere():
     assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [3, 4]
 
 
+def test_robots_at_work_that_carry_are_counted_in_each_tick():
+    """Robots 0 to 2 hold an object; robot 2 is in repair; robot 0 lets go, which is seen from the next tick on."""
+    env = tidy_world()
+    for robot in range(3):
+        load(env, robot, robot)
+    env.set_population(active=np.array([True, True, False, True]), present=np.ones(4, np.bool_))
+    counted = []
+    for grips in ({}, {0: Grip.RELEASE}, {}):
+        act(env, grips)
+        counted.append(int(env.events.counters[Counter.CARRYING]))
+    assert counted == [2, 4, 5]
+
+
 def test_absent_robots_are_no_obstacles():
     env = tidy_world()
     met(env, 0, 1)

@@ -55,6 +55,28 @@ def test_performance_is_what_the_scenario_declares():
     assert columns["collected"].sum() > 0
 
 
+def test_performance_may_be_any_column_and_what_is_computed_from_them():
+    def performance(name, recorder=RunRecorder, **run):
+        return drive(recorder(FakeArena(small_scenario(performance=name))), **run).columns()["performance"].tolist()
+
+    assert performance("n_active") == [4.0, 4.0, 4.0]
+    assert performance("1/interference_ticks") == [0.2, 0.2, 0.2]
+    assert performance("throttle", lambda arena: RunRecorder(Contributor(arena))) == [5.0, 10.0, 15.0]
+    assert performance("throttle") == [0.0, 0.0, 0.0]
+    halves = performance("task_balance", tasks=np.array([1, 1, 2, 2], np.int8))
+    np.testing.assert_allclose(halves, np.log(2) / np.log(7))
+
+
+def test_robots_that_carry_are_counted_as_a_mean_over_ticks():
+    recorder = RunRecorder(FakeArena())
+    recorder.reset_batch(0)
+    for tick in range(15):
+        if tick == 7:
+            recorder.unwrapped.swarm.carried_object[:] = [3, -1, 0, -1]
+        recorder.step_batch(STILL)
+    assert recorder.columns()["n_carrying"].tolist() == [0.0, 3 * 2 / 5, 2.0]
+
+
 def test_robots_that_are_away_lower_the_mean():
     recorder = RunRecorder(FakeArena())
     recorder.reset_batch(0)

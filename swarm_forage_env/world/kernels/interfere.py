@@ -6,9 +6,10 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.contract.layout import RING_SENSORS
-from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 
 _INTERFERING, _ACTIVE, _PRESENT = int(Counter.INTERFERING), int(Counter.ACTIVE), int(Counter.PRESENT)
+_CARRYING = int(Counter.CARRYING)
 
 
 @kernel
@@ -19,6 +20,7 @@ def mark(
     behind_counts: bool,
     active: BoolArray,
     present: BoolArray,
+    carried_object: IntArray,
     interfering: BoolArray,
     counters: np.ndarray,
     interference_sum: FloatArray,
@@ -27,6 +29,7 @@ def mark(
     n_interfering = 0
     n_active = 0
     n_present = 0
+    n_carrying = 0
     for i in range(active.shape[0]):
         ring = obs[i, proximity : proximity + RING_SENSORS]
         flag = active[i] and near[i] and sees_obstacle(ring, behind_counts)
@@ -34,8 +37,10 @@ def mark(
         n_interfering += flag
         n_active += active[i]
         n_present += present[i]
+        n_carrying += active[i] and carried_object[i] >= 0
     counters[_INTERFERING] += n_interfering
     counters[_ACTIVE] += n_active
     counters[_PRESENT] += n_present
+    counters[_CARRYING] += n_carrying
     if n_active > 0:
         interference_sum[0] += n_interfering / n_active

@@ -1,0 +1,229 @@
+"""Scores of any performance: recorded, computed, or a function; stored runs are read again, never repeated."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import metrics
+from metrics import CurveError, Performance, compare_policies, compare_tables, score_curves, score_policy
+from metrics.scoring.performance import checked_performance
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.performance import DERIVED_PERFORMANCES, PERFORMANCE_COLUMNS
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study import runner
+from swarm_forage_env.study.experiments import Budget
+from swarm_forage_env.study.record import schema_table
+from swarm_forage_env.study.store import load
+from tests.support.curve_tables import rows, table
+
+WORLD = scenario("warehouse_small", n_robots=4, n_objects=20)
+TINY = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=2, n_sizes=2, n_levels=1)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Stored runs of two sizes and two seeds of a policy with tasks, scored by deliveries."""
+    place = tmp_path_factory.mktemp("runs")
+    scored(out=place)
+    return place
+
+
+def scored(policy="stochm", world=WORLD, **options):
+    """Score in this process, quietly, in the tiny budget."""
+    return score_policy(
+        policy, world, **{"budget": TINY, "jobs": 1, "progress": False, "measures": ["raw_performance"], **options}
+    )
+
+
+def values(found) -> dict[tuple[int, int], float]:
+    """(Robots, seed) -> raw performance."""
+    return {
+        (score.n_robots[0], seed): value for score in found["raw_performance"] for seed, value in score.per_seed.items()
+    }
+
+
+@pytest.fixture
+def no_runs(monkeypatch):
+    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+
+
+def recorded() -> set[str]:
+    """Columns of a record that hold a number per interval, but for the clock and performance itself."""
+    lines = [line.split() for line in schema_table().splitlines()[1:]]
+    keys = {"run_id", "scenario", "controller", "n_robots", "criterion", "criterion_value", "seed"}
+    return {name for name, *_ in lines} - keys - {"interval", "t_end_s", "performance"}
+
+
+def test_every_recorded_column_is_a_performance():
+    assert recorded() == set(PERFORMANCE_COLUMNS)
+
+
+@pytest.mark.parametrize("name", [*sorted(recorded()), *DERIVED_PERFORMANCES, "1/interference_fraction"])
+def test_every_column_of_stored_runs_can_be_scored(name, folder, no_runs):
+    found = scored(out=folder, performance=name)
+    assert len(values(found)) == 4
+    assert all(np.isfinite(value) and value >= 0.0 for value in values(found).values())
+    assert found.settings["performance"] == name
+    if name in PERFORMANCE_COLUMNS:
+        for record in load(folder):
+            expected = record.columns().get(name, np.full(2, float(name == "task_share_none"))).sum()
+            assert values(found)[record.n_robots, record.seed] == pytest.approx(expected)
+
+
+def test_scenario_and_argument_mean_the_same(folder, no_runs):
+    by_scenario = scored(world=dataclasses.replace(WORLD, performance="n_active"), out=folder)
+    assert str(by_scenario) == str(scored(performance="n_active", out=folder))
+    assert values(by_scenario) == {(1, 0): 2.0, (1, 1): 2.0, (4, 0): 8.0, (4, 1): 8.0}
+    assert str(by_scenario).startswith("stochm in warehouse_small, performance n_active, budget custom")
+
+
+def test_units_follow(folder, no_runs):
+    def units(**options):
+        measures = ["raw_performance", "efficiency"]
+        return [score.unit for score in scored(out=folder, measures=measures, **options).scores[1:3]]
+
+    assert units() == ["objects in 4 s", "objects per robot in 4 s"]
+    assert units(performance="deaths") == ["robots in 4 s", "robots per robot in 4 s"]
+    assert units(performance="n_active") == ["robots summed over intervals", "robots per robot summed over intervals"]
+    assert units(performance="task_balance")[0] == "task_balance summed over intervals"
+    own = Performance(function=lambda record: record["n_active"], name="crowd", unit="heads", is_total=True)
+    assert units(performance=own)[0] == "heads in 4 s"
+
+
+def test_shares_are_noted_where_growth_in_proportion_is_the_scale(folder, no_runs):
+    """Two swarms in full balance are no worse than one; a swarm of four is not expected to have four times of it."""
+    measures = ["raw_performance", "efficiency", "t_lost_fraction", "task_emergence", "scalability"]
+
+    def noted(performance):
+        found = scored(out=folder, measures=measures, performance=performance)
+        return {score.measure for score in found.scores if "no sum over robots" in score.note}
+
+    assert noted("task_balance") == noted("1/n_active") == {"efficiency", "task_emergence", "scalability"}
+    assert noted("n_active") == noted("collected") == noted(lambda record: record["n_active"]) == set()
+    share = Performance(function=lambda record: record["interference_fraction"], name="lost", adds_up=False)
+    assert noted(share) == {"efficiency", "task_emergence", "scalability"}
+
+
+def test_units_of_measures_of_adversity_follow():
+    found = scored("random", measures=["noise_robustness", "population_robustness"], performance="n_active")
+    assert {score.unit for score in found.scores} == {"robots (DTW)", "robots summed over intervals"}
+
+
+def test_a_function_of_the_record_is_a_performance(folder, no_runs):
+    def at_work(record):
+        assert record.height == 2
+        return 2.0 * record["n_active"]
+
+    found = scored(out=folder, performance=at_work)
+    assert values(found) == {(1, 0): 4.0, (1, 1): 4.0, (4, 0): 16.0, (4, 1): 16.0}
+    assert found.settings["performance"] == "at_work"
+    assert found["raw_performance"][0].unit == "at_work summed over intervals"
+
+
+def test_policies_are_compared_by_a_function():
+    compared = compare_policies(
+        ["random", "crw"],
+        WORLD,
+        budget=TINY,
+        jobs=1,
+        progress=False,
+        measures=["raw_performance"],
+        performance=Performance(function=lambda record: record["n_present"], name="bodies", unit="robots"),
+    )
+    assert "performance bodies" in str(compared).splitlines()[0]
+    assert {score.summary.mean for each in compared.tables for score in each.scores} == {2.0, 8.0}
+
+
+def test_tables_of_different_performances_are_not_compared(folder, no_runs):
+    tables = [
+        scored(out=folder),
+        dataclasses.replace(scored(out=folder, performance="n_active"), policy="other"),
+    ]
+    with pytest.raises(CurveError, match="one performance to compare, got collected of stochm, n_active of other"):
+        compare_tables(tables)
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda record: record["n_active"] - 2.0, r"performance mine of run \w+ as finite numbers >= 0, got -1\.0 in"),
+        (lambda record: record["n_active"] * np.nan, "got nan in interval 0"),
+        (lambda record: [1.0, np.inf], "got inf in interval 1; let 1/0 be 0"),
+        (lambda record: 3.0, r"one number per interval, shape \(2,\), got shape \(\)"),
+        (lambda record: record["controller"], "as numbers, got"),
+    ],
+    ids=["negative", "nan", "inf", "one number", "text"],
+)
+def test_values_that_are_no_performance_are_told(function, message, folder):
+    with pytest.raises(CurveError, match=message):
+        scored(out=folder, performance=Performance(function=function, name="mine"))
+
+
+def test_unknown_performances_are_refused_before_anything_runs(no_runs):
+    with pytest.raises(ConfigError, match=r"got 'n_carying'\. Did you mean 'n_carrying'\?"):
+        scored(performance="n_carying")
+    with pytest.raises(CurveError, match="name of a recorded column, or a function of a record, got 3"):
+        scored(performance=3)
+
+
+def test_a_name_of_a_record_is_checked_like_a_function():
+    with pytest.raises(
+        CurveError, match=r"performance adversity of run 7 as finite numbers >= 0, got -0\.5 in interval 1"
+    ):
+        checked_performance([1.0, -0.5], "adversity", 2, "run 7")
+
+
+CURVES = table(
+    rows(1, [[9.0, 9.0], [9.0, 9.0]], carried=[1.0, 3.0], lost=[0.5, 0.0]),
+    rows(2, [[9.0, 9.0], [9.0, 9.0]], carried=[4.0, 4.0], lost=[0.25, 0.25]),
+)
+
+
+@pytest.mark.parametrize(
+    ("performance", "expected"),
+    [("carried", [4.0, 8.0]), ("1/lost", [2.0, 8.0]), (lambda run: run["carried"].cum_sum(), [5.0, 12.0])],
+    ids=["column", "inverse", "function of a run"],
+)
+def test_curves_from_a_file_have_any_performance(performance, expected, tmp_path):
+    CURVES.sample(fraction=1.0, shuffle=True, seed=2).sort("n_robots").drop("performance").write_csv(tmp_path / "c.csv")
+    (found,) = score_curves(tmp_path / "c.csv", measures=["raw_performance"], performance=performance)
+    assert [score.summary.mean for score in found.scores] == expected
+    assert [score.summary.std for score in found.scores] == [0.0, 0.0]
+
+
+def test_units_of_known_columns_of_a_file_follow(tmp_path):
+    frame = table(*(rows(n, [[9.0]], n_active=float(n), interference_fraction=0.5) for n in (1, 2)))
+    frame.write_csv(tmp_path / "c.csv")
+
+    def score(performance):
+        (found,) = score_curves(tmp_path / "c.csv", measures=["task_emergence"], performance=performance)
+        assert found.settings["performance"] == performance
+        return found.scores[0].unit, "no sum over robots" in found.scores[0].note
+
+    assert score("n_active") == ("robots summed over intervals", False)
+    assert score("interference_fraction") == ("interference_fraction summed over intervals", True)
+    assert score("1/n_active") == ("1/n_active summed over intervals", True)
+
+
+def test_a_function_does_not_hide_what_a_file_lacks(tmp_path):
+    CURVES.select("carried").write_csv(tmp_path / "c.csv")
+    with pytest.raises(CurveError, match="Expected the columns n_robots, seed, interval in"):
+        score_curves(tmp_path / "c.csv", performance=lambda run: run["carried"])
+
+
+@pytest.mark.parametrize(
+    ("performance", "message"),
+    [
+        ("carred", "Expected a column carred for performance in .*Did you mean 'carried'"),
+        (lambda run: run["carried"] - 2.0, "of n_robots 1, seed 0 in .* got -1.0 in interval 0"),
+    ],
+)
+def test_what_is_wrong_with_the_performance_of_a_file_is_told(performance, message, tmp_path):
+    CURVES.write_csv(tmp_path / "c.csv")
+    with pytest.raises(CurveError, match=message):
+        score_curves(tmp_path / "c.csv", performance=performance)
+
+
+def test_the_class_is_public():
+    assert metrics.Performance is Performance

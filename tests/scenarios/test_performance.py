@@ -1,0 +1,120 @@
+"""What performance can mean: names, units, and values worked out by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.performance import (
+    DERIVED_PERFORMANCES,
+    PERFORMANCE_COLUMNS,
+    performance_curve,
+    quantity,
+)
+
+TASKS = ("generalist", "harvester", "collector", "starter", "finisher", "transferer", "cache_collector")
+
+
+def curve(name, **columns):
+    given = {key: np.asarray(values) for key, values in columns.items()}
+    n_intervals = len(next(iter(given.values())))
+    return performance_curve(name, {"interval": np.arange(n_intervals), **given})
+
+
+def balance(**shares):
+    columns = {f"task_share_{task}": [share] for task, share in shares.items()}
+    return curve("task_balance", **columns)[0]
+
+
+def test_a_recorded_column_is_taken_as_it_is():
+    found = curve("cache_drops", cache_drops=np.array([3, 0, 5]))
+    assert found.tolist() == [3.0, 0.0, 5.0]
+    assert found.dtype == np.float64
+
+
+def test_one_over_a_column_of_which_less_is_better():
+    """A tenth of the time lost is worth 10, half of it 2; no loss at all is 0, because distances need finite curves."""
+    found = curve("1/interference_fraction", interference_fraction=[0.1, 0.5, 0.0])
+    np.testing.assert_allclose(found, [10.0, 2.0, 0.0])
+
+
+def test_load_is_objects_per_cache():
+    """Six objects in two caches are 3 per cache; before the first cache stands there is no load."""
+    loads = {"n_objects_cached": [6.0, 0.0, 5.0], "n_caches": [2.0, 0.0, 0.5]}
+    assert curve("cache_load", **loads).tolist() == [3.0, 0.0, 10.0]
+    np.testing.assert_allclose(curve("1/cache_load", **loads), [1 / 3, 0.0, 0.1])
+
+
+def test_balance_of_tasks_is_the_entropy_of_their_shares():
+    assert balance(**dict.fromkeys(TASKS, 1 / 7)) == pytest.approx(1.0)
+    assert balance(generalist=1 / 3, harvester=1 / 3, collector=1 / 3) == pytest.approx(math.log(3) / math.log(7))
+    # 1/4 ln 4 + 3/4 ln 4/3 = 0.5623, over ln 7 = 1.9459
+    assert balance(harvester=0.25, collector=0.75) == pytest.approx(0.28899, abs=1e-5)
+    assert balance(generalist=1.0) == 0.0
+
+
+def test_balance_is_about_robots_that_have_a_task():
+    assert balance(none=0.5, harvester=0.25, collector=0.25) == pytest.approx(math.log(2) / math.log(7))
+    assert balance(none=1.0) == 0.0
+
+
+def test_a_column_that_a_run_lacks_says_what_is_true_without_it():
+    """No population wrapper, no deaths; no tasks told, every robot without one."""
+    assert curve("deaths", collected=[1, 2]).tolist() == [0.0, 0.0]
+    assert curve("task_balance", collected=[1, 2]).tolist() == [0.0, 0.0]
+    assert curve("task_share_none", collected=[1, 2]).tolist() == [1.0, 1.0]
+    assert curve("task_share_none", task_share_none=[0.25]).tolist() == [0.25]
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "amount", "title", "is_total"),
+    [
+        ("collected", "objects", "objects", "deliveries", True),
+        ("n_carrying", "robots", "robots", "robots carrying", False),
+        ("1/interference_ticks", "1/robot-ticks", "1/robot-ticks", "1/interference ticks", False),
+        ("1/cache_load", "1/(objects per cache)", "1/(objects per cache)", "1/cache load", False),
+        ("task_balance", "1", "task_balance", "task balance", False),
+        ("1/task_balance", "1", "1/task_balance", "1/task balance", False),
+    ],
+)
+def test_units_and_words(name, unit, amount, title, is_total):
+    found = quantity(name)
+    assert (found.name, found.unit, found.amount, found.title, found.is_total) == (name, unit, amount, title, is_total)
+
+
+def test_counts_add_up_over_robots_and_shares_do_not():
+    assert all(
+        quantity(name).adds_up for name in ("collected", "n_carrying", "n_caches", "interference_ticks", "deaths")
+    )
+    others = ("task_balance", "cache_load", "interference_fraction", "time_at_work_s", "1/collected", "adversity")
+    assert not any(quantity(name).adds_up for name in others)
+
+
+@pytest.mark.parametrize("name", [*PERFORMANCE_COLUMNS, *DERIVED_PERFORMANCES])
+def test_every_name_has_a_curve_and_an_inverse(name):
+    given = dict.fromkeys(PERFORMANCE_COLUMNS, np.array([0.5, 0.0]))
+    found = curve(name, **given)
+    assert found.shape == (2,)
+    np.testing.assert_allclose(curve(f"1/{name}", **given)[found > 0.0] * found[found > 0.0], 1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("colected", "'colected'. Did you mean 'collected'?"),
+        ("1/interference_fractoin", "Did you mean '1/interference_fraction'?"),
+        ("task_blance", "Did you mean 'task_balance'?"),
+        ("first_pickups", "Did you mean 'first_picked'?"),
+        ("1/deliveries", "Did you mean '1/collected'?"),
+        ("1/1/collected", "got '1/1/collected'"),
+        ("interval", "got 'interval'"),
+        ("", "got ''"),
+        (3, "got 3"),
+        (None, "got None"),
+    ],
+)
+def test_unknown_names_are_refused_with_the_nearest(name, hint):
+    with pytest.raises(ConfigError, match="Expected performance to be a recorded column") as error:
+        quantity(name)
+    assert hint in str(error.value)
