@@ -82,7 +82,9 @@ class RunRecord:
     n_present: Annotated[FloatArray, Column("robots", "mean over ticks of robots that are born and alive")]
     n_caches: Annotated[FloatArray, Column("caches", "mean over ticks")]
     n_objects_cached: Annotated[FloatArray, Column("objects", "mean over ticks of objects inside caches")]
-    adversity: Annotated[FloatArray, Column("1", "mean over ticks of the conditions V(t); 0 = nothing adverse")]
+    adversity: Annotated[
+        FloatArray, Column("1", "mean over ticks of V(t): of a throttle, else of a handling cost in ticks, else 0")
+    ]
 
     contributed: Mapping[str, FloatArray]
     """Further columns, (T,) float64 each, from wrappers and policies; see `KNOWN_CONTRIBUTIONS`."""
@@ -234,6 +236,8 @@ KNOWN_CONTRIBUTIONS: dict[str, tuple[str, str]] = {
     "task_share_cache_collector": ("1", "the same for the task Cache Collector"),
     "throttle": ("1", "waveform V(t) of the throttle at the last tick of the interval"),
     "throttle_mean": ("1", "waveform V(t) of the throttle, mean over the ticks of the interval"),
+    "handling_cost": ("ticks", "waveform V(t) of the handling cost at the last tick of the interval"),
+    "handling_cost_mean": ("ticks", "waveform V(t) of the handling cost, mean over the ticks of the interval"),
     "deaths": ("robots", "that died in the interval"),
     "births": ("robots", "that were born"),
     "malfunctions": ("robots", "that went into repair"),
