@@ -1,4 +1,4 @@
-"""The paper's three scenarios as configurations; each value names its source.
+"""The paper's three scenarios, and two warehouses with more sources, as configurations; each value names its source.
 
 Section numbers refer to the paper, "Improved Swarm Engineering: Aligning Intuition and Analysis" (Harwell, Gini);
 "study" means the experiment configuration published with it. Every field can be overridden:
@@ -18,7 +18,7 @@ from swarm_forage_env.scenarios.config import (
     with_overrides,
 )
 
-SCENARIO_NAMES = ("warehouse_small", "warehouse_medium", "search_and_rescue")
+SCENARIO_NAMES = ("warehouse_small", "warehouse_medium", "warehouse_dual", "warehouse_quad", "search_and_rescue")
 
 SEARCH_AND_RESCUE_OBJECTS = {16: 80, 32: 272, 48: 368, 64: 448, 80: 544, 96: 1248, 112: 1408, 128: 1568}
 """Side in metres -> objects: a number that the power-law clusters of that side always hold (our choice: the study asked
@@ -61,6 +61,40 @@ def warehouse_medium(**overrides: Any) -> ScenarioConfig:
         ),
         robots=RobotConfig(n_robots=200),  # scenario 1: 200 robots in all sweeps but size
         objects=ObjectConfig(n_objects=800, placement="random"),  # study: 800 (2,048 in the size sweep)
+        performance="collected",
+    )
+    return with_overrides(base, **overrides)
+
+
+def warehouse_dual(**overrides: Any) -> ScenarioConfig:
+    """Indoor warehouse, 32 x 16 m, nest in the middle between two sources. 50 robots, 200 objects."""
+    base = ScenarioConfig(
+        name="warehouse_dual",
+        arena=ArenaConfig(
+            width_m=32.0,  # our choice: as the small warehouse (study: twice as wide as high)
+            height_m=16.0,
+            nest_centre_m=(16.0, 8.0),  # study: centre of the arena
+            nest_size_m=(3.2, 12.8),  # study: 0.1 X by 0.8 Y
+        ),
+        robots=RobotConfig(n_robots=50),  # our choice: as the small warehouse, so that only the sources differ
+        objects=ObjectConfig(n_objects=200, placement="dual_source"),
+        performance="collected",
+    )
+    return with_overrides(base, **overrides)
+
+
+def warehouse_quad(**overrides: Any) -> ScenarioConfig:
+    """Indoor warehouse, 48 x 48 m, nest in the middle of four sources. 200 robots, 800 objects."""
+    base = ScenarioConfig(
+        name="warehouse_quad",
+        arena=ArenaConfig(
+            width_m=48.0,  # our choice: as the medium warehouse (study: as wide as high)
+            height_m=48.0,
+            nest_centre_m=(24.0, 24.0),  # study: centre of the arena
+            nest_size_m=(9.6, 9.6),  # study: 0.2 X square
+        ),
+        robots=RobotConfig(n_robots=200),  # our choice: as the medium warehouse, so that only the sources differ
+        objects=ObjectConfig(n_objects=800, placement="quad_source"),
         performance="collected",
     )
     return with_overrides(base, **overrides)
@@ -131,6 +165,8 @@ def scenario(name: str, /, **overrides: Any) -> ScenarioConfig:
     builders = {
         "warehouse_small": warehouse_small,
         "warehouse_medium": warehouse_medium,
+        "warehouse_dual": warehouse_dual,
+        "warehouse_quad": warehouse_quad,
         "search_and_rescue": search_and_rescue,
     }
     known_name("scenario", name, builders)

@@ -30,12 +30,24 @@ UNDISTURBED = "none"
 """Criterion of the runs in which nothing is varied."""
 STUDY_HORIZON_S = 10_000.0
 """Length of the study's runs, for which the periods of its throttle waveforms are chosen."""
-SIZE_SWEEP_OBJECTS = {"warehouse_small": 512, "warehouse_medium": 2048}
-"""Objects while the swarm size varies (study configuration): enough for the largest swarm."""
+SIZE_SWEEP_OBJECTS = {
+    "warehouse_small": 512,
+    "warehouse_medium": 2048,
+    "warehouse_dual": 512,
+    "warehouse_quad": 2048,
+}
+"""Objects while the swarm size varies: enough for the largest swarm (study configuration; dual and quad: our choice, as
+in the warehouse of that size)."""
 STUDY_LARGEST_SIZE = 2.56
 """Largest swarm of the size sweeps in units of the usual one: 128 of 50 and 512 of 200 (study configuration)."""
-SIGMA_MAX = {"warehouse_small": 0.03, "warehouse_medium": 0.03, "search_and_rescue": 0.10}
-"""Highest noise of the robustness studies (paper)."""
+SIGMA_MAX = {
+    "warehouse_small": 0.03,
+    "warehouse_medium": 0.03,
+    "warehouse_dual": 0.03,
+    "warehouse_quad": 0.03,
+    "search_and_rescue": 0.10,
+}
+"""Highest noise of the robustness studies (paper; dual and quad: our choice, as in the other warehouses)."""
 STUDY_SIZES_OF_MALFUNCTIONS = (50, 200)
 MALFUNCTION_PER_TICK = 0.001
 AWAY_SHARE = 0.9

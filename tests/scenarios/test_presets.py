@@ -1,17 +1,20 @@
-"""The three presets against the paper's tables."""
+"""The presets against the paper's tables."""
 
 import math
 
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.config import with_overrides
 from swarm_forage_env.scenarios.presets import (
     SCENARIO_NAMES,
     SEARCH_AND_RESCUE_OBJECTS,
     robots_at_density,
     scenario,
     search_and_rescue,
+    warehouse_dual,
     warehouse_medium,
+    warehouse_quad,
     warehouse_small,
 )
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
@@ -73,6 +76,23 @@ def test_medium_warehouse():
     assert config.performance == "collected"
     assert config.min_dist_m == pytest.approx(9.6)
     assert config.cache_proximity_m == pytest.approx(19.2)
+
+
+def test_dual_source_is_the_small_warehouse_with_the_nest_between_two_sources():
+    config, small = warehouse_dual(), warehouse_small()
+    assert config.arena.nest_box_m == (14.4, 1.6, 17.6, 14.4)  # 16 -+ 1.6 m, 8 -+ 6.4 m
+    assert config.objects.placement == "dual_source"
+    lights = config.arena.lights_m
+    assert [light[:2] for light in lights] == [pytest.approx((16.0, y)) for y in (4.8, 8.0, 11.2)]
+    same = {"nest_centre_m": small.arena.nest_centre_m, "placement": "single_source", "name": "warehouse_small"}
+    assert with_overrides(config, **same) == small
+
+
+def test_quad_source_is_the_medium_warehouse_with_other_places():
+    config, medium = warehouse_quad(), warehouse_medium()
+    assert config.arena.nest_box_m == (19.2, 19.2, 28.8, 28.8)
+    assert config.arena.lights_m == (pytest.approx((24.0, 24.0, math.sqrt(48.0))),)
+    assert with_overrides(config, placement="random", name="warehouse_medium") == medium
 
 
 @pytest.mark.parametrize("n_objects", [200, 512])
