@@ -34,6 +34,7 @@ def score_policy(
     name: str | None = None,
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
+    density: float | None = None,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
@@ -53,6 +54,8 @@ def score_policy(
             for the code: give another name when the code has changed.
         parameters: Keyword arguments of a registered policy or a class.
         caches: "none", "static", "dynamic"; default see `swarm_forage_env.study.spec.chosen_caches`.
+        density: Robots per m^2 that all swarm sizes keep: the arena grows with the swarm, one robot is in the smallest.
+            Default: all sizes in the scenario's arena (in search and rescue at its density).
         out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
         jobs: Processes; default one per core.
         executor: Runs the work instead, for example Dask's `client.get_executor()`.
@@ -76,6 +79,7 @@ def score_policy(
         horizon_s=horizon_s,
         parameters=parameters,
         caches=caches,
+        density=density,
     )
     return run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress)[0]
 
@@ -89,6 +93,7 @@ def compare_policies(
     seeds: int | Sequence[int] | None = None,
     horizon_s: float | None = None,
     caches: str | None = None,
+    density: float | None = None,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
@@ -99,7 +104,14 @@ def compare_policies(
     Args and errors as in `score_policy`; `policies` are two or more, or a mapping from names to policies.
     """
     plan = plan_scores(
-        policies, scenario, measures=measures, budget=budget, seeds=seeds, horizon_s=horizon_s, caches=caches
+        policies,
+        scenario,
+        measures=measures,
+        budget=budget,
+        seeds=seeds,
+        horizon_s=horizon_s,
+        caches=caches,
+        density=density,
     )
     return compare_tables(run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress))
 

@@ -55,6 +55,7 @@ def plan_scores(
     horizon_s: float | None = None,
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
+    density: float | None = None,
 ) -> ScoringPlan:
     """Return the runs that `score_policy` and `compare_policies` make; arguments and errors as there."""
     from swarm_forage_env.scenarios.presets import scenario as preset
@@ -68,7 +69,9 @@ def plan_scores(
     chosen = preset(scenario) if isinstance(scenario, str) else scenario
     return ScoringPlan(
         contestants=contestants_of(policies, parameters or {}, chosen, caches),
-        experiments=experiments.plan_experiments(chosen, {MEASURE_CRITERIA[name] for name in wanted}, allowed),
+        experiments=experiments.plan_experiments(
+            chosen, {MEASURE_CRITERIA[name] for name in wanted}, allowed, density=density
+        ),
         seeds=chosen_seeds(seeds, allowed.n_seeds),
         measures=wanted,
         scenario=chosen,

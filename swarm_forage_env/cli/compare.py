@@ -8,6 +8,7 @@ from swarm_forage_env.cli.options import (
     AsJson,
     Budget,
     Caches,
+    Density,
     DryRun,
     Jobs,
     Measures,
@@ -37,6 +38,7 @@ def compare(
     robots: Robots = None,
     objects: Objects = None,
     side: Side = None,
+    density: Density = None,
     caches: Caches = None,
     settings: Settings = None,
     out: Out = None,
@@ -50,7 +52,13 @@ def compare(
     from swarm_forage_env.cli.score_report import run_and_show
 
     chosen = ScenarioOptions(
-        scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
+        scenario=scenario,
+        robots=robots,
+        objects=objects,
+        side=side,
+        density=density,
+        caches=caches,
+        settings=tuple(settings or ()),
     )
     options = ScoreOptions(policies=policies, measures=measures, budget=budget, seeds=seeds, horizon=horizon)
     plan = build_plan(chosen, options, at_least=2)

@@ -9,6 +9,7 @@ from swarm_forage_env.cli.options import (
     AsJson,
     Budget,
     Caches,
+    Density,
     DryRun,
     Jobs,
     Measures,
@@ -40,6 +41,7 @@ def score(
     robots: Robots = None,
     objects: Objects = None,
     side: Side = None,
+    density: Density = None,
     caches: Caches = None,
     settings: Settings = None,
     out: Out = None,
@@ -63,7 +65,13 @@ def score(
         show_scores(tables_of_file(curves, measures), None, as_json=as_json)
         return
     chosen = ScenarioOptions(
-        scenario=scenario, robots=robots, objects=objects, side=side, caches=caches, settings=tuple(settings or ())
+        scenario=scenario,
+        robots=robots,
+        objects=objects,
+        side=side,
+        density=density,
+        caches=caches,
+        settings=tuple(settings or ()),
     )
     options = ScoreOptions(policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon)
     folder = out or default_folder(scenario)

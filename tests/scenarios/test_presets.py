@@ -7,9 +7,9 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.config import with_overrides
 from swarm_forage_env.scenarios.presets import (
+    DENSITY,
     SCENARIO_NAMES,
     SEARCH_AND_RESCUE_OBJECTS,
-    robots_at_density,
     scenario,
     search_and_rescue,
     warehouse_dual,
@@ -18,6 +18,7 @@ from swarm_forage_env.scenarios.presets import (
     warehouse_small,
 )
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
+from swarm_forage_env.scenarios.sizing import robots_at_density
 
 SIDES = (16, 32, 48, 64, 80, 96, 112, 128)
 ROBOTS = (12, 51, 115, 204, 320, 460, 627, 819)
@@ -120,7 +121,7 @@ def test_search_and_rescue_defaults():
 def test_search_and_rescue_series(side, n_robots, n_objects, cache_side_m):
     config = search_and_rescue(side_m=side)
     assert (config.arena.width_m, config.arena.height_m) == (side, side)
-    assert config.robots.n_robots == robots_at_density(side) == n_robots
+    assert config.robots.n_robots == robots_at_density(side * side, DENSITY) == n_robots
     assert config.objects.n_objects == SEARCH_AND_RESCUE_OBJECTS[side] == n_objects
     assert config.arena.nest_centre_m == (side / 2, side / 2)
     assert config.arena.nest_size_m == pytest.approx((side / 5, side / 5))

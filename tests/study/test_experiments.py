@@ -178,6 +178,36 @@ def test_sizes_end_with_the_swarm_of_the_scenario(name, n_robots, count, sizes):
     )
 
 
+def test_sizes_at_constant_density_grow_with_the_arena():
+    ladder = size_ladder(scenario("warehouse_small", n_robots=200, density=0.05), 4, 0.05)
+    seen = [(w.robots.n_robots, w.arena.width_m, w.arena.height_m, w.objects.n_objects) for w in ladder]
+    # 50 robots need 1,000 m^2 = 2 a^2 with a = 22.36 m, 100 need a = 31.62 m, 200 need a = 44.72 m.
+    assert seen == [(1, 44.8, 22.4, 392), (50, 44.8, 22.4, 392), (100, 63.6, 31.8, 790), (200, 89.6, 44.8, 1568)]
+    assert ladder[-1] == scenario("warehouse_small", n_robots=200, density=0.05)
+
+
+def test_sizes_that_need_too_small_an_arena_are_left_out():
+    # Margins take 5.6 m of both sides. Two robots would have 9.2 x 4.6 m, four have 12.8 x 6.4 m.
+    ladder = size_ladder(scenario("warehouse_small", n_robots=8), None, 0.05)
+    assert [(w.robots.n_robots, w.arena.width_m) for w in ladder] == [(1, 12.8), (4, 12.8), (8, 18.0), (16, 25.6)]
+    with pytest.raises(ConfigError, match=r"density of 0\.05 is larger than twice .* got 2 robots"):
+        size_ladder(scenario("warehouse_small", n_robots=2), 2, 0.05)
+
+
+def test_search_and_rescue_keeps_to_its_arenas_at_another_density():
+    ladder = size_ladder(scenario("search_and_rescue", n_robots=230, density=0.1), 3, 0.1)
+    assert [(w.robots.n_robots, w.arena.width_m) for w in ladder] == [(1, 16.0), (102, 32.0), (230, 48.0)]
+
+
+def test_a_plan_keeps_the_density_in_sizes_only():
+    base = scenario("warehouse_small", n_robots=200, density=0.05)
+    quick = BUDGETS["quick"]
+    experiments = plan_experiments(base, ["population_size", "throttle"], quick, density=0.05)
+    sizes = [e.scenario.arena.width_m for e in of("population_size", experiments)]
+    assert sizes == [63.6, 63.6, 89.6]
+    assert {e.scenario.arena.width_m for e in of("throttle", experiments)} == {89.6}
+
+
 def test_levels_are_spread_evenly_and_end_with_the_strongest():
     assert spread([1, 2, 3, 4, 5, 6], 2) == (3, 6)
     assert spread([1, 2, 3, 4, 5, 6, 7], 3) == (2, 4, 7)
