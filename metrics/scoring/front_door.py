@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from metrics.checks import CurveError
 
+from .columns import THROTTLE
 from .comparison import Comparison, compare_tables
 from .contestants import PolicyLike
 from .curves_file import read_curves
@@ -35,6 +36,7 @@ def score_policy(
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
     density: float | None = None,
+    disturbance: str = THROTTLE,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
@@ -56,6 +58,8 @@ def score_policy(
         caches: "none", "static", "dynamic"; default see `swarm_forage_env.study.spec.chosen_caches`.
         density: Robots per m^2 that all swarm sizes keep: the arena grows with the swarm, one robot is in the smallest.
             Default: all sizes in the scenario's arena (in search and rescue at its density).
+        disturbance: What reactivity and adaptability are scored under: "throttle" (robots lose speed) or
+            "handling_cost" (picking up and dropping take longer).
         out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
         jobs: Processes; default one per core.
         executor: Runs the work instead, for example Dask's `client.get_executor()`.
@@ -80,6 +84,7 @@ def score_policy(
         parameters=parameters,
         caches=caches,
         density=density,
+        disturbance=disturbance,
     )
     return run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress)[0]
 
@@ -94,6 +99,7 @@ def compare_policies(
     horizon_s: float | None = None,
     caches: str | None = None,
     density: float | None = None,
+    disturbance: str = THROTTLE,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
@@ -112,6 +118,7 @@ def compare_policies(
         horizon_s=horizon_s,
         caches=caches,
         density=density,
+        disturbance=disturbance,
     )
     return compare_tables(run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress))
 

@@ -9,6 +9,7 @@ from swarm_forage_env.cli.options import (
     Budget,
     Caches,
     Density,
+    Disturbance,
     DryRun,
     Jobs,
     Measures,
@@ -39,6 +40,7 @@ def compare(
     objects: Objects = None,
     side: Side = None,
     density: Density = None,
+    disturbance: Disturbance = "throttle",
     caches: Caches = None,
     settings: Settings = None,
     out: Out = None,
@@ -60,6 +62,8 @@ def compare(
         caches=caches,
         settings=tuple(settings or ()),
     )
-    options = ScoreOptions(policies=policies, measures=measures, budget=budget, seeds=seeds, horizon=horizon)
+    options = ScoreOptions(
+        policies=policies, measures=measures, budget=budget, seeds=seeds, horizon=horizon, disturbance=disturbance
+    )
     plan = build_plan(chosen, options, at_least=2)
     run_and_show(plan, out or default_folder(scenario), "comparison.png", jobs, as_json=as_json, dry_run=dry_run)

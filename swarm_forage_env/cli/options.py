@@ -47,6 +47,10 @@ ConfigFile = Annotated[
 ]
 
 Measures = Annotated[str | None, typer.Option("--measures", help="Names separated by commas; default all.")]
+Disturbance = Annotated[
+    str,
+    typer.Option("--disturbance", help="What reactivity and adaptability are scored under: throttle or handling_cost."),
+]
 Budget = Annotated[str, typer.Option("--budget", help="quick, standard or paper: how long, how many runs and levels.")]
 ScoreSeeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per experiment; default the budget's.")]
 ScoreHorizon = Annotated[float | None, typer.Option("--horizon", help="Seconds per run; default the budget's.")]

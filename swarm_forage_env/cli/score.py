@@ -10,6 +10,7 @@ from swarm_forage_env.cli.options import (
     Budget,
     Caches,
     Density,
+    Disturbance,
     DryRun,
     Jobs,
     Measures,
@@ -42,6 +43,7 @@ def score(
     objects: Objects = None,
     side: Side = None,
     density: Density = None,
+    disturbance: Disturbance = "throttle",
     caches: Caches = None,
     settings: Settings = None,
     out: Out = None,
@@ -73,7 +75,9 @@ def score(
         caches=caches,
         settings=tuple(settings or ()),
     )
-    options = ScoreOptions(policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon)
+    options = ScoreOptions(
+        policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon, disturbance=disturbance
+    )
     folder = out or default_folder(scenario)
     run_and_show(build_plan(chosen, options, at_most=1), folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run)
 

@@ -21,6 +21,7 @@ class ScoreOptions:
     budget: str = "standard"
     seeds: int | None = None
     horizon: float | None = None
+    disturbance: str = "throttle"
 
 
 def build_plan(
@@ -57,6 +58,7 @@ def build_plan(
             horizon_s=options.horizon,
             caches=caches,
             density=parsed_density(described.density),
+            disturbance=options.disturbance,
         )
     except ValueError as error:  # of a policy, a measure, a budget or a file
         raise ConfigError(str(error)) from error

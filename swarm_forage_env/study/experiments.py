@@ -5,6 +5,7 @@ that each of them varies, and its reference run:
 
     population_size       number of robots; reference: one robot
     throttle              amplitude of the waveform by which robots lose speed; reference: value 0, ideal throttle
+    handling_cost         amplitude of the waveform by which handling takes longer; reference: value 0, one tick
     noise                 standard deviation of sensor and actuator noise; reference: the undisturbed run
     population_dynamics   rates of malfunctions and repairs, or of deaths; reference: the undisturbed run
     none                  the undisturbed run itself
@@ -22,11 +23,12 @@ from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.scenarios.sizing import arena_at_density, in_arena, robots_at_density
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.handling import HandlingCostConfig, square_costs
 from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, noise_levels
 from swarm_forage_env.wrappers.population import PopulationConfig, death_levels, malfunction_levels
 from swarm_forage_env.wrappers.throttle import ThrottleConfig, sine_throttles, square_throttles
 
-CRITERIA = ("population_size", "throttle", "noise", "population_dynamics")
+CRITERIA = ("population_size", "throttle", "handling_cost", "noise", "population_dynamics")
 UNDISTURBED = "none"
 """Criterion of the runs in which nothing is varied."""
 STUDY_HORIZON_S = 10_000.0
@@ -55,6 +57,7 @@ AWAY_SHARE = 0.9
 """Share of the swarm away in the equilibrium of an unlimited queue at the study's malfunction and repair rates."""
 
 _T = TypeVar("_T")
+_Waved = TypeVar("_Waved", ThrottleConfig, HandlingCostConfig)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -135,7 +138,12 @@ def plan_experiments(
         ]
     if "noise" in criteria or "population_dynamics" in criteria:
         experiments.append(Experiment(criterion=UNDISTURBED, value=0.0, scenario=scenario))
-    levels = {"throttle": _throttle_levels, "noise": _noise_levels, "population_dynamics": _population_levels}
+    levels = {
+        "throttle": _throttle_levels,
+        "handling_cost": _handling_levels,
+        "noise": _noise_levels,
+        "population_dynamics": _population_levels,
+    }
     for criterion, of_study in levels.items():
         if criterion in criteria:
             reference, disturbed = of_study(scenario)
@@ -290,7 +298,12 @@ def _throttle_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Leve
     return [(0.0, (ideal,))], [(config.waveform.amplitude, (config,)) for config in levels]
 
 
-def _compressed(config: ThrottleConfig, factor: float) -> ThrottleConfig:
+def _handling_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    ideal, *levels = (_compressed(config, scenario.horizon_s / STUDY_HORIZON_S) for config in square_costs())
+    return [(0.0, (ideal,))], [(config.waveform.amplitude, (config,)) for config in levels]
+
+
+def _compressed(config: _Waved, factor: float) -> _Waved:
     period_s = config.waveform.period_s
     if period_s is None:
         return config

@@ -10,6 +10,11 @@ from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, from_mapping
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.waveform import Waveform, gather_waveform
 
+IDEAL_COST = 1.0
+"""Constant cost, in ticks, that comparisons take as ideal conditions: nothing extra."""
+COST_AMPLITUDES = (25.0, 50.0, 100.0, 200.0, 400.0, 800.0)
+"""Levels of `square_costs`, in ticks."""
+
 
 class HandlingCost(SwarmWrapper):
     """Lets pick-ups and drops take more ticks: those that start in tick t take the integer part of V(t).
@@ -81,3 +86,17 @@ class HandlingCostConfig(WrapperConfig):
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "HandlingCostConfig":
         """Build the configuration from plain values; the waveform as `waveform.gather_waveform` reads it."""
         return from_mapping(cls, gather_waveform(mapping, "waveform", cls))
+
+
+def square_costs() -> tuple[HandlingCostConfig, ...]:
+    """Handling costs to compare policies under: a square wave, two cycles in a run of 10,000 s; the first is the ideal.
+
+    At amplitude A, a pick-up and a drop take 1 + 2 A ticks each in one half of a cycle and one tick in the other (our
+    choice, as the throttles of scenario 1; the paper shows no levels). A = 25, 50, ..., 800: up to 10 s ... 320 s.
+    """
+    ideal = Waveform(kind="constant", amplitude=IDEAL_COST)
+    waves = [
+        Waveform(kind="square", amplitude=level, offset=IDEAL_COST + level, period_s=5_000.0)
+        for level in COST_AMPLITUDES
+    ]
+    return tuple(HandlingCostConfig(waveform=waveform) for waveform in (ideal, *waves))

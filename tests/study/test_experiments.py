@@ -20,6 +20,7 @@ from swarm_forage_env.study.experiments import (
 )
 from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, SensorNoiseConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
+from swarm_forage_env.wrappers.waveform import Waveform
 
 PAPER = BUDGETS["paper"]
 
@@ -98,6 +99,18 @@ def test_throttles_pass_as_many_cycles_in_a_short_run():
         assert allowed.horizon_s / config.waveform.period_s == 2.0
 
 
+def test_handling_costs_begin_with_one_tick_and_double():
+    reference, *levels = planned("warehouse_medium", "handling_cost", BUDGETS["quick"])
+    (ideal,) = reference.wrappers
+    assert (reference.value, ideal.waveform) == (0.0, Waveform(kind="constant", amplitude=1.0))
+    assert [level.value for level in levels] == [100.0, 800.0]
+    (strongest,) = levels[-1].wrappers
+    # Two cycles in 4,000 s, from 801 - 800 = 1 to 801 + 800 = 1,601 ticks.
+    assert strongest.waveform == Waveform(kind="square", amplitude=800.0, offset=801.0, period_s=2_000.0)
+    full = planned("warehouse_medium", "handling_cost")
+    assert [level.value for level in full] == [0.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0]
+
+
 @pytest.mark.parametrize(("name", "highest"), [("warehouse_small", 0.03), ("search_and_rescue", 0.10)])
 def test_noise_rises_in_equal_steps_from_the_undisturbed_run(name, highest):
     reference, *levels = planned(name, "noise")
@@ -140,7 +153,7 @@ def test_search_and_rescue_has_deaths():
 def test_the_undisturbed_run_is_planned_once():
     experiments = plan_experiments(scenario("warehouse_small"), CRITERIA, BUDGETS["quick"])
     assert len(of(UNDISTURBED, experiments)) == 1
-    assert len(experiments) == 11
+    assert len(experiments) == 14  # itself, 3 sizes, 3 throttles, 3 handling costs, 2 noises, 2 populations
     assert len({(e.criterion, e.value) for e in experiments}) == 11
 
 
