@@ -2,7 +2,7 @@
 
     python scripts/draw_pictures.py
 
-Each shows the small warehouse with trails of 40 s. Needs the render extra.
+Each shows a warehouse with trails of 40 s. Needs the render extra.
 """
 
 from pathlib import Path
@@ -14,30 +14,42 @@ from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.study.run import LiveRun, build_env
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
-PICTURES = {"warehouse_small_dpo.png": ("dpo", 300.0), "warehouse_small_ppo.png": ("ppo_warehouse_small", 900.0)}
-"""File -> policy, and the time in s at which the picture is taken."""
+PICTURES = {
+    "warehouse_small_dpo.png": ("warehouse_small", "dpo", 300.0, 900),
+    "warehouse_small_ppo.png": ("warehouse_small", "ppo_warehouse_small", 900.0, 900),
+    "warehouse_quad_dpo.png": ("warehouse_quad", "dpo", 300.0, 700),
+}
+"""File -> scenario, policy, the time in s at which the picture is taken, and the width of the picture in pixels."""
 TRAIL_S = 40.0
 SAMPLE_S = 1.0
 
 
-def draw(file: str, policy_name: str, time_s: float) -> None:
+def draw(file: str, scenario_name: str, policy_name: str, time_s: float, size_px: int) -> None:
     """Run a policy with seed 0 and draw the arena as it is at `time_s`."""
-    small = scenario("warehouse_small")
+    world = scenario(scenario_name)
     policy = load_policy(policy_name)
-    run = LiveRun(build_env(small), policy, 0)
+    run = LiveRun(build_env(world), policy, 0)
     env = run.forage_env
-    trails = Trails(small.robots.n_robots, round(TRAIL_S / SAMPLE_S) + 1)
+    trails = Trails(world.robots.n_robots, round(TRAIL_S / SAMPLE_S) + 1)
     for sample in range(round(TRAIL_S / SAMPLE_S) + 1):
-        run.advance(to_tick=round((time_s - TRAIL_S + sample * SAMPLE_S) / small.dt_s))
+        run.advance(to_tick=round((time_s - TRAIL_S + sample * SAMPLE_S) / world.dt_s))
         trails.add(env.swarm)
-    title = f"warehouse small, {policy_name}, {small.arena.width_m:g} x {small.arena.height_m:g} m"
+    title = f"{scenario_name.replace('_', ' ')}, {policy_name}, {world.arena.width_m:g} x {world.arena.height_m:g} m"
     picture = render_frame(
-        small, env.swarm, env.objects, env.caches, env.events, tick=env.tick, size_px=900, trails=trails, title=title
+        world,
+        env.swarm,
+        env.objects,
+        env.caches,
+        env.events,
+        tick=env.tick,
+        size_px=size_px,
+        trails=trails,
+        title=title,
     )
     Image.fromarray(picture).save(IMAGES / file, optimize=True)
     print(IMAGES / file)
 
 
 if __name__ == "__main__":
-    for name, (policy, seconds) in PICTURES.items():
-        draw(name, policy, seconds)
+    for name, (world_name, policy, seconds, width) in PICTURES.items():
+        draw(name, world_name, policy, seconds, width)

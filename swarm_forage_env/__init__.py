@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.study.runner import run_all
     from swarm_forage_env.study.spec import RunSpec, plan_run
     from swarm_forage_env.views.pettingzoo import parallel_env
+    from swarm_forage_env.wrappers.handling import HandlingCost, HandlingCostConfig
     from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig, SensorNoise, SensorNoiseConfig
     from swarm_forage_env.wrappers.population import PopulationConfig, PopulationDynamics
     from swarm_forage_env.wrappers.recorder import RunRecorder
@@ -47,6 +48,8 @@ __all__ = [
     "Event",
     "ForageEnv",
     "Grip",
+    "HandlingCost",
+    "HandlingCostConfig",
     "ObservationLayout",
     "Policy",
     "PopulationConfig",
@@ -91,6 +94,8 @@ _HOMES = {
     "Event": "contract.codes",
     "ForageEnv": "env",
     "Grip": "contract.codes",
+    "HandlingCost": "wrappers.handling",
+    "HandlingCostConfig": "wrappers.handling",
     "ObservationLayout": "contract.layout",
     "Policy": "contract.policy",
     "PopulationConfig": "wrappers.population",

@@ -166,6 +166,10 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         if terminated is not None:
             self._terminated[:] = terminated
 
+    def set_handling_ticks(self, *, pickup: int, drop: int) -> None:
+        """Set how many ticks pick-ups and drops take; see `ForagingArena.set_handling_ticks`."""
+        self._world.set_handling_ticks(pickup=pickup, drop=drop)
+
     # Array level
 
     def reset_batch(self, seed: int | None = None) -> ObsArray:

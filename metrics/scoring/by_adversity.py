@@ -14,23 +14,23 @@ from metrics.queues import PopulationRates
 from metrics.robustness import mean_signed_difference, noise_robustness
 from metrics.statistics import Summary
 
-from .columns import NOISE, POPULATION, THROTTLE
+from .columns import HANDLING, NOISE, POPULATION, THROTTLE
 from .draft import ScoreDraft, Uncomputable, Values
-from .measures import MEASURE_CRITERIA
+from .measures import DISTURBANCES, MEASURE_CRITERIA
 from .studies import RunCurves, StudyCurves, common_runs
 from .table import Score
 
 ENOUGH_SHARE = 0.1
 """Share of the swarm that availability asks for: 5 of 50 and 20 of 200 robots (scenario 1 of the paper)."""
 
-_WORDS = {THROTTLE: "throttle", NOISE: "sigma", POPULATION: "population"}
+_WORDS = {THROTTLE: "throttle", HANDLING: "handling cost", NOISE: "sigma", POPULATION: "population"}
 """Criterion -> its word in `Score.at`."""
 
 
-def _levels(study: StudyCurves, criterion: str) -> tuple[tuple[RunCurves, RunCurves], ...]:
-    levels = study.levels(criterion)
+def _levels(study: StudyCurves, *criteria: str) -> tuple[tuple[RunCurves, RunCurves], ...]:
+    levels = tuple(level for criterion in criteria for level in study.levels(criterion))
     if not levels:
-        raise Uncomputable(f"there are no runs with criterion {criterion} and a value other than 0")
+        raise Uncomputable(f"there are no runs with criterion {' or '.join(criteria)} and a value other than 0")
     return levels
 
 
@@ -49,6 +49,10 @@ def _draft(measure: str, pair: tuple[RunCurves, RunCurves], *, unit: str, beside
 
 
 def _reactivity(ideal: RunCurves, disturbed: RunCurves) -> FloatArray:
+    if disturbed.criterion == HANDLING:
+        # Ticks that handling takes, never less than one: twice as many halve the performance of a perfect swarm.
+        v, i_ec = (np.maximum(1.0, runs.curves["adversity"]) for runs in (disturbed, ideal))
+        return reactivity(ideal.performance, disturbed.performance, v, i_ec, model="reciprocal")
     return reactivity(
         ideal.performance, disturbed.performance, disturbed.curves["adversity"], ideal.curves["adversity"]
     )
@@ -70,7 +74,8 @@ _DISTANCES: dict[str, Values] = {
 
 
 def _distance_scores(name: str, study: StudyCurves) -> Iterator[Score]:
-    levels = _levels(study, MEASURE_CRITERIA[name])
+    criterion = MEASURE_CRITERIA[name]
+    levels = _levels(study, *(DISTURBANCES if criterion in DISTURBANCES else (criterion,)))
     if name == "reactivity" and any("adversity" not in e.curves and e.seeds for pair in levels for e in pair):
         raise Uncomputable("there is no column adversity for the reference run and every level")
     for reference, level in levels:
@@ -86,7 +91,7 @@ def _beside_distance(reference: RunCurves, level: RunCurves) -> dict[str, float]
         return {}
     difference = mean_signed_difference(ideal.performance, disturbed.performance)
     beside = {"signed_difference": float(np.mean(difference))}
-    if level.criterion == THROTTLE and "adversity" in ideal.curves and "adversity" in disturbed.curves:
+    if level.criterion in DISTURBANCES and "adversity" in ideal.curves and "adversity" in disturbed.curves:
         applied, wanted = disturbed.curves["adversity"].mean(axis=0), ideal.curves["adversity"].mean(axis=0)
         beside["environment_distance"] = environment_distance(applied, wanted)
     return beside

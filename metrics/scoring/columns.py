@@ -10,7 +10,8 @@ Kind: TypeAlias = Literal["text", "whole", "number", "amount", "fraction"]
 """Kind of a column: text, whole numbers >= 0, numbers, numbers >= 0, numbers in [0, 1]."""
 
 SIZE, THROTTLE, NOISE, POPULATION, UNDISTURBED = "population_size", "throttle", "noise", "population_dynamics", "none"
-CRITERIA = (SIZE, THROTTLE, NOISE, POPULATION, UNDISTURBED)
+HANDLING = "handling_cost"
+CRITERIA = (SIZE, THROTTLE, HANDLING, NOISE, POPULATION, UNDISTURBED)
 """What a study varies, in column `criterion`."""
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from metrics.checks import CurveError
 
-from .columns import NOISE, POPULATION, THROTTLE
+from .columns import HANDLING, NOISE, POPULATION, THROTTLE
 from .curves_table import study_curves
 from .performance import PerformanceLike, with_performance
 from .studies import StudyCurves, shared_seeds
@@ -40,7 +40,7 @@ def read_curves(path: str | Path, performance: PerformanceLike | None = None) ->
 
 def _check_comparable(study: StudyCurves) -> None:
     """Check that there is a reference for everything that is varied, and that runs can be paired."""
-    for criterion in (THROTTLE, NOISE, POPULATION):
+    for criterion in (THROTTLE, HANDLING, NOISE, POPULATION):
         study.levels(criterion)
     if not shared_seeds(study.experiments):
         raise CurveError(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from metrics.checks import CurveError
 
+from .columns import THROTTLE
 from .comparison import Comparison, compare_tables
 from .contestants import PolicyLike
 from .curves_file import read_curves
@@ -36,6 +37,8 @@ def score_policy(
     name: str | None = None,
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
+    density: float | None = None,
+    disturbance: str = THROTTLE,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
@@ -58,6 +61,10 @@ def score_policy(
             for the code: give another name when the code has changed.
         parameters: Keyword arguments of a registered policy or a class.
         caches: "none", "static", "dynamic"; default see `swarm_forage_env.study.spec.chosen_caches`.
+        density: Robots per m^2 that all swarm sizes keep: the arena grows with the swarm, one robot is in the smallest.
+            Default: all sizes in the scenario's arena (in search and rescue at its density).
+        disturbance: What reactivity and adaptability are scored under: "throttle" (robots lose speed) or
+            "handling_cost" (picking up and dropping take longer).
         out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
         jobs: Processes; default one per core.
         executor: Runs the work instead, for example Dask's `client.get_executor()`.
@@ -82,6 +89,8 @@ def score_policy(
         performance=performance,
         parameters=parameters,
         caches=caches,
+        density=density,
+        disturbance=disturbance,
     )
     return run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress)[0]
 
@@ -96,6 +105,8 @@ def compare_policies(
     horizon_s: float | None = None,
     performance: PerformanceLike | None = None,
     caches: str | None = None,
+    density: float | None = None,
+    disturbance: str = THROTTLE,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
@@ -114,6 +125,8 @@ def compare_policies(
         horizon_s=horizon_s,
         performance=performance,
         caches=caches,
+        density=density,
+        disturbance=disturbance,
     )
     return compare_tables(run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress))
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from metrics.checks import CurveError
 
-from .columns import NOISE, POPULATION, SIZE, THROTTLE
+from .columns import HANDLING, NOISE, POPULATION, SIZE, THROTTLE
 
 MEASURE_CRITERIA: dict[str, str] = {
     "raw_performance": SIZE,
@@ -22,6 +22,20 @@ MEASURE_CRITERIA: dict[str, str] = {
     "availability": POPULATION,
 }
 """Measure -> what has to be varied for it. The order is that of score tables."""
+DISTURBANCES = (THROTTLE, HANDLING)
+"""Kinds of disturbance over time, the paper's two, under which reactivity and adaptability can be scored."""
+
+
+def criteria_of(measures: Sequence[str], disturbance: str) -> set[str]:
+    """Return what has to be varied for some measures, with one of `DISTURBANCES` in place of the throttle.
+
+    Raises:
+        CurveError: an unknown kind of disturbance.
+    """
+    if disturbance not in DISTURBANCES:
+        raise CurveError(f"Expected disturbance to be one of {', '.join(DISTURBANCES)}, got {disturbance!r}.")
+    criteria = (MEASURE_CRITERIA[name] for name in measures)
+    return {disturbance if criterion == THROTTLE else criterion for criterion in criteria}
 
 
 def check_measures(measures: Sequence[str] | None) -> tuple[str, ...]:

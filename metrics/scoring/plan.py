@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from metrics.checks import chosen_seeds
 
+from .columns import THROTTLE
 from .contestants import Contestant, PolicyLike, contestants_of
-from .measures import MEASURE_CRITERIA, check_measures
+from .measures import check_measures, criteria_of
 from .performance import Performance, PerformanceLike, own_performance
 
 if TYPE_CHECKING:
@@ -67,6 +68,8 @@ def plan_scores(
     performance: PerformanceLike | None = None,
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
+    density: float | None = None,
+    disturbance: str = THROTTLE,
 ) -> ScoringPlan:
     """Return the runs that `score_policy` and `compare_policies` make; arguments and errors as there."""
     from swarm_forage_env.scenarios.presets import scenario as preset
@@ -82,7 +85,7 @@ def plan_scores(
         chosen = replace(chosen, performance=performance)
     return ScoringPlan(
         contestants=contestants_of(policies, parameters or {}, chosen, caches),
-        experiments=experiments.plan_experiments(chosen, {MEASURE_CRITERIA[name] for name in wanted}, allowed),
+        experiments=experiments.plan_experiments(chosen, criteria_of(wanted, disturbance), allowed, density=density),
         seeds=chosen_seeds(seeds, allowed.n_seeds),
         measures=wanted,
         scenario=chosen,

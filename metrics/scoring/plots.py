@@ -19,7 +19,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F
 PANELS_PER_ROW = 4
 _X_LABELS = {
     SIZE: "robots (the larger swarm)",
-    THROTTLE: "throttle amplitude",
+    THROTTLE: "amplitude of throttle, or of handling cost in ticks",
     NOISE: "standard deviation of noise",
     POPULATION: "level of population dynamics",
 }

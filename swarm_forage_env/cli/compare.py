@@ -8,6 +8,8 @@ from swarm_forage_env.cli.options import (
     AsJson,
     Budget,
     Caches,
+    Density,
+    Disturbance,
     DryRun,
     Jobs,
     Measures,
@@ -38,6 +40,8 @@ def compare(
     robots: Robots = None,
     objects: Objects = None,
     side: Side = None,
+    density: Density = None,
+    disturbance: Disturbance = "throttle",
     caches: Caches = None,
     performance: Performance = None,
     settings: Settings = None,
@@ -56,10 +60,13 @@ def compare(
         robots=robots,
         objects=objects,
         side=side,
+        density=density,
         caches=caches,
         performance=performance,
         settings=tuple(settings or ()),
     )
-    options = ScoreOptions(policies=policies, measures=measures, budget=budget, seeds=seeds, horizon=horizon)
+    options = ScoreOptions(
+        policies=policies, measures=measures, budget=budget, seeds=seeds, horizon=horizon, disturbance=disturbance
+    )
     plan = build_plan(chosen, options, at_least=2)
     run_and_show(plan, out or default_folder(scenario), "comparison.png", jobs, as_json=as_json, dry_run=dry_run)

@@ -18,6 +18,10 @@ Scenario = Annotated[str, typer.Option("--scenario", help="Preset; see 'swarm-fo
 Robots = Annotated[int | None, typer.Option("--robots", min=1, help="Swarm size.")]
 Objects = Annotated[int | None, typer.Option("--objects", min=1, help="Number of objects.")]
 Side = Annotated[float | None, typer.Option("--side", help="Side of the arena in m (search_and_rescue only).")]
+Density = Annotated[
+    str | None,
+    typer.Option("--density", help="Robots per m2, e.g. 5% or 0.05; the arena is as large as the swarm needs."),
+]
 Caches = Annotated[
     str | None,
     typer.Option("--caches", help="none, static or dynamic; default: those of the policy, else of the scenario."),
@@ -52,6 +56,10 @@ ConfigFile = Annotated[
 ]
 
 Measures = Annotated[str | None, typer.Option("--measures", help="Names separated by commas; default all.")]
+Disturbance = Annotated[
+    str,
+    typer.Option("--disturbance", help="What reactivity and adaptability are scored under: throttle or handling_cost."),
+]
 Budget = Annotated[str, typer.Option("--budget", help="quick, standard or paper: how long, how many runs and levels.")]
 ScoreSeeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per experiment; default the budget's.")]
 ScoreHorizon = Annotated[float | None, typer.Option("--horizon", help="Seconds per run; default the budget's.")]

@@ -6,10 +6,20 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from swarm_forage_env.cli.options import Caches, ConfigFile, Objects, Robots, Scenario, Settings, Side, Wrappers
+from swarm_forage_env.cli.options import (
+    Caches,
+    ConfigFile,
+    Density,
+    Objects,
+    Robots,
+    Scenario,
+    Settings,
+    Side,
+    Wrappers,
+)
 
 
-def record(
+def record(  # long: one parameter per option
     out: Annotated[
         Path | None, typer.Option(help="File to write, .gif or .mp4; default results/SCENARIO_POLICY.gif.")
     ] = None,
@@ -23,6 +33,7 @@ def record(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
     objects: Objects = None,
     side: Side = None,
+    density: Density = None,
     caches: Caches = None,
     settings: Settings = None,
     wrappers: Wrappers = None,
@@ -42,6 +53,7 @@ def record(
         robots=robots,
         objects=objects,
         side=side,
+        density=density,
         caches=caches,
         settings=tuple(settings or ()),
         wrappers=tuple(wrappers or ()),

@@ -10,6 +10,7 @@ from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig, field_sections
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.sizing import checked_density
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -25,6 +26,8 @@ class ScenarioOptions:
     robots: int | None = None
     objects: int | None = None
     side: float | None = None
+    density: str | None = None
+    """A share, "0.05" or "5%"."""
     caches: str | None = None
     horizon: float | None = None
     performance: str | None = None
@@ -69,6 +72,7 @@ def scenario_overrides(options: ScenarioOptions, file_fields: Mapping[str, Any] 
     overrides = dict(parse_setting(word) for word in options.settings)
     named = {"n_robots": options.robots, "n_objects": options.objects, "horizon_s": options.horizon}
     named |= {"side_m": options.side, "caches": options.caches, "performance": options.performance}
+    named |= {"density": parsed_density(options.density)}
     for name, value in named.items():
         if value is not None and name in overrides:
             raise ConfigError(f"Expected {name} once, got it from an option and from --set.")
@@ -80,6 +84,22 @@ def scenario_overrides(options: ScenarioOptions, file_fields: Mapping[str, Any] 
             "other arenas change by --set width_m=... and --set height_m=..."
         )
     return {**(file_fields or {}), **overrides}
+
+
+def parsed_density(text: str | None) -> float | None:
+    """Return a density in robots per m^2 from "5%" or "0.05"; None = none given.
+
+    Raises:
+        ConfigError: no number, or no share above 0 and at most 1.
+    """
+    if text is None:
+        return None
+    number = text.strip().removesuffix("%")
+    try:
+        value = float(number)
+    except ValueError as error:
+        raise ConfigError(f"Expected --density as a share such as 5% or 0.05, got {text!r}.") from error
+    return checked_density(value / 100.0 if text.strip().endswith("%") else value)
 
 
 def parse_setting(word: str) -> tuple[str, Any]:

@@ -9,6 +9,8 @@ from swarm_forage_env.cli.options import (
     AsJson,
     Budget,
     Caches,
+    Density,
+    Disturbance,
     DryRun,
     Jobs,
     Measures,
@@ -41,6 +43,8 @@ def score(
     robots: Robots = None,
     objects: Objects = None,
     side: Side = None,
+    density: Density = None,
+    disturbance: Disturbance = "throttle",
     caches: Caches = None,
     performance: Performance = None,
     settings: Settings = None,
@@ -69,11 +73,14 @@ def score(
         robots=robots,
         objects=objects,
         side=side,
+        density=density,
         caches=caches,
         performance=performance,
         settings=tuple(settings or ()),
     )
-    options = ScoreOptions(policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon)
+    options = ScoreOptions(
+        policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon, disturbance=disturbance
+    )
     folder = out or default_folder(scenario)
     run_and_show(build_plan(chosen, options, at_most=1), folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from metrics.scoring import ScoringPlan, plan_scores, score_curves
 from metrics.scoring.table import ScoreTable
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
+from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, parsed_density, split_names
 
 _OF_THE_BUDGET = ("horizon_s", "interval_s")
 
@@ -21,6 +21,7 @@ class ScoreOptions:
     budget: str = "standard"
     seeds: int | None = None
     horizon: float | None = None
+    disturbance: str = "throttle"
 
 
 def build_plan(
@@ -56,6 +57,8 @@ def build_plan(
             seeds=options.seeds,
             horizon_s=options.horizon,
             caches=caches,
+            density=parsed_density(described.density),
+            disturbance=options.disturbance,
         )
     except ValueError as error:  # of a policy, a measure, a budget or a file
         raise ConfigError(str(error)) from error

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import ConfigFile, Objects, Robots, Settings, Side, Wrappers
+from swarm_forage_env.cli.options import ConfigFile, Density, Objects, Robots, Settings, Side, Wrappers
 from swarm_forage_env.training.defaults import (
     DECISION_TICKS,
     DEFAULT_ARENAS,
@@ -64,6 +64,7 @@ def train(  # long: one parameter per option
     robots: Robots = None,
     objects: Objects = None,
     side: Side = None,
+    density: Density = None,
     caches: Annotated[str | None, typer.Option(help="none, static or dynamic; default: those of the preset.")] = None,
     settings: Settings = None,
     wrappers: Wrappers = None,
@@ -104,6 +105,7 @@ def train(  # long: one parameter per option
         robots=robots,
         objects=objects,
         side=side,
+        density=density,
         caches=caches,
         settings=tuple(settings or ()),
         wrappers=tuple(wrappers or ()),

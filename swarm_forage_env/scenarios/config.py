@@ -20,6 +20,8 @@ from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, EAST_WALL_M, W
 CACHE_KINDS = ("none", "static", "dynamic")
 MAX_DISC_SHARE = 0.4
 """Robot discs may cover at most this share of the start area; with more, random start poses cannot be drawn."""
+MAX_HANDLING_TICKS = 1_000_000
+"""Longest pick-up or drop (our choice: twenty runs of the paper, far below what a 32-bit tick holds)."""
 MAX_CELLS = 200_000_000
 """Largest floor, 2.8 km square (our choice: its codes take 800 MB; the largest of the paper has 409,600 cells)."""
 
@@ -148,18 +150,24 @@ class RobotConfig:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ObjectConfig:
-    """One-cell objects: how many, where they appear, whether they wander."""
+    """One-cell objects: how many, where they appear, whether they wander, how long handling one takes."""
 
     n_objects: int
     placement: str
     """One of `regions.PLACEMENTS`."""
     walk_probability: float = 0.0
     """Probability p_rw that a free object takes a one-cell step, per object and tick."""
+    pickup_ticks: int = 1
+    """Ticks from the start of a pick-up, from the floor or a cache, to its effect; the robot stands still."""
+    drop_ticks: int = 1
+    """The same for a drop in the nest, into a cache or at a cache site. Letting go over open floor acts at once."""
 
     def __post_init__(self) -> None:
         fields.whole("objects.n_objects", self.n_objects, at_least=1)
         fields.one_of("objects.placement", self.placement, PLACEMENTS)
         fields.number("objects.walk_probability", self.walk_probability, at_least=0.0, at_most=1.0)
+        for name in ("pickup_ticks", "drop_ticks"):
+            fields.whole(f"objects.{name}", getattr(self, name), at_least=1, at_most=MAX_HANDLING_TICKS)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -83,6 +83,8 @@ _QUANTITIES = (
     Quantity("task_share_cache_collector", "1"),
     Quantity("throttle", "1"),
     Quantity("throttle_mean", "1"),
+    Quantity("handling_cost", "ticks"),
+    Quantity("handling_cost_mean", "ticks"),
     Quantity("deaths", "robots", is_total=True),
     Quantity("births", "robots", is_total=True),
     Quantity("malfunctions", "robots", is_total=True),

@@ -1,4 +1,4 @@
-"""The paper's three scenarios as configurations; each value names its source.
+"""The paper's three scenarios, and two warehouses with more sources, as configurations; each value names its source.
 
 Section numbers refer to the paper, "Improved Swarm Engineering: Aligning Intuition and Analysis" (Harwell, Gini);
 "study" means the experiment configuration published with it. Every field can be overridden:
@@ -8,6 +8,7 @@ Section numbers refer to the paper, "Improved Swarm Engineering: Aligning Intuit
 from collections.abc import Mapping
 from typing import Any
 
+from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError, known_name
 from swarm_forage_env.scenarios.config import (
     ArenaConfig,
@@ -17,19 +18,23 @@ from swarm_forage_env.scenarios.config import (
     ScenarioConfig,
     with_overrides,
 )
+from swarm_forage_env.scenarios.sizing import (
+    ARENA_FIELDS,
+    arena_at_density,
+    checked_density,
+    in_arena,
+    robots_at_density,
+)
 
-SCENARIO_NAMES = ("warehouse_small", "warehouse_medium", "search_and_rescue")
+SCENARIO_NAMES = ("warehouse_small", "warehouse_medium", "warehouse_dual", "warehouse_quad", "search_and_rescue")
 
 SEARCH_AND_RESCUE_OBJECTS = {16: 80, 32: 272, 48: 368, 64: 448, 80: 544, 96: 1248, 112: 1408, 128: 1568}
 """Side in metres -> objects: a number that the power-law clusters of that side always hold (our choice: the study asked
 for 4,000 everywhere and placed what fitted)."""
 DENSITY = 0.05
 """Robots per square metre in search and rescue: 5 % (scenario 2 of the paper)."""
-
-
-def robots_at_density(side_m: float, density: float = DENSITY) -> int:
-    """Swarm size of a square arena at constant density, truncated, at least 1: 12, 51, 115, ... 819."""
-    return max(1, int(round(side_m * side_m * density, 6)))
+_SIZES = ("n_robots", "n_objects", "side_m", *ARENA_FIELDS)
+"""Fields that a density decides or goes by; the others are overridden first."""
 
 
 def warehouse_small(**overrides: Any) -> ScenarioConfig:
@@ -66,6 +71,40 @@ def warehouse_medium(**overrides: Any) -> ScenarioConfig:
     return with_overrides(base, **overrides)
 
 
+def warehouse_dual(**overrides: Any) -> ScenarioConfig:
+    """Indoor warehouse, 32 x 16 m, nest in the middle between two sources. 50 robots, 200 objects."""
+    base = ScenarioConfig(
+        name="warehouse_dual",
+        arena=ArenaConfig(
+            width_m=32.0,  # our choice: as the small warehouse (study: twice as wide as high)
+            height_m=16.0,
+            nest_centre_m=(16.0, 8.0),  # study: centre of the arena
+            nest_size_m=(3.2, 12.8),  # study: 0.1 X by 0.8 Y
+        ),
+        robots=RobotConfig(n_robots=50),  # our choice: as the small warehouse, so that only the sources differ
+        objects=ObjectConfig(n_objects=200, placement="dual_source"),
+        performance="collected",
+    )
+    return with_overrides(base, **overrides)
+
+
+def warehouse_quad(**overrides: Any) -> ScenarioConfig:
+    """Indoor warehouse, 48 x 48 m, nest in the middle of four sources. 200 robots, 800 objects."""
+    base = ScenarioConfig(
+        name="warehouse_quad",
+        arena=ArenaConfig(
+            width_m=48.0,  # our choice: as the medium warehouse (study: as wide as high)
+            height_m=48.0,
+            nest_centre_m=(24.0, 24.0),  # study: centre of the arena
+            nest_size_m=(9.6, 9.6),  # study: 0.2 X square
+        ),
+        robots=RobotConfig(n_robots=200),  # our choice: as the medium warehouse, so that only the sources differ
+        objects=ObjectConfig(n_objects=800, placement="quad_source"),
+        performance="collected",
+    )
+    return with_overrides(base, **overrides)
+
+
 def search_and_rescue(*, side_m: float | None = None, n_robots: int | None = None, **overrides: Any) -> ScenarioConfig:
     """Outdoor search and rescue: power-law clusters of slowly moving objects (scenario 2).
 
@@ -77,7 +116,7 @@ def search_and_rescue(*, side_m: float | None = None, n_robots: int | None = Non
     """
     robots = None if n_robots is None else RobotConfig(n_robots=n_robots)  # checks the number before a side is chosen
     if side_m is None:
-        side_m = 48.0 if n_robots is None else _side_for(n_robots)
+        side_m = 48.0 if n_robots is None else side_for(n_robots)
     n_objects = overrides.pop("n_objects", None)
     if n_objects is None:
         if side_m not in SEARCH_AND_RESCUE_OBJECTS:
@@ -95,7 +134,7 @@ def search_and_rescue(*, side_m: float | None = None, n_robots: int | None = Non
     base = ScenarioConfig(
         name="search_and_rescue",
         arena=arena,
-        robots=robots or RobotConfig(n_robots=robots_at_density(side_m)),
+        robots=robots or RobotConfig(n_robots=robots_at_density(side_m * side_m, DENSITY)),
         objects=ObjectConfig(
             n_objects=n_objects,
             placement="power_law",
@@ -107,30 +146,77 @@ def search_and_rescue(*, side_m: float | None = None, n_robots: int | None = Non
     return with_overrides(base, **overrides)
 
 
-def _side_for(n_robots: int) -> float:
+def side_for(n_robots: int, density: float = DENSITY) -> float:
+    """Return the smallest side of the search and rescue series that holds a swarm at a density (robots per m^2).
+
+    Raises:
+        ConfigError: not even the largest holds so many.
+    """
     for side in SEARCH_AND_RESCUE_OBJECTS:
-        if robots_at_density(side) >= n_robots:
+        if robots_at_density(side * side, density) >= n_robots:
             return float(side)
-    most = robots_at_density(max(SEARCH_AND_RESCUE_OBJECTS))
+    most = robots_at_density(max(SEARCH_AND_RESCUE_OBJECTS) ** 2, density)
     raise ConfigError(
-        f"Expected at most {most} robots in search_and_rescue (128 m at 5 % density), got {n_robots}; "
+        f"Expected at most {most} robots in search_and_rescue (128 m at {100 * density:g} % density), got {n_robots}; "
         "for more give side_m and n_objects."
     )
 
 
-def scenario(name: str, /, **overrides: Any) -> ScenarioConfig:
+def at_density(
+    config: ScenarioConfig, density: float, *, n_robots: int | None = None, n_objects: int | None = None
+) -> ScenarioConfig:
+    """Return a scenario in the smallest arena of its proportions that holds its robots at a density.
+
+    Example: `at_density(scenario("warehouse_small"), 0.05, n_robots=200)` has 89.6 x 44.8 m. With power-law clusters
+    the arena is one of search and rescue, with its objects: for those sides the clusters are known to hold them.
+
+    Args:
+        config: The scenario.
+        density: Robots per m^2, points without size (study); 0.05 is the paper's 5 %.
+        n_robots: Size of the swarm; default that of `config`.
+        n_objects: Number of objects; default as many per m^2 as in `config`, with clusters those of the series.
+
+    Raises:
+        ConfigError: a density that is no share, or an arena that is too small or too large for the scenario.
+    """
+    n_robots = config.robots.n_robots if n_robots is None else n_robots
+    if config.objects.placement != "power_law":
+        return in_arena(config, arena_at_density(config, density, n_robots), n_robots=n_robots, n_objects=n_objects)
+    fields.whole("robots.n_robots", n_robots, at_least=1)
+    side_m = side_for(n_robots, checked_density(density))
+    arena = {name: getattr(search_and_rescue(side_m=side_m).arena, name) for name in ARENA_FIELDS}
+    objects = SEARCH_AND_RESCUE_OBJECTS[int(side_m)] if n_objects is None else n_objects
+    return in_arena(config, arena, n_robots=n_robots, n_objects=objects)
+
+
+def _with_density(config: ScenarioConfig, density: float, overrides: Mapping[str, Any]) -> ScenarioConfig:
+    """Return `config` at a density; `overrides` are what the user gave beside it."""
+    given = [name for name in ("side_m", *ARENA_FIELDS) if name in overrides]
+    if given:
+        raise ConfigError(f"Expected either density, which chooses the arena, or {', '.join(given)}; got both.")
+    return at_density(config, density, n_robots=overrides.get("n_robots"), n_objects=overrides.get("n_objects"))
+
+
+def scenario(name: str, /, *, density: float | None = None, **overrides: Any) -> ScenarioConfig:
     """Return a preset by name with fields overridden.
 
     Args:
         name: One of `SCENARIO_NAMES`.
+        density: Robots per m^2, for example 0.05; the arena is as large as the swarm needs, see `at_density`. Default:
+            the arena of the preset.
         overrides: Field names of ScenarioConfig or of its sections, see `with_overrides`.
 
     Raises:
         ConfigError: unknown name or field (with the nearest known one), or values that do not fit together.
     """
+    if density is not None:
+        others = {key: value for key, value in overrides.items() if key not in _SIZES}
+        return _with_density(scenario(name, **others), density, overrides)
     builders = {
         "warehouse_small": warehouse_small,
         "warehouse_medium": warehouse_medium,
+        "warehouse_dual": warehouse_dual,
+        "warehouse_quad": warehouse_quad,
         "search_and_rescue": search_and_rescue,
     }
     known_name("scenario", name, builders)
@@ -143,11 +229,15 @@ def scenario(name: str, /, **overrides: Any) -> ScenarioConfig:
 
 
 def chosen_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
-    """Return a preset by name, or a complete configuration, with fields overridden by name.
+    """Return a preset by name, or a complete configuration, with fields overridden by name; `density` as in `scenario`.
 
     Raises:
         ConfigError: unknown preset or field, or values that do not fit together.
     """
-    if isinstance(given, ScenarioConfig):
+    if not isinstance(given, ScenarioConfig):
+        return scenario(given, **overrides)
+    density = overrides.get("density")
+    if density is None:
         return with_overrides(given, **overrides)
-    return scenario(given, **overrides)
+    others = {key: value for key, value in overrides.items() if key not in (*_SIZES, "density")}
+    return _with_density(with_overrides(given, **others), density, overrides)

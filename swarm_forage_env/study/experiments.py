@@ -5,6 +5,7 @@ that each of them varies, and its reference run:
 
     population_size       number of robots; reference: one robot
     throttle              amplitude of the waveform by which robots lose speed; reference: value 0, ideal throttle
+    handling_cost         amplitude of the waveform by which handling takes longer; reference: value 0, one tick
     noise                 standard deviation of sensor and actuator noise; reference: the undisturbed run
     population_dynamics   rates of malfunctions and repairs, or of deaths; reference: the undisturbed run
     none                  the undisturbed run itself
@@ -16,32 +17,47 @@ from typing import Any, TypeVar
 
 from swarm_forage_env._internal.fields import ConfigError, known_name, whole
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, robots_at_density, search_and_rescue
+from swarm_forage_env.scenarios.presets import DENSITY, SEARCH_AND_RESCUE_OBJECTS, search_and_rescue
 from swarm_forage_env.scenarios.presets import scenario as preset_scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
+from swarm_forage_env.scenarios.sizing import arena_at_density, in_arena, robots_at_density
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.handling import HandlingCostConfig, square_costs
 from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, noise_levels
 from swarm_forage_env.wrappers.population import PopulationConfig, death_levels, malfunction_levels
 from swarm_forage_env.wrappers.throttle import ThrottleConfig, sine_throttles, square_throttles
 
-CRITERIA = ("population_size", "throttle", "noise", "population_dynamics")
+CRITERIA = ("population_size", "throttle", "handling_cost", "noise", "population_dynamics")
 UNDISTURBED = "none"
 """Criterion of the runs in which nothing is varied."""
 STUDY_HORIZON_S = 10_000.0
 """Length of the study's runs, for which the periods of its throttle waveforms are chosen."""
-SIZE_SWEEP_OBJECTS = {"warehouse_small": 512, "warehouse_medium": 2048}
-"""Objects while the swarm size varies (study configuration): enough for the largest swarm."""
+SIZE_SWEEP_OBJECTS = {
+    "warehouse_small": 512,
+    "warehouse_medium": 2048,
+    "warehouse_dual": 512,
+    "warehouse_quad": 2048,
+}
+"""Objects while the swarm size varies: enough for the largest swarm (study configuration; dual and quad: our choice, as
+in the warehouse of that size)."""
 STUDY_LARGEST_SIZE = 2.56
 """Largest swarm of the size sweeps in units of the usual one: 128 of 50 and 512 of 200 (study configuration)."""
-SIGMA_MAX = {"warehouse_small": 0.03, "warehouse_medium": 0.03, "search_and_rescue": 0.10}
-"""Highest noise of the robustness studies (paper)."""
+SIGMA_MAX = {
+    "warehouse_small": 0.03,
+    "warehouse_medium": 0.03,
+    "warehouse_dual": 0.03,
+    "warehouse_quad": 0.03,
+    "search_and_rescue": 0.10,
+}
+"""Highest noise of the robustness studies (paper; dual and quad: our choice, as in the other warehouses)."""
 STUDY_SIZES_OF_MALFUNCTIONS = (50, 200)
 MALFUNCTION_PER_TICK = 0.001
 AWAY_SHARE = 0.9
 """Share of the swarm away in the equilibrium of an unlimited queue at the study's malfunction and repair rates."""
 
 _T = TypeVar("_T")
+_Waved = TypeVar("_Waved", ThrottleConfig, HandlingCostConfig)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -96,13 +112,16 @@ class Experiment:
         return next((config for config in self.wrappers if isinstance(config, PopulationConfig)), None)
 
 
-def plan_experiments(base: ScenarioConfig, criteria: Collection[str], budget: Budget) -> tuple[Experiment, ...]:
+def plan_experiments(
+    base: ScenarioConfig, criteria: Collection[str], budget: Budget, *, density: float | None = None
+) -> tuple[Experiment, ...]:
     """Return the experiments of `criteria`, reference runs included, none of them twice.
 
     Args:
         base: The scenario; its horizon and recording interval are replaced by those of the budget.
         criteria: Some of `CRITERIA`.
         budget: How many sizes and levels, and how long a run is.
+        density: Robots per m^2 that all swarm sizes keep, see `size_ladder`; None = all sizes in the scenario's arena.
 
     Raises:
         ConfigError: an unknown criterion, a swarm of one robot when sizes are varied, or a size for which the arena has
@@ -115,11 +134,16 @@ def plan_experiments(base: ScenarioConfig, criteria: Collection[str], budget: Bu
     if "population_size" in criteria:
         experiments += [
             Experiment(criterion="population_size", value=sized.robots.n_robots, scenario=sized)
-            for sized in size_ladder(scenario, budget.n_sizes)
+            for sized in size_ladder(scenario, budget.n_sizes, density)
         ]
     if "noise" in criteria or "population_dynamics" in criteria:
         experiments.append(Experiment(criterion=UNDISTURBED, value=0.0, scenario=scenario))
-    levels = {"throttle": _throttle_levels, "noise": _noise_levels, "population_dynamics": _population_levels}
+    levels = {
+        "throttle": _throttle_levels,
+        "handling_cost": _handling_levels,
+        "noise": _noise_levels,
+        "population_dynamics": _population_levels,
+    }
     for criterion, of_study in levels.items():
         if criterion in criteria:
             reference, disturbed = of_study(scenario)
@@ -178,15 +202,21 @@ def spread(levels: Sequence[_T], count: int | None) -> tuple[_T, ...]:
     return tuple(levels[(index + 1) * len(levels) // count - 1] for index in range(count))
 
 
-def size_ladder(scenario: ScenarioConfig, count: int | None) -> tuple[ScenarioConfig, ...]:
+def size_ladder(
+    scenario: ScenarioConfig, count: int | None, density: float | None = None
+) -> tuple[ScenarioConfig, ...]:
     """Return the scenario with one robot, with more robots, up to its own swarm size (or the largest of the study).
 
-    In search and rescue the arena grows with the swarm; the one-robot run is in the smallest arena.
+    In search and rescue, and where a density is given, the arena grows with the swarm; the one-robot run is in the
+    smallest arena.
 
     Args:
         scenario: With the usual number of robots.
         count: Number of sizes; None = powers of two up to 2.56 times the usual size (which gives the study's 128 and
             512), or all eight arenas of search and rescue.
+        density: Robots per m^2 of all sizes but one robot; the arenas have the proportions of the scenario. Sizes for
+            which the arena would be too small are left out. Search and rescue keeps to its arenas; its default is the
+            density of the scenario.
 
     Raises:
         ConfigError: the scenario has one robot only, or there is no room for the largest swarm.
@@ -195,12 +225,14 @@ def size_ladder(scenario: ScenarioConfig, count: int | None) -> tuple[ScenarioCo
     if n_robots < 2:
         raise ConfigError("Expected a scenario of at least 2 robots where swarm sizes are compared, got 1.")
     if scenario.name == "search_and_rescue":
-        return _growing_arenas(scenario, count)
+        return _growing_arenas(scenario, count, density)
     if count is None:
         sizes = {2**power for power in range(64) if 2**power <= STUDY_LARGEST_SIZE * n_robots}
     else:
         # Halves of halves, so that neighbours differ by the same factor: 1, 25, 50 or 1, 6, 12, 25, 50.
         sizes = {1, *(max(2, n_robots >> halvings) for halvings in range(count - 1))}
+    if density is not None:
+        return _growing_with_swarm(scenario, sorted(sizes), density)
     if scenario.objects.n_objects == _preset_objects(scenario.name):
         scenario = replace(scenario, objects=replace(scenario.objects, n_objects=SIZE_SWEEP_OBJECTS[scenario.name]))
     return tuple(replace(scenario, robots=replace(scenario.robots, n_robots=size)) for size in sorted(sizes))
@@ -211,12 +243,27 @@ def _preset_objects(name: str) -> int | None:
     return preset_scenario(name).objects.n_objects if name in SIZE_SWEEP_OBJECTS else None
 
 
-def _growing_arenas(scenario: ScenarioConfig, count: int | None) -> tuple[ScenarioConfig, ...]:
+def _growing_with_swarm(scenario: ScenarioConfig, sizes: Sequence[int], density: float) -> tuple[ScenarioConfig, ...]:
+    """The scenario at constant density, one robot in the smallest arena first."""
+    arenas = {size: arena_at_density(scenario, density, size) for size in sizes if size > 1}
+    least = 2.0 * scenario.robots.start_margin_m
+    arenas = {size: arena for size, arena in arenas.items() if min(arena["width_m"], arena["height_m"]) > least}
+    if not arenas:
+        raise ConfigError(
+            f"Expected a swarm whose arena at a density of {density:g} is larger than twice robots.start_margin_m = "
+            f"{least / 2} m, got {max(sizes)} robots; ask for more robots or a lower density."
+        )
+    grown = [in_arena(scenario, arena, n_robots=size, n_objects=None) for size, arena in arenas.items()]
+    return replace(grown[0], robots=replace(grown[0].robots, n_robots=1)), *grown
+
+
+def _growing_arenas(scenario: ScenarioConfig, count: int | None, density: float | None) -> tuple[ScenarioConfig, ...]:
     """Search and rescue at constant density, one robot in the smallest arena first."""
     base_side = scenario.arena.width_m
-    density = scenario.robots.n_robots / (base_side * base_side)
-    if scenario.robots.n_robots == robots_at_density(base_side):
-        density = robots_at_density(1000.0) / 1e6  # the density of the preset, without truncation to whole robots
+    if density is None:
+        density = scenario.robots.n_robots / (base_side * base_side)
+        if scenario.robots.n_robots == robots_at_density(base_side * base_side, DENSITY):
+            density = DENSITY  # that of the preset, without truncation to whole robots
     smallest = min(SEARCH_AND_RESCUE_OBJECTS)
     sides = [float(side) for side in SEARCH_AND_RESCUE_OBJECTS if count is None or side < base_side]
     sides = sides if count is None else [*spread(sides, min(count - 2, len(sides))), base_side]
@@ -224,7 +271,7 @@ def _growing_arenas(scenario: ScenarioConfig, count: int | None) -> tuple[Scenar
         sides = [base_side]
     ladder = [_in_arena(scenario, float(smallest), 1)]
     for side in sides:
-        sized = scenario if side == base_side else _in_arena(scenario, side, robots_at_density(side, density))
+        sized = scenario if side == base_side else _in_arena(scenario, side, robots_at_density(side * side, density))
         if sized.robots.n_robots > ladder[-1].robots.n_robots:
             ladder.append(sized)
     return tuple(ladder)
@@ -251,7 +298,12 @@ def _throttle_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Leve
     return [(0.0, (ideal,))], [(config.waveform.amplitude, (config,)) for config in levels]
 
 
-def _compressed(config: ThrottleConfig, factor: float) -> ThrottleConfig:
+def _handling_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    ideal, *levels = (_compressed(config, scenario.horizon_s / STUDY_HORIZON_S) for config in square_costs())
+    return [(0.0, (ideal,))], [(config.waveform.amplitude, (config,)) for config in levels]
+
+
+def _compressed(config: _Waved, factor: float) -> _Waved:
     period_s = config.waveform.period_s
     if period_s is None:
         return config

@@ -84,7 +84,9 @@ class RunRecord:
     n_carrying: Annotated[FloatArray, Column("robots", "mean over ticks of active robots that carry an object")]
     n_caches: Annotated[FloatArray, Column("caches", "mean over ticks")]
     n_objects_cached: Annotated[FloatArray, Column("objects", "mean over ticks of objects inside caches")]
-    adversity: Annotated[FloatArray, Column("1", "mean over ticks of the conditions V(t); 0 = nothing adverse")]
+    adversity: Annotated[
+        FloatArray, Column("1", "mean over ticks of V(t): of a throttle, else of a handling cost in ticks, else 0")
+    ]
 
     contributed: Mapping[str, FloatArray]
     """Further columns, (T,) float64 each, from wrappers and policies; see `KNOWN_CONTRIBUTIONS`."""
@@ -256,6 +258,8 @@ KNOWN_CONTRIBUTIONS: dict[str, tuple[str, str]] = {
         "1",
         "share of active robots that see an obstacle under sensor noise, false ones included, mean over ticks",
     ),
+    "handling_cost": ("ticks", "waveform V(t) of the handling cost at the last tick of the interval"),
+    "handling_cost_mean": ("ticks", "waveform V(t) of the handling cost, mean over the ticks of the interval"),
     "deaths": ("robots", "that died in the interval"),
     "births": ("robots", "that were born"),
     "malfunctions": ("robots", "that went into repair"),
@@ -273,8 +277,9 @@ def schema_table() -> str:
     notes: dict[str, Column] = {name: hint.__metadata__[0] for name, hint in _HINTS.items()}
     rows = [(name, dtypes[name].__name__, note.unit or "-", note.meaning) for name, note in notes.items()]
     rows += [(name, "float64", unit, meaning + " (optional)") for name, (unit, meaning) in KNOWN_CONTRIBUTIONS.items()]
-    header = f"{'column':<27}{'type':<9}{'unit':<13}meaning"
-    return "\n".join([header, *(f"{name:<27}{dtype:<9}{unit:<13}{meaning}" for name, dtype, unit, meaning in rows)])
+    width = max(len(name) for name, *_ in rows) + 2
+    header = f"{'column':<{width}}{'type':<9}{'unit':<13}meaning"
+    return "\n".join([header, *(f"{name:<{width}}{dtype:<9}{unit:<13}{meaning}" for name, dtype, unit, meaning in rows)])
 
 
 @lru_cache(maxsize=1)

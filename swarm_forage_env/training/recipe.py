@@ -149,10 +149,11 @@ def _stages(scenario: ScenarioConfig, steps: int, *, small_start: bool) -> tuple
 def small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
     """Return fields that shrink the arena to SMALL_START of its size with the nest in proportion.
 
-    Only along x for a single source, which lies opposite the nest: the other axis is no way home.
+    Only along x for a single and a dual source, which lie beside the nest: the other axis is no way home.
     """
     arena = scenario.arena
-    shares = (SMALL_START, 1.0 if scenario.objects.placement == "single_source" else SMALL_START)
+    is_beside = scenario.objects.placement in ("single_source", "dual_source")
+    shares = (SMALL_START, 1.0 if is_beside else SMALL_START)
     width_m, height_m = (
         round(extent * share * CELLS_PER_M) / CELLS_PER_M
         for extent, share in zip((arena.width_m, arena.height_m), shares, strict=True)

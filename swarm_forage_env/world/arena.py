@@ -4,12 +4,12 @@ from collections.abc import Collection
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import known_name
+from swarm_forage_env._internal.fields import known_name, whole
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Counter, ObjectStatus
 from swarm_forage_env.contract.layout import observation_layout
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
-from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
 from swarm_forage_env.scenarios.units import CELLS_PER_M
 from swarm_forage_env.world.actuators import Drive
 from swarm_forage_env.world.caches import (
@@ -188,6 +188,22 @@ class ForagingArena:
         if self.config.caches != "none":
             self.events.counters[Counter.CACHES_ALIVE] += np.count_nonzero(self.caches.alive)
             self.events.counters[Counter.OBJECTS_CACHED] += self.caches.count.sum()
+
+    def set_handling_ticks(self, *, pickup: int, drop: int) -> None:
+        """Set how many ticks pick-ups and drops take that start from the next step on; a reset restores the scenario's.
+
+        What is running keeps its end.
+
+        Args:
+            pickup: Ticks of a pick-up, 1 to `scenarios.config.MAX_HANDLING_TICKS`.
+            drop: Ticks of a drop, likewise.
+
+        Raises:
+            ConfigError: a number of ticks that is not whole or out of range.
+        """
+        for name, ticks in (("pickup", pickup), ("drop", drop)):
+            whole(f"{name}, in ticks,", ticks, at_least=1, at_most=MAX_HANDLING_TICKS)
+        self._interactions.set_handling_ticks(pickup=pickup, drop=drop)
 
     def set_population(self, *, active: BoolArray, present: BoolArray) -> None:
         """Set which robots are in the world and which are at work; takes effect in the next step.

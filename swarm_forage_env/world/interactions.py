@@ -1,7 +1,7 @@
 """Pick-ups and drops of one tick: the arrays and constants behind `kernels.interact`, where each rule is a function.
 
-An interaction takes one tick: a request that can be met starts it, and it takes effect in the next tick if the robot
-still asks for the same and the condition still holds. A RELEASE onto open floor acts at once.
+An interaction takes one tick or more: a request that can be met starts it, and it takes effect if the robot asks for
+the same, and the condition holds, in every tick until then. A RELEASE onto open floor acts at once.
 """
 
 import numpy as np
@@ -33,6 +33,7 @@ class Interactions:
             pending_kind=swarm.pending_kind,
             pending_band=swarm.pending_band,
             pending_target=swarm.pending_target,
+            pending_until=swarm.pending_until,
             active=swarm.active,
             floor=objects.floor,
             status=objects.status,
@@ -52,6 +53,7 @@ class Interactions:
             creators=np.zeros(n_robots + 1, np.int32),
             queue=np.zeros(2 * n_robots, np.int32),
             handler_used=np.zeros(kernel.N_HANDLERS, np.bool_),
+            handling_ticks=np.array([config.objects.pickup_ticks, config.objects.drop_ticks], np.int32),
         )
         nest = config.arena.nest_box_m
         area = config.arena.distributable_cells
@@ -80,6 +82,10 @@ class Interactions:
         if busy:
             kernel.interact(state, self.rules, actions, tick, chance)
         return busy
+
+    def set_handling_ticks(self, *, pickup: int, drop: int) -> None:
+        """Set how many ticks a pick-up and a drop take that start from now on; what is running keeps its end."""
+        self.state.handling_ticks[:] = pickup, drop
 
     def drop_cargo(self, robot: int) -> None:
         """Take the cargo of a dying robot: it goes into the cache or onto the floor there, or is placed again."""

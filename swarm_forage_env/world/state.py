@@ -34,6 +34,8 @@ class SwarmState:
     """(N,) gripper band that started it; another band cancels it."""
     pending_target: IntArray
     """(N,) object row or cache serial of the interaction in progress, -1 = none."""
+    pending_until: IntArray
+    """(N,) tick in which the interaction in progress can take effect, 0 = none."""
     present: BoolArray
     """(N,) born and not dead: has a body."""
     active: BoolArray
@@ -52,6 +54,7 @@ class SwarmState:
             pending_kind=np.zeros(n_robots, np.int8),
             pending_band=np.zeros(n_robots, np.int8),
             pending_target=np.full(n_robots, -1, np.int32),
+            pending_until=np.zeros(n_robots, np.int32),
             present=np.ones(n_robots, np.bool_),
             active=np.ones(n_robots, np.bool_),
         )

@@ -16,7 +16,15 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, F
 from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.scenarios import config as configs
 
-STACK_ORDER = ("RunRecorder", "SensorNoise", "PopulationDynamics", "Throttle", "ActuatorNoise", "ForageEnv")
+STACK_ORDER = (
+    "RunRecorder",
+    "SensorNoise",
+    "PopulationDynamics",
+    "Throttle",
+    "ActuatorNoise",
+    "HandlingCost",
+    "ForageEnv",
+)
 """The documented stack, outermost first; `SwarmWrapper.stack_position` counts along it."""
 
 
@@ -26,7 +34,8 @@ class SwarmWrapper(BaseParallelWrapper):
     Hooks of one step, each called once per tick: `before_step` and `gain` from the outermost wrapper inwards, then
     the environment steps, then `observe` and `after_step` from the innermost wrapper outwards. A reset calls
     `on_reset` and `observe` from the innermost wrapper outwards. Wrappers never rewrite actions. They read the true
-    state from `self.unwrapped` (`swarm`, `events`, `tick` ...) and change it only by `self.unwrapped.set_population`.
+    state from `self.unwrapped` (`swarm`, `events`, `tick` ...) and change the world only by `set_population` and
+    `set_handling_ticks` of `self.unwrapped`.
 
     Attributes:
         env: The wrapped environment.

@@ -98,12 +98,19 @@ class RunRecorder(SwarmWrapper):
             "interval": interval,
             "t_end_s": (interval + 1.0) * scenario.interval_s,
             "interference_fraction": self._interference,
-            "adversity": self._contributed.get("throttle_mean", np.zeros(self._n_intervals)),
+            "adversity": self._adversity(),
         }
         columns |= {name: self._counts[:, counter] for name, counter in TOTALS.items()}
         columns |= {name: self._counts[:, counter] / self._interval_ticks for name, counter in TICK_MEANS.items()}
         columns["performance"] = performance_curve(scenario.performance, columns | self._contributed)
         return columns
+
+    def _adversity(self) -> np.ndarray:
+        """Conditions V(t), (T,): the throttle if there is one, else the handling cost, else zero."""
+        for name in ("throttle_mean", "handling_cost_mean"):
+            if name in self._contributed:
+                return self._contributed[name]
+        return np.zeros(self._n_intervals)
 
     def contributed(self) -> dict[str, np.ndarray]:
         """Return the columns that other wrappers and the policy's tasks add, (T,) each; raises as `columns`."""

@@ -14,6 +14,7 @@ WRAPPERS: dict[str, str] = {
     "population": "swarm_forage_env.wrappers.population:PopulationConfig",
     "throttle": "swarm_forage_env.wrappers.throttle:ThrottleConfig",
     "actuator_noise": "swarm_forage_env.wrappers.noise:ActuatorNoiseConfig",
+    "handling_cost": "swarm_forage_env.wrappers.handling:HandlingCostConfig",
 }
 """Name -> "module:class" of a `WrapperConfig`. Strings, so that reading a specification imports only what it names."""
 

@@ -19,6 +19,7 @@ from swarm_forage_env.policies.registry import RandomPolicy, policy_names
 from swarm_forage_env.scenarios.config import field_sections
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.study.record import RunRecord
+from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import load
 
 SHORT = ("--robots", "3", "--objects", "20", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
@@ -141,6 +142,15 @@ def test_set_changes_any_field_with_its_type(command):
     assert world["cache"]["static_size"] == 3
     assert world["name"] == "depot"
     assert world["physics_substeps"] == [0.2] * 5
+
+
+@pytest.mark.parametrize("density", ["5%", "0.05", " 5 % "])
+def test_a_density_chooses_the_arena(command, density):
+    words = ("run", "--policy", "random", "--robots", "20", "--density", density, "--horizon", "4", "--jobs", "1")
+    assert command(*words, "--set", "interval_s=2")[0] == 0
+    (record,) = load(Path("results/warehouse_small"))
+    arena = RunSpec.from_json(record.spec).scenario.arena
+    assert (arena.width_m, arena.height_m) == (28.4, 14.2)  # 400 m^2 = 2 a^2 with a = 14.14 m
 
 
 def test_wrappers_disturb_the_run_and_are_part_of_its_record(command):
@@ -398,6 +408,9 @@ def test_help_loads_neither_physics_nor_tables():
         (("run", "--horizon", "-200"), "horizon_s to be a finite number > 0"),
         (("run", "--side", "32"), "Expected --side with search_and_rescue only"),
         (("run", "--scenario", "search_and_rescue", "--side", "33"), "Expected side_m to be one of"),
+        (("run", "--density", "five"), "Expected --density as a share such as 5% or 0.05, got 'five'"),
+        (("run", "--density", "500%"), "density (robots per m^2; 0.05 is 5 %)"),
+        (("run", "--density", "5%", "--set", "width_m=64"), "either density, which chooses the arena, or width_m"),
         (("run", "--caches", "foo"), "Expected caches to be one of none, static, dynamic, got 'foo'"),
         (("run", "--set", "n_robot=5"), "Unknown scenario field 'n_robot'. Did you mean 'n_robots'?"),
         (("run", "--set", "quirks=PROGRAM"), "Unknown reading 'PROGRAM'. Did you mean 'AUTHORS_PROGRAM'?"),

@@ -14,6 +14,7 @@ import pytest
 
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.study.experiments import BUDGETS, Budget
+from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import RunStore, load
 
 WORLD = ("--robots", "3", "--objects", "20", "--jobs", "1", "--budget", "tiny")
@@ -51,6 +52,27 @@ def test_compare_shows_values_differences_and_the_test(command):
     for word in ("random - crw", "paired t test", "Holm", "adaptability, relative", "throttle 0.4"):
         assert word in out
     assert Path("here/comparison.png").is_file()
+
+
+def test_flexibility_is_scored_under_a_handling_cost_if_asked(command):
+    code, out, _ = command(*SCORE, "--measures", "reactivity,adaptability", "--disturbance", "handling_cost")
+    assert code == 0
+    assert out.count("handling cost 800") >= 2
+    assert "throttle" not in out
+    columns = [record.columns() for record in load(Path("results/warehouse_small"))]
+    # A cycle is as long as an interval here: half of it at 1,601 ticks, half at one.
+    assert {float(values["adversity"].max()) for values in columns} == {1.0, 801.0}
+
+
+def test_sizes_keep_a_density_if_asked(command):
+    words = ("--robots", "20", "--density", "5%", "--measures", "raw_performance")
+    code, _, _ = command("score", "--policy", "random", "--jobs", "1", "--budget", "tiny", *words)
+    assert code == 0
+    arenas = {
+        (record.n_robots, RunSpec.from_json(record.spec).scenario.arena.width_m)
+        for record in load(Path("results/warehouse_small"))
+    }
+    assert arenas == {(1, 28.4), (20, 28.4)}
 
 
 def test_json_is_the_only_thing_on_stdout(command):
@@ -130,6 +152,7 @@ def test_seeds_length_and_world_can_be_chosen(command):
         (("score", "--policy", "crw", "--scenario", "warehouse"), "Unknown scenario 'warehouse'"),
         (("score", "--policy", "crw", "--measures", "reactivty"), "Did you mean 'reactivity'?"),
         (("score", "--policy", "crw", "--measures", ","), "Expected one or more names"),
+        (("score", "--policy", "crw", "--disturbance", "noise"), "one of throttle, handling_cost, got 'noise'"),
         (("score", "--policy", "crw", "--budget", "huge"), "Unknown budget 'huge'"),
         (("score", "--policy", "crw", "--performance", "n_carying"), "Did you mean 'n_carrying'?"),
         (("compare", "--policy", "crw,dpo", "--set", "performance=colected"), "Did you mean 'collected'?"),

@@ -20,7 +20,7 @@ def test_every_column_that_measures_read_is_recorded():
 
 def test_units_of_performances_agree():
     units = recorded_units()
-    assert {name: reading.unit for name, reading in PERFORMANCE_COLUMNS.items()} == {
+    assert {name: each.unit for name, each in PERFORMANCE_COLUMNS.items()} == {
         name: units[name] for name in PERFORMANCE_COLUMNS
     }
 

@@ -20,6 +20,7 @@ from swarm_forage_env.study.run import build_stack, run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.wrappers.base import STACK_ORDER, WrapperConfig
+from swarm_forage_env.wrappers.handling import HandlingCostConfig
 from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig, SensorNoise, SensorNoiseConfig
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.registry import WRAPPERS, parse_wrapper, wrapper_config_class, wrappers_from_mapping
@@ -41,6 +42,7 @@ ACTIVE: dict[str, WrapperConfig] = {
         waveform=Waveform(kind="square", amplitude=0.4, offset=0.4, period_s=3.0), carriers=True
     ),
     "actuator_noise": ActuatorNoiseConfig(sigma=0.3, distribution="uniform"),
+    "handling_cost": HandlingCostConfig(waveform=Waveform(kind="square", amplitude=2.0, offset=3.0, period_s=3.0)),
 }
 """One strong example of each wrapper."""
 
@@ -49,6 +51,7 @@ QUIET: dict[str, WrapperConfig] = {
     "population": PopulationConfig(),
     "throttle": ThrottleConfig(waveform=Waveform(kind="sine", amplitude=0.0, period_s=10.0)),
     "actuator_noise": ActuatorNoiseConfig(sigma=0.0),
+    "handling_cost": HandlingCostConfig(waveform=Waveform(kind="sine", amplitude=0.0, period_s=10.0)),
 }
 """Each wrapper with amplitudes, sigmas and rates of zero."""
 
@@ -159,7 +162,7 @@ def test_the_full_stack_does_something():
     recorder = stacked(ACTIVE.values(), n_robots=30, horizon_s=60.0)
     play(recorder, 2, 300)
     contributed = recorder.contributed()
-    for name in ("deaths", "births", "malfunctions", "repairs", "throttle_mean"):
+    for name in ("deaths", "births", "malfunctions", "repairs", "throttle_mean", "handling_cost_mean"):
         assert contributed[name].sum() > 0, name
     assert recorder.columns()["free_pickups"].sum() > 0
 

@@ -41,6 +41,10 @@ class SlowWorld:
     active: list[bool]
     cargo: dict[int, int]
     pending: dict[int, tuple[str, Request]]
+    until: dict[int, int]
+    """Tick before which a robot's interaction does not take effect."""
+    pickup_ticks: int
+    drop_ticks: int
     floor: dict[tuple[int, int], int]
     caches: dict[int, SlowCache]
     carriers: dict[int, int]
@@ -49,6 +53,7 @@ class SlowWorld:
     displaced: list[int] = field(default_factory=list)
     creators: list[int] = field(default_factory=list)
     finished: set[str] = field(default_factory=set)
+    tick: int = 0
 
     def cell(self, robot: int) -> tuple[int, int]:
         """Cell under a robot's centre."""
@@ -101,7 +106,7 @@ class SlowWorld:
     def serve(self, grips: list[float], tick: int, chance: list[float]) -> None:
         """One interaction phase."""
         self.events, self.first_picked, self.displaced, self.creators = {}, set(), [], []
-        self.finished = set()
+        self.finished, self.tick = set(), tick
         n_robots = len(self.position)
         order = sorted(range(n_robots), key=lambda robot: (robot - tick) % n_robots)
         asked: dict[int, tuple[str, Request | None]] = {}
@@ -126,17 +131,20 @@ class SlowWorld:
         running = self.pending.get(robot)
         if running is not None and running[0] == band:
             if request == running[1]:
+                if self.tick < self.until[robot]:
+                    return
                 handler = self.handler(request[0])
                 if self.serialized and handler in self.finished:
                     return
                 self.finished.add(handler)
-                del self.pending[robot]
+                del self.pending[robot], self.until[robot]
                 self.finish(robot, request, chance)
             else:
-                del self.pending[robot]
+                del self.pending[robot], self.until[robot]
                 self.report(robot, Event.VANISHED)
             return
-        self.pending.pop(robot, None)
+        if running is not None:
+            del self.pending[robot], self.until[robot]
         if request is None:
             return
         if request[0] == "nothing":
@@ -147,6 +155,7 @@ class SlowWorld:
             self.lay_down(robot)
         else:
             self.pending[robot] = band, request
+            self.until[robot] = self.tick + (self.pickup_ticks if "take" in request[0] else self.drop_ticks)
 
     @staticmethod
     def handler(kind: str) -> str:

@@ -1,20 +1,24 @@
-"""The three presets against the paper's tables."""
+"""The presets against the paper's tables."""
 
 import math
 
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.config import with_overrides
 from swarm_forage_env.scenarios.presets import (
+    DENSITY,
     SCENARIO_NAMES,
     SEARCH_AND_RESCUE_OBJECTS,
-    robots_at_density,
     scenario,
     search_and_rescue,
+    warehouse_dual,
     warehouse_medium,
+    warehouse_quad,
     warehouse_small,
 )
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
+from swarm_forage_env.scenarios.sizing import robots_at_density
 
 SIDES = (16, 32, 48, 64, 80, 96, 112, 128)
 ROBOTS = (12, 51, 115, 204, 320, 460, 627, 819)
@@ -75,6 +79,23 @@ def test_medium_warehouse():
     assert config.cache_proximity_m == pytest.approx(19.2)
 
 
+def test_dual_source_is_the_small_warehouse_with_the_nest_between_two_sources():
+    config, small = warehouse_dual(), warehouse_small()
+    assert config.arena.nest_box_m == (14.4, 1.6, 17.6, 14.4)  # 16 -+ 1.6 m, 8 -+ 6.4 m
+    assert config.objects.placement == "dual_source"
+    lights = config.arena.lights_m
+    assert [light[:2] for light in lights] == [pytest.approx((16.0, y)) for y in (4.8, 8.0, 11.2)]
+    same = {"nest_centre_m": small.arena.nest_centre_m, "placement": "single_source", "name": "warehouse_small"}
+    assert with_overrides(config, **same) == small
+
+
+def test_quad_source_is_the_medium_warehouse_with_other_places():
+    config, medium = warehouse_quad(), warehouse_medium()
+    assert config.arena.nest_box_m == (19.2, 19.2, 28.8, 28.8)
+    assert config.arena.lights_m == (pytest.approx((24.0, 24.0, math.sqrt(48.0))),)
+    assert with_overrides(config, placement="random", name="warehouse_medium") == medium
+
+
 @pytest.mark.parametrize("n_objects", [200, 512])
 def test_small_warehouse_holds_the_objects_of_every_set(n_objects):
     assert warehouse_small(n_objects=n_objects).objects.n_objects == n_objects
@@ -100,7 +121,7 @@ def test_search_and_rescue_defaults():
 def test_search_and_rescue_series(side, n_robots, n_objects, cache_side_m):
     config = search_and_rescue(side_m=side)
     assert (config.arena.width_m, config.arena.height_m) == (side, side)
-    assert config.robots.n_robots == robots_at_density(side) == n_robots
+    assert config.robots.n_robots == robots_at_density(side * side, DENSITY) == n_robots
     assert config.objects.n_objects == SEARCH_AND_RESCUE_OBJECTS[side] == n_objects
     assert config.arena.nest_centre_m == (side / 2, side / 2)
     assert config.arena.nest_size_m == pytest.approx((side / 5, side / 5))

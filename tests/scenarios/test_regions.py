@@ -46,12 +46,19 @@ def test_medium_warehouse_source():
     assert capacity("random", *config.arena.n_cells, config.arena.nest_cells) == 168 * 168 - 48 * 48
 
 
-def test_dual_and_quad_sources():
-    right, left = (120, 12, 136, 68), (24, 12, 40, 68)
-    assert source_boxes("dual_source", 160, 80) == (right, left)
-    right, left = (180, 36, 204, 204), (36, 36, 60, 204)
+def test_dual_source():
+    config = scenario("warehouse_dual")
+    right, left = source_boxes("dual_source", *config.arena.n_cells)
+    assert tuple(edge * CELL_M for edge in right) == pytest.approx((24.0, 2.4, 27.2, 13.6))
+    assert tuple(edge * CELL_M for edge in left) == pytest.approx((4.8, 2.4, 8.0, 13.6))
+    assert capacity("dual_source", *config.arena.n_cells, config.arena.nest_cells) == 2 * 16 * 56
+
+
+def test_quad_source():
+    config = scenario("warehouse_quad")
+    right, left = (180, 36, 204, 204), (36, 36, 60, 204)  # 36 .. 40.8 and 7.2 .. 12 m
     bottom, top = (36, 36, 204, 60), (36, 180, 204, 204)
-    assert source_boxes("quad_source", 240, 240) == (right, left, bottom, top)
+    assert source_boxes("quad_source", *config.arena.n_cells) == (right, left, bottom, top)
 
 
 def test_quad_source_corners_count_once():

@@ -20,6 +20,7 @@ from swarm_forage_env.study.experiments import (
 )
 from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, SensorNoiseConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
+from swarm_forage_env.wrappers.waveform import Waveform
 
 PAPER = BUDGETS["paper"]
 
@@ -98,6 +99,18 @@ def test_throttles_pass_as_many_cycles_in_a_short_run():
         assert allowed.horizon_s / config.waveform.period_s == 2.0
 
 
+def test_handling_costs_begin_with_one_tick_and_double():
+    reference, *levels = planned("warehouse_medium", "handling_cost", BUDGETS["quick"])
+    (ideal,) = reference.wrappers
+    assert (reference.value, ideal.waveform) == (0.0, Waveform(kind="constant", amplitude=1.0))
+    assert [level.value for level in levels] == [100.0, 800.0]
+    (strongest,) = levels[-1].wrappers
+    # Two cycles in 4,000 s, from 801 - 800 = 1 to 801 + 800 = 1,601 ticks.
+    assert strongest.waveform == Waveform(kind="square", amplitude=800.0, offset=801.0, period_s=2_000.0)
+    full = planned("warehouse_medium", "handling_cost")
+    assert [level.value for level in full] == [0.0, 25.0, 50.0, 100.0, 200.0, 400.0, 800.0]
+
+
 @pytest.mark.parametrize(("name", "highest"), [("warehouse_small", 0.03), ("search_and_rescue", 0.10)])
 def test_noise_rises_in_equal_steps_from_the_undisturbed_run(name, highest):
     reference, *levels = planned(name, "noise")
@@ -140,7 +153,7 @@ def test_search_and_rescue_has_deaths():
 def test_the_undisturbed_run_is_planned_once():
     experiments = plan_experiments(scenario("warehouse_small"), CRITERIA, BUDGETS["quick"])
     assert len(of(UNDISTURBED, experiments)) == 1
-    assert len(experiments) == 11
+    assert len(experiments) == 14  # itself, 3 sizes, 3 throttles, 3 handling costs, 2 noises, 2 populations
     assert len({(e.criterion, e.value) for e in experiments}) == 11
 
 
@@ -176,6 +189,36 @@ def test_sizes_end_with_the_swarm_of_the_scenario(name, n_robots, count, sizes):
     assert replace(ladder[-1], objects=scenario(name).objects) == scenario(name, n_robots=n_robots, n_objects=200) or (
         name == "search_and_rescue" and ladder[-1] == scenario(name, n_robots=n_robots)
     )
+
+
+def test_sizes_at_constant_density_grow_with_the_arena():
+    ladder = size_ladder(scenario("warehouse_small", n_robots=200, density=0.05), 4, 0.05)
+    seen = [(w.robots.n_robots, w.arena.width_m, w.arena.height_m, w.objects.n_objects) for w in ladder]
+    # 50 robots need 1,000 m^2 = 2 a^2 with a = 22.36 m, 100 need a = 31.62 m, 200 need a = 44.72 m.
+    assert seen == [(1, 44.8, 22.4, 392), (50, 44.8, 22.4, 392), (100, 63.6, 31.8, 790), (200, 89.6, 44.8, 1568)]
+    assert ladder[-1] == scenario("warehouse_small", n_robots=200, density=0.05)
+
+
+def test_sizes_that_need_too_small_an_arena_are_left_out():
+    # Margins take 5.6 m of both sides. Two robots would have 9.2 x 4.6 m, four have 12.8 x 6.4 m.
+    ladder = size_ladder(scenario("warehouse_small", n_robots=8), None, 0.05)
+    assert [(w.robots.n_robots, w.arena.width_m) for w in ladder] == [(1, 12.8), (4, 12.8), (8, 18.0), (16, 25.6)]
+    with pytest.raises(ConfigError, match=r"density of 0\.05 is larger than twice .* got 2 robots"):
+        size_ladder(scenario("warehouse_small", n_robots=2), 2, 0.05)
+
+
+def test_search_and_rescue_keeps_to_its_arenas_at_another_density():
+    ladder = size_ladder(scenario("search_and_rescue", n_robots=230, density=0.1), 3, 0.1)
+    assert [(w.robots.n_robots, w.arena.width_m) for w in ladder] == [(1, 16.0), (102, 32.0), (230, 48.0)]
+
+
+def test_a_plan_keeps_the_density_in_sizes_only():
+    base = scenario("warehouse_small", n_robots=200, density=0.05)
+    quick = BUDGETS["quick"]
+    experiments = plan_experiments(base, ["population_size", "throttle"], quick, density=0.05)
+    sizes = [e.scenario.arena.width_m for e in of("population_size", experiments)]
+    assert sizes == [63.6, 63.6, 89.6]
+    assert {e.scenario.arena.width_m for e in of("throttle", experiments)} == {89.6}
 
 
 def test_levels_are_spread_evenly_and_end_with_the_strongest():

@@ -17,7 +17,13 @@ from tests.support.foraging import mild_wrappers, quick_world
 
 TICKS = 60
 CROWDED: dict[str, Any] = {"n_robots": 20, "walk_probability": 0.01}
-DENSE = {"warehouse_small": 800, "warehouse_medium": 2000, "search_and_rescue": 272}
+DENSE = {
+    "warehouse_small": 800,
+    "warehouse_medium": 2000,
+    "warehouse_dual": 1200,
+    "warehouse_quad": 2000,
+    "search_and_rescue": 272,
+}
 
 
 def made_for(policy: str) -> tuple[str, ...]:

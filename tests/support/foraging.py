@@ -16,6 +16,14 @@ NEAR: dict[str, dict[str, Any]] = {
         "nest_centre_m": (12.0, 12.0),
         "nest_size_m": (4.8, 4.8),
     },
+    "warehouse_dual": {"n_objects": 1500, "nest_size_m": (12.0, 12.8)},
+    "warehouse_quad": {
+        "n_objects": 1500,
+        "width_m": 24.0,
+        "height_m": 24.0,
+        "nest_centre_m": (12.0, 12.0),
+        "nest_size_m": (4.8, 4.8),
+    },
     "search_and_rescue": {"side_m": 16.0},
 }
 """What makes each scenario quick, by its name."""

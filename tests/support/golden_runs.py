@@ -23,7 +23,10 @@ FILE = Path(__file__).with_suffix(".json")
 POLICIES = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
 READINGS = {"described": Quirks(), "program": AUTHORS_PROGRAM}
 WRAPPERS = {"calm": (), "adverse": mild_wrappers()}
-FAR: dict[str, dict[str, Any]] = {"warehouse_small": {"nest_centre_m": (3.2, 8.0), "nest_size_m": (3.2, 12.8)}}
+FAR: dict[str, dict[str, Any]] = {
+    "warehouse_small": {"nest_centre_m": (3.2, 8.0), "nest_size_m": (3.2, 12.8)},
+    "warehouse_dual": {"nest_size_m": (3.2, 12.8)},
+}
 """The nest where the preset has it: a static cache needs the room in between."""
 INTERFACES: dict[str, dict[str, Any]] = {
     "full": {},

@@ -114,6 +114,8 @@ def test_the_default_minibatch_fits_the_rollout(n_robots, n_arenas, options, exp
     [
         ("warehouse_small", (12.8, 16.0, (1.28, 8.0), (1.28, 12.8))),
         ("warehouse_medium", (19.2, 19.2, (9.6, 9.6), (3.84, 3.84))),
+        ("warehouse_dual", (12.8, 16.0, (6.4, 8.0), (1.28, 12.8))),
+        ("warehouse_quad", (19.2, 19.2, (9.6, 9.6), (3.84, 3.84))),
     ],
 )
 def test_a_small_start_keeps_proportions(name, expected):

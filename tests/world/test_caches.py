@@ -57,6 +57,25 @@ def test_random_placement_absorbs_what_lies_on_the_squares(n_objects):
     assert_conserved(env)
 
 
+def test_dual_source_starts_with_two_objects_in_each_of_two_caches():
+    env = reset("warehouse_dual", caches="static")
+    assert env.caches.cell[env.caches.alive].tolist() == [[104, 40], [56, 40]]
+    # No square reaches a strip, so nothing is absorbed: 104 + 15 < 120 and 56 - 15 > 39.
+    assert [contents(env, slot) for slot in (0, 1)] == [[0, 1], [2, 3]]
+    assert_conserved(env)
+
+
+def test_quad_source_absorbs_what_lies_on_its_squares():
+    env = reset("warehouse_quad", caches="static")
+    assert env.caches.alive.sum() == 4
+    # West: a square of cells 49 .. 95, so 11 columns of the left strip (36 .. 59) and its 47 rows. East: cells 144 ..
+    # 190, so 11 columns of the right strip (180 .. 203). South and north alike. Each object has picked one of the four
+    # strips, so about a quarter of 800 lies in the 24 x 168 cells of each.
+    expected = 800 / 4 * (11 * 47) / (24 * 168)
+    assert np.all(np.abs(env.caches.count[:4] - expected) < 4 * math.sqrt(expected))
+    assert_conserved(env)
+
+
 def test_first_objects_in_row_order_from_outside_of_every_square():
     env = tidy_world(n_objects=8, caches="static")
     lay(env, 0, (STATIC_CENTRE[0] - 15, STATIC_CENTRE[1] - 15))  # on the square: absorbed, but not taken

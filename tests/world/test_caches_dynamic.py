@@ -115,6 +115,38 @@ def test_objects_of_the_source_strip_do_not_join():
     assert env.objects.status[2] == ObjectStatus.FREE
 
 
+@pytest.mark.parametrize("strip_cell", [STRIP_CELL, (30, 60)], ids=["right", "left"])
+def test_both_strips_of_a_dual_source_create_nothing(strip_cell):
+    env = tidy_world(caches="dynamic", placement="dual_source", nest_centre_m=(16.0, 8.0))
+    lay(env, 1, (strip_cell[0] - 1, strip_cell[1]))
+    assert found_at(env, strip_cell) == []
+
+
+@pytest.mark.parametrize(("x", "centre"), [(103, 104), (54, 55)])
+def test_a_cache_fits_between_the_nest_and_each_strip_of_a_dual_source(x, centre):
+    # The nest has the columns 72 .. 87, the strips 24 .. 39 and 120 .. 135: 32 columns between them for a side of 31.
+    env = tidy_world(caches="dynamic", placement="dual_source", nest_centre_m=(16.0, 8.0))
+    for row, cell in enumerate([(x + 1, 40), (x + 2, 40)], start=1):
+        lay(env, row, cell)
+    (slot,) = found_at(env, (x, 40))
+    assert env.caches.cell[slot].tolist() == [centre, 40]
+
+
+@pytest.mark.parametrize(("side_share", "forms"), [(0.2, False), (0.14, True)])
+def test_a_quad_source_has_room_for_smaller_caches_only(side_share, forms):
+    # 36 cells between the nest (96 .. 143) and a strip (36 .. 59): too few for the usual 47, enough for 33.
+    env = ForageEnv(
+        scenario("warehouse_quad", n_robots=1, n_objects=8, caches="dynamic", side_share=side_share, distance_share=0.1)
+    )
+    env.reset_batch(0)
+    clear(env)
+    for row in range(8):
+        lay(env, row, (40, 60 + 10 * row))  # on the left strip
+    lay(env, 1, (79, 120))
+    slots = found_at(env, (77, 120))
+    assert [env.caches.cell[slot].tolist() for slot in slots] == ([[78, 120]] if forms else [])
+
+
 def test_clusters_are_protected():
     env = ForageEnv(scenario("search_and_rescue", side_m=48.0, n_robots=1, caches="dynamic"))
     env.reset_batch(0)

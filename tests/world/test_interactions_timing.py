@@ -10,6 +10,7 @@ from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.stage import (
     BASE_CELL,
     CORNER_CACHE,
+    CORNERS,
     NEST_CELL,
     OPEN_CELL,
     WALL_CELL,
@@ -20,9 +21,11 @@ from tests.support.stage import (
     count,
     depot,
     events_of,
+    kill,
     lay,
     load,
     put,
+    repair,
     stand,
     tidy_world,
 )
@@ -140,9 +143,6 @@ def test_events_last_one_tick():
 
 # Who comes first
 
-CORNERS = [(-0.07, -0.07), (0.07, 0.07)]
-"""Offsets in one cell at which two robots stand without touching."""
-
 
 @pytest.mark.parametrize("tick", range(6))
 @pytest.mark.parametrize("rows", [(0, 3), (1, 2), (3, 1)])
@@ -214,12 +214,6 @@ def test_floor_drops_on_one_cell():
 # Robots in repair, robots that die
 
 
-def repair(env: ForageEnv, *rows: int) -> None:
-    active = np.ones(len(env.active), np.bool_)
-    active[list(rows)] = False
-    env.set_population(active=active, present=np.ones_like(active))
-
-
 @pytest.mark.parametrize("grip", [Grip.RELEASE, Grip.GRASP])
 def test_a_robot_in_repair_completes_what_is_running(grip):
     env = tidy_world()
@@ -251,12 +245,6 @@ def test_a_robot_in_repair_starts_nothing_and_keeps_its_cargo():
     for _ in range(3):
         assert act(env, {0: Grip.GRASP, 1: Grip.RELEASE}) == [NONE] * 4
     assert env.swarm.carried_object.tolist() == [-1, 1, -1, -1]
-
-
-def kill(env: ForageEnv, row: int) -> None:
-    present = env.swarm.present.copy()
-    present[row] = False
-    env.set_population(active=env.active & present, present=present)
 
 
 def test_a_dying_robot_drops_its_cargo_on_the_floor():

@@ -69,6 +69,9 @@ def mirror(env: ForageEnv) -> SlowWorld:
         active=swarm.active.tolist(),
         cargo={robot: row for robot, row in enumerate(swarm.carried_object.tolist()) if row >= 0},
         pending=pending,
+        until={robot: int(swarm.pending_until[robot]) for robot in pending},
+        pickup_ticks=int(env.arena._interactions.state.handling_ticks[0]),
+        drop_ticks=int(env.arena._interactions.state.handling_ticks[1]),
         floor={tuple(objects.cell[row].tolist()): row for row in lying},
         caches={
             int(caches.serial[slot]): SlowCache(
@@ -87,7 +90,7 @@ def assert_same(env: ForageEnv, expected: SlowWorld) -> None:
         happened[robot] = Event(int(env.events.code[robot])), int(env.events.event_object[robot]), about
     assert happened == expected.events
     seen = mirror(env)
-    for name in ("cargo", "pending", "floor", "caches", "carriers"):
+    for name in ("cargo", "pending", "until", "floor", "caches", "carriers"):
         assert getattr(seen, name) == getattr(expected, name), name
     assert set(np.flatnonzero(env.events.first_picked).tolist()) == expected.first_picked
     interactions = env.arena._interactions
@@ -129,9 +132,11 @@ def create_somewhere(env: ForageEnv, rng: np.random.Generator) -> None:
         build_cache(env, rows, (x, y))
 
 
+@pytest.mark.parametrize("longest", [1, 4])
 @pytest.mark.parametrize("serialized", [False, True])
 @pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
-def test_every_tick_equals_the_twin(caches, serialized):
+def test_every_tick_equals_the_twin(caches, serialized, longest):
+    """With `longest` above 1, picking up and dropping take 1 to that many ticks, drawn in every tick."""
     env = crowd(caches, serialized)
     rng = np.random.default_rng(7)
     grips = np.ones(N_ROBOTS, np.float32)
@@ -141,6 +146,9 @@ def test_every_tick_equals_the_twin(caches, serialized):
         shuffle(env, rng, grips)
         actions[:, 2] = grips
         chance = rng.random(N_ROBOTS)
+        if longest > 1:
+            pickup, drop = rng.integers(1, longest + 1, 2).tolist()
+            env.set_handling_ticks(pickup=pickup, drop=drop)
         expected = mirror(env)
         expected.serve(actions[:, 2].tolist(), tick, chance.tolist())
         env.arena._interactions.serve(actions, tick, chance)

@@ -40,12 +40,12 @@ def test_search_and_rescue_has_four_at_the_quarters(side):
 
 
 def test_dual_source_has_one_on_either_side_of_the_nest():
-    config = scenario("warehouse_small", placement="dual_source", nest_centre_m=(16.0, 8.0))
+    config = scenario("warehouse_dual")  # half way from 16.0 to 25.6 m and to 6.4 m, on the centre of a cell
     assert metres(static_cache_centres(config)) == [(20.9, 8.1), (11.3, 8.1)]
 
 
 def test_quad_source_stands_clear_of_the_nest():
-    config = scenario("warehouse_medium", placement="quad_source")
+    config = scenario("warehouse_quad")
     west, east, south, north = static_cache_centres(config)
     assert (west, south) == ((72, 120), (120, 72))  # 0.30 X
     # 0.675 X = cell 162 would reach 4 cells into the nest (cells 96 .. 143) with a half side of 23.
@@ -57,8 +57,8 @@ def test_quad_source_stands_clear_of_the_nest():
     [
         scenario("warehouse_small"),
         scenario("warehouse_medium"),
-        scenario("warehouse_medium", placement="quad_source"),
-        scenario("warehouse_small", placement="dual_source", nest_centre_m=(16.0, 8.0)),
+        scenario("warehouse_quad"),
+        scenario("warehouse_dual"),
         *(scenario("search_and_rescue", side_m=side) for side in SEARCH_AND_RESCUE_OBJECTS),
     ],
     ids=lambda config: f"{config.objects.placement}-{config.arena.width_m:g}",

@@ -1,7 +1,8 @@
 """Pick-ups and drops, one function per rule, in a fixed order; ties are resolved in rotating order, without draws.
 
 A robot's gripper command asks for something (`request_of`). If the condition of a request fails, it is refused at once.
-If it holds, an interaction starts; it takes effect one tick later if the request is still the same and still possible.
+If it holds, an interaction starts. It takes effect some ticks later (usually one), if the request is the same and
+possible in every tick until then.
 """
 
 from typing import NamedTuple
@@ -53,6 +54,7 @@ class InteractionState(NamedTuple):
     pending_kind: CodeArray
     pending_band: CodeArray
     pending_target: IntArray
+    pending_until: IntArray
     active: BoolArray
     floor: IntArray
     status: CodeArray
@@ -76,6 +78,8 @@ class InteractionState(NamedTuple):
     """(2 N,) scratch: robots with a request and what they ask."""
     handler_used: BoolArray
     """(N_HANDLERS,) scratch: kinds of interaction that finished this tick."""
+    handling_ticks: IntArray
+    """(2,) ticks that a pick-up and a drop take which start in this tick, at least 1."""
 
 
 class Rules(NamedTuple):
@@ -213,6 +217,7 @@ def _forget_pending(state: InteractionState, i: int) -> None:
     state.pending_kind[i] = NO_REQUEST
     state.pending_band[i] = 0
     state.pending_target[i] = -1
+    state.pending_until[i] = 0
 
 
 @kernel
@@ -385,10 +390,12 @@ def _take_effect(state: InteractionState, rules: Rules, i: int, kind: int, targe
 
 
 @kernel
-def _continue(state: InteractionState, rules: Rules, i: int, kind: int, target: int, chance: float) -> None:
-    """Finish the interaction that robot i has in progress, or report that its condition is lost."""
+def _continue(state: InteractionState, rules: Rules, i: int, kind: int, target: int, tick: int, chance: float) -> None:
+    """Wait on, or finish the interaction that robot i has in progress, or report that its condition is lost."""
     same = kind == state.pending_kind[i] and _target_identity(state, kind, target) == state.pending_target[i]
     if same:
+        if tick < state.pending_until[i]:
+            return
         handler = _handler_of(kind)
         if rules.serialized and state.handler_used[handler]:
             return
@@ -401,12 +408,12 @@ def _continue(state: InteractionState, rules: Rules, i: int, kind: int, target: 
 
 
 @kernel
-def _serve(state: InteractionState, rules: Rules, band: int, i: int, chance: float) -> None:
+def _serve(state: InteractionState, rules: Rules, band: int, i: int, tick: int, chance: float) -> None:
     """Start, continue, refuse or cancel what robot i asks, by the state of the arrays at its turn."""
     kind, target = request_of(state, rules, band, i)
     if state.pending_kind[i] != NO_REQUEST:
         if band == state.pending_band[i]:
-            _continue(state, rules, i, kind, target, chance)
+            _continue(state, rules, i, kind, target, tick, chance)
             return
         _forget_pending(state, i)
     if kind == FLOOR_DROP:
@@ -419,6 +426,7 @@ def _serve(state: InteractionState, rules: Rules, band: int, i: int, chance: flo
         state.pending_kind[i] = kind
         state.pending_band[i] = band
         state.pending_target[i] = _target_identity(state, kind, target)
+        state.pending_until[i] = tick + state.handling_ticks[0 if band == GRASP else 1]
 
 
 @kernel
@@ -467,4 +475,4 @@ def interact(state: InteractionState, rules: Rules, gripper: ActionArray, tick: 
         for place in range(n_queued):
             if state.queue[n_robots + place] == phase:
                 i = int(state.queue[place])
-                _serve(state, rules, _band_now(state, gripper, i), i, chance[i])
+                _serve(state, rules, _band_now(state, gripper, i), i, tick, chance[i])

@@ -8,7 +8,7 @@ import pytest
 import metrics
 from metrics import METRICS, CurveError, PopulationRates
 from metrics.scoring.curves_table import study_curves
-from metrics.scoring.measures import MEASURE_CRITERIA, check_measures
+from metrics.scoring.measures import MEASURE_CRITERIA, check_measures, criteria_of
 from metrics.scoring.studies import RunCurves, StudyCurves
 from metrics.scoring.study_scores import score_study
 from metrics.scoring.table import HEADER, ScoreTable
@@ -89,6 +89,32 @@ def test_distances_come_with_noise_floor_mean_curves_and_what_they_do_not_tell()
     assert reactivity.of_mean_curves.upper == pytest.approx(by_hand.upper)
     assert reactivity.beside["environment_distance"] == pytest.approx(1.0)
     assert reactivity.beside["signed_difference"] == pytest.approx((np.sum(SLOWED) - np.sum(IDEAL)) / 12)
+
+
+@pytest.mark.parametrize("lowest", [0.0, 1.0])
+def test_under_a_handling_cost_twice_the_ticks_halve_what_a_reactive_swarm_does(lowest):
+    # Handling takes 1, 2, 2, 1 ticks. Perfectly reactive: 4, 2, 2, 4. Perfectly adaptable: 4, 4, 4, 4. Observed: 4, 3,
+    # 3, 4, so both distances are 1 + 1. A waveform below 1 stands for one tick, too.
+    reactivity, adaptability = scored(
+        rows(3, [[4.0] * 4], criterion="handling_cost", criterion_value=0.0, adversity=lowest),
+        rows(
+            3,
+            [[4.0, 3.0, 3.0, 4.0]],
+            criterion="handling_cost",
+            criterion_value=25.0,
+            adversity=[lowest, 2.0, 2.0, lowest],
+        ),
+        measures=["reactivity", "adaptability"],
+    )
+    assert (reactivity.summary.mean, adaptability.summary.mean) == (2.0, 2.0)
+    assert (reactivity.at, reactivity.criterion) == ("handling cost 25", "handling_cost")
+    assert reactivity.beside["environment_distance"] == 2.0 * (2.0 - lowest)
+
+
+def test_another_disturbance_than_the_two_is_refused():
+    assert criteria_of(["reactivity", "noise_robustness"], "handling_cost") == {"handling_cost", "noise"}
+    with pytest.raises(CurveError, match="disturbance to be one of throttle, handling_cost, got 'noise'"):
+        criteria_of(["reactivity"], "noise")
 
 
 def test_one_reference_run_has_no_noise_floor():
