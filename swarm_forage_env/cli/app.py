@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from swarm_forage_env.cli.ablate import ablate
 from swarm_forage_env.cli.availability import availability
 from swarm_forage_env.cli.compare import compare
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE, complain
@@ -49,7 +50,7 @@ def _options(
 for command in (run, score, compare, train):
     app.command()(command)
 app.command("list")(list_everything)
-for command in (info, schema, rerun, record, stuck, availability):
+for command in (info, schema, rerun, record, stuck, ablate, availability):
     app.command()(command)
 
 

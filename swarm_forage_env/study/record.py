@@ -279,7 +279,9 @@ def schema_table() -> str:
     rows += [(name, "float64", unit, meaning + " (optional)") for name, (unit, meaning) in KNOWN_CONTRIBUTIONS.items()]
     width = max(len(name) for name, *_ in rows) + 2
     header = f"{'column':<{width}}{'type':<9}{'unit':<13}meaning"
-    return "\n".join([header, *(f"{name:<{width}}{dtype:<9}{unit:<13}{meaning}" for name, dtype, unit, meaning in rows)])
+    return "\n".join(
+        [header, *(f"{name:<{width}}{dtype:<9}{unit:<13}{meaning}" for name, dtype, unit, meaning in rows)]
+    )
 
 
 @lru_cache(maxsize=1)

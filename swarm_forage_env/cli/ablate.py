@@ -1,0 +1,86 @@
+"""The command `ablate`."""
+
+from typing import Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import (
+    EXIT_FAILURE,
+    EXIT_INTERRUPTED,
+    AsJson,
+    Caches,
+    DryRun,
+    Jobs,
+    Out,
+    Settings,
+    complain,
+)
+
+
+def ablate(
+    scenario: Annotated[
+        str, typer.Option("--scenario", help="One or more presets, separated by commas.")
+    ] = "warehouse_small,warehouse_medium",
+    policy: Annotated[
+        str, typer.Option("--policy", "--controller", help="One or more, separated by commas.")
+    ] = "crw,dpo,stochm,stochx",
+    robots: Annotated[str, typer.Option("--robots", help="One or more swarm sizes, separated by commas.")] = "32,128",
+    quirks: Annotated[
+        str, typer.Option("--quirks", help="Which to switch, separated by commas; all; or none: the readings only.")
+    ] = "all",
+    seeds: Annotated[int, typer.Option(min=2, help="Runs per policy, size and switched quirk.")] = 3,
+    horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    out: Out = None,
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Switch one quirk at a time, on in the described reading and off in the authors' program, and show what it moves.
+
+    The tables are Markdown. Records go to a folder; an interrupted command can simply be given again.
+    """
+    from pathlib import Path
+
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.cli.ablation_report import ablation_json, ablation_pages
+    from swarm_forage_env.cli.report import estimated_seconds, plan_note
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
+    from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
+    from swarm_forage_env.study.ablation import plan_ablation, run_ablation
+    from swarm_forage_env.study.runner import StudyInterrupted, available_cores
+    from swarm_forage_env.study.store import RunStore
+
+    try:
+        sizes = [int(word) for word in split_names(robots)]
+    except ValueError as error:
+        raise ConfigError(f"Expected --robots as whole numbers separated by commas, got {robots!r}.") from error
+    worlds = [
+        build_scenario(ScenarioOptions(scenario=name, robots=size, horizon=horizon, settings=tuple(settings or ())))[0]
+        for name in split_names(scenario)
+        for size in sizes
+    ]
+    every = {"all": QUIRK_NAMES, "none": ()}
+    switched = every[quirks] if quirks in every else split_names(quirks)
+    try:
+        plan = plan_ablation(worlds, split_names(policy), quirks=switched, seeds=range(seeds), caches=caches)
+    except ValueError as error:  # of a policy
+        raise ConfigError(str(error)) from error
+    store = RunStore(out or Path("results", "ablation"))
+    if dry_run:
+        todo = [spec for spec in plan.all if spec.run_id not in store]
+        processes = jobs or available_cores()
+        note = plan_note(todo, estimated_seconds(todo, processes), processes)
+        typer.echo(f"At most {note} A quirk that changes nothing needs one run instead of {seeds}.")
+        return
+    try:
+        result = run_ablation(plan, store=store, jobs=jobs, progress=True)
+    except StudyInterrupted as interrupt:
+        complain(f"{interrupt} They are in {store.folder}; the same command does the rest.", EXIT_INTERRUPTED)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    typer.echo(ablation_json(result) if as_json else ablation_pages(result))
+    for failure in result.failures:
+        typer.echo(f"failed: {failure.spec.describe()}: {failure.error}", err=True)
+    if result.failures:
+        raise typer.Exit(EXIT_FAILURE)
