@@ -154,7 +154,7 @@ def test_the_undisturbed_run_is_planned_once():
     experiments = plan_experiments(scenario("warehouse_small"), CRITERIA, BUDGETS["quick"])
     assert len(of(UNDISTURBED, experiments)) == 1
     assert len(experiments) == 14  # itself, 3 sizes, 3 throttles, 3 handling costs, 2 noises, 2 populations
-    assert len({(e.criterion, e.value) for e in experiments}) == 11
+    assert len({(e.criterion, e.value) for e in experiments}) == 14
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
