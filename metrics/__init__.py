@@ -16,11 +16,17 @@ if TYPE_CHECKING:
     from .checks import CurveError, PopulationError
     from .distance import aligned_l1, dtw, noise_floor
     from .earlier_papers import fractional_maintenance, projective_performance, weighted_combination
-    from .emergence import spatial_emergence, task_emergence
+    from .emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
     from .environment import environment_distance, environment_scaling, waveform
     from .flexibility import adaptability, reactivity
     from .interference import fractional_loss, performance_lost, t_lost_fraction
-    from .population import availability, population_robustness, population_weight, ratio_for_availability
+    from .population import (
+        availability,
+        population_robustness,
+        population_weight,
+        ratio_for_availability,
+        recorded_population_robustness,
+    )
     from .queues import PopulationRates, QueueStats, mean_away, queue_statistics
     from .robustness import mean_signed_difference, noise_robustness
     from .scaling import efficiency, raw_performance, scalability, skipped_intervals
@@ -50,7 +56,10 @@ __all__ = [
     "fractional_loss",
     # emergence
     "spatial_emergence",
+    "time_emergence",
     "task_emergence",
+    "interference_gain",
+    "undisturbed_gain",
     # scalability
     "scalability",
     "skipped_intervals",
@@ -77,6 +86,7 @@ __all__ = [
     "queue_statistics",
     "mean_away",
     "population_robustness",
+    "recorded_population_robustness",
     "population_weight",
     "availability",
     "ratio_for_availability",
@@ -106,8 +116,11 @@ _HOMES = {
     "fractional_maintenance": "earlier_papers",
     "projective_performance": "earlier_papers",
     "weighted_combination": "earlier_papers",
+    "interference_gain": "emergence",
     "spatial_emergence": "emergence",
     "task_emergence": "emergence",
+    "time_emergence": "emergence",
+    "undisturbed_gain": "emergence",
     "environment_distance": "environment",
     "environment_scaling": "environment",
     "waveform": "environment",
@@ -120,6 +133,7 @@ _HOMES = {
     "population_robustness": "population",
     "population_weight": "population",
     "ratio_for_availability": "population",
+    "recorded_population_robustness": "population",
     "PopulationRates": "queues",
     "QueueStats": "queues",
     "mean_away": "queues",
