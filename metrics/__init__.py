@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from .scoring import (
         Comparison,
         Score,
+        ScoreForms,
         ScoreTable,
         compare_policies,
         compare_tables,
@@ -49,6 +50,7 @@ __all__ = [
     "compare_tables",
     "Score",
     "ScoreTable",
+    "ScoreForms",
     "Comparison",
     # interference
     "t_lost_fraction",
@@ -146,6 +148,7 @@ _HOMES = {
     "skipped_intervals": "scaling",
     "Comparison": "scoring",
     "Score": "scoring",
+    "ScoreForms": "scoring",
     "ScoreTable": "scoring",
     "compare_policies": "scoring",
     "compare_tables": "scoring",

@@ -1,6 +1,7 @@
 """The public functions of scoring: score a policy in a scenario, compare policies, or score curves from a file."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ from .comparison import Comparison, compare_tables
 from .contestants import PolicyLike
 from .curves_file import read_curves
 from .forecast import forecast_population
-from .measures import check_measures
+from .measures import ScoreForms, check_measures
 from .plan import plan_scores
 from .runs import run_scores
 from .study_scores import score_study
@@ -34,6 +35,7 @@ def score_policy(
     name: str | None = None,
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
+    forms: ScoreForms | None = None,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
@@ -53,6 +55,7 @@ def score_policy(
             for the code: give another name when the code has changed.
         parameters: Keyword arguments of a registered policy or a class.
         caches: "none", "static", "dynamic"; default see `swarm_forage_env.study.spec.chosen_caches`.
+        forms: Variants and forms of the measures; default the corrected marginal one.
         out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
         jobs: Processes; default one per core.
         executor: Runs the work instead, for example Dask's `client.get_executor()`.
@@ -77,6 +80,7 @@ def score_policy(
         parameters=parameters,
         caches=caches,
     )
+    plan = replace(plan, forms=forms or ScoreForms())
     return run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress)[0]
 
 
@@ -89,6 +93,7 @@ def compare_policies(
     seeds: int | Sequence[int] | None = None,
     horizon_s: float | None = None,
     caches: str | None = None,
+    forms: ScoreForms | None = None,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
@@ -101,15 +106,19 @@ def compare_policies(
     plan = plan_scores(
         policies, scenario, measures=measures, budget=budget, seeds=seeds, horizon_s=horizon_s, caches=caches
     )
+    plan = replace(plan, forms=forms or ScoreForms())
     return compare_tables(run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress))
 
 
-def score_curves(path: str | Path, *, measures: Sequence[str] | None = None) -> tuple[ScoreTable, ...]:
+def score_curves(
+    path: str | Path, *, measures: Sequence[str] | None = None, forms: ScoreForms | None = None
+) -> tuple[ScoreTable, ...]:
     """Score curves from any simulator, one table per policy in the file.
 
     Args:
         path: CSV or Parquet file with the columns of `CURVE_COLUMNS`.
         measures: Default all that the columns allow; the table says which others are missing, and why.
+        forms: As in `score_policy`.
 
     Raises:
         CurveError: whatever is wrong with the file, or a measure that was asked for and cannot be computed.
@@ -117,7 +126,7 @@ def score_curves(path: str | Path, *, measures: Sequence[str] | None = None) -> 
     wanted = check_measures(measures)
     tables: list[ScoreTable] = []
     for study in read_curves(path):
-        scores, missing = score_study(study, wanted)
+        scores, missing = score_study(study, wanted, forms)
         if missing and (measures is not None or not scores):
             measure, reason = next(iter(missing.items()))
             raise CurveError(f"Cannot compute {measure} for {study.controller} from {path}: {reason}.")

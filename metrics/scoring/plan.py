@@ -1,13 +1,13 @@
 """The plan of a scoring: which policies, which experiments, which seeds."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from metrics.checks import chosen_seeds
 
 from .contestants import Contestant, PolicyLike, contestants_of
-from .measures import MEASURE_CRITERIA, check_measures
+from .measures import MEASURE_CRITERIA, ScoreForms, check_measures
 
 if TYPE_CHECKING:
     from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -26,6 +26,7 @@ class ScoringPlan:
     scenario: "ScenarioConfig"
     budget: "Budget"
     budget_name: str
+    forms: ScoreForms = field(default_factory=ScoreForms)
 
     def specs_of(self, contestant: Contestant) -> "tuple[RunSpec, ...]":
         """Return the runs of one policy, seed by seed."""

@@ -91,9 +91,6 @@ class Score:
     def cells(self, *, band: bool = False) -> tuple[str, ...]:
         """Return the score as texts under `HEADER`; with `band`, one more column after the interval."""
         summary = self.summary
-        floor = "" if self.noise_floor is None else number(self.noise_floor)
-        if self.relative_floor is not None:
-            floor += f" ({percent(self.relative_floor)})"
         runs = str(summary.n_used) + (f" of {summary.n_used + summary.n_nan + self.n_lost}" if self.is_partial else "")
         enters = bool(self.per_seed) or self.is_partial  # a measure that follows from rates alone uses no runs
         return (
@@ -103,12 +100,18 @@ class Score:
             number(summary.mean) + (f" {DOUBTFUL}" if self.is_doubtful else ""),
             interval(summary),
             *([limits(*self.band)] if band else []),
-            floor,
+            self.floor_cell(),
             "" if self.relative is None else percent(self.relative.mean),
             runs if enters else "-",
             "higher" if self.higher_is_better else "lower",
             self.unit,
         )
+
+    def floor_cell(self) -> str:
+        """Return the noise floor, and in brackets relative to performance; empty for measures without one."""
+        if self.noise_floor is None:
+            return ""
+        return number(self.noise_floor) + ("" if self.relative_floor is None else f" ({percent(self.relative_floor)})")
 
     @property
     def is_partial(self) -> bool:
