@@ -278,6 +278,6 @@ def _cell(score: Score | None, *, band: bool) -> str:
     if score is None:
         return "-"
     relative = "" if score.relative is None else f" ({percent(score.relative.mean)})"
-    deviations = f" [{limits(*score.band)}]" if band else ""
+    deviations = f" [{limits(*score.band)}]" if band and score.summary.n_used > 1 else ""
     marks = (" !" if score.is_partial else "") + (f" {DOUBTFUL}" if score.is_doubtful else "")
     return spread(score.summary) + relative + deviations + marks

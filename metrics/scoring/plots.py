@@ -19,6 +19,8 @@ Panel: TypeAlias = Any
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
 """Okabe-Ito palette: told apart by readers with any colour vision."""
 PANELS_PER_ROW = 4
+LONG_TITLE = 48
+"""Letters that fit above a panel; longer titles are smaller, so that they do not run into their neighbours."""
 _X_LABELS = {
     SIZE: "robots (the larger swarm)",
     THROTTLE: "distance from ideal conditions (throttle amplitude)",
@@ -112,8 +114,8 @@ def _draw_panel(panel: Panel, content: _Content, tables: Sequence[ScoreTable], *
     if about.neutral is not None and not about.is_distance and first.variant == "corrected":
         panel.axhline(about.neutral, color="0.6", linewidth=0.8, zorder=0)
     arrow = "higher" if about.higher_is_better else "lower"
-    title = content.label + (", relative" if content.is_relative else "")
-    panel.set_title(f"{title} ({arrow} is better)", fontsize=9)
+    title = f"{content.label}{', relative' if content.is_relative else ''} ({arrow} is better)"
+    panel.set_title(title, fontsize=9 if len(title) <= LONG_TITLE else 7)
     panel.set_ylabel("share of performance" if content.is_relative else first.unit, fontsize=8)
     panel.set_xlabel(_X_LABELS[MEASURE_CRITERIA[first.measure]], fontsize=8)
     panel.set_xticks(range(len(places)), [_place(place, shown) for place in places])
