@@ -58,11 +58,14 @@ def markdown(document: Mapping[str, Any], groups: Groups = PAPER) -> str:
         for is_relative in (False, True):
             scores = {name: found[name][key] for name in members}
             order = _ranked(scores, is_relative)
-            verdict = _verdict([name for name, _ in order], groups)
-            counts[key[0], is_relative, verdict] += 1
+            verdict = _verdict(order, groups)
+            counts[key[0], is_relative, verdict] += bool(order)
             significant = _significant(document["differences"], key, groups, verdict, is_relative)
             pairs = len(groups[0]) * len(groups[1])
-            cells += [", ".join(text for _, text in order), f"{verdict} ({significant} of {pairs})" if order else "-"]
+            cells += [
+                ", ".join(text for _, text, _ in order),
+                f"{verdict} ({significant} of {pairs})" if order else "-",
+            ]
         lines.append(cells)
     if not lines:
         raise ValueError(f"Expected scores of {', '.join(MEASURES)}, got none that all of {', '.join(members)} have.")
@@ -74,8 +77,8 @@ def _key(score: Score) -> tuple[str, str, tuple[int, ...]]:
     return score["label"], score["at"], tuple(score["n_robots"])
 
 
-def _ranked(scores: Mapping[str, Score], is_relative: bool) -> list[tuple[str, str]]:
-    """Return names with their texts, the best first; empty if a value does not exist."""
+def _ranked(scores: Mapping[str, Score], is_relative: bool) -> list[tuple[str, str, float]]:
+    """Return names with their texts and values, the best first; empty if a value does not exist."""
     values: dict[str, float] = {}
     for name, score in scores.items():
         value = (score["relative"] or [None])[0] if is_relative else score["value"]
@@ -84,7 +87,7 @@ def _ranked(scores: Mapping[str, Score], is_relative: bool) -> list[tuple[str, s
         values[name] = value
     higher_is_better = next(iter(scores.values()))["higher_is_better"]
     ordered = sorted(values, key=lambda name: values[name], reverse=higher_is_better)
-    return [(name, f"{name} {_number(values[name], scores[name], is_relative)}") for name in ordered]
+    return [(name, f"{name} {_number(values[name], scores[name], is_relative)}", values[name]) for name in ordered]
 
 
 def _number(value: float, score: Score, is_relative: bool) -> str:
@@ -93,10 +96,11 @@ def _number(value: float, score: Score, is_relative: bool) -> str:
     return text + ("°" if floor is not None and value <= floor else "")
 
 
-def _verdict(order: Sequence[str], groups: Groups) -> str:
-    """Return which group comes wholly before the other."""
+def _verdict(order: Sequence[tuple[str, str, float]], groups: Groups) -> str:
+    """Return which group comes wholly before the other; equal values of two groups are no order."""
     for group in groups:
-        if set(order[: len(group)]) == set(group):
+        first, rest = order[: len(group)], order[len(group) :]
+        if {name for name, _, _ in first} == set(group) and first[-1][2] != rest[0][2]:
             return _name(group)
     return MIXED
 

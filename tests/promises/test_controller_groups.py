@@ -49,6 +49,11 @@ def test_orders_that_mix_the_groups_and_significant_pairs_are_counted():
     assert lines[-1] == "| all | 0 | 0 | 1 | 0 | 1 | 0 |"
 
 
+def test_equal_values_of_two_groups_are_no_order():
+    row = markdown(document(**(PERFORMANCE | {"dpo": 45.0}))).splitlines()[2]  # loses 9 objects, as stochx does
+    assert "crw 5, stochx 9, dpo 9, stochm 30 | mixed" in row
+
+
 def test_values_at_the_noise_floor_are_marked_and_undefined_ones_have_no_order():
     given = document(**PERFORMANCE)
     for scored in given["tables"]:
@@ -58,6 +63,7 @@ def test_values_at_the_noise_floor_are_marked_and_undefined_ones_have_no_order()
     row = markdown(given).splitlines()[2]
     assert "crw 5°, stochx 9°, dpo 20, stochm 30" in row
     assert row.endswith("|  | - |")
+    assert markdown(given).splitlines()[-1] == "| all | 1 | 0 | 0 | 0 | 0 | 0 |"
 
 
 def test_the_script_prints_all_files(tmp_path, capsys):
