@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .checks import CurveError, PopulationError
     from .distance import aligned_l1, dtw, noise_floor
     from .earlier_papers import fractional_maintenance, projective_performance, weighted_combination
-    from .emergence import spatial_emergence, task_emergence
+    from .emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
     from .environment import environment_distance, environment_scaling, waveform
     from .flexibility import adaptability, reactivity
     from .interference import fractional_loss, performance_lost, t_lost_fraction
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         population_weight,
         ratio_for_availability,
         ratio_for_team,
+        recorded_population_robustness,
     )
     from .queues import PopulationRates, QueueStats, mean_away, queue_statistics
     from .robustness import mean_signed_difference, noise_robustness
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
         Comparison,
         Performance,
         Score,
+        ScoreForms,
         ScoreTable,
         compare_policies,
         compare_tables,
@@ -51,6 +53,7 @@ __all__ = [
     "compare_tables",
     "Score",
     "ScoreTable",
+    "ScoreForms",
     "Comparison",
     "Performance",
     # interference
@@ -59,7 +62,10 @@ __all__ = [
     "fractional_loss",
     # emergence
     "spatial_emergence",
+    "time_emergence",
     "task_emergence",
+    "interference_gain",
+    "undisturbed_gain",
     # scalability
     "scalability",
     "skipped_intervals",
@@ -86,6 +92,7 @@ __all__ = [
     "queue_statistics",
     "mean_away",
     "population_robustness",
+    "recorded_population_robustness",
     "population_weight",
     "availability",
     "availability_curves",
@@ -117,8 +124,11 @@ _HOMES = {
     "fractional_maintenance": "earlier_papers",
     "projective_performance": "earlier_papers",
     "weighted_combination": "earlier_papers",
+    "interference_gain": "emergence",
     "spatial_emergence": "emergence",
     "task_emergence": "emergence",
+    "time_emergence": "emergence",
+    "undisturbed_gain": "emergence",
     "environment_distance": "environment",
     "environment_scaling": "environment",
     "waveform": "environment",
@@ -133,6 +143,7 @@ _HOMES = {
     "population_weight": "population",
     "ratio_for_availability": "population",
     "ratio_for_team": "population",
+    "recorded_population_robustness": "population",
     "PopulationRates": "queues",
     "QueueStats": "queues",
     "mean_away": "queues",
@@ -146,6 +157,7 @@ _HOMES = {
     "Comparison": "scoring",
     "Performance": "scoring",
     "Score": "scoring",
+    "ScoreForms": "scoring",
     "ScoreTable": "scoring",
     "compare_policies": "scoring",
     "compare_tables": "scoring",

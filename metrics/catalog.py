@@ -4,14 +4,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-from .emergence import spatial_emergence, task_emergence
+from .emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
 from .flexibility import adaptability, reactivity
 from .interference import performance_lost, t_lost_fraction
-from .population import availability, population_robustness
+from .population import availability, population_robustness, recorded_population_robustness
 from .robustness import noise_robustness
 from .scaling import efficiency, raw_performance, scalability
 
-Input: TypeAlias = Literal["performance", "interference", "one robot", "two sizes", "ideal run", "waveforms", "rates"]
+Input: TypeAlias = Literal[
+    "performance", "interference", "one robot", "two sizes", "ideal run", "waveforms", "rates", "robots at work"
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +25,7 @@ class Measure:
     symbol: str
     """Symbol in the paper."""
     equation: str
-    """Displayed equation of the paper, or where else it comes from."""
+    """Displayed equation of the paper, or where else it comes from; "ours" is not in the paper."""
     higher_is_better: bool
     """Direction of the corrected form."""
     neutral: float | None
@@ -74,6 +76,17 @@ METRICS: dict[str, Measure] = {
         is_distance=False,
         needs=("performance", "interference", "one robot", "two sizes"),
     ),
+    "time_emergence": Measure(
+        function=time_emergence,
+        symbol="E_R(N1, N2)",
+        equation="ours, Eq. (2) in robot time",
+        higher_is_better=True,
+        neutral=0.0,
+        lowest=-_INF,
+        highest=_INF,
+        is_distance=False,
+        needs=("interference", "two sizes"),
+    ),
     "task_emergence": Measure(
         function=task_emergence,
         symbol="E_T(N1, N2)",
@@ -84,6 +97,28 @@ METRICS: dict[str, Measure] = {
         highest=_INF,
         is_distance=False,
         needs=("performance", "two sizes"),
+    ),
+    "interference_gain": Measure(
+        function=interference_gain,
+        symbol="E_I(N1, N2)",
+        equation="ours, part of Eq. (3)",
+        higher_is_better=True,
+        neutral=0.0,
+        lowest=-_INF,
+        highest=_INF,
+        is_distance=False,
+        needs=("performance", "interference", "two sizes"),
+    ),
+    "undisturbed_gain": Measure(
+        function=undisturbed_gain,
+        symbol="E_U(N1, N2)",
+        equation="ours, part of Eq. (3)",
+        higher_is_better=True,
+        neutral=0.0,
+        lowest=-_INF,
+        highest=_INF,
+        is_distance=False,
+        needs=("performance", "interference", "two sizes"),
     ),
     "scalability": Measure(
         function=scalability,
@@ -139,6 +174,17 @@ METRICS: dict[str, Measure] = {
         highest=_INF,
         is_distance=False,
         needs=("performance", "ideal run", "rates"),
+    ),
+    "recorded_population_robustness": Measure(
+        function=recorded_population_robustness,
+        symbol="B_pd'",
+        equation="ours, Eq. (12) with the robots recorded at work",
+        higher_is_better=True,
+        neutral=0.0,
+        lowest=-_INF,
+        highest=_INF,
+        is_distance=False,
+        needs=("performance", "ideal run", "robots at work"),
     ),
     "availability": Measure(
         function=availability,

@@ -130,6 +130,16 @@ def reduce_intervals(theta: FloatArray, reduce: Reduction, *inputs: FloatArray) 
     return value[()]
 
 
+def per_performance(value: FloatArray, perf: FloatArray, reduce: Reduction = "sum") -> FloatArray:
+    """Return a measure relative to a performance: value / the likewise reduced `perf`; NaN or +-inf where that is 0.
+
+    Amounts and distances grow with performance, so a swarm that does little scores well without doing anything well.
+    Divided by the performance that they are compared with, they are shares of it (our addition, not in the paper).
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return value / reduce_intervals(perf, reduce, perf)
+
+
 def last_interval_only(reduce: Reduction) -> None:
     """Check the reduction given to a measure whose `sierra` form reads only the last interval.
 

@@ -2,7 +2,7 @@
 
 from numpy.typing import ArrayLike
 
-from .curves import FloatArray, Variant, as_curves, as_waveforms, check_broadcast
+from .curves import FloatArray, Variant, as_curves, as_waveforms, check_broadcast, per_performance
 from .distance import curve_distance
 from .environment import ScalingModel, environment_scaling
 
@@ -16,6 +16,7 @@ def reactivity(
     model: ScalingModel = "linear",
     variant: Variant = "corrected",
     clock: ArrayLike | None = None,
+    relative: bool = False,
 ) -> FloatArray:
     """Reactivity R(N), Eqs. (5) and (6): distance from a swarm whose performance changes just as the environment does.
 
@@ -34,9 +35,10 @@ def reactivity(
         variant: Distance: exact DTW on values for `paper` and `corrected`; for `sierra` the cost includes the clock, as
             in the authors' program, so that short delays are not forgiven.
         clock: For `sierra`, sample times as in `dtw` (the authors: ticks, steps of 1000). Default: interval numbers.
+        relative: Divide by the summed P_ideal, see `metrics.curves.per_performance`.
 
     Returns:
-        R >= 0, shape (...,), in the unit of `perf`.
+        R >= 0, shape (...,), in the unit of `perf`; a pure number if relative.
 
     Raises:
         CurveError: Curves or signals are missing, negative (performance only), infinite, of different length or for
@@ -48,11 +50,17 @@ def reactivity(
     shapes = f"perf_ideal {perf_ideal.shape}, perf {perf.shape}, v {v.shape}, i_ec {i_ec.shape}"
     check_broadcast((perf_ideal, perf, v, i_ec), shapes)
     perfectly_reactive = environment_scaling(v, i_ec, model=model) * perf_ideal
-    return curve_distance(perfectly_reactive, perf, variant, clock)
+    distance = curve_distance(perfectly_reactive, perf, variant, clock)
+    return per_performance(distance, perf_ideal) if relative else distance
 
 
 def adaptability(
-    perf_ideal: ArrayLike, perf: ArrayLike, *, variant: Variant = "corrected", clock: ArrayLike | None = None
+    perf_ideal: ArrayLike,
+    perf: ArrayLike,
+    *,
+    variant: Variant = "corrected",
+    clock: ArrayLike | None = None,
+    relative: bool = False,
 ) -> FloatArray:
     """Adaptability A(N), Eq. (7): distance from a swarm whose performance does not change at all.
 
@@ -66,13 +74,15 @@ def adaptability(
         perf: Performance P(N, t) under the applied conditions, same intervals.
         variant: As in `reactivity`.
         clock: As in `reactivity`.
+        relative: As in `reactivity`.
 
     Returns:
-        A >= 0, shape (...,), in the unit of `perf`.
+        A >= 0, shape (...,), in the unit of `perf`; a pure number if relative.
 
     Raises:
         CurveError: Curves are missing, negative, infinite or of different length.
         ValueError: Unknown variant.
     """
     perf_ideal, perf = as_curves(perf_ideal=perf_ideal, perf=perf)
-    return curve_distance(perf_ideal, perf, variant, clock)
+    distance = curve_distance(perf_ideal, perf, variant, clock)
+    return per_performance(distance, perf_ideal) if relative else distance

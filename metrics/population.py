@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .checks import (
+    CurveError,
     PopulationError,
     check_availability,
     check_horizon,
@@ -18,7 +19,16 @@ from .checks import (
     check_team,
     check_whole,
 )
-from .curves import FloatArray, Reduction, as_curves, last_interval_only, reduce_intervals
+from .curves import (
+    FloatArray,
+    Reduction,
+    as_curves,
+    as_waveforms,
+    check_broadcast,
+    last_interval_only,
+    per_performance,
+    reduce_intervals,
+)
 from .queues import PopulationRates, mean_away, queue_statistics, stationary_distribution
 
 PopulationWeight: TypeAlias = Literal["paper", "sojourn", "transient", "stationary", "sierra"]
@@ -37,6 +47,7 @@ def population_robustness(
     ideal_rates: PopulationRates | None = None,
     weight: PopulationWeight = "transient",
     reduce: Reduction = "sum",
+    relative: bool = False,
 ) -> FloatArray:
     """Population dynamics robustness B_pd, Eq. (12): performance beyond what the robots at work explain.
 
@@ -53,9 +64,10 @@ def population_robustness(
         ideal_rates: Rates of the ideal swarm; None: no robot leaves. `sierra` needs them.
         weight: See `population_weight`.
         reduce: `sum` as in the paper, `mean` or `last`. `sierra` always reads the last interval.
+        relative: Divide by the likewise reduced P_ideal, see `metrics.curves.per_performance`.
 
     Returns:
-        B_pd, shape (...,), in the unit of `perf`.
+        B_pd, shape (...,), in the unit of `perf`; a pure number if relative.
 
     Raises:
         CurveError: Curves are missing, negative, infinite or of different length, or n < 1.
@@ -67,7 +79,54 @@ def population_robustness(
     if weight == "sierra":
         last_interval_only(reduce)
         reduce = "last"
-    return reduce_intervals(perf - share * perf_ideal, reduce, perf, perf_ideal)
+    gain = reduce_intervals(perf - share * perf_ideal, reduce, perf, perf_ideal)
+    return per_performance(gain, perf_ideal, reduce) if relative else gain
+
+
+def recorded_population_robustness(
+    perf: ArrayLike,
+    n_active: ArrayLike,
+    perf_ideal: ArrayLike,
+    n_active_ideal: ArrayLike,
+    *,
+    reduce: Reduction = "sum",
+    relative: bool = False,
+) -> FloatArray:
+    """Population dynamics robustness weighted with the robots that were at work, in place of an expected share.
+
+        B_pd' = sum_t [ P(N(t), t) - (n(t) / n_ideal(t)) P_ideal(t) ]
+
+    The weight of Eq. (12) is the same for every run with the same rates, so a run in which more robots than expected
+    happened to fail seems less robust. Here each interval has the share of its own robots: a swarm whose performance
+    is proportional to the robots at work scores 0 in every run and interval. Higher is better. Our addition.
+
+    Args:
+        perf: Performance with population dynamics, shape (..., T), objects per interval.
+        n_active: Robots at work n(t), mean over each interval of the same runs; a curve, or one number.
+        perf_ideal: Performance of the ideal swarm, same intervals.
+        n_active_ideal: Its robots at work; a curve, or one number for a swarm that no robot leaves.
+        reduce: `sum` as in the paper, `mean` or `last`.
+        relative: Divide by the likewise reduced P_ideal, see `metrics.curves.per_performance`.
+
+    Returns:
+        B_pd', shape (...,), in the unit of `perf`; a pure number if relative.
+
+    Raises:
+        CurveError: Curves are missing, negative, infinite or of different length, or no robot of the ideal swarm was at
+            work in some interval.
+        ValueError: Unknown reduction.
+    """
+    perf, perf_ideal = as_curves(perf=perf, perf_ideal=perf_ideal)
+    active, ideal = as_waveforms(perf.shape[-1], n_active=n_active, n_active_ideal=n_active_ideal)
+    if (active < 0.0).any() or (ideal <= 0.0).any():
+        raise CurveError(
+            "Expected n_active >= 0 and n_active_ideal > 0 robots in every interval, got "
+            f"{np.nanmin(active)} and {np.nanmin(ideal)}; pass the ideal swarm's robots at work."
+        )
+    shapes = f"perf {perf.shape}, perf_ideal {perf_ideal.shape}, n_active {active.shape}, n_active_ideal {ideal.shape}"
+    check_broadcast((perf, perf_ideal, active, ideal), shapes)
+    gain = reduce_intervals(perf - active / ideal * perf_ideal, reduce, perf, active, perf_ideal, ideal)
+    return per_performance(gain, perf_ideal, reduce) if relative else gain
 
 
 def population_weight(

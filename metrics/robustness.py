@@ -2,12 +2,17 @@
 
 from numpy.typing import ArrayLike
 
-from .curves import FloatArray, Variant, as_curves, reduce_intervals
+from .curves import FloatArray, Variant, as_curves, per_performance, reduce_intervals
 from .distance import curve_distance
 
 
 def noise_robustness(
-    perf_ideal: ArrayLike, perf: ArrayLike, *, variant: Variant = "corrected", clock: ArrayLike | None = None
+    perf_ideal: ArrayLike,
+    perf: ArrayLike,
+    *,
+    variant: Variant = "corrected",
+    clock: ArrayLike | None = None,
+    relative: bool = False,
 ) -> FloatArray:
     """Sensor and actuator noise robustness B_sa = DTW( P_ideal, P ), Eq. (8). Lower is better.
 
@@ -19,16 +24,18 @@ def noise_robustness(
         perf: Performance P(N, t) with noise, same intervals.
         variant: Distance, as in `reactivity`.
         clock: For `sierra`, sample times as in `dtw`; the authors used sample numbers, the default.
+        relative: Divide by the summed P_ideal, see `metrics.curves.per_performance`.
 
     Returns:
-        B_sa >= 0, shape (...,), in the unit of `perf`.
+        B_sa >= 0, shape (...,), in the unit of `perf`; a pure number if relative.
 
     Raises:
         CurveError: Curves are missing, negative, infinite or of different length.
         ValueError: Unknown variant.
     """
     perf_ideal, perf = as_curves(perf_ideal=perf_ideal, perf=perf)
-    return curve_distance(perf_ideal, perf, variant, clock)
+    distance = curve_distance(perf_ideal, perf, variant, clock)
+    return per_performance(distance, perf_ideal) if relative else distance
 
 
 def mean_signed_difference(perf_ideal: ArrayLike, perf: ArrayLike) -> FloatArray:

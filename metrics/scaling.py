@@ -30,11 +30,15 @@ def scalability(
 
         corrected    C = 1 - (1/S - 1/r) / (1 - 1/r)         S of the performance summed over time
         paper        C = sum_t [ 1 - (S - 1/r) / (1 - 1/r) ]
-        sierra       as paper, last interval; 0 if N1 = N2 or N2 = 1 or P(N1) = 0 < P(N2)
+        sierra       as paper, last interval; 0 if P(N1) = 0 < P(N2)
 
     The paper names e but prints the speedup where Karp and Flatt have its reciprocal. The printed value is -S times the
     corrected one, so it reverses the order of swarms: at r = 2, linear gain (S = 2) is 1 corrected and -2 printed, and
     halved performance is -2 corrected and 1 printed. The text (higher means more cooperative) fits the corrected form.
+
+    No form means anything for sizes that are equal (r = 1 divides by zero) or in the wrong order (a smaller swarm would
+    be praised for doing less). The authors' program computes them all the same: 0 if N1 = N2 or N2 = 1, and the printed
+    form with r < 1 otherwise.
 
     Args:
         perf1: P(N1, t), shape (..., T), objects per interval.
@@ -52,15 +56,14 @@ def scalability(
         P(N1) is 0), negative when the larger swarm does worse (-inf where only P(N2) is 0), NaN where both are 0.
 
     Raises:
-        CurveError: Curves are missing, negative, infinite or of different length; n1 >= n2 when corrected.
+        CurveError: Curves are missing, negative, infinite or of different length; n1 >= n2.
         ValueError: Unknown option, or zero_policy="skip" without a sum or mean over intervals.
     """
     n1, n2 = check_size("n1", n1), check_size("n2", n2)
     perf1, perf2 = as_curves(perf1=perf1, perf2=perf2)
     check_option("variant", variant, Variant)
     check_option("zero_policy", zero_policy, ZeroPolicy)
-    if variant == "corrected":
-        check_size_order(n1, n2)
+    check_size_order(n1, n2)
     if reduce is None:
         reduce = _DEFAULT_REDUCTION[variant]
     check_option("reduce", reduce, Reduction)
@@ -88,8 +91,6 @@ def _as_printed(perf1: FloatArray, n1: int, perf2: FloatArray, n2: int) -> Float
 
 
 def _as_programmed(perf1: FloatArray, n1: int, perf2: FloatArray, n2: int) -> FloatArray:
-    if n1 == n2 or n2 == 1:
-        return np.zeros(np.broadcast_shapes(perf1.shape, perf2.shape))
     infinite_speedup = (perf1 == 0.0) & (perf2 > 0.0)
     return np.where(infinite_speedup, 0.0, _as_printed(perf1, n1, perf2, n2))
 

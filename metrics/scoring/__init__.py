@@ -2,6 +2,7 @@
 
 from .comparison import Comparison, compare_tables
 from .front_door import compare_policies, score_curves, score_policy
+from .measures import ScoreForms
 from .performance import Performance
 from .plan import ScoringPlan, plan_scores
 from .plots import draw_scores
@@ -18,6 +19,7 @@ __all__ = [
     "draw_scores",
     "Score",
     "ScoreTable",
+    "ScoreForms",
     "Comparison",
     "ScoringPlan",
     "Performance",

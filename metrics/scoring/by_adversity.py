@@ -1,22 +1,30 @@
 """Scores of the measures that vary an adversity: throttled, noisy and failing robots beside undisturbed ones."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
-from metrics.curves import FloatArray
+from metrics.checks import PopulationError
+from metrics.curves import FloatArray, Variant
 from metrics.distance import noise_floor
 from metrics.environment import environment_distance
 from metrics.flexibility import adaptability, reactivity
-from metrics.population import availability, population_robustness, population_weight
+from metrics.population import (
+    PopulationWeight,
+    availability,
+    population_robustness,
+    population_weight,
+    recorded_population_robustness,
+)
 from metrics.queues import PopulationRates
 from metrics.robustness import mean_signed_difference, noise_robustness
 from metrics.statistics import Summary
 
 from .columns import HANDLING, NOISE, POPULATION, THROTTLE
-from .draft import ScoreDraft, Uncomputable, Values
-from .measures import DISTURBANCES, MEASURE_CRITERIA
+from .draft import ScoreDraft, Uncomputable
+from .measures import DISTURBANCES, MEASURE_CRITERIA, Form
 from .studies import RunCurves, StudyCurves, common_runs
 from .table import Score
 
@@ -34,54 +42,109 @@ def _levels(study: StudyCurves, *criteria: str) -> tuple[tuple[RunCurves, RunCur
     return levels
 
 
-def _draft(measure: str, pair: tuple[RunCurves, RunCurves], *, unit: str, beside: dict[str, float]) -> ScoreDraft:
+def _draft(
+    measure: str,
+    pair: tuple[RunCurves, RunCurves],
+    *,
+    variant: Variant,
+    unit: str,
+    beside: dict[str, float],
+    is_relative: bool = True,
+) -> ScoreDraft:
     """Return the draft of a score that compares a level with its reference."""
     level = pair[1]
     return ScoreDraft(
         measure=measure,
+        variant=variant,
         at=f"{_WORDS[level.criterion]} {level.value:.4g}",
         x=level.value,
         unit=unit,
         experiments=pair,
-        compared_with=0,
+        compared_with=0 if is_relative else None,
         beside=beside,
     )
 
 
-def _reactivity(ideal: RunCurves, disturbed: RunCurves) -> FloatArray:
-    if disturbed.criterion == HANDLING:
+def _conditions(runs: RunCurves, variant: Variant) -> FloatArray:
+    """V(t), (R, T): the mean over each interval, or its value at the end of each, as in the paper's waveforms.
+
+    What robots deliver in an interval depends on the conditions in all of it, so the corrected form uses the mean.
+    """
+    if runs.criterion == HANDLING:
         # Ticks that handling takes, never less than one: twice as many halve the performance of a perfect swarm.
-        v, i_ec = (np.maximum(1.0, runs.curves["adversity"]) for runs in (disturbed, ideal))
-        return reactivity(ideal.performance, disturbed.performance, v, i_ec, model="reciprocal")
-    return reactivity(
-        ideal.performance, disturbed.performance, disturbed.curves["adversity"], ideal.curves["adversity"]
+        return np.maximum(1.0, runs.curves["adversity"])
+    sampled = runs.curves.get("throttle")
+    return runs.curves["adversity"] if sampled is None or variant == "corrected" else sampled
+
+
+def _reactivity(ideal: RunCurves, disturbed: RunCurves, *, variant: Variant) -> FloatArray:
+    of_handling = disturbed.criterion == HANDLING
+    measure = partial(
+        reactivity,
+        v=_conditions(disturbed, variant),
+        i_ec=np.maximum(1.0, ideal.curves["adversity"]) if of_handling else _conditions(ideal, variant),
+        model="paper" if variant == "paper" else "reciprocal" if of_handling else "linear",
     )
+    return _on_clock(measure, ideal, disturbed, variant)
 
 
-def _adaptability(ideal: RunCurves, disturbed: RunCurves) -> FloatArray:
-    return adaptability(ideal.performance, disturbed.performance)
+def _adaptability(ideal: RunCurves, disturbed: RunCurves, *, variant: Variant) -> FloatArray:
+    return _on_clock(adaptability, ideal, disturbed, variant)
 
 
-def _noise_robustness(ideal: RunCurves, disturbed: RunCurves) -> FloatArray:
-    return noise_robustness(ideal.performance, disturbed.performance)
+def _noise_robustness(ideal: RunCurves, disturbed: RunCurves, *, variant: Variant) -> FloatArray:
+    return _on_clock(noise_robustness, ideal, disturbed, variant)
 
 
-_DISTANCES: dict[str, Values] = {
+def _floor(ideal: RunCurves, variant: Variant) -> FloatArray:
+    def apart(perf: FloatArray, _: FloatArray, *, variant: Variant, clock: FloatArray | None = None) -> FloatArray:
+        return noise_floor(perf, variant=variant, clock=clock)
+
+    return _on_clock(apart, ideal, ideal, variant)
+
+
+def _on_clock(
+    distance: Callable[..., FloatArray], ideal: RunCurves, disturbed: RunCurves, variant: Variant
+) -> FloatArray:
+    """Return a distance in objects; in the program's form with rates and the clock in its cost, see `metrics.dtw`.
+
+    The program's curves are rates, which differ by far less than a step of the clock. The distance of rates times the
+    length of an interval is in objects again.
+    """
+    if variant != "sierra":
+        return distance(ideal.performance, disturbed.performance, variant=variant)
+    clock = np.atleast_2d(ideal.curves["t_end_s"])[0]
+    interval_s = float(clock[-1]) / clock.size
+    rates = (runs.performance / interval_s for runs in (ideal, disturbed))
+    return interval_s * distance(*rates, variant=variant, clock=clock)
+
+
+_DISTANCES: dict[str, Callable[..., FloatArray]] = {
     "reactivity": _reactivity,
     "adaptability": _adaptability,
     "noise_robustness": _noise_robustness,
 }
 
 
-def _distance_scores(name: str, study: StudyCurves) -> Iterator[Score]:
+def _distance_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -> Iterator[Score]:
     criterion = MEASURE_CRITERIA[name]
     levels = _levels(study, *(DISTURBANCES if criterion in DISTURBANCES else (criterion,)))
     if name == "reactivity" and any("adversity" not in e.curves and e.seeds for pair in levels for e in pair):
         raise Uncomputable("there is no column adversity for the reference run and every level")
+    if variant == "sierra" and study.horizon_s is None:
+        raise Uncomputable("there is no column t_end_s, the clock that this form has in its cost")
     for reference, level in levels:
-        floor = float(noise_floor(reference.performance).mean()) if len(reference.seeds) > 1 else None
-        draft = _draft(name, (reference, level), unit="objects (DTW)", beside=_beside_distance(reference, level))
-        yield draft.score(_DISTANCES[name], floor=floor, order_matters=True)
+        if name == "reactivity" and variant == "paper" and _has_perfect_conditions(reference):
+            raise Uncomputable("the printed form divides by the ideal conditions, which are 0 here")
+        floor = float(_floor(reference, variant).mean()) if len(reference.seeds) > 1 else None
+        beside = _beside_distance(reference, level)
+        unit = "objects (DTW with clock)" if variant == "sierra" else "objects (DTW)"
+        draft = _draft(name, (reference, level), variant=variant, unit=unit, beside=beside)
+        yield draft.score(partial(_DISTANCES[name], variant=variant), floor=floor, order_matters=True)
+
+
+def _has_perfect_conditions(reference: RunCurves) -> bool:
+    return bool(reference.seeds) and bool((_conditions(reference, "paper") == 0.0).any())
 
 
 def _beside_distance(reference: RunCurves, level: RunCurves) -> dict[str, float]:
@@ -92,18 +155,33 @@ def _beside_distance(reference: RunCurves, level: RunCurves) -> dict[str, float]
     difference = mean_signed_difference(ideal.performance, disturbed.performance)
     beside = {"signed_difference": float(np.mean(difference))}
     if level.criterion in DISTURBANCES and "adversity" in ideal.curves and "adversity" in disturbed.curves:
-        applied, wanted = disturbed.curves["adversity"].mean(axis=0), ideal.curves["adversity"].mean(axis=0)
+        # Sampled at interval ends, which gives the paper's x axis.
+        applied, wanted = (_conditions(runs, "paper").mean(axis=0) for runs in (disturbed, ideal))
         beside["environment_distance"] = environment_distance(applied, wanted)
     return beside
 
 
-def _population_scores(name: str, study: StudyCurves) -> Iterator[Score]:
-    levels = _levels(study, POPULATION)
+_WEIGHTS: dict[Variant, PopulationWeight] = {"corrected": "transient", "paper": "paper", "sierra": "sierra"}
+
+
+def _population_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -> Iterator[Score]:
     horizon_s = study.horizon_s
+    levels = _levels(study, POPULATION)
     if horizon_s is None:
         raise Uncomputable("there is no column t_end_s, which gives the length of a run")
+    if variant == "sierra":
+        levels = _against_lowest_rate(levels)
     for reference, level in levels:
-        weight = population_weight(_rates(level), horizon=horizon_s, n=level.n_robots, ideal_rates=reference.rates)
+        try:
+            weight = population_weight(
+                _rates(level),
+                horizon=horizon_s,
+                n=level.n_robots,
+                ideal_rates=reference.rates,
+                weight=_WEIGHTS[variant],
+            )
+        except PopulationError as error:
+            raise Uncomputable(str(error)) from error
 
         def values(ideal: RunCurves, disturbed: RunCurves) -> FloatArray:
             return population_robustness(
@@ -113,10 +191,53 @@ def _population_scores(name: str, study: StudyCurves) -> Iterator[Score]:
                 horizon=horizon_s,
                 n=disturbed.n_robots,
                 ideal_rates=ideal.rates,
+                weight=_WEIGHTS[variant],
             )
 
-        draft = _draft(name, (reference, level), unit=f"objects in {horizon_s:,.0f} s", beside={"weight": weight})
+        is_last = variant == "sierra"
+        draft = _draft(
+            name,
+            (reference, level),
+            variant=variant,
+            unit="objects in the last interval" if is_last else f"objects in {horizon_s:,.0f} s",
+            beside={"weight": weight},
+            is_relative=not is_last,
+        )
         yield draft.score(values)
+
+
+def _against_lowest_rate(levels: Sequence[tuple[RunCurves, RunCurves]]) -> list[tuple[RunCurves, RunCurves]]:
+    """Return the levels with the lowest one of the same swarm size as reference, as the authors' program has it."""
+    lowest: dict[int, RunCurves] = {}
+    for _, level in levels:
+        lowest.setdefault(level.n_robots, level)
+        _rates(level)
+    pairs = [(lowest[level.n_robots], level) for _, level in levels if level is not lowest[level.n_robots]]
+    if not pairs:
+        raise Uncomputable("there is one level of population dynamics only, and this form compares with the lowest")
+    return pairs
+
+
+def _recorded_population(ideal: RunCurves, disturbed: RunCurves) -> FloatArray:
+    return recorded_population_robustness(
+        disturbed.performance, disturbed.curves["n_active"], ideal.performance, ideal.curves["n_active"]
+    )
+
+
+def _recorded_population_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -> Iterator[Score]:
+    levels = _levels(study, POPULATION)
+    if any("n_active" not in e.curves and e.seeds for pair in levels for e in pair):
+        raise Uncomputable("there is no column n_active for the reference run and every level")
+    span = "per run" if study.horizon_s is None else f"in {study.horizon_s:,.0f} s"
+    for reference, level in levels:
+        if reference.seeds and (reference.curves["n_active"] <= 0.0).any():
+            raise Uncomputable("no robot of the reference run was at work in some interval")
+        ideal, disturbed = common_runs(reference, level)
+        weight = {}
+        if ideal.seeds:
+            weight = {"weight": float(disturbed.curves["n_active"].mean() / ideal.curves["n_active"].mean())}
+        draft = _draft(name, (reference, level), variant=variant, unit=f"objects {span}", beside=weight)
+        yield draft.score(_recorded_population)
 
 
 def _rates(level: RunCurves) -> PopulationRates:
@@ -125,7 +246,7 @@ def _rates(level: RunCurves) -> PopulationRates:
     return level.rates
 
 
-def _availability_scores(name: str, study: StudyCurves) -> Iterator[Score]:
+def _availability_scores(name: str, study: StudyCurves, _variant: Variant, _form: Form) -> Iterator[Score]:
     """One score per ratio of rates; it follows from the rates alone and is the same for every policy."""
     seen: set[tuple[int, float]] = set()
     for _, level in _levels(study, POPULATION):
@@ -149,9 +270,10 @@ def _availability_scores(name: str, study: StudyCurves) -> Iterator[Score]:
         )
 
 
-BY_ADVERSITY: dict[str, Callable[[str, StudyCurves], Iterator[Score]]] = {
+BY_ADVERSITY: dict[str, Callable[[str, StudyCurves, Variant, Form], Iterator[Score]]] = {
     **dict.fromkeys(_DISTANCES, _distance_scores),
     "population_robustness": _population_scores,
+    "recorded_population_robustness": _recorded_population_scores,
     "availability": _availability_scores,
 }
 """Measure -> what computes its scores."""

@@ -1,37 +1,56 @@
 """Scores of the measures that vary the swarm size: which sizes each compares."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
-from metrics.curves import FloatArray
-from metrics.emergence import spatial_emergence, task_emergence
+from metrics.curves import FloatArray, Variant
+from metrics.emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
 from metrics.interference import performance_lost
 from metrics.scaling import efficiency, raw_performance, scalability
 
 from .columns import SIZE
 from .draft import ScoreDraft, Uncomputable, Values
-from .studies import RunCurves, StudyCurves
+from .measures import MEASURE_VARIANTS, Form
+from .studies import RunCurves, StudyCurves, common_runs
 from .table import Score
 
+FALLING = (
+    "performance is lower than that of the next smaller swarm, and it weights the time lost, so that a collapse counts "
+    "as organisation; read time_emergence beside it"
+)
+"""Note of a doubtful score: see erratum 16 in docs/errata.md."""
+UPSIDE_DOWN = (
+    "this form of scalability is minus the speedup times the corrected one, so it reverses the order of swarms"
+)
 
-def _raw_performance(runs: RunCurves) -> FloatArray:
-    return raw_performance(runs.performance, reduce="sum")
+
+def _raw_performance(runs: RunCurves, *, variant: Variant) -> FloatArray:
+    return raw_performance(runs.performance, reduce="last" if variant == "sierra" else "sum")
 
 
-def _efficiency(runs: RunCurves) -> FloatArray:
-    return efficiency(runs.performance, runs.n_robots, reduce="sum")
+def _efficiency(runs: RunCurves, *, variant: Variant) -> FloatArray:
+    return efficiency(runs.performance, runs.n_robots, reduce="last" if variant == "sierra" else "sum")
 
 
 def _t_lost_fraction(runs: RunCurves) -> FloatArray:
     return runs.interference.mean(axis=-1)
 
 
-def _performance_lost(one: RunCurves, runs: RunCurves) -> FloatArray:
-    lost = performance_lost(runs.performance, runs.interference, runs.n_robots, one.performance, one.interference)
-    return lost.sum(axis=-1)
+def _performance_lost(one: RunCurves, runs: RunCurves, *, variant: Variant) -> FloatArray:
+    lost = performance_lost(
+        runs.performance,
+        runs.interference,
+        runs.n_robots,
+        one.performance,
+        one.interference,
+        variant=variant,
+        n_reference=one.n_robots,
+    )
+    return lost[..., -1] if variant == "sierra" else lost.sum(axis=-1)
 
 
-def _spatial_emergence(one: RunCurves, few: RunCurves, many: RunCurves) -> FloatArray:
+def _spatial_emergence(one: RunCurves, few: RunCurves, many: RunCurves, *, variant: Variant) -> FloatArray:
     return spatial_emergence(
         few.performance,
         few.interference,
@@ -41,15 +60,34 @@ def _spatial_emergence(one: RunCurves, few: RunCurves, many: RunCurves) -> Float
         many.n_robots,
         one.performance,
         one.interference,
+        variant=variant,
+        n_reference=one.n_robots,
     )
 
 
-def _task_emergence(few: RunCurves, many: RunCurves) -> FloatArray:
-    return task_emergence(few.performance, few.n_robots, many.performance, many.n_robots)
+def _time_emergence(few: RunCurves, many: RunCurves) -> FloatArray:
+    return time_emergence(few.interference, few.n_robots, many.interference, many.n_robots)
 
 
-def _scalability(few: RunCurves, many: RunCurves) -> FloatArray:
-    return scalability(few.performance, few.n_robots, many.performance, many.n_robots)
+def _task_emergence(few: RunCurves, many: RunCurves, *, variant: Variant) -> FloatArray:
+    reduce = "last" if variant == "sierra" else "sum"
+    return task_emergence(few.performance, few.n_robots, many.performance, many.n_robots, reduce=reduce)
+
+
+def _interference_gain(few: RunCurves, many: RunCurves) -> FloatArray:
+    return interference_gain(
+        few.performance, few.interference, few.n_robots, many.performance, many.interference, many.n_robots
+    )
+
+
+def _undisturbed_gain(few: RunCurves, many: RunCurves) -> FloatArray:
+    return undisturbed_gain(
+        few.performance, few.interference, few.n_robots, many.performance, many.interference, many.n_robots
+    )
+
+
+def _scalability(few: RunCurves, many: RunCurves, *, variant: Variant) -> FloatArray:
+    return scalability(few.performance, few.n_robots, many.performance, many.n_robots, variant=variant)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,15 +95,21 @@ class _SizeMeasure:
     """How a measure of swarm sizes is applied."""
 
     values: Values
-    """Computes it. Arguments: the runs of one robot if `from_one`, of the next smaller swarm if `of_neighbours`, and of
-    the swarm itself."""
+    """Computes it. Arguments: the runs of one robot if `from_one`, of the smaller swarm if `of_two_sizes`, and of the
+    swarm itself; `variant` if the measure has more than one."""
     unit: str
-    """Unit of the value; {span} stands for the length of a run."""
+    """Unit of the value; {span} stands for the length of a run, or the last interval in the program's form."""
+    sierra_unit: str = ""
+    """Unit in the program's form, where it is another one."""
     from_one: bool = False
-    of_neighbours: bool = False
+    of_two_sizes: bool = False
     needs_interference: bool = False
     is_gain: bool = False
     """Whether the value is an amount of performance, which is also given relative to that of the swarm."""
+    is_part: bool = False
+    """Whether it is task emergence or a part of it, which is also given per robot."""
+    is_weighted: bool = False
+    """Whether it weights the time lost with the performance achieved, which misleads where performance falls."""
     order_matters: bool = False
     """As in `ScoreDraft.score`."""
 
@@ -75,59 +119,120 @@ _SIZE_MEASURES: dict[str, _SizeMeasure] = {
     "efficiency": _SizeMeasure(values=_efficiency, unit="objects per robot {span}"),
     "t_lost_fraction": _SizeMeasure(values=_t_lost_fraction, unit="share of robot time", needs_interference=True),
     "performance_lost": _SizeMeasure(
-        values=_performance_lost, unit="objects {span}", from_one=True, needs_interference=True, is_gain=True
+        values=_performance_lost,
+        unit="objects {span}",
+        from_one=True,
+        needs_interference=True,
+        is_gain=True,
+        is_weighted=True,
     ),
     "spatial_emergence": _SizeMeasure(
         values=_spatial_emergence,
         unit="objects {span}",
+        sierra_unit="share of performance",
         from_one=True,
-        of_neighbours=True,
+        of_two_sizes=True,
         needs_interference=True,
         is_gain=True,
+        is_weighted=True,
     ),
-    "task_emergence": _SizeMeasure(values=_task_emergence, unit="objects {span}", of_neighbours=True, is_gain=True),
-    "scalability": _SizeMeasure(values=_scalability, unit="1 = linear", of_neighbours=True, order_matters=True),
+    "time_emergence": _SizeMeasure(values=_time_emergence, unit="robots", of_two_sizes=True, needs_interference=True),
+    "task_emergence": _SizeMeasure(
+        values=_task_emergence, unit="objects {span}", of_two_sizes=True, is_gain=True, is_part=True
+    ),
+    "interference_gain": _SizeMeasure(
+        values=_interference_gain,
+        unit="objects {span}",
+        of_two_sizes=True,
+        needs_interference=True,
+        is_gain=True,
+        is_part=True,
+    ),
+    "undisturbed_gain": _SizeMeasure(
+        values=_undisturbed_gain,
+        unit="objects {span}",
+        of_two_sizes=True,
+        needs_interference=True,
+        is_gain=True,
+        is_part=True,
+    ),
+    "scalability": _SizeMeasure(values=_scalability, unit="1 = linear", of_two_sizes=True, order_matters=True),
 }
 
 
-def _size_scores(name: str, study: StudyCurves) -> Iterator[Score]:
+def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) -> Iterator[Score]:
     measure = _SIZE_MEASURES[name]
-    sizes = _sizes(study, measure)
+    values = partial(measure.values, variant=variant) if name in MEASURE_VARIANTS else measure.values
+    sizes = _sizes(study, measure, variant, form)
     one = sizes[0]
-    span = "per run" if study.horizon_s is None else f"in {study.horizon_s:,.0f} s"
-    for smaller, larger in zip((None, *sizes), sizes, strict=False):
-        if smaller is None and (measure.from_one or measure.of_neighbours):
+    for previous, larger in zip((None, *sizes), sizes, strict=False):
+        if previous is None and (measure.from_one or measure.of_two_sizes):
             continue  # the first size has nothing to be compared with
         experiments = (larger,)
         at = f"N = {larger.n_robots}"
-        if measure.of_neighbours and smaller is not None:
+        if measure.of_two_sizes and previous is not None:
+            smaller = one if form == "interactive" else previous
             experiments = (smaller, larger)
             at = f"N = {smaller.n_robots} to {larger.n_robots}"
         if measure.from_one:
             experiments = (one, *experiments)
-        yield ScoreDraft(
+        falls = measure.is_weighted and previous is not None and _falls(previous, larger)
+        score = ScoreDraft(
             measure=name,
+            variant=variant,
+            form=form,
             at=at,
             x=larger.n_robots,
-            unit=measure.unit.format(span=span),
+            unit=_unit(name, study, variant),
             experiments=experiments,
-            compared_with=len(experiments) - 1 if measure.is_gain else None,
-        ).score(measure.values, order_matters=measure.order_matters)
+            compared_with=len(experiments) - 1 if measure.is_gain and variant != "sierra" else None,
+            is_doubtful=falls,
+            remark=FALLING if falls else UPSIDE_DOWN if name == "scalability" and variant != "corrected" else "",
+        ).score(values, order_matters=measure.order_matters)
+        yield _per_robot(score, *experiments) if measure.is_part and variant == "corrected" else score
 
 
-def _sizes(study: StudyCurves, measure: _SizeMeasure) -> tuple[RunCurves, ...]:
+def _unit(name: str, study: StudyCurves, variant: Variant) -> str:
+    measure = _SIZE_MEASURES[name]
+    if name == "scalability" and variant != "corrected":
+        return "printed form, summed over intervals" if variant == "paper" else "printed form, last interval"
+    if variant == "sierra":
+        return measure.sierra_unit or measure.unit.format(span="in the last interval")
+    return measure.unit.format(span="per run" if study.horizon_s is None else f"in {study.horizon_s:,.0f} s")
+
+
+def _falls(previous: RunCurves, larger: RunCurves) -> bool:
+    """Whether the mean performance is lower than that of the next smaller swarm."""
+    few, many = common_runs(previous, larger)
+    return bool(few.seeds) and float(many.performance.sum()) < float(few.performance.sum())
+
+
+def _per_robot(score: Score, smaller: RunCurves, larger: RunCurves) -> Score:
+    """Return the score with what it is per robot: its share of the performance of N2 robots as good as each of N1."""
+    few, _ = common_runs(smaller, larger)
+    proportional = larger.n_robots / smaller.n_robots * float(few.performance.sum()) if few.seeds else 0.0
+    if proportional == 0.0:
+        return score
+    total = sum(score.per_seed.values())
+    return replace(score, beside={"per_robot": total / proportional})
+
+
+def _sizes(study: StudyCurves, measure: _SizeMeasure, variant: Variant, form: Form) -> tuple[RunCurves, ...]:
     sizes = study.sizes()
     if not sizes:
         raise Uncomputable(f"there are no runs with criterion {SIZE}")
     smallest = sizes[0].n_robots
     if measure.needs_interference and any("interference_fraction" not in e.curves and e.seeds for e in sizes):
         raise Uncomputable("there is no column interference_fraction for every swarm size")
-    if measure.from_one and smallest != 1:
+    # The authors' program takes its first experiment for the run of one robot, whatever its size.
+    if (measure.from_one or form == "interactive") and smallest != 1 and variant != "sierra":
         raise Uncomputable(f"there is no reference run of one robot, the smallest swarm has {smallest}")
-    if len(sizes) < 2 and (measure.from_one or measure.of_neighbours):
+    if len(sizes) < 2 and (measure.from_one or measure.of_two_sizes):
         raise Uncomputable(f"there is one swarm size only, N = {smallest}")
     return sizes
 
 
-BY_SIZE: dict[str, Callable[[str, StudyCurves], Iterator[Score]]] = dict.fromkeys(_SIZE_MEASURES, _size_scores)
-"""Measure -> what computes its scores."""
+BY_SIZE: dict[str, Callable[[str, StudyCurves, Variant, Form], Iterator[Score]]] = dict.fromkeys(
+    _SIZE_MEASURES, _size_scores
+)
+"""Measure -> what computes its scores, in one variant and form."""

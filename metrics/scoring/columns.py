@@ -37,6 +37,7 @@ CURVE_COLUMNS: dict[str, Column] = {
     "interference_fraction": Column("fraction", "1", "t_lost(N, t), share of active robots avoiding others or walls"),
     "n_active": Column("amount", "robots", "mean number of robots at work"),
     "adversity": Column("number", "1", "conditions V(t), mean over the interval; those of the reference run are I_ec"),
+    "throttle": Column("number", "1", "conditions V(t) at the end of the interval, as the paper samples them"),
     "deaths_per_s": Column("amount", "1/s", "rate of the whole swarm, the same in each row of a run"),
     "malfunctions_per_s": Column("amount", "1/s", "likewise"),
     "births_per_s": Column("amount", "1/s", "likewise"),

@@ -13,8 +13,8 @@ from metrics.curves import FloatArray
 from metrics.significance import holm, paired_p
 from metrics.statistics import Summary, aggregate
 
-from .table import Score, ScoreTable, forecast_lines, title
-from .texts import aligned, paragraph, percent, plain, spread
+from .table import DOUBTFUL, Score, ScoreTable, forecast_lines, title
+from .texts import aligned, limits, paragraph, percent, plain, spread
 
 FAMILY_ERROR = 0.05
 """Probability that one or more differences within a measure are called significant by chance."""
@@ -27,8 +27,10 @@ TEST = (
 """How differences are tested, as a text for readers."""
 VALUES = (
     "Values: mean over seeds with half of Student's 95 % interval; in brackets the mean relative to the performance "
-    "compared with; ! = runs are missing."
+    f"compared with; ! = runs are missing; {DOUBTFUL} = misleads, a note says why. Noise floor: what two runs of the "
+    "undisturbed swarm score by chance."
 )
+BANDS = "In square brackets: mean minus and plus two standard deviations of single runs."
 PAIRS_PER_TABLE = 6
 """Pairs of policies side by side; more go into further tables."""
 
@@ -38,6 +40,8 @@ class Difference:
     """Score of one policy minus that of another, at one level of one measure."""
 
     measure: str
+    label: str
+    """Name of the measure with its variant and form, as in `Score.label`."""
     at: str
     n_robots: tuple[int, ...]
     first: str
@@ -57,7 +61,7 @@ class Difference:
     @property
     def key(self) -> tuple[str, str, bool, str, str, tuple[int, ...]]:
         """Which policies are compared, and in which score."""
-        return self.first, self.second, self.is_relative, self.measure, self.at, self.n_robots
+        return self.first, self.second, self.is_relative, self.label, self.at, self.n_robots
 
     @property
     def is_significant(self) -> bool:
@@ -72,6 +76,7 @@ class Difference:
         """Return the difference as plain values."""
         return {
             "measure": self.measure,
+            "label": self.label,
             "at": self.at,
             "n_robots": list(self.n_robots),
             "first": self.first,
@@ -129,12 +134,23 @@ class Comparison:
             "differences": [difference.to_mapping() for difference in self.differences],
         }
 
-    def value_rows(self) -> list[tuple[str, ...]]:
-        """Return the values side by side as texts, a row of headings first."""
-        header = ("measure", "at", "better", *self.policies)
-        words = {True: "higher", False: "lower"}
-        rows = self.rows()
-        return [header, *((row.measure, row.at, words[row.higher_is_better], *self._values(row)) for row in rows)]
+    def value_rows(self, *, band: bool = False) -> list[tuple[str, ...]]:
+        """Return the values side by side as texts, a row of headings first; distances have a row of noise floors."""
+        lines = [("measure", "at", "better", *self.policies)]
+        for row in self.rows():
+            scores = [self.score(policy, row) for policy in self.policies]
+            better = "higher" if row.higher_is_better else "lower"
+            lines.append((row.label, row.at, better, *(_cell(score, band=band) for score in scores)))
+            if any(score is not None and score.noise_floor is not None for score in scores):
+                lines.append(
+                    (
+                        f"{row.label}, noise floor",
+                        row.at,
+                        "",
+                        *(score.floor_cell() if score else "-" for score in scores),
+                    )
+                )
+        return lines
 
     def difference_rows(self, pairs: Sequence[tuple[str, str]] | None = None) -> list[tuple[str, ...]]:
         """Return the differences of pairs of policies (default: all) as texts, a row of headings first."""
@@ -144,7 +160,7 @@ class Comparison:
             for is_relative in (False, True):
                 found = [self.difference(pair, row, is_relative=is_relative) for pair in pairs]
                 if any(found):
-                    name = f"{row.measure}, relative" if is_relative else row.measure
+                    name = f"{row.label}, relative" if is_relative else row.label
                     lines.append((name, row.at, *("-" if d is None else d.cell() for d in found)))
         return lines
 
@@ -160,14 +176,15 @@ class Comparison:
         ]
         return (*shared, *own)
 
-    def __str__(self) -> str:
-        lines = [title(self.tables), *aligned(self.value_rows()), VALUES]
+    def text(self, *, band: bool = False) -> str:
+        """Return values and differences for people; with `band`, the authors' bands beside the values."""
+        lines = [title(self.tables), *aligned(self.value_rows(band=band)), VALUES, *([BANDS] if band else [])]
         for start in range(0, len(self.pairs), PAIRS_PER_TABLE):
             lines += ["", *aligned(self.difference_rows(self.pairs[start : start + PAIRS_PER_TABLE]))]
         return "\n".join([*lines, TEST, *forecast_lines(self.tables), *paragraph(self.notes())])
 
-    def _values(self, row: Score) -> tuple[str, ...]:
-        return tuple(_cell(self.score(policy, row)) for policy in self.policies)
+    def __str__(self) -> str:
+        return self.text()
 
 
 def compare_tables(tables: Sequence[ScoreTable]) -> Comparison:
@@ -215,7 +232,7 @@ class _Pair:
     @property
     def family(self) -> tuple[str, bool]:
         """Tests that are corrected together."""
-        return self.score.measure, self.is_relative
+        return self.score.label, self.is_relative
 
 
 def _pairs(score: Score, other: Score, first: str, second: str) -> list[_Pair]:
@@ -247,6 +264,7 @@ def _difference(pair: _Pair, p: float, p_holm: float) -> Difference:
         better = pair.first if (summary.mean > 0.0) == score.higher_is_better else pair.second
     return Difference(
         measure=score.measure,
+        label=score.label,
         at=score.at,
         n_robots=score.n_robots,
         first=pair.first,
@@ -259,9 +277,11 @@ def _difference(pair: _Pair, p: float, p_holm: float) -> Difference:
     )
 
 
-def _cell(score: Score | None) -> str:
-    """Value with its half interval, the value relative to performance, and "!" where runs are missing."""
+def _cell(score: Score | None, *, band: bool) -> str:
+    """Value with its half interval, relative to performance, its band, and marks for missing runs and doubt."""
     if score is None:
         return "-"
     relative = "" if score.relative is None else f" ({percent(score.relative.mean)})"
-    return spread(score.summary) + relative + (" !" if score.is_partial else "")
+    deviations = f" [{limits(*score.band)}]" if band and score.summary.n_used > 1 else ""
+    marks = (" !" if score.is_partial else "") + (f" {DOUBTFUL}" if score.is_doubtful else "")
+    return spread(score.summary) + relative + deviations + marks

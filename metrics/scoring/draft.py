@@ -8,9 +8,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metrics.curves import FloatArray
+from metrics.curves import FloatArray, Variant
 from metrics.statistics import Summary, aggregate, bootstrap_measure
 
+from .measures import Form
 from .studies import RunCurves, common_runs
 from .table import Score
 
@@ -39,6 +40,12 @@ class ScoreDraft:
     compared_with: int | None = None
     """Index in `experiments` of the swarm whose total performance divides relative values; None: no relative values."""
     beside: dict[str, float] = field(default_factory=dict[str, float])
+    variant: Variant = "corrected"
+    form: Form = "marginal"
+    is_doubtful: bool = False
+    """As in `Score`."""
+    remark: str = ""
+    """What to know before reading the value, whatever the runs are."""
 
     def score(self, values: Values, *, floor: float | None = None, order_matters: bool = False) -> Score:
         """Return the score with one value per common run.
@@ -52,12 +59,16 @@ class ScoreDraft:
         seeds = paired[0].seeds
         n_lost = max(experiment.n_lost + len(experiment.seeds) for experiment in self.experiments) - len(seeds)
         per_run = np.atleast_1d(np.asarray(values(*paired), dtype=np.float64)) if seeds else np.empty(0)
-        relative = None
+        relative = relative_floor = None
         if self.compared_with is not None and seeds:
             total = paired[self.compared_with].performance.sum(axis=-1)
+            mean_total = float(total.mean())
+            relative_floor = None if floor is None or mean_total == 0.0 else floor / mean_total
             relative = np.divide(per_run, total, out=np.full(len(seeds), math.nan), where=total > 0.0)
         return Score(
             measure=self.measure,
+            variant=self.variant,
+            form=self.form,
             at=self.at,
             criterion=self.experiments[-1].criterion,
             x=self.x,
@@ -68,9 +79,11 @@ class ScoreDraft:
             relative_per_seed={} if relative is None else dict(zip(seeds, relative.tolist(), strict=True)),
             n_lost=n_lost,
             noise_floor=floor,
+            relative_floor=relative_floor,
             of_mean_curves=_of_mean_curves(values, paired) if order_matters and seeds else None,
             beside=self.beside,
-            note=_note(per_run, n_lost, relative),
+            is_doubtful=self.is_doubtful,
+            note="; ".join(filter(None, (self.remark, _note(per_run, n_lost, relative)))),
         )
 
 

@@ -1,6 +1,7 @@
 """The public functions of scoring: score a policy in a scenario, compare policies, or score curves from a file."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from .comparison import Comparison, compare_tables
 from .contestants import PolicyLike
 from .curves_file import read_curves
 from .forecast import forecast_population
-from .measures import check_measures
+from .measures import ScoreForms, check_measures
 from .performance import PerformanceLike, own_performance
 from .plan import plan_scores
 from .runs import run_scores
@@ -39,6 +40,7 @@ def score_policy(
     caches: str | None = None,
     density: float | None = None,
     disturbance: str = THROTTLE,
+    forms: ScoreForms | None = None,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
@@ -65,6 +67,7 @@ def score_policy(
             Default: all sizes in the scenario's arena (in search and rescue at its density).
         disturbance: What reactivity and adaptability are scored under: "throttle" (robots lose speed) or
             "handling_cost" (picking up and dropping take longer).
+        forms: Variants and forms of the measures; default the corrected marginal one.
         out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
         jobs: Processes; default one per core.
         executor: Runs the work instead, for example Dask's `client.get_executor()`.
@@ -92,6 +95,7 @@ def score_policy(
         density=density,
         disturbance=disturbance,
     )
+    plan = replace(plan, forms=forms or ScoreForms())
     return run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress)[0]
 
 
@@ -107,6 +111,7 @@ def compare_policies(
     caches: str | None = None,
     density: float | None = None,
     disturbance: str = THROTTLE,
+    forms: ScoreForms | None = None,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: "Executor | None" = None,
@@ -128,11 +133,16 @@ def compare_policies(
         density=density,
         disturbance=disturbance,
     )
+    plan = replace(plan, forms=forms or ScoreForms())
     return compare_tables(run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress))
 
 
 def score_curves(
-    path: str | Path, *, measures: Sequence[str] | None = None, performance: PerformanceLike | None = None
+    path: str | Path,
+    *,
+    measures: Sequence[str] | None = None,
+    performance: PerformanceLike | None = None,
+    forms: ScoreForms | None = None,
 ) -> tuple[ScoreTable, ...]:
     """Score curves from any simulator, one table per policy in the file.
 
@@ -141,6 +151,7 @@ def score_curves(
         measures: Default all that the columns allow; the table says which others are missing, and why.
         performance: Another column of the file than `performance`, "1/" and a column, or a function of the rows of a
             run (`Performance`).
+        forms: As in `score_policy`.
 
     Raises:
         CurveError: whatever is wrong with the file, or a measure that was asked for and cannot be computed.
@@ -150,7 +161,7 @@ def score_curves(
     told = {} if performance is None else {"performance": performance if own is None else own.name}
     tables: list[ScoreTable] = []
     for study in read_curves(path, performance):
-        scores, missing = score_study(study, wanted)
+        scores, missing = score_study(study, wanted, forms)
         if missing and (measures is not None or not scores):
             measure, reason = next(iter(missing.items()))
             raise CurveError(f"Cannot compute {measure} for {study.controller} from {path}: {reason}.")

@@ -1,14 +1,14 @@
 """The plan of a scoring: which policies, which experiments, which seeds."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from metrics.checks import chosen_seeds
 
 from .columns import THROTTLE
 from .contestants import Contestant, PolicyLike, contestants_of
-from .measures import check_measures, criteria_of
+from .measures import ScoreForms, check_measures, criteria_of
 from .performance import Performance, PerformanceLike, own_performance
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ class ScoringPlan:
     scenario: "ScenarioConfig"
     budget: "Budget"
     budget_name: str
+    forms: ScoreForms = field(default_factory=ScoreForms)
 
     def specs_of(self, contestant: Contestant) -> "tuple[RunSpec, ...]":
         """Return the runs of one policy, seed by seed."""

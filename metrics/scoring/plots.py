@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from metrics.catalog import METRICS
+from metrics.statistics import Summary
 
 from .columns import NOISE, POPULATION, SIZE, THROTTLE
 from .measures import MEASURE_CRITERIA
@@ -17,23 +19,27 @@ Panel: TypeAlias = Any
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
 """Okabe-Ito palette: told apart by readers with any colour vision."""
 PANELS_PER_ROW = 4
+LONG_TITLE = 48
+"""Letters that fit above a panel; longer titles are smaller, so that they do not run into their neighbours."""
 _X_LABELS = {
     SIZE: "robots (the larger swarm)",
-    THROTTLE: "amplitude of throttle, or of handling cost in ticks",
+    THROTTLE: "distance from ideal conditions (amplitude of throttle, or of handling cost in ticks)",
     NOISE: "standard deviation of noise",
     POPULATION: "level of population dynamics",
 }
 
 
-def draw_scores(tables: Sequence[ScoreTable], path: str | Path) -> None:
+def draw_scores(tables: Sequence[ScoreTable], path: str | Path, *, band: bool = False) -> None:
     """Draw score tables side by side into a picture file: one panel per measure, one line per policy.
 
-    Error bars are the intervals of the tables, dotted lines the noise floors. Measures that are computed without runs
-    (availability) and values that are not finite are left out.
+    Amounts and distances have a second panel with their values relative to performance. Error bars are the intervals of
+    the tables; below a dotted line, the noise floor, a distance says nothing; hollow marks are values that mislead.
+    Measures that are computed without runs (availability) and values that are not finite are left out.
 
     Args:
         tables: One per policy.
         path: File to write; its suffix chooses the format (.png, .svg, .pdf).
+        band: Shade the mean plus and minus two standard deviations of single runs, as the paper does.
 
     Raises:
         ImportError: matplotlib is not installed.
@@ -41,51 +47,109 @@ def draw_scores(tables: Sequence[ScoreTable], path: str | Path) -> None:
     """
     from matplotlib.figure import Figure  # not pyplot: no global state, no window system
 
-    drawn = [name for name in MEASURE_CRITERIA if any(_drawable(table, name) for table in tables)]
+    drawn = _contents(tables)
     if not drawn:
         raise ValueError("Expected a score to draw, got tables without a finite value from runs.")
     n_rows = math.ceil(len(drawn) / PANELS_PER_ROW)
     n_columns = min(PANELS_PER_ROW, len(drawn))
     figure: Any = Figure(figsize=(3.4 * n_columns + 0.6, 2.8 * n_rows + 0.8), layout="constrained")
     panels: list[Panel] = figure.subplots(n_rows, n_columns, squeeze=False).ravel().tolist()
-    for name, panel in zip(drawn, panels, strict=False):
-        _draw_measure(panel, name, tables)
+    for content, panel in zip(drawn, panels, strict=False):
+        _draw_panel(panel, content, tables, band=band)
     for panel in panels[len(drawn) :]:
         panel.set_axis_off()
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(tables), frameon=False)
     where = next((table.scenario for table in tables if table.scenario), "")
-    figure.suptitle(f"{where + ': ' if where else ''}mean and 95 % interval over seeds; dotted: noise floor")
+    words = "mean and 95 % interval over seeds" + ("; shaded: mean ± 2 sd of runs" if band else "")
+    figure.suptitle(f"{where + ': ' if where else ''}{words}; dotted: noise floor; hollow: misleads")
     figure.savefig(path, dpi=150)
 
 
-def _drawable(table: ScoreTable, measure: str) -> list[Score]:
-    found = (score for score in table.scores if score.measure == measure and score.per_seed)
-    return [score for score in found if math.isfinite(score.summary.mean)]
+@dataclass(frozen=True, kw_only=True)
+class _Content:
+    """What one panel shows: a measure in one variant and form, itself or relative to performance."""
+
+    label: str
+    is_relative: bool
+
+    def scores(self, table: ScoreTable) -> list[Score]:
+        """Return the scores of a table that can be drawn here."""
+        found = [score for score in table.scores if score.label == self.label and score.per_seed]
+        return [score for score in found if math.isfinite(self.summary(score).mean)]
+
+    def summary(self, score: Score) -> Summary:
+        """Return the numbers of a score that are shown here; all NaN where there are none."""
+        if not self.is_relative:
+            return score.summary
+        nothing = math.nan
+        absent = Summary(mean=nothing, std=nothing, lower=nothing, upper=nothing, n_used=0, n_nan=0)
+        return score.relative or absent
+
+    def floor(self, score: Score) -> float | None:
+        """Return the noise floor of a score, in the unit of this panel."""
+        return score.relative_floor if self.is_relative else score.noise_floor
 
 
-def _draw_measure(panel: Panel, measure: str, tables: Sequence[ScoreTable]) -> None:
-    about = METRICS[measure]
-    places = sorted({score.x for table in tables for score in _drawable(table, measure)})
+def _contents(tables: Sequence[ScoreTable]) -> list[_Content]:
+    """Return the panels that have something to show, in the order of tables, relative ones beside their measure."""
+    scores = [score for table in tables for score in table.scores]
+    order = list(MEASURE_CRITERIA)
+    labels = dict.fromkeys(score.label for score in sorted(scores, key=lambda score: order.index(score.measure)))
+    wanted = [_Content(label=label, is_relative=is_relative) for label in labels for is_relative in (False, True)]
+    return [content for content in wanted if any(content.scores(table) for table in tables)]
+
+
+def _draw_panel(panel: Panel, content: _Content, tables: Sequence[ScoreTable], *, band: bool) -> None:
+    shown = [score for table in tables for score in content.scores(table)]
+    first = shown[0]
+    about = METRICS[first.measure]
+    places = sorted({score.x for score in shown})
     for index, table in enumerate(tables):
-        scores = _drawable(table, measure)
-        colour = COLOURS[index % len(COLOURS)]
         # Levels are categories, side by side, so that error bars of different policies do not cover each other.
         shift = 0.08 * (index - 0.5 * (len(tables) - 1))
+        scores = content.scores(table)
         x = [places.index(score.x) + shift for score in scores]
-        y = [score.summary.mean for score in scores]
-        half = [0.0 if math.isnan(s.summary.upper) else s.summary.upper - s.summary.mean for s in scores]
-        panel.errorbar(x, y, yerr=half, color=colour, marker="o", markersize=4, capsize=2, label=table.policy)
-        floors = [(place, score.noise_floor) for place, score in zip(x, scores, strict=True) if score.noise_floor]
-        if floors:
-            panel.plot(*zip(*floors, strict=True), color=colour, linestyle=":", marker="_")
-    if about.neutral is not None and not about.is_distance:
+        _draw_policy(panel, content, scores, x, COLOURS[index % len(COLOURS)], table.policy, band=band)
+    if about.neutral is not None and not about.is_distance and first.variant == "corrected":
         panel.axhline(about.neutral, color="0.6", linewidth=0.8, zorder=0)
     arrow = "higher" if about.higher_is_better else "lower"
-    panel.set_title(f"{measure} ({arrow} is better)", fontsize=9)
-    panel.set_ylabel(next(score.unit for table in tables for score in _drawable(table, measure)), fontsize=8)
-    panel.set_xlabel(_X_LABELS[MEASURE_CRITERIA[measure]], fontsize=8)
-    panel.set_xticks(range(len(places)), [f"{place:.3g}" for place in places])
+    title = f"{content.label}{', relative' if content.is_relative else ''} ({arrow} is better)"
+    panel.set_title(title, fontsize=9 if len(title) <= LONG_TITLE else 7)
+    panel.set_ylabel("share of performance" if content.is_relative else first.unit, fontsize=8)
+    panel.set_xlabel(_X_LABELS[MEASURE_CRITERIA[first.measure]], fontsize=8)
+    panel.set_xticks(range(len(places)), [_place(place, shown) for place in places])
     panel.tick_params(labelsize=8)
     panel.margins(x=0.15)
     panel.grid(alpha=0.3)
+
+
+def _draw_policy(
+    panel: Panel, content: _Content, scores: Sequence[Score], x: Sequence[float], colour: str, name: str, *, band: bool
+) -> None:
+    summaries = [content.summary(score) for score in scores]
+    y = [summary.mean for summary in summaries]
+    half = [0.0 if math.isnan(s.upper) else s.upper - s.mean for s in summaries]
+    panel.errorbar(x, y, yerr=half, color=colour, marker="o", markersize=4, capsize=2, label=name)
+    hollow = [(place, value) for place, value, score in zip(x, y, scores, strict=True) if score.is_doubtful]
+    if hollow:
+        panel.plot(
+            *zip(*hollow, strict=True), color=colour, marker="o", markersize=4, markerfacecolor="w", linestyle=""
+        )
+    if band:
+        spread = [0.0 if math.isnan(s.std) else 2.0 * s.std for s in summaries]
+        lower = [value - width for value, width in zip(y, spread, strict=True)]
+        upper = [value + width for value, width in zip(y, spread, strict=True)]
+        panel.fill_between(x, lower, upper, color=colour, alpha=0.15, linewidth=0.0)
+    floors = [(place, floor) for place, score in zip(x, scores, strict=True) if (floor := content.floor(score))]
+    if floors:
+        places, heights = zip(*floors, strict=True)
+        panel.plot(places, heights, color=colour, linestyle=":", marker="_")
+        panel.fill_between(places, 0.0, heights, color=colour, alpha=0.06, linewidth=0.0)
+
+
+def _place(x: float, shown: Sequence[Score]) -> str:
+    """Return the text of a level; for throttles the distance of the conditions from the ideal, as in the paper."""
+    distances = (score.beside.get("environment_distance") for score in shown if score.x == x)
+    distance = next((distance for distance in distances if distance is not None), None)
+    return f"{x:.3g}" if distance is None else f"{distance:.3g} ({x:.3g})"

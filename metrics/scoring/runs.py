@@ -62,7 +62,7 @@ def _table(
     records = [record for result in results for record in result.records if record.run_id in planned]
     failures = [failure for result in results for failure in result.failures if failure.run_id in planned]
     study = _study(plan, contestant, records)
-    scores, missing = score_study(study, plan.measures)
+    scores, missing = score_study(study, plan.measures, plan.forms)
     return ScoreTable(
         policy=contestant.label,
         scenario=plan.scenario.name,

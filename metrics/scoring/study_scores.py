@@ -9,7 +9,7 @@ from metrics.catalog import METRICS
 from .by_adversity import BY_ADVERSITY
 from .by_size import BY_SIZE
 from .draft import Uncomputable
-from .measures import check_measures
+from .measures import ScoreForms, check_measures, label_of
 from .studies import StudyCurves
 from .table import Score
 
@@ -18,19 +18,22 @@ _SCORES = BY_SIZE | BY_ADVERSITY
 _OVER_A_RUN = re.compile(r"(per run|in [\d,]+ s)$")
 """End of a unit of what is summed over a run."""
 _NO_SUM = "this performance is no sum over robots, and the measure compares with growth in proportion to them"
-_OTHER_SWARMS = {"one robot", "two sizes", "rates"}
+_OTHER_SWARMS = {"one robot", "two sizes", "rates", "robots at work"}
 """Input of measures that know how many robots made a performance, and expect it of as many others."""
 
 
-def score_study(study: StudyCurves, measures: Sequence[str] | None = None) -> tuple[tuple[Score, ...], dict[str, str]]:
+def score_study(
+    study: StudyCurves, measures: Sequence[str] | None = None, forms: ScoreForms | None = None
+) -> tuple[tuple[Score, ...], dict[str, str]]:
     """Compute the scores of all measures that the curves of a study allow.
 
     Args:
         study: Curves of one policy.
         measures: Names out of `MEASURE_CRITERIA`; default all.
+        forms: Variants and forms; default the corrected marginal one.
 
     Returns:
-        The scores, and for each measure that could not be computed the reason.
+        The scores, and for each measure (in a form of it) that could not be computed the reason.
 
     Raises:
         CurveError: an unknown measure, or curves that a measure refuses.
@@ -38,10 +41,11 @@ def score_study(study: StudyCurves, measures: Sequence[str] | None = None) -> tu
     scores: list[Score] = []
     missing: dict[str, str] = {}
     for measure in check_measures(measures):
-        try:
-            scores += list(_SCORES[measure](measure, study))
-        except Uncomputable as reason:
-            missing[measure] = str(reason)
+        for variant, form in (forms or ScoreForms()).of(measure):
+            try:
+                scores += list(_SCORES[measure](measure, study, variant, form))
+            except Uncomputable as reason:
+                missing[label_of(measure, variant, form)] = str(reason)
     return tuple(_told(score, study) for score in scores), missing
 
 

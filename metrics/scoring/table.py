@@ -5,16 +5,22 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from metrics.catalog import METRICS
+from metrics.curves import Variant
 from metrics.statistics import Summary, aggregate
 
 from .forecast import FORECAST_HEADER, FORECAST_TITLE, PopulationForecast
-from .texts import aligned, bounds, counted, interval, number, paragraph, percent, plain
+from .measures import Form, label_of
+from .texts import aligned, bounds, counted, interval, limits, number, paragraph, percent, plain
 
 if TYPE_CHECKING:
     import polars as pl
 
 HEADER = ("measure", "at", "robots", "value", "95 % interval", "noise floor", "relative", "runs", "better", "unit")
 """Headings of `Score.cells`."""
+BAND = "mean ± 2 sd"
+"""Heading of the column that `Score.cells` adds for the authors' bands."""
+DOUBTFUL = "?"
+"""Mark of a value that misleads; its note says why."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,8 +44,14 @@ class Score:
     """Seed -> value of the runs with this seed, one run of each experiment that is used."""
     n_lost: int = 0
     """Runs that failed or have no partner of the same seed."""
+    variant: Variant = "corrected"
+    form: Form = "marginal"
+    is_doubtful: bool = False
+    """Whether the value misleads: it weights the time lost with a performance that falls with the size."""
     noise_floor: float | None = None
     """For distances: mean distance between two different reference runs, what a perfect swarm scores by chance."""
+    relative_floor: float | None = None
+    """The noise floor over the mean performance that relative values are compared with."""
     relative_per_seed: Mapping[int, float] = field(default_factory=dict[int, float])
     """For amounts and distances: the values over the total performance that they are compared with, which makes
     policies of different performance comparable; NaN where that performance is zero."""
@@ -61,27 +73,45 @@ class Score:
         return aggregate(list(self.relative_per_seed.values())) if self.relative_per_seed else None
 
     @property
+    def band(self) -> tuple[float, float]:
+        """Mean minus and plus two standard deviations of single runs, which the paper shades; NaN for one run."""
+        mean, std = self.summary.mean, self.summary.std
+        return mean - 2.0 * std, mean + 2.0 * std
+
+    @property
+    def label(self) -> str:
+        """Name of the measure, with its variant and form where they are not the usual ones."""
+        return label_of(self.measure, self.variant, self.form)
+
+    @property
     def key(self) -> tuple[str, str, tuple[int, ...]]:
         """What the score is about, the same for all policies."""
-        return self.measure, self.at, self.n_robots
+        return self.label, self.at, self.n_robots
 
-    def cells(self) -> tuple[str, ...]:
-        """Return the score as texts under `HEADER`."""
+    def cells(self, *, band: bool = False) -> tuple[str, ...]:
+        """Return the score as texts under `HEADER`; with `band`, one more column after the interval."""
         summary = self.summary
         runs = str(summary.n_used) + (f" of {summary.n_used + summary.n_nan + self.n_lost}" if self.is_partial else "")
         enters = bool(self.per_seed) or self.is_partial  # a measure that follows from rates alone uses no runs
         return (
-            self.measure,
+            self.label,
             self.at,
             ", ".join(map(str, self.n_robots)),
-            number(summary.mean),
+            number(summary.mean) + (f" {DOUBTFUL}" if self.is_doubtful else ""),
             interval(summary),
-            "" if self.noise_floor is None else number(self.noise_floor),
+            *([limits(*self.band)] if band else []),
+            self.floor_cell(),
             "" if self.relative is None else percent(self.relative.mean),
             runs if enters else "-",
             "higher" if self.higher_is_better else "lower",
             self.unit,
         )
+
+    def floor_cell(self) -> str:
+        """Return the noise floor, and in brackets relative to performance; empty for measures without one."""
+        if self.noise_floor is None:
+            return ""
+        return number(self.noise_floor) + ("" if self.relative_floor is None else f" ({percent(self.relative_floor)})")
 
     @property
     def is_partial(self) -> bool:
@@ -93,6 +123,9 @@ class Score:
         summary, means, relative = self.summary, self.of_mean_curves, self.relative
         return {
             "measure": self.measure,
+            "variant": self.variant,
+            "form": self.form,
+            "label": self.label,
             "symbol": METRICS[self.measure].symbol,
             "at": self.at,
             "criterion": self.criterion,
@@ -105,10 +138,13 @@ class Score:
             "std": plain(summary.std),
             "lower": plain(summary.lower),
             "upper": plain(summary.upper),
+            "two_sd": [plain(bound) for bound in self.band],
+            "doubtful": self.is_doubtful,
             "n_runs": summary.n_used,
             "n_nan": summary.n_nan,
             "n_lost": self.n_lost,
             "noise_floor": plain(self.noise_floor),
+            "relative_floor": plain(self.relative_floor),
             "relative": bounds(relative),
             "of_mean_curves": bounds(means),
             "beside": {name: plain(value) for name, value in self.beside.items()},
@@ -156,7 +192,7 @@ class ScoreTable:
         levels: dict[str, dict[str, list[str]]] = {}
         for score in self.scores:
             if score.note:
-                levels.setdefault(score.note, {}).setdefault(score.measure, []).append(score.at)
+                levels.setdefault(score.note, {}).setdefault(score.label, []).append(score.at)
         return {
             note: "; ".join(f"{measure}, {', '.join(places)}" for measure, places in places_of.items())
             for note, places_of in levels.items()
@@ -173,6 +209,7 @@ class ScoreTable:
             for name in ("relative", "of_mean_curves"):
                 values = row.pop(name) or [None, None, None]
                 row |= dict(zip((name, f"{name}_lower", f"{name}_upper"), values, strict=True))
+            row |= dict(zip(("two_sd_lower", "two_sd_upper"), row.pop("two_sd"), strict=True))
             row["n_robots"] = " ".join(map(str, score.n_robots))
             rows.append({"policy": self.policy, "scenario": self.scenario, **row})
         return pl.DataFrame(rows, infer_schema_length=None)
@@ -189,9 +226,15 @@ class ScoreTable:
             "failures": list(self.failures),
         }
 
-    def __str__(self) -> str:
-        rows = aligned([HEADER, *(score.cells() for score in self.scores)])
+    def text(self, *, band: bool = False) -> str:
+        """Return the table for people; with `band`, the authors' bands beside the intervals."""
+        place = HEADER.index("95 % interval") + 1
+        header = (*HEADER[:place], BAND, *HEADER[place:]) if band else HEADER
+        rows = aligned([header, *(score.cells(band=band) for score in self.scores)])
         return "\n".join([title([self]), *rows, *forecast_lines([self]), *paragraph(self.notes())])
+
+    def __str__(self) -> str:
+        return self.text()
 
 
 def title(tables: Sequence[ScoreTable]) -> str:

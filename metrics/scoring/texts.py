@@ -42,9 +42,12 @@ def percent(value: float) -> str:
 
 def interval(summary: Summary) -> str:
     """Return the bounds of an interval."""
-    if math.isnan(summary.lower):
-        return "-"
-    return f"{number(summary.lower)} to {number(summary.upper)}"
+    return limits(summary.lower, summary.upper)
+
+
+def limits(lower: float, upper: float) -> str:
+    """Return two bounds; a dash where there are none."""
+    return "-" if math.isnan(lower) else f"{number(lower)} to {number(upper)}"
 
 
 def plain(value: float | None) -> float | None:

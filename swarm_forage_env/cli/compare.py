@@ -6,11 +6,13 @@ import typer
 
 from swarm_forage_env.cli.options import (
     AsJson,
+    Band,
     Budget,
     Caches,
     Density,
     Disturbance,
     DryRun,
+    Forms,
     Jobs,
     Measures,
     Objects,
@@ -22,6 +24,7 @@ from swarm_forage_env.cli.options import (
     ScoreSeeds,
     Settings,
     Side,
+    Variants,
 )
 
 
@@ -34,6 +37,9 @@ def compare(
     ],
     scenario: Scenario = "warehouse_small",
     measures: Measures = None,
+    variant: Variants = "corrected",
+    form: Forms = "marginal",
+    band: Band = False,
     budget: Budget = "standard",
     seeds: ScoreSeeds = None,
     horizon: ScoreHorizon = None,
@@ -66,7 +72,15 @@ def compare(
         settings=tuple(settings or ()),
     )
     options = ScoreOptions(
-        policies=policies, measures=measures, budget=budget, seeds=seeds, horizon=horizon, disturbance=disturbance
+        policies=policies,
+        measures=measures,
+        variants=variant,
+        forms=form,
+        budget=budget,
+        seeds=seeds,
+        horizon=horizon,
+        disturbance=disturbance,
     )
     plan = build_plan(chosen, options, at_least=2)
-    run_and_show(plan, out or default_folder(scenario), "comparison.png", jobs, as_json=as_json, dry_run=dry_run)
+    folder = out or default_folder(scenario)
+    run_and_show(plan, folder, "comparison.png", jobs, as_json=as_json, dry_run=dry_run, band=band)

@@ -60,6 +60,19 @@ Disturbance = Annotated[
     str,
     typer.Option("--disturbance", help="What reactivity and adaptability are scored under: throttle or handling_cost."),
 ]
+Variants = Annotated[
+    str,
+    typer.Option("--variant", help="corrected, paper (as printed), sierra (authors' program); separated by commas."),
+]
+Forms = Annotated[
+    str,
+    typer.Option(
+        "--form", help="marginal (against the next smaller swarm), interactive (against N lone robots), or both."
+    ),
+]
+Band = Annotated[
+    bool, typer.Option("--band", help="Add the paper's bands, mean ± 2 standard deviations of single runs.")
+]
 Budget = Annotated[str, typer.Option("--budget", help="quick, standard or paper: how long, how many runs and levels.")]
 ScoreSeeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per experiment; default the budget's.")]
 ScoreHorizon = Annotated[float | None, typer.Option("--horizon", help="Seconds per run; default the budget's.")]

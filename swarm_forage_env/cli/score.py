@@ -7,11 +7,13 @@ import typer
 
 from swarm_forage_env.cli.options import (
     AsJson,
+    Band,
     Budget,
     Caches,
     Density,
     Disturbance,
     DryRun,
+    Forms,
     Jobs,
     Measures,
     Objects,
@@ -23,9 +25,10 @@ from swarm_forage_env.cli.options import (
     ScoreSeeds,
     Settings,
     Side,
+    Variants,
 )
 
-_OF_CURVES = ("curves", "measures", "performance", "as_json")
+_OF_CURVES = ("curves", "measures", "performance", "variant", "form", "band", "as_json")
 """Options of `score` that go with --curves."""
 
 
@@ -37,6 +40,9 @@ def score(
     ] = None,
     scenario: Scenario = "warehouse_small",
     measures: Measures = None,
+    variant: Variants = "corrected",
+    form: Forms = "marginal",
+    band: Band = False,
     budget: Budget = "standard",
     seeds: ScoreSeeds = None,
     horizon: ScoreHorizon = None,
@@ -59,14 +65,15 @@ def score(
     the folder holds already are not repeated.
     """
     from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder
-    from swarm_forage_env.cli.score_options import ScoreOptions, build_plan, tables_of_file
+    from swarm_forage_env.cli.score_options import ScoreOptions, build_plan, score_forms, tables_of_file
     from swarm_forage_env.cli.score_report import run_and_show, show_scores
 
     if (policy is None) == (curves is None):
         raise typer.BadParameter("Expected either --policy or --curves.")
     if curves is not None:
         _refuse_options_of_runs(context)
-        show_scores(tables_of_file(curves, measures, performance), None, as_json=as_json)
+        tables = tables_of_file(curves, measures, performance, score_forms(variant, form))
+        show_scores(tables, None, as_json=as_json, band=band)
         return
     chosen = ScenarioOptions(
         scenario=scenario,
@@ -79,10 +86,18 @@ def score(
         settings=tuple(settings or ()),
     )
     options = ScoreOptions(
-        policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon, disturbance=disturbance
+        policies=policy or "",
+        measures=measures,
+        variants=variant,
+        forms=form,
+        budget=budget,
+        seeds=seeds,
+        horizon=horizon,
+        disturbance=disturbance,
     )
     folder = out or default_folder(scenario)
-    run_and_show(build_plan(chosen, options, at_most=1), folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run)
+    plan = build_plan(chosen, options, at_most=1)
+    run_and_show(plan, folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run, band=band)
 
 
 def _refuse_options_of_runs(context: typer.Context) -> None:
@@ -95,6 +110,6 @@ def _refuse_options_of_runs(context: typer.Context) -> None:
     ]
     if given:
         raise typer.BadParameter(
-            "Expected --curves with no other options than --measures, --performance and --json, got "
-            f"{', '.join(given)}, which are about runs."
+            "Expected --curves with no other options than --measures, --performance, --variant, --form, --band and "
+            f"--json, got {', '.join(given)}, which are about runs."
         )

@@ -1,9 +1,10 @@
 """From the words after `score` and `compare` to a plan."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from metrics.scoring import ScoringPlan, plan_scores, score_curves
+from metrics.scoring import ScoreForms, ScoringPlan, plan_scores, score_curves
 from metrics.scoring.table import ScoreTable
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, parsed_density, split_names
@@ -18,6 +19,8 @@ class ScoreOptions:
     policies: str
     """Names and files, separated by commas."""
     measures: str | None = None
+    variants: str = "corrected"
+    forms: str = "marginal"
     budget: str = "standard"
     seeds: int | None = None
     horizon: float | None = None
@@ -48,8 +51,9 @@ def build_plan(
     if at_most is not None and len(names) > at_most:
         raise ConfigError(f"Expected one policy to score, got {', '.join(names)}; compare scores more than one.")
     scenario, caches = build_scenario(described)
+    forms = score_forms(options.variants, options.forms)
     try:
-        return plan_scores(
+        plan = plan_scores(
             names,
             scenario,
             measures=None if options.measures is None else split_names(options.measures),
@@ -62,11 +66,28 @@ def build_plan(
         )
     except ValueError as error:  # of a policy, a measure, a budget or a file
         raise ConfigError(str(error)) from error
+    return replace(plan, forms=forms)
 
 
-def tables_of_file(path: Path, measures: str | None, performance: str | None) -> tuple[ScoreTable, ...]:
-    """Return the scores of a file of curves; raises ConfigError whatever is wrong with it."""
+def score_forms(variants: str, forms: str) -> ScoreForms:
+    """Return the variants and forms that the words name, separated by commas.
+
+    Raises:
+        ConfigError: an unknown word, or none.
+    """
+    words: dict[str, Any] = {"variants": tuple(split_names(variants)), "forms": tuple(split_names(forms))}
     try:
-        return score_curves(path, measures=None if measures is None else split_names(measures), performance=performance)
+        return ScoreForms(**words)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+
+
+def tables_of_file(
+    path: Path, measures: str | None, performance: str | None, forms: ScoreForms
+) -> tuple[ScoreTable, ...]:
+    """Return the scores of a file of curves; raises ConfigError whatever is wrong with it."""
+    wanted = None if measures is None else split_names(measures)
+    try:
+        return score_curves(path, measures=wanted, performance=performance, forms=forms)
     except ValueError as error:
         raise ConfigError(str(error)) from error

@@ -19,7 +19,14 @@ from swarm_forage_env.study.store import RunStore
 
 
 def run_and_show(
-    plan: ScoringPlan, folder: Path, picture: str, jobs: int | None, *, as_json: bool, dry_run: bool
+    plan: ScoringPlan,
+    folder: Path,
+    picture: str,
+    jobs: int | None,
+    *,
+    as_json: bool,
+    dry_run: bool,
+    band: bool = False,
 ) -> None:
     """Run a plan and show the scores; with `dry_run`, only show the plan.
 
@@ -30,6 +37,7 @@ def run_and_show(
         jobs: Processes; None = one per core.
         as_json: Print JSON instead of tables.
         dry_run: Run nothing.
+        band: Show mean ± 2 standard deviations of single runs beside the intervals.
 
     Raises:
         typer.Exit: Ctrl-C, or runs have failed.
@@ -43,24 +51,27 @@ def run_and_show(
     except StudyInterrupted as interrupt:
         complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
         raise typer.Exit(EXIT_INTERRUPTED) from None
-    show_scores(tables, folder / picture, as_json=as_json)
+    show_scores(tables, folder / picture, as_json=as_json, band=band)
     if any(table.failures for table in tables):
         raise typer.Exit(EXIT_FAILURE)
 
 
-def show_scores(tables: Sequence[ScoreTable], picture: Path | None, *, as_json: bool) -> None:
-    """Show the scores of one policy, or compare those of several; draw them into `picture` unless it is None."""
+def show_scores(tables: Sequence[ScoreTable], picture: Path | None, *, as_json: bool, band: bool = False) -> None:
+    """Show the scores of one policy, or compare those of several; draw them into `picture` unless it is None.
+
+    `band` is as in `run_and_show`; the JSON document has the bands in any case.
+    """
     comparison = compare_tables(tables) if len(tables) > 1 else None
     drawn = None
     if picture is not None:
         try:
-            drawn = _draw(tables, picture)
+            drawn = _draw(tables, picture, band=band)
         except ImportError:
             typer.echo(NO_PICTURE, err=True)
     if as_json:
         typer.echo(_json_text(tables, comparison, drawn))
     else:
-        typer.echo(str(tables[0] if comparison is None else comparison))
+        typer.echo((tables[0] if comparison is None else comparison).text(band=band))
     if drawn is not None:
         typer.echo(f"picture {drawn}", err=True)
 
@@ -115,7 +126,7 @@ def _json_text(tables: Sequence[ScoreTable], comparison: Comparison | None, pict
     return json.dumps({**document, "picture": None if picture is None else str(picture)}, indent=1)
 
 
-def _draw(tables: Sequence[ScoreTable], path: Path) -> Path | None:
+def _draw(tables: Sequence[ScoreTable], path: Path, *, band: bool) -> Path | None:
     """Draw the tables; returns None if there is nothing to draw.
 
     Raises:
@@ -124,5 +135,5 @@ def _draw(tables: Sequence[ScoreTable], path: Path) -> Path | None:
     if not any(score.per_seed for table in tables for score in table.scores):
         return None
     path.parent.mkdir(parents=True, exist_ok=True)
-    draw_scores(tables, path)
+    draw_scores(tables, path, band=band)
     return path

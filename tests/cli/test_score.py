@@ -75,6 +75,21 @@ def test_sizes_keep_a_density_if_asked(command):
     assert arenas == {(1, 28.4), (20, 28.4)}
 
 
+def test_variants_forms_and_bands_can_be_chosen(command):
+    words = ("--measures", "spatial_emergence,scalability", "--variant", "corrected,sierra")
+    code, out, _ = command(*SCORE, *words, "--form", "marginal,interactive", "--band")
+    assert code == 0
+    for word in ("mean ± 2 sd", "spatial_emergence, interactive, sierra", "scalability, interactive", "N = 1 to 3"):
+        assert word in out
+    _, out, _ = command(*COMPARE, *words, "--json")
+    answer = json.loads(out)
+    labels = {"spatial_emergence", "spatial_emergence, sierra", "scalability", "scalability, sierra"}
+    assert {difference["label"] for difference in answer["differences"]} == labels
+    assert {score["variant"] for score in answer["tables"][0]["scores"]} == {"corrected", "sierra"}
+    _, out, _ = command(*COMPARE, *words, "--band")
+    assert "In square brackets: mean minus and plus two standard deviations" in out
+
+
 def test_json_is_the_only_thing_on_stdout(command):
     _, out, _ = command(*SCORE, *FEW, "--json")
     (table,) = json.loads(out)["tables"]
@@ -153,6 +168,9 @@ def test_seeds_length_and_world_can_be_chosen(command):
         (("score", "--policy", "crw", "--measures", "reactivty"), "Did you mean 'reactivity'?"),
         (("score", "--policy", "crw", "--measures", ","), "Expected one or more names"),
         (("score", "--policy", "crw", "--disturbance", "noise"), "one of throttle, handling_cost, got 'noise'"),
+        (("score", "--policy", "crw", "--variant", "papr"), "Unknown variant 'papr'. Did you mean 'paper'?"),
+        (("compare", "--policy", "crw,dpo", "--form", "single"), "Unknown form 'single'"),
+        (("score", "--curves", "curves.csv", "--form", "single"), "Unknown form 'single'"),
         (("score", "--policy", "crw", "--budget", "huge"), "Unknown budget 'huge'"),
         (("score", "--policy", "crw", "--performance", "n_carying"), "Did you mean 'n_carrying'?"),
         (("compare", "--policy", "crw,dpo", "--set", "performance=colected"), "Did you mean 'collected'?"),
@@ -189,6 +207,9 @@ def test_curves_from_elsewhere_are_scored(command):
     assert "task_emergence" in out
     assert "reactivity is not computed: there are no runs with criterion throttle" in out
     assert not Path("results").exists()
+    code, out, _ = command("score", "--curves", "curves.csv", "--variant", "paper", "--band")
+    assert "scalability, paper" in out
+    assert "mean ± 2 sd" in out
     code, out, err = command("score", "--curves", "curves.csv", "--measures", "reactivity")
     assert (code, out) == (2, "")
     assert "Cannot compute reactivity for curves" in err

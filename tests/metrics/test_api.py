@@ -19,6 +19,9 @@ SIGNATURES = {
     "spatial_emergence": "perf1, t_lost1, n1, perf2, t_lost2, n2, perf_one, t_lost_one, *, variant='corrected', "
     "reduce='sum'",
     "task_emergence": "perf1, n1, perf2, n2, *, reduce='sum'",
+    "time_emergence": "t_lost1, n1, t_lost2, n2, *, reduce='mean'",
+    "interference_gain": "perf1, t_lost1, n1, perf2, t_lost2, n2, *, relative=False",
+    "undisturbed_gain": "perf1, t_lost1, n1, perf2, t_lost2, n2, *, relative=False",
     "scalability": "perf1, n1, perf2, n2, *, variant='corrected', reduce=None, zero_policy='nan'",
     "efficiency": "perf, n, *, reduce='last'",
     "dtw": "x, y, *, ground='value', clock=None, window=None, per_interval=False",
@@ -34,6 +37,7 @@ SIGNATURES = {
     "mean_away": "rates, n, horizon, *, per_robot=False",
     "population_robustness": "perf, perf_ideal, rates, *, horizon, n=None, ideal_rates=None, weight='transient', "
     "reduce='sum'",
+    "recorded_population_robustness": "perf, n_active, perf_ideal, n_active_ideal, *, reduce='sum', relative=False",
     "availability": "n, n_min, ratio_out",
     "availability_curves": "n, teams, n_min=None",
     "ratio_for_availability": "n, n_min, p_v",

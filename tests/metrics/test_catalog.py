@@ -32,12 +32,16 @@ INDEPENDENT = {
     "t_lost_fraction": lambda f: f([0.0], 4),
     "performance_lost": lambda f: f([4.0], [0.1], 4, [1.0], [0.1]),
     "spatial_emergence": lambda f: f([2.0], [0.1], 2, [4.0], [0.1], 4, [1.0], [0.1]),
+    "time_emergence": lambda f: f([0.1], 2, [0.1], 4),
     "task_emergence": lambda f: f([2.0], 2, [4.0], 4),
+    "interference_gain": lambda f: f([2.0], [0.1], 2, [4.0], [0.1], 4),
+    "undisturbed_gain": lambda f: f([2.0], [0.1], 2, [4.0], [0.1], 4),
     "scalability": lambda f: f([2.0], 2, [4.0], 4),
     "reactivity": lambda f: f([2.0], [1.0], 0.5, 0.0),
     "adaptability": lambda f: f([2.0], [2.0]),
     "noise_robustness": lambda f: f([2.0], [2.0]),
     "population_robustness": lambda f: f([2.0], [2.0], metrics.PopulationRates(), horizon=10),
+    "recorded_population_robustness": lambda f: f([2.0], [4.0], [2.0], 4.0),
     "availability": lambda f: f(4, 2, 0.0),
 }
 

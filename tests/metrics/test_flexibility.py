@@ -25,6 +25,15 @@ def test_perfect_swarms():
     assert reactivity(IDEAL, IDEAL, THROTTLE, 0.0) == pytest.approx(1.0, abs=1e-12)
 
 
+def test_relative_distances_are_shares_of_the_ideal_performance():
+    """Two intervals of four lost half: 1 object of 4, a quarter."""
+    assert adaptability(IDEAL, IN_TIME, relative=True) == pytest.approx(0.25, abs=1e-12)
+    assert noise_robustness(IDEAL, IN_TIME, relative=True) == pytest.approx(0.25, abs=1e-12)
+    assert reactivity(IDEAL, IDEAL, THROTTLE, 0.0, relative=True) == pytest.approx(0.25, abs=1e-12)
+    assert np.isnan(adaptability([0.0], [0.0], relative=True))
+    assert np.isposinf(adaptability([0.0], [1.0], relative=True))
+
+
 def test_the_printed_factor_rewards_gaining_from_adversity():
     observed = [5.0, 5.0]
     assert reactivity([1.0, 1.0], observed, 0.5, 0.1, model="paper", variant="paper") == pytest.approx(0.0, abs=1e-12)

@@ -16,6 +16,7 @@ from metrics import (
     queue_statistics,
     ratio_for_availability,
     ratio_for_team,
+    recorded_population_robustness,
 )
 from tests.reference.population_chain import generator, stationary_by_null_vector
 
@@ -283,3 +284,34 @@ def test_availabilities_that_no_ratio_gives_are_refused(n_min, p_v):
 def test_one_weight_serves_all_runs():
     runs = np.full((3, 2), 0.9)
     assert population_robustness(runs, [1.0, 1.0], HALF, horizon=50_000, n=10).shape == (3,)
+
+
+def test_robots_recorded_at_work_weigh_each_interval():
+    """8 and 5 of 10 robots at work: 8 - 0.8 * 10 = 0 and 6 - 0.5 * 10 = 1."""
+    perf, active, ideal = [8.0, 6.0], [8.0, 5.0], [10.0, 10.0]
+    values = {"sum": 1.0, "mean": 0.5, "last": 1.0}
+    for reduce, expected in values.items():
+        value = recorded_population_robustness(perf, active, ideal, 10.0, reduce=reduce)
+        assert value == pytest.approx(expected, abs=1e-12)
+    assert recorded_population_robustness(perf, active, ideal, [10.0, 5.0]) == pytest.approx(-4.0, abs=1e-12)
+    assert recorded_population_robustness(perf, active, ideal, 10.0, relative=True) == pytest.approx(0.05, abs=1e-12)
+
+
+def test_an_unlucky_run_of_a_proportional_swarm_is_as_robust_as_a_lucky_one():
+    active = np.array([[9.0, 9.0], [6.0, 2.0]])
+    np.testing.assert_allclose(recorded_population_robustness(active, active, [[10.0, 10.0]] * 2, 10.0), 0.0)
+    expected_share = population_robustness(active, [[10.0, 10.0]] * 2, HALF, horizon=50_000, n=10)
+    assert expected_share[0] - expected_share[1] == pytest.approx(10.0, abs=1e-9)
+
+
+def test_relative_population_robustness():
+    for weight, options in (("transient", {}), ("sierra", {"ideal_rates": DEATHS})):
+        value = robustness(weight, relative=True, **options)
+        total = 1.0 if weight == "sierra" else 2.0  # the authors' form reads the last interval
+        assert value == pytest.approx(robustness(weight, **options) / total, abs=1e-12)
+
+
+@pytest.mark.parametrize(("active", "ideal"), [([5.0], [0.0]), ([-1.0], [5.0])])
+def test_robots_at_work_are_checked(active, ideal):
+    with pytest.raises(CurveError, match="n_active_ideal > 0"):
+        recorded_population_robustness([1.0], active, [1.0], ideal)

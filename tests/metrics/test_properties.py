@@ -30,11 +30,26 @@ def from_ideal_and_observed(name):
         return lambda ideal, observed, **options: metrics.reactivity(ideal, observed, 0.3, 0.3, **options)
     if name == "population_robustness":
         return lambda ideal, observed: metrics.population_robustness(observed, ideal, PopulationRates(), horizon=100)
+    if name == "recorded_population_robustness":
+        return lambda ideal, observed: metrics.recorded_population_robustness(observed, 7.0, ideal, 7.0)
     return getattr(metrics, name)
 
 
-COMPARISONS = ["reactivity", "adaptability", "noise_robustness", "population_robustness"]
-SIZE_MEASURES = ["spatial_emergence", "task_emergence", "scalability"]
+COMPARISONS = [
+    "reactivity",
+    "adaptability",
+    "noise_robustness",
+    "population_robustness",
+    "recorded_population_robustness",
+]
+SIZE_MEASURES = [
+    "spatial_emergence",
+    "time_emergence",
+    "task_emergence",
+    "interference_gain",
+    "undisturbed_gain",
+    "scalability",
+]
 NOT_LISTED = {
     "t_lost_fraction": "an input of the others, not a comparison",
     "performance_lost": "an input of spatial_emergence; its laws are there",
@@ -61,6 +76,15 @@ def test_identical_curves_score_zero(name, curve):
 def test_comparisons_scale_with_the_unit_of_performance(name, ideal, observed, factor):
     measure = from_ideal_and_observed(name)
     assert measure(factor * ideal, factor * observed) == pytest.approx(factor * measure(ideal, observed), **close)
+
+
+@pytest.mark.parametrize("name", [name for name in COMPARISONS if METRICS[name].is_distance])
+@law
+@given(ideal=working, observed=performance, factor=scale)
+def test_relative_distances_do_not_depend_on_the_unit(name, ideal, observed, factor):
+    measure = from_ideal_and_observed(name)
+    value = measure(ideal, observed) / ideal.sum()
+    assert measure(factor * ideal, factor * observed, relative=True) == pytest.approx(value, **close)
 
 
 @pytest.mark.parametrize("name", [name for name in COMPARISONS if METRICS[name].is_distance])
@@ -107,10 +131,23 @@ def test_independent_robots_are_neutral_at_any_pair_of_sizes(name, lone, lost, n
     small, large = n[0] * lone, n[1] * lone
     value = {
         "spatial_emergence": lambda: metrics.spatial_emergence(small, lost, n[0], large, lost, n[1], lone, lost),
+        "time_emergence": lambda: metrics.time_emergence(lost, n[0], lost, n[1]),
         "task_emergence": lambda: metrics.task_emergence(small, n[0], large, n[1]),
+        "interference_gain": lambda: metrics.interference_gain(small, 0.9 * lost, n[0], large, 0.9 * lost, n[1]),
+        "undisturbed_gain": lambda: metrics.undisturbed_gain(small, 0.9 * lost, n[0], large, 0.9 * lost, n[1]),
         "scalability": lambda: metrics.scalability(small, n[0], large, n[1]),
     }[name]()
     assert value == pytest.approx(METRICS[name].neutral, rel=1e-9, abs=1e-6)
+
+
+@law
+@given(perf1=performance, perf2=performance, lost1=fraction, lost2=fraction, n=sizes)
+def test_task_emergence_is_the_sum_of_its_two_parts(perf1, perf2, lost1, lost2, n):
+    calm1, calm2 = 0.9 * lost1, 0.9 * lost2
+    parts = [
+        part(perf1, calm1, n[0], perf2, calm2, n[1]) for part in (metrics.interference_gain, metrics.undisturbed_gain)
+    ]
+    assert sum(parts) == pytest.approx(metrics.task_emergence(perf1, n[0], perf2, n[1]), rel=1e-9, abs=1e-5)
 
 
 @law

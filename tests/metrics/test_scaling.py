@@ -45,21 +45,11 @@ def test_swarms_without_performance(perf1, perf2, paper, sierra, corrected):
         assert value == pytest.approx(expected, abs=1e-12, nan_ok=True), variant
 
 
-@pytest.mark.parametrize(("perf2", "expected"), [(0.5, INF), (1.0, NAN), (2.0, -INF)])
-def test_equal_sizes(perf2, expected):
-    assert scalability([1.0], 4, [perf2], 4, variant="paper") == pytest.approx(expected, nan_ok=True)
-    assert scalability([1.0], 4, [perf2], 4, variant="sierra") == 0.0
-    with pytest.raises(CurveError, match="n1 < n2"):
-        scalability([1.0], 4, [perf2], 4)
-
-
-def test_sizes_in_reverse():
-    printed = 1 - (0.5 - 2) / (1 - 2)  # S = 1/2, r = 1/2
-    assert scalability([2.0], 8, [1.0], 4, variant="paper") == pytest.approx(printed, abs=1e-12)
-    assert scalability([2.0], 8, [1.0], 4, variant="sierra") == pytest.approx(printed, abs=1e-12)
-    assert scalability([2.0], 8, [1.0], 1, variant="sierra") == 0.0
-    with pytest.raises(CurveError, match="n1 < n2"):
-        scalability([2.0], 8, [1.0], 4)
+@pytest.mark.parametrize("variant", ["corrected", "paper", "sierra"])
+@pytest.mark.parametrize(("n1", "n2"), [(4, 4), (8, 4), (8, 1)])
+def test_sizes_that_are_equal_or_in_the_wrong_order_are_refused_in_every_form(variant, n1, n2):
+    with pytest.raises(CurveError, match=f"n1 < n2, got n1 = {n1} and n2 = {n2}"):
+        scalability([1.0], n1, [2.0], n2, variant=variant)
 
 
 def test_intervals_without_performance_can_be_skipped_and_are_counted():

@@ -1,6 +1,7 @@
 """Which policy is better, and whether the difference is significant: pairing, families of tests, what is shown."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -148,3 +149,33 @@ def test_false_alarms_are_as_rare_as_promised():
         tables = {name: [score(rng.normal(size=5).tolist(), at=at) for at in "xy"] for name in "abc"}
         alarms += any(difference.is_significant for difference in compared(**tables).differences)
     assert alarms <= 32  # 20 expected at most; 32 is exceeded by chance in 0.4 % of such tests
+
+
+def test_noise_floors_stand_below_the_values_and_doubt_beside_them():
+    doubtful = replace(score([1.0, 2.0], measure="spatial_emergence"), is_doubtful=True)
+    distance = replace(score([3.0, 5.0], measure="adaptability"), noise_floor=1.5, relative_floor=0.25)
+    comparison = compared(a=[doubtful, distance], b=[score([1.0, 2.0], measure="spatial_emergence"), score([1.0])])
+    lines = [line[0] for line in comparison.value_rows()]
+    assert lines == ["measure", "spatial_emergence", "adaptability", "adaptability, noise floor", "raw_performance"]
+    values = {line[0]: line[3:] for line in comparison.value_rows()}
+    assert values["adaptability, noise floor"] == ("1.5 (25 %)", "-")
+    assert [cell.endswith(" ?") for cell in values["spatial_emergence"]] == [True, False]
+    assert "? = misleads" in str(comparison)
+
+
+def test_bands_stand_in_square_brackets_on_request():
+    comparison = compared(a=score([1.0, 3.0]), b=score([2.0, 2.0]))
+    std = math.sqrt(2.0)
+    assert comparison.value_rows(band=True)[1][-2].endswith(f"[{2 - 2 * std:.4g} to {2 + 2 * std:.4g}]")
+    assert "two standard deviations" in comparison.text(band=True)
+    assert "two standard deviations" not in str(comparison)
+
+
+def test_variants_are_compared_and_corrected_apart():
+    tables = {
+        name: [score(values), replace(score([x + 1.0 for x in values]), variant="sierra")]
+        for name, values in {"a": [1.0, 2.0, 4.0], "b": [1.5, 2.5, 3.0]}.items()
+    }
+    found = compared(**tables).differences
+    assert [difference.label for difference in found] == ["raw_performance", "raw_performance, sierra"]
+    assert [difference.p for difference in found] == [difference.p_holm for difference in found]

@@ -53,6 +53,7 @@ def test_what_the_columns_do_not_allow_is_told_with_the_reason(tmp_path):
         "adaptability",
         "noise_robustness",
         "population_robustness",
+        "recorded_population_robustness",
         "availability",
     }
     assert "criterion throttle" in scored.missing["reactivity"]

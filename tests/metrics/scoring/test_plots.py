@@ -2,8 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
+from metrics import ScoreForms, waveform
 from metrics.scoring.curves_table import study_curves
 from metrics.scoring.plots import draw_scores
 from metrics.scoring.study_scores import score_study
@@ -24,7 +26,7 @@ def tables(*names, runs=((1.0, 2.0), (2.0, 2.0))):
     return [ScoreTable(policy=name, scenario="here", scores=score_study(study)[0]) for name in names]
 
 
-def drawn(monkeypatch, path, given):
+def drawn(monkeypatch, path, given, **options):
     """Draw, and return the figure that was saved."""
     from matplotlib.figure import Figure
 
@@ -36,8 +38,12 @@ def drawn(monkeypatch, path, given):
         save(self, *args, **kwargs)
 
     monkeypatch.setattr(Figure, "savefig", keep)
-    draw_scores(given, path)
+    draw_scores(given, path, **options)
     return figures[0]
+
+
+def panel_of(figure, title):
+    return next(axes for axes in figure.axes if axes.get_title().startswith(f"{title} ("))
 
 
 def test_one_panel_per_measure_and_one_line_per_policy(tmp_path, monkeypatch):
@@ -46,10 +52,10 @@ def test_one_panel_per_measure_and_one_line_per_policy(tmp_path, monkeypatch):
     assert (tmp_path / "scores.png").read_bytes().startswith(PNG)
     titles = [axes.get_title() for axes in figure.axes if axes.axison]
     measures = dict.fromkeys(score.measure for score in given[0].scores)
-    assert [title.split()[0] for title in titles] == list(measures)
+    assert list(dict.fromkeys(title.split()[0].rstrip(",") for title in titles)) == list(measures)
     assert "raw_performance (higher is better)" in titles
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["mine", "theirs"]
-    panel = next(axes for axes in figure.axes if axes.get_title().startswith("noise_robustness"))
+    panel = panel_of(figure, "noise_robustness")
     assert len(panel.containers) == 2
     assert panel.get_ylabel() == "objects (DTW)"
     summary = given[0]["noise_robustness"][0].summary
@@ -74,3 +80,67 @@ def test_values_that_are_not_finite_are_left_out(tmp_path, monkeypatch):
 def test_nothing_to_draw_is_refused(tmp_path):
     with pytest.raises(ValueError, match="Expected a score to draw"):
         draw_scores([ScoreTable(policy="mine", scenario="", scores=())], tmp_path / "scores.png")
+
+
+def test_amounts_and_distances_are_drawn_relative_to_performance_too(tmp_path, monkeypatch):
+    (given,) = tables("mine")
+    figure = drawn(monkeypatch, tmp_path / "scores.png", [given])
+    panel = panel_of(figure, "noise_robustness, relative")
+    (score,) = given["noise_robustness"]
+    line, floor = panel.get_lines()[0], panel.get_lines()[-1]
+    assert line.get_ydata()[0] == pytest.approx(score.relative.mean)
+    assert floor.get_ydata()[0] == pytest.approx(score.relative_floor)
+    assert panel.get_ylabel() == "share of performance"
+    assert not any(axes.get_title().startswith("scalability, relative") for axes in figure.axes)
+
+
+def test_bands_are_two_standard_deviations_wide_and_drawn_on_request_only(tmp_path, monkeypatch):
+    (given,) = tables("mine")
+    for band in (True, False):
+        monkeypatch.undo()
+        figure = drawn(monkeypatch, tmp_path / "scores.png", [given], band=band)
+        shades = panel_of(figure, "efficiency").collections[1:]  # the first are error bars
+        assert len(shades) == band
+        if band:
+            heights = shades[0].get_paths()[0].vertices[:, 1]
+            lowest, highest = zip(*(score.band for score in given["efficiency"]), strict=True)
+            assert [heights.min(), heights.max()] == pytest.approx([min(lowest), max(highest)])
+
+
+def test_values_that_mislead_have_hollow_marks(tmp_path, monkeypatch):
+    frame = table(
+        rows(1, [[1.0], [2.0]], interference_fraction=0.1),
+        rows(4, [[8.0], [9.0]], interference_fraction=0.2),
+        rows(8, [[2.0], [3.0]], interference_fraction=0.6),
+    )
+    (study,) = study_curves(frame)
+    given = ScoreTable(policy="mine", scenario="", scores=score_study(study, ["spatial_emergence"])[0])
+    panel = panel_of(drawn(monkeypatch, tmp_path / "scores.png", [given]), "spatial_emergence")
+    (hollow,) = [line for line in panel.get_lines() if line.get_markerfacecolor() == "w"]
+    assert hollow.get_ydata().tolist() == [given.scores[1].summary.mean]
+
+
+def test_variants_and_forms_have_panels_of_their_own(tmp_path, monkeypatch):
+    frame = table(*(rows(n, [[1.0 * n]], interference_fraction=0.1) for n in (1, 2, 4)))
+    (study,) = study_curves(frame)
+    forms = ScoreForms(variants=("corrected", "paper"), forms=("marginal", "interactive"))
+    given = ScoreTable(policy="mine", scenario="", scores=score_study(study, ["scalability"], forms)[0])
+    figure = drawn(monkeypatch, tmp_path / "scores.png", [given])
+    names = ["scalability", "scalability, interactive", "scalability, paper", "scalability, interactive, paper"]
+    assert [axes.get_title() for axes in figure.axes] == [f"{name} (higher is better)" for name in names]
+
+
+def test_the_x_axis_of_flexibility_is_the_distance_of_the_conditions(tmp_path, monkeypatch):
+    ends = np.arange(1000, 50_001, 1000)
+    levels = [
+        rows(5, [[1.0] * 50], criterion="throttle", criterion_value=a, adversity=0.2, throttle=wave.tolist())
+        for a in (0.15, 0.40)
+        for wave in (waveform("square", ends, frequency=4e-5, amplitude=a, offset=a),)
+    ]
+    ideal = rows(5, [[1.0] * 50], criterion="throttle", criterion_value=0.0, adversity=0.1, throttle=0.1)
+    (study,) = study_curves(table(ideal, *levels))
+    given = ScoreTable(policy="mine", scenario="", scores=score_study(study, ["reactivity"])[0])
+    figure = drawn(monkeypatch, tmp_path / "scores.png", [given])
+    panel = panel_of(figure, "reactivity")
+    assert [text.get_text() for text in panel.get_xticklabels()] == ["7.4 (0.15)", "19.4 (0.4)"]
+    assert panel.get_xlabel() == "distance from ideal conditions (amplitude of throttle, or of handling cost in ticks)"
