@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .flexibility import adaptability, reactivity
     from .interference import fractional_loss, performance_lost, t_lost_fraction
     from .population import availability, population_robustness, population_weight, ratio_for_availability
+    from .prediction import SizeLaw, SizePrediction, fit_law, forward_error, predict_performance
     from .queues import PopulationRates, QueueStats, mean_away, queue_statistics
     from .robustness import mean_signed_difference, noise_robustness
     from .scaling import efficiency, raw_performance, scalability, skipped_intervals
@@ -80,6 +81,12 @@ __all__ = [
     "population_weight",
     "availability",
     "ratio_for_availability",
+    # prediction of larger swarms
+    "predict_performance",
+    "fit_law",
+    "forward_error",
+    "SizeLaw",
+    "SizePrediction",
     # statistics
     "normalize",
     "Summary",
@@ -120,6 +127,11 @@ _HOMES = {
     "population_robustness": "population",
     "population_weight": "population",
     "ratio_for_availability": "population",
+    "SizeLaw": "prediction",
+    "SizePrediction": "prediction",
+    "fit_law": "prediction",
+    "forward_error": "prediction",
+    "predict_performance": "prediction",
     "PopulationRates": "queues",
     "QueueStats": "queues",
     "mean_away": "queues",
