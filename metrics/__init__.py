@@ -26,11 +26,16 @@ if TYPE_CHECKING:
     from .robustness import mean_signed_difference, noise_robustness
     from .scaling import efficiency, raw_performance, scalability, skipped_intervals
     from .scoring import (
+        Choice,
         Comparison,
+        PredictionTable,
         Score,
         ScoreTable,
+        choose_policy,
         compare_policies,
         compare_tables,
+        predict_curves,
+        predict_policy,
         score_curves,
         score_policy,
     )
@@ -45,6 +50,12 @@ __all__ = [
     "Score",
     "ScoreTable",
     "Comparison",
+    # decisions: larger swarms, and which policy
+    "predict_policy",
+    "predict_curves",
+    "choose_policy",
+    "PredictionTable",
+    "Choice",
     # interference
     "t_lost_fraction",
     "performance_lost",
@@ -142,11 +153,16 @@ _HOMES = {
     "raw_performance": "scaling",
     "scalability": "scaling",
     "skipped_intervals": "scaling",
+    "Choice": "scoring",
     "Comparison": "scoring",
+    "PredictionTable": "scoring",
     "Score": "scoring",
     "ScoreTable": "scoring",
+    "choose_policy": "scoring",
     "compare_policies": "scoring",
     "compare_tables": "scoring",
+    "predict_curves": "scoring",
+    "predict_policy": "scoring",
     "score_curves": "scoring",
     "score_policy": "scoring",
     "Summary": "statistics",

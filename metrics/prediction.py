@@ -16,7 +16,7 @@ grows with their mean, and the variance of their square roots does not.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -351,8 +351,7 @@ def _fit(name: LawName, n: FloatArray, roots: FloatArray) -> SizeLaw:
 
 
 def _non_negative(matrix: FloatArray, target: FloatArray) -> FloatArray:
-    solution: FloatArray = nnls(matrix, target)[0]
-    return solution
+    return cast("FloatArray", nnls(matrix, target)[0])
 
 
 def _loss(solution: FloatArray, terms: FloatArray, n: FloatArray, roots: FloatArray) -> float:

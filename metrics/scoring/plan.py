@@ -26,6 +26,7 @@ class ScoringPlan:
     scenario: "ScenarioConfig"
     budget: "Budget"
     budget_name: str
+    """Empty for runs that follow no budget."""
 
     def specs_of(self, contestant: Contestant) -> "tuple[RunSpec, ...]":
         """Return the runs of one policy, seed by seed."""

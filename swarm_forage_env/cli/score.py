@@ -20,6 +20,7 @@ from swarm_forage_env.cli.options import (
     ScoreSeeds,
     Settings,
     Side,
+    refuse_options_of_runs,
 )
 
 _OF_CURVES = ("curves", "measures", "as_json")
@@ -59,7 +60,7 @@ def score(
     if (policy is None) == (curves is None):
         raise typer.BadParameter("Expected either --policy or --curves.")
     if curves is not None:
-        _refuse_options_of_runs(context)
+        refuse_options_of_runs(context, _OF_CURVES)
         show_scores(tables_of_file(curves, measures), None, as_json=as_json)
         return
     chosen = ScenarioOptions(
@@ -68,18 +69,3 @@ def score(
     options = ScoreOptions(policies=policy or "", measures=measures, budget=budget, seeds=seeds, horizon=horizon)
     folder = out or default_folder(scenario)
     run_and_show(build_plan(chosen, options, at_most=1), folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run)
-
-
-def _refuse_options_of_runs(context: typer.Context) -> None:
-    """Refuse options about runs, which would have no effect on curves from a file."""
-    sources = {option: context.get_parameter_source(str(option.name)) for option in context.command.params}
-    given = [
-        option.opts[0]
-        for option, source in sources.items()
-        if source is not None and source.name == "COMMANDLINE" and option.name not in _OF_CURVES
-    ]
-    if given:
-        raise typer.BadParameter(
-            f"Expected --curves with no other options than --measures and --json, got {', '.join(given)}, which are "
-            "about runs."
-        )
