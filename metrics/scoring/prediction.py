@@ -143,7 +143,7 @@ class PredictionTable:
     def laws_text(self) -> str:
         """Return the error of each law in predicting the next fitted sizes, and how often resamples choose it."""
         found = self.prediction
-        told = [f"{name} {number(found.errors[name])} ({percent(found.law_shares[name])})" for name in LAWS]
+        told = [f"{name} {found.errors[name]:.3f} ({percent(found.law_shares[name])})" for name in LAWS]
         return f"error of each law in roots of objects, and share of resamples that choose it: {', '.join(told)}"
 
     def _row(self, size: int) -> tuple[str, ...]:
