@@ -314,6 +314,12 @@ def _with_robots(scenario: "ScenarioConfig", n_robots: int) -> "ScenarioConfig":
         if objects.n_objects == presets.scenario(scenario.name).objects.n_objects:
             objects = replace(objects, n_objects=SIZE_SWEEP_OBJECTS[scenario.name])
         return replace(scenario, robots=robots, objects=objects)
+    usual = presets.search_and_rescue()
+    if (scenario.arena, scenario.objects.n_objects) != (usual.arena, usual.objects.n_objects):
+        raise CurveError(
+            f"Expected {scenario.name} with its own arena and objects, which grow with the swarm, got an arena "
+            f"{scenario.arena.width_m:g} m wide with {scenario.objects.n_objects} objects."
+        )
     sides = {presets.robots_at_density(side): side for side in presets.SEARCH_AND_RESCUE_OBJECTS}
     side_m = min(sides.values()) if n_robots == 1 else sides.get(n_robots)
     if side_m is None:

@@ -73,6 +73,8 @@ def predict_runs(
         typer.Exit: Ctrl-C, or runs have failed.
     """
     sizes = fit or FIT_SIZES
+    if any(word.partition("=")[0] == "n_robots" for word in described.settings):
+        raise ConfigError("Expected no --set n_robots=..., because sizes are varied; give them by --fit and --hold.")
     scenario, caches = build_scenario(described)
     try:
         plan = plan_prediction(split_names(policies), scenario, fit=sizes, hold=hold, seeds=seeds, caches=caches)

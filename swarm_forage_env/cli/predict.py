@@ -14,7 +14,6 @@ from swarm_forage_env.cli.options import (
     Out,
     Scenario,
     Settings,
-    Side,
     refuse_options_of_runs,
 )
 
@@ -41,7 +40,6 @@ def predict(
     seeds: Annotated[int, typer.Option(min=2, help="Runs per size.")] = 4,
     horizon: Annotated[float | None, typer.Option(help="Seconds per run, whole intervals of 200 s.")] = None,
     objects: Objects = None,
-    side: Side = None,
     caches: Caches = None,
     settings: Settings = None,
     out: Out = None,
@@ -68,7 +66,6 @@ def predict(
     described = ScenarioOptions(
         scenario=scenario,
         objects=objects,
-        side=side,
         caches=caches,
         horizon=horizon,
         settings=tuple(settings or ()),

@@ -111,6 +111,8 @@ def test_worlds_are_those_of_the_size_sweep_of_scores():
     assert [e.scenario.objects.n_objects for e in rescue] == [80, 80, 272, 368]
     with pytest.raises(CurveError, match=r"fill one of its arenas, 1, 12, 51, 115, .*, got 2"):
         plan_prediction(["random"], "search_and_rescue", fit=[1, 2, 12, 51])
+    with pytest.raises(CurveError, match="which grow with the swarm, got an arena 48 m wide with 50 objects"):
+        plan_prediction(["random"], scenario("search_and_rescue", n_objects=50), fit=[1, 12, 51, 115])
 
 
 @pytest.mark.compiled
