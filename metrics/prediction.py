@@ -355,8 +355,6 @@ def _non_negative(matrix: FloatArray, target: FloatArray) -> FloatArray:
 
 
 def _loss(solution: FloatArray, terms: FloatArray, n: FloatArray, roots: FloatArray) -> float:
-    cost = terms @ solution
-    if not (cost > 0.0).all():
-        return math.inf
-    difference = np.sqrt(n / cost) - roots
+    with np.errstate(divide="ignore"):  # a cost of zero makes an infinite loss, and the step is halved
+        difference = np.sqrt(n / (terms @ solution)) - roots
     return float(difference @ difference)

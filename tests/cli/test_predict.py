@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from metrics import SizeLaw
@@ -112,6 +113,19 @@ def test_ctrl_c_says_what_is_kept(command, monkeypatch):
     code, out, err = command(*RUNS, *WORLD)
     assert (code, out) == (130, "")
     assert "0 of 10 runs are finished and kept. They are in results/warehouse_small" in err
+
+
+def test_a_size_whose_runs_fail_is_left_out_and_the_command_exits_with_1(command, one_object_per_robot, monkeypatch):
+    def act(self, obs, active):
+        assert len(obs) != 2
+        return np.zeros((len(obs), 3), np.float32)
+
+    monkeypatch.setattr(RandomPolicy, "act", act)
+    words = tuple({"crw": "random", "1,2,3,4": "1,2,3,4,5"}.get(word, word) for word in RUNS)
+    code, out, _ = command(*words, *WORLD)
+    assert code == 1
+    assert "fitted to 1, 3, 4, 5 robots" in out
+    assert out.count("failed: ") == 2
 
 
 def test_runs_that_leave_nothing_to_predict_end_with_one_line(command):

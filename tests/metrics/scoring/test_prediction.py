@@ -172,7 +172,7 @@ def test_the_picture_shows_runs_law_interval_and_critical_size(tmp_path, monkeyp
     linear = predict_curves(curves_file(tmp_path / "b.csv", SizeLaw(name="linear", a=2.0), name="other"))
     draw_predictions([*mine, *linear], tmp_path / "prediction.png")
     assert (tmp_path / "prediction.png").read_bytes().startswith(b"\x89PNG")
-    (figure,) = figures
+    figure = figures[0]
     first, second = figure.axes
     assert first.get_title() == "mine"
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -182,3 +182,5 @@ def test_the_picture_shows_runs_law_interval_and_critical_size(tmp_path, monkeyp
     assert len(lines["fitted runs"].get_xdata()) == 10
     assert lines["held-back runs"].get_xdata().tolist() == [32, 32, 64, 64]
     assert "critical size" not in [line.get_label() for line in second.get_lines()]
+    draw_predictions([*mine, *linear] * 2 + [*mine], tmp_path / "five.png")
+    assert [axes.axison for axes in figures[1].axes] == [True] * 5 + [False] * 3
