@@ -29,17 +29,23 @@ if TYPE_CHECKING:
         ratio_for_team,
         recorded_population_robustness,
     )
+    from .prediction import SizeLaw, SizePrediction, fit_law, forward_error, predict_performance
     from .queues import PopulationRates, QueueStats, mean_away, queue_statistics
     from .robustness import mean_signed_difference, noise_robustness
     from .scaling import efficiency, raw_performance, scalability, skipped_intervals
     from .scoring import (
+        Choice,
         Comparison,
         Performance,
+        PredictionTable,
         Score,
         ScoreForms,
         ScoreTable,
+        choose_policy,
         compare_policies,
         compare_tables,
+        predict_curves,
+        predict_policy,
         score_curves,
         score_policy,
     )
@@ -56,6 +62,12 @@ __all__ = [
     "ScoreForms",
     "Comparison",
     "Performance",
+    # decisions: larger swarms, and which policy
+    "predict_policy",
+    "predict_curves",
+    "choose_policy",
+    "PredictionTable",
+    "Choice",
     # interference
     "t_lost_fraction",
     "performance_lost",
@@ -98,6 +110,12 @@ __all__ = [
     "availability_curves",
     "ratio_for_availability",
     "ratio_for_team",
+    # prediction of larger swarms
+    "predict_performance",
+    "fit_law",
+    "forward_error",
+    "SizeLaw",
+    "SizePrediction",
     # statistics
     "normalize",
     "Summary",
@@ -144,6 +162,11 @@ _HOMES = {
     "ratio_for_availability": "population",
     "ratio_for_team": "population",
     "recorded_population_robustness": "population",
+    "SizeLaw": "prediction",
+    "SizePrediction": "prediction",
+    "fit_law": "prediction",
+    "forward_error": "prediction",
+    "predict_performance": "prediction",
     "PopulationRates": "queues",
     "QueueStats": "queues",
     "mean_away": "queues",
@@ -154,13 +177,18 @@ _HOMES = {
     "raw_performance": "scaling",
     "scalability": "scaling",
     "skipped_intervals": "scaling",
+    "Choice": "scoring",
     "Comparison": "scoring",
     "Performance": "scoring",
+    "PredictionTable": "scoring",
     "Score": "scoring",
     "ScoreForms": "scoring",
     "ScoreTable": "scoring",
+    "choose_policy": "scoring",
     "compare_policies": "scoring",
     "compare_tables": "scoring",
+    "predict_curves": "scoring",
+    "predict_policy": "scoring",
     "score_curves": "scoring",
     "score_policy": "scoring",
     "Summary": "statistics",

@@ -1,11 +1,14 @@
 """From policies, runs and files of curves to tables of scores, with notes that help to read them."""
 
+from .choosing import Choice, choose_policy
 from .comparison import Comparison, compare_tables
 from .front_door import compare_policies, score_curves, score_policy
 from .measures import ScoreForms
 from .performance import Performance
 from .plan import ScoringPlan, plan_scores
 from .plots import draw_scores
+from .prediction import PredictionTable, predict_curves, predict_policy
+from .prediction_plots import draw_predictions
 from .runs import run_scores
 from .table import Score, ScoreTable
 
@@ -17,10 +20,16 @@ __all__ = [
     "plan_scores",
     "run_scores",
     "draw_scores",
+    "predict_policy",
+    "predict_curves",
+    "draw_predictions",
+    "choose_policy",
     "Score",
     "ScoreTable",
     "ScoreForms",
     "Comparison",
     "ScoringPlan",
     "Performance",
+    "PredictionTable",
+    "Choice",
 ]

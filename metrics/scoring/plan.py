@@ -31,6 +31,7 @@ class ScoringPlan:
     scenario: "ScenarioConfig"
     budget: "Budget"
     budget_name: str
+    """Empty for runs that follow no budget."""
     forms: ScoreForms = field(default_factory=ScoreForms)
 
     def specs_of(self, contestant: Contestant) -> "tuple[RunSpec, ...]":

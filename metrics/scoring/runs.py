@@ -37,6 +37,19 @@ def run_scores(
     progress: bool = True,
 ) -> tuple[ScoreTable, ...]:
     """Run a plan and return one table per policy; arguments and errors as in `score_policy`."""
+    results = run_plan(plan, out=out, jobs=jobs, executor=executor, progress=progress)
+    return tuple(_table(plan, contestant, results, out) for contestant in plan.contestants)
+
+
+def run_plan(
+    plan: ScoringPlan,
+    *,
+    out: str | Path | None = None,
+    jobs: int | None = None,
+    executor: "Executor | None" = None,
+    progress: bool = True,
+) -> "list[StudyResult]":
+    """Run a plan and return the outcomes of its runs; arguments and errors as in `score_policy`."""
     from swarm_forage_env.policies.registry import local_policy
     from swarm_forage_env.study.runner import run_all
     from swarm_forage_env.study.store import RunStore
@@ -52,7 +65,7 @@ def run_scores(
         if contestant.factory is not None:
             with local_policy(contestant.policy, contestant.factory):
                 results.append(run_all(plan.specs_of(contestant), store=store, jobs=1, progress=progress))
-    return tuple(_table(plan, contestant, results, out) for contestant in plan.contestants)
+    return results
 
 
 def _table(

@@ -10,8 +10,10 @@ import typer
 
 from swarm_forage_env.cli.ablate import ablate
 from swarm_forage_env.cli.availability import availability
+from swarm_forage_env.cli.choose import choose
 from swarm_forage_env.cli.compare import compare
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE, complain
+from swarm_forage_env.cli.predict import predict
 from swarm_forage_env.cli.record import record
 from swarm_forage_env.cli.rerun import rerun
 from swarm_forage_env.cli.run import run
@@ -47,7 +49,7 @@ def _options(
 
 
 # `--help` lists them in this order.
-for command in (run, score, compare, train):
+for command in (run, score, compare, predict, choose, train):
     app.command()(command)
 app.command("list")(list_everything)
 for command in (info, schema, rerun, record, stuck, ablate, availability):

@@ -1,5 +1,6 @@
 """What several commands share: options, exit codes, complaints. Light, so that `--help` answers at once."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -86,3 +87,28 @@ def complain(message: str, code: int) -> int:
     """Print one line on stderr; returns `code`."""
     typer.echo("swarm-forage: " + " ".join(message.split()), err=True)
     return code
+
+
+def refuse_options_of_runs(context: typer.Context, of_curves: Sequence[str]) -> None:
+    """Refuse options about runs, which would have no effect on curves from a file.
+
+    Args:
+        context: Of the command.
+        of_curves: Parameters that go with --curves, itself first.
+
+    Raises:
+        typer.BadParameter: others were given.
+    """
+    words = {str(option.name): option.opts[0] for option in context.command.params}
+    sources = {name: context.get_parameter_source(name) for name in words}
+    given = [
+        words[name]
+        for name, source in sources.items()
+        if source is not None and source.name == "COMMANDLINE" and name not in of_curves
+    ]
+    if given:
+        allowed = [words[name] for name in of_curves[1:]]
+        raise typer.BadParameter(
+            f"Expected --curves with no other options than {', '.join(allowed[:-1])} and {allowed[-1]}, got "
+            f"{', '.join(given)}, which are about runs."
+        )

@@ -26,6 +26,7 @@ from swarm_forage_env.cli.options import (
     Settings,
     Side,
     Variants,
+    refuse_options_of_runs,
 )
 
 _OF_CURVES = ("curves", "measures", "performance", "variant", "form", "band", "as_json")
@@ -71,7 +72,7 @@ def score(
     if (policy is None) == (curves is None):
         raise typer.BadParameter("Expected either --policy or --curves.")
     if curves is not None:
-        _refuse_options_of_runs(context)
+        refuse_options_of_runs(context, _OF_CURVES)
         tables = tables_of_file(curves, measures, performance, score_forms(variant, form))
         show_scores(tables, None, as_json=as_json, band=band)
         return
@@ -98,18 +99,3 @@ def score(
     folder = out or default_folder(scenario)
     plan = build_plan(chosen, options, at_most=1)
     run_and_show(plan, folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run, band=band)
-
-
-def _refuse_options_of_runs(context: typer.Context) -> None:
-    """Refuse options about runs, which would have no effect on curves from a file."""
-    sources = {option: context.get_parameter_source(str(option.name)) for option in context.command.params}
-    given = [
-        option.opts[0]
-        for option, source in sources.items()
-        if source is not None and source.name == "COMMANDLINE" and option.name not in _OF_CURVES
-    ]
-    if given:
-        raise typer.BadParameter(
-            "Expected --curves with no other options than --measures, --performance, --variant, --form, --band and "
-            f"--json, got {', '.join(given)}, which are about runs."
-        )

@@ -43,7 +43,7 @@ def run_and_show(
         typer.Exit: Ctrl-C, or runs have failed.
     """
     if dry_run:
-        show = _plan_json if as_json else _plan_text
+        show = plan_json if as_json else plan_text
         typer.echo(show(plan, RunStore(folder), jobs or available_cores()))
         return
     try:
@@ -76,7 +76,7 @@ def show_scores(tables: Sequence[ScoreTable], picture: Path | None, *, as_json: 
         typer.echo(f"picture {drawn}", err=True)
 
 
-def _plan_text(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
+def plan_text(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
     """Return the planned experiments as a table with an estimate."""
     todo = [spec for spec in plan.specs if spec.run_id not in store]
     left = Counter((spec.criterion, spec.criterion_value, spec.scenario.robots.n_robots) for spec in todo)
@@ -96,17 +96,18 @@ def _plan_text(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
             )
         )
     seconds = estimated_seconds(todo, jobs)
+    budget = f"budget {plan.budget_name}, " if plan.budget_name else ""
     return "\n".join(
         [
-            f"{', '.join(contestant.label for contestant in plan.contestants)} in {plan.scenario.name}, budget "
-            f"{plan.budget_name}, {counted(len(plan.seeds), 'seed')}, records go to {store.folder}",
+            f"{', '.join(contestant.label for contestant in plan.contestants)} in {plan.scenario.name}, {budget}"
+            f"{counted(len(plan.seeds), 'seed')}, records go to {store.folder}",
             *aligned(rows),
             f"{counted(len(plan.specs), 'run')}, {len(todo):,} to do" + estimate(seconds, jobs, any_left=bool(todo)),
         ]
     )
 
 
-def _plan_json(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
+def plan_json(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
     """Return the planned runs as a JSON document."""
     todo = [spec for spec in plan.specs if spec.run_id not in store]
     runs = [{"run_id": spec.run_id, "stored": spec.run_id in store, "spec": spec.to_mapping()} for spec in plan.specs]

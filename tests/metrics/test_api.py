@@ -42,6 +42,12 @@ SIGNATURES = {
     "availability_curves": "n, teams, n_min=None",
     "ratio_for_availability": "n, n_min, p_v",
     "ratio_for_team": "team",
+    "fit_law": "name, sizes, performance",
+    "forward_error": "name, sizes, performance",
+    "predict_performance": "sizes, runs, at, *, level=0.95, n_resamples=500, seed=None",
+    "predict_policy": "policy, scenario='warehouse_small', *, fit=(1, 2, 4, 8, 16, 32), hold=(), seeds=4",
+    "choose_policy": "policies, scenario='warehouse_small', *, deliver, keep=1.0, failures=None, deaths=None, "
+    "noise=None, seeds=4",
     "normalize": "theta, *, distance=False",
     "aggregate": "values, *, method='t', level=0.95, seed=None",
 }

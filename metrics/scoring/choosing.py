@@ -1,0 +1,414 @@
+"""Which policy meets given constraints: runs under each of them, verdicts with confidence, and a ranking."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
+
+from metrics.checks import CurveError
+from metrics.significance import paired_p
+from metrics.statistics import Summary, aggregate
+
+from .columns import NOISE, POPULATION, UNDISTURBED
+from .contestants import PolicyLike
+from .plan import ScoringPlan
+from .texts import aligned, bounds, counted, interval, number, paragraph, percent, plain
+from .totals import PolicyTotals, plan_conditions, run_totals
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from swarm_forage_env.scenarios.config import ScenarioConfig
+    from swarm_forage_env.study.experiments import Experiment
+
+MET, NOT_MET, UNDECIDED = "met", "not met", "undecided"
+"""Verdicts: the whole 95 % interval of mean performance reaches the demand, stays below it, or contains it."""
+RULE = (
+    "met: the whole 95 % interval (Student's, over seeds) reaches the demand; not met: it stays below; undecided: the "
+    "demand lies inside. Confidence: probability that mean performance reaches the demand, from the same distribution. "
+    "Ranked by constraints met, then by fewest not met, then by undisturbed performance."
+)
+SIGNIFICANT = 0.05
+"""Largest p value of a difference that is called significant."""
+_NEARLY = 0.001
+"""Probabilities closer than this to 0 or 1 are shown as below or above it."""
+_HEADER = ("rank", "policy", "constraint", "demand", "measured", "95 % interval", "margin", "confidence", "runs", "")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constraint:
+    """A demand on performance under one condition."""
+
+    condition: str
+    """In words: "undisturbed", "failures 0.001", "deaths 10", "noise 0.01"."""
+    demand: float
+    """Performance that a run must reach, summed over time."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Evidence:
+    """What the runs of a policy say about a constraint."""
+
+    constraint: Constraint
+    per_seed: Mapping[int, float]
+    """Seed -> performance summed over the run."""
+
+    @property
+    def summary(self) -> Summary | None:
+        """Mean performance with Student's interval; None if no run finished."""
+        return aggregate(list(self.per_seed.values())) if self.per_seed else None
+
+    @property
+    def margin(self) -> float:
+        """Mean performance minus the demand; NaN without runs."""
+        return math.nan if self.summary is None else self.summary.mean - self.constraint.demand
+
+    @property
+    def confidence(self) -> float:
+        """Probability that mean performance reaches the demand, by Student's distribution; NaN for fewer than two runs.
+
+        Runs that are all alike leave no doubt: 1 or 0.
+        """
+        summary = self.summary
+        if summary is None or summary.n_used < 2:
+            return math.nan
+        error = summary.std / math.sqrt(summary.n_used)
+        if error == 0.0:
+            return 1.0 if self.margin >= 0.0 else 0.0
+        return float(stdtr(summary.n_used - 1, self.margin / error))
+
+    @property
+    def n_reaching(self) -> int:
+        """Runs that reach the demand, each for itself."""
+        return sum(value >= self.constraint.demand for value in self.per_seed.values())
+
+    @property
+    def verdict(self) -> str:
+        """`MET`, `NOT_MET` or `UNDECIDED`."""
+        summary = self.summary
+        if summary is None or math.isnan(summary.lower):
+            return UNDECIDED
+        if summary.lower >= self.constraint.demand:
+            return MET
+        return NOT_MET if summary.upper < self.constraint.demand else UNDECIDED
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the evidence as texts for the table."""
+        summary = self.summary
+        sign = "+" if self.margin > 0.0 else ""
+        return (
+            self.constraint.condition,
+            number(self.constraint.demand),
+            "-" if summary is None else number(summary.mean),
+            "-" if summary is None else interval(summary),
+            sign + number(self.margin),
+            _probability(self.confidence),
+            f"{self.n_reaching} of {len(self.per_seed)}",
+            self.verdict,
+        )
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the evidence as plain values; numbers that do not exist are None."""
+        return {
+            "constraint": self.constraint.condition,
+            "demand": self.constraint.demand,
+            "measured": bounds(self.summary),
+            "margin": plain(self.margin),
+            "confidence": plain(self.confidence),
+            "runs_reaching": self.n_reaching,
+            "per_seed": {str(seed): value for seed, value in self.per_seed.items()},
+            "verdict": self.verdict,
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """A policy with its evidence, constraint by constraint, the undisturbed one first."""
+
+    policy: str
+    evidence: tuple[Evidence, ...]
+    failures: tuple[str, ...] = ()
+    """Runs that failed, one line each."""
+
+    @property
+    def performance(self) -> float:
+        """Mean undisturbed performance; minus infinity without runs."""
+        summary = self.evidence[0].summary
+        return -math.inf if summary is None else summary.mean
+
+    def conditions(self, verdict: str) -> tuple[str, ...]:
+        """Return the conditions of all constraints with a verdict."""
+        return tuple(e.constraint.condition for e in self.evidence if e.verdict == verdict)
+
+    @property
+    def lacks_runs(self) -> bool:
+        """Whether a condition has no finished run."""
+        return any(evidence.summary is None for evidence in self.evidence)
+
+    @property
+    def order(self) -> tuple[bool, int, int, float]:
+        """What candidates are sorted by, the best lowest; one that lacks runs comes last."""
+        return self.lacks_runs, -len(self.conditions(MET)), len(self.conditions(NOT_MET)), -self.performance
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Choice:
+    """Policies in order, the best first, with the evidence."""
+
+    candidates: tuple[Candidate, ...]
+    scenario: str
+    n_robots: int
+    horizon_s: float
+
+    @property
+    def reason(self) -> str:
+        """One sentence: why the first is first, and what that does not say."""
+        first, *others = self.candidates
+        n_all, n_met = len(first.evidence), len(first.conditions(MET))
+        meets = f"meets {n_met} of {counted(n_all, 'constraint')} with confidence"
+        if not others:
+            return f"{first.policy} {meets}{_missing(first)}."
+        second = others[0]
+        opening = f"{first.policy} comes first: it {meets}"
+        if first.lacks_runs != second.lacks_runs:
+            return f"{opening}{_missing(first)}; runs of {second.policy} failed."
+        if first.order[1] != second.order[1]:
+            return f"{opening}{_missing(first)}, {second.policy} {len(second.conditions(MET))}{_missing(second)}."
+        if first.order[2] != second.order[2]:
+            failed, others = (len(candidate.conditions(NOT_MET)) for candidate in (first, second))
+            return f"{opening}, as {second.policy} does, and fails {failed} where {second.policy} fails {others}."
+        words = f"{opening}, as {second.policy} does, and achieves {number(first.performance)} undisturbed against "
+        return f"{words}{number(second.performance)}; {self._significance(first, second)}."
+
+    def _significance(self, first: Candidate, second: Candidate) -> str:
+        mine, theirs = first.evidence[0].per_seed, second.evidence[0].per_seed
+        p = paired_p(np.array([mine[seed] - theirs[seed] for seed in mine if seed in theirs]))
+        if math.isnan(p):
+            return "there are too few runs to test the difference"
+        told = f"the difference is {'' if p <= SIGNIFICANT else 'not '}significant (paired t test, p = {p:.2g})"
+        return told if p <= SIGNIFICANT else f"{told}, so the runs do not tell them apart"
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return everything as plain values, ready for JSON."""
+        return {
+            "scenario": self.scenario,
+            "n_robots": self.n_robots,
+            "horizon_s": self.horizon_s,
+            "rule": RULE,
+            "reason": self.reason,
+            "ranking": [
+                {
+                    "rank": rank,
+                    "policy": candidate.policy,
+                    "performance": plain(candidate.performance),
+                    "met": list(candidate.conditions(MET)),
+                    "not_met": list(candidate.conditions(NOT_MET)),
+                    "undecided": list(candidate.conditions(UNDECIDED)),
+                    "evidence": [evidence.to_mapping() for evidence in candidate.evidence],
+                    "failures": list(candidate.failures),
+                }
+                for rank, candidate in enumerate(self.candidates, 1)
+            ],
+        }
+
+    def __str__(self) -> str:
+        rows: list[Sequence[str]] = [_HEADER]
+        for rank, candidate in enumerate(self.candidates, 1):
+            names = [(str(rank), candidate.policy), *[("", "")] * (len(candidate.evidence) - 1)]
+            rows += [(*name, *evidence.cells()) for name, evidence in zip(names, candidate.evidence, strict=True)]
+        failures = [f"failed: {failure}" for candidate in self.candidates for failure in candidate.failures]
+        title = f"{self.scenario}, {counted(self.n_robots, 'robot')}, runs of {self.horizon_s:,g} s"
+        return "\n".join([title, *aligned(rows), self.reason, RULE, *paragraph(failures)])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ChoicePlan:
+    """The runs of a choice, and what each experiment demands."""
+
+    runs: ScoringPlan
+    constraints: tuple[Constraint, ...]
+    """One per experiment of `runs`, in its order."""
+
+
+def choose_policy(
+    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
+    scenario: "str | ScenarioConfig" = "warehouse_small",
+    *,
+    deliver: float,
+    keep: float = 1.0,
+    failures: float | None = None,
+    deaths: float | None = None,
+    noise: float | None = None,
+    seeds: int | Sequence[int] = 4,
+    caches: str | None = None,
+    out: str | Path | None = None,
+    jobs: int | None = None,
+    executor: "Executor | None" = None,
+    progress: bool = True,
+) -> Choice:
+    """Rank policies by the constraints that they meet.
+
+        choose_policy(["crw", "dpo"], scenario("warehouse_small", n_robots=50), deliver=200, noise=0.01, keep=0.5)
+
+    asks for 200 objects from 50 undisturbed robots, and for 100 objects from 50 robots with noise of 0.01.
+
+    Args:
+        policies: As in `compare_policies`, one or more.
+        scenario: Name of a preset, or a complete configuration: it says how many robots there are, and how long a run.
+        deliver: Performance that an undisturbed run must reach, more than 0.
+        keep: Share of `deliver` that is still demanded under each disturbance.
+        failures: Malfunctions per tick of the whole swarm. Robots stop where they are and are repaired one after the
+            other, at the rate at which a tenth of the swarm is at work in equilibrium, as in the study.
+        deaths: Robots that are expected to die during a run, one by one at random times; they do not come back.
+        noise: Standard deviation of the noise of all sensors and wheels, see `SensorNoise` and `ActuatorNoise`.
+        seeds: How many, at least two, or which. All policies and conditions share them.
+        caches: As in `score_policy`, and so are all further arguments.
+        out: Folder for run records; runs that it holds are not repeated.
+        jobs: Processes; default one per core.
+        executor: Runs the work instead.
+        progress: Show progress and an estimate on stderr.
+
+    Raises:
+        CurveError: a demand or a disturbance that is no number above 0, or fewer than two seeds.
+        ValueError: an unknown policy or scenario.
+        swarm_forage_env.study.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
+    """
+    plan = plan_choice(
+        policies,
+        scenario,
+        deliver=deliver,
+        keep=keep,
+        failures=failures,
+        deaths=deaths,
+        noise=noise,
+        seeds=seeds,
+        caches=caches,
+    )
+    return run_choice(plan, out=out, jobs=jobs, executor=executor, progress=progress)
+
+
+def plan_choice(
+    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
+    scenario: "str | ScenarioConfig" = "warehouse_small",
+    *,
+    deliver: float,
+    keep: float = 1.0,
+    failures: float | None = None,
+    deaths: float | None = None,
+    noise: float | None = None,
+    seeds: int | Sequence[int] = 4,
+    caches: str | None = None,
+) -> ChoicePlan:
+    """Return the runs that `choose_policy` makes; arguments and errors as there."""
+    from swarm_forage_env.scenarios.presets import scenario as preset
+    from swarm_forage_env.study.experiments import Experiment
+
+    chosen = preset(scenario) if isinstance(scenario, str) else scenario
+    given = {"deliver": deliver, "keep": keep, "failures": failures, "deaths": deaths, "noise": noise}
+    for name, value in given.items():
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise CurveError(f"Expected {name} as a number above 0, got {value:g}.")
+    experiments = [Experiment(criterion=UNDISTURBED, value=0.0, scenario=chosen)]
+    constraints = [Constraint(condition="undisturbed", demand=deliver)]
+    disturbances = {"failures": (failures, _failing), "deaths": (deaths, _dying), "noise": (noise, _noisy)}
+    for name, (strength, experiment) in disturbances.items():
+        if strength is not None:
+            experiments.append(experiment(chosen, float(strength)))
+            constraints.append(Constraint(condition=f"{name} {strength:g}", demand=keep * deliver))
+    runs = plan_conditions(policies, chosen, experiments, seeds=seeds, caches=caches)
+    return ChoicePlan(runs=runs, constraints=tuple(constraints))
+
+
+def run_choice(
+    plan: ChoicePlan,
+    *,
+    out: str | Path | None = None,
+    jobs: int | None = None,
+    executor: "Executor | None" = None,
+    progress: bool = True,
+) -> Choice:
+    """Carry out a plan of `plan_choice`; arguments and errors as in `choose_policy`."""
+    found = run_totals(plan.runs, out=out, jobs=jobs, executor=executor, progress=progress)
+    return rank_policies(found, plan.constraints, plan.runs.scenario)
+
+
+def rank_policies(
+    found: Sequence[PolicyTotals], constraints: Sequence[Constraint], scenario: "ScenarioConfig"
+) -> Choice:
+    """Return the policies in order: most constraints met, then fewest not met, then best undisturbed performance.
+
+    Args:
+        found: Runs of each policy, one condition per constraint.
+        constraints: The undisturbed one first.
+        scenario: Where the runs were made.
+    """
+    candidates = [
+        Candidate(
+            policy=one.policy,
+            evidence=tuple(
+                Evidence(constraint=constraint, per_seed=per_seed)
+                for constraint, per_seed in zip(constraints, one.totals, strict=True)
+            ),
+            failures=one.failures,
+        )
+        for one in found
+    ]
+    return Choice(
+        candidates=tuple(sorted(candidates, key=lambda candidate: candidate.order)),
+        scenario=scenario.name,
+        n_robots=scenario.robots.n_robots,
+        horizon_s=scenario.horizon_s,
+    )
+
+
+def _probability(value: float) -> str:
+    """Return a probability in percent; one that is nearly 0 or 1 is not called certain."""
+    if 0.0 < value < _NEARLY or 1.0 - _NEARLY < value < 1.0:
+        return f"< {percent(_NEARLY)}" if value < 0.5 else f"> {percent(1.0 - _NEARLY)}"
+    return percent(value)
+
+
+def _missing(candidate: Candidate) -> str:
+    """Return the constraints that are not met, in brackets; empty if all are."""
+    told = [
+        f"{verdict}: {', '.join(candidate.conditions(verdict))}"
+        for verdict in (NOT_MET, UNDECIDED)
+        if candidate.conditions(verdict)
+    ]
+    return f" ({'; '.join(told)})" if told else ""
+
+
+def _failing(scenario: "ScenarioConfig", rate: float) -> "Experiment":
+    """Malfunctions per tick, and repairs as in the study."""
+    from swarm_forage_env.study.experiments import AWAY_SHARE, Experiment
+    from swarm_forage_env.wrappers.population import PopulationConfig
+
+    away = AWAY_SHARE * scenario.robots.n_robots  # rho / (1 - rho) with rho = malfunctions / repairs
+    config = PopulationConfig(malfunction_per_tick=rate, repair_per_tick=rate * (1.0 + 1.0 / away))
+    return Experiment(criterion=POPULATION, value=rate, scenario=scenario, wrappers=(config,))
+
+
+def _dying(scenario: "ScenarioConfig", count: float) -> "Experiment":
+    """Deaths per tick, so many that `count` are expected in a run."""
+    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.wrappers.population import PopulationConfig
+
+    rate = count / scenario.horizon_ticks
+    return Experiment(
+        criterion=POPULATION, value=rate, scenario=scenario, wrappers=(PopulationConfig(death_per_tick=rate),)
+    )
+
+
+def _noisy(scenario: "ScenarioConfig", sigma: float) -> "Experiment":
+    """Noise of all sensors and wheels, as in scores."""
+    from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
+    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, noise_levels
+
+    groups = STUDY_NOISE_GROUPS if scenario.quirks == AUTHORS_PROGRAM else NOISE_GROUPS
+    _, noisy = noise_levels(sigma, n_levels=2, groups=groups)
+    return Experiment(criterion=NOISE, value=sigma, scenario=scenario, wrappers=noisy)

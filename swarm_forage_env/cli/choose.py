@@ -1,0 +1,73 @@
+"""The command `choose`."""
+
+from typing import Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import AsJson, Caches, DryRun, Jobs, Objects, Out, Robots, Scenario, Settings, Side
+
+
+def choose(
+    policy: Annotated[
+        str,
+        typer.Option(
+            "--policy", "--policies", help="One or more, separated by commas: names, or files of trained policies."
+        ),
+    ],
+    deliver: Annotated[
+        float, typer.Option(help="Objects that an undisturbed run must achieve (first pick-ups in search and rescue).")
+    ],
+    keep: Annotated[
+        float, typer.Option(help="Share of --deliver that is still demanded under each disturbance.")
+    ] = 1.0,
+    failures: Annotated[
+        float | None,
+        typer.Option(
+            metavar="RATE",
+            help="Malfunctions per tick (0.2 s) of the whole swarm, 0.001 in the study. Robots stop and are repaired "
+            "one after the other, at a rate that leaves a tenth of the swarm at work in equilibrium.",
+        ),
+    ] = None,
+    deaths: Annotated[
+        float | None,
+        typer.Option(
+            metavar="COUNT", help="Robots that are expected to die in a run, at random times; they do not come back."
+        ),
+    ] = None,
+    noise: Annotated[
+        float | None,
+        typer.Option(metavar="SIGMA", help="Standard deviation of the noise of all sensors and wheels."),
+    ] = None,
+    scenario: Scenario = "warehouse_small",
+    robots: Robots = None,
+    seeds: Annotated[int, typer.Option(min=2, help="Runs per policy and condition.")] = 4,
+    horizon: Annotated[float | None, typer.Option(help="Seconds per run, whole intervals of 200 s.")] = None,
+    objects: Objects = None,
+    side: Side = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    out: Out = None,
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Rank policies by the constraints that they meet: deliver so much, despite failures, deaths and noise.
+
+    Each policy runs undisturbed and under each disturbance alone. A constraint is met if the whole 95 % interval of
+    mean performance reaches the demand. Runs that the folder holds already are not repeated.
+    """
+    from swarm_forage_env.cli.decision_report import Demands, choose_runs
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder
+
+    described = ScenarioOptions(
+        scenario=scenario,
+        robots=robots,
+        objects=objects,
+        side=side,
+        caches=caches,
+        horizon=horizon,
+        settings=tuple(settings or ()),
+    )
+    demands = Demands(deliver=deliver, keep=keep, failures=failures, deaths=deaths, noise=noise)
+    folder = out or default_folder(scenario)
+    choose_runs(described, policy, demands, seeds, folder, jobs, as_json=as_json, dry_run=dry_run)

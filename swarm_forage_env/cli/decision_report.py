@@ -1,0 +1,177 @@
+"""How `predict` and `choose` carry out their plans, and what they print: a table, JSON, a picture."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import typer
+
+from metrics.scoring import ScoringPlan
+from metrics.scoring.choosing import plan_choice, run_choice
+from metrics.scoring.prediction import (
+    FIT_SIZES,
+    PredictionTable,
+    counted_inside,
+    plan_prediction,
+    predict_curves,
+    run_predictions,
+)
+from metrics.scoring.prediction_plots import draw_predictions
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, NO_PICTURE, complain
+from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
+from swarm_forage_env.cli.score_report import plan_json, plan_text
+from swarm_forage_env.study.runner import StudyInterrupted, available_cores
+from swarm_forage_env.study.store import RunStore
+
+_PICTURE = "prediction.png"
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Demands:
+    """The constraints of a choice; see `metrics.choose_policy`."""
+
+    deliver: float
+    keep: float
+    failures: float | None
+    deaths: float | None
+    noise: float | None
+
+
+def whole_sizes(option: str, text: str) -> tuple[int, ...]:
+    """Turn swarm sizes separated by commas into numbers.
+
+    Raises:
+        ConfigError: one is no whole number, or there is none.
+    """
+    words = split_names(text)
+    try:
+        return tuple(int(word) for word in words)
+    except ValueError:
+        raise ConfigError(f"Expected {option} as whole numbers of robots separated by commas, got {text!r}.") from None
+
+
+def predict_runs(
+    described: ScenarioOptions,
+    policies: str,
+    fit: Sequence[int] | None,
+    hold: Sequence[int],
+    seeds: int,
+    folder: Path,
+    jobs: int | None,
+    *,
+    as_json: bool,
+    dry_run: bool,
+) -> None:
+    """Run policies in swarms of the given sizes, predict, print and draw; with `dry_run`, only show the plan.
+
+    Raises:
+        ConfigError: whatever is wrong with the words.
+        typer.Exit: Ctrl-C, or runs have failed.
+    """
+    sizes = fit or FIT_SIZES
+    if any(word.partition("=")[0] == "n_robots" for word in described.settings):
+        raise ConfigError("Expected no --set n_robots=..., because sizes are varied; give them by --fit and --hold.")
+    scenario, caches = build_scenario(described)
+    try:
+        plan = plan_prediction(split_names(policies), scenario, fit=sizes, hold=hold, seeds=seeds, caches=caches)
+    except ValueError as error:  # of a policy or a size
+        raise ConfigError(str(error)) from error
+    if dry_run:
+        _show_plan(plan, folder, jobs, as_json=as_json)
+        return
+    tables = _carried_out(lambda: run_predictions(plan, sizes, hold, out=folder, jobs=jobs), folder)
+    _show_predictions(tables, folder, as_json=as_json)
+    if any(table.failures for table in tables):
+        raise typer.Exit(EXIT_FAILURE)
+
+
+def predict_file(
+    path: Path, fit: Sequence[int] | None, hold: Sequence[int], folder: Path | None, *, as_json: bool
+) -> None:
+    """Predict from a file of curves and print; draw only where a folder is given.
+
+    Raises:
+        ConfigError: whatever is wrong with the file or the sizes.
+    """
+    try:
+        tables = predict_curves(path, fit=fit, hold=hold)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    _show_predictions(tables, folder, as_json=as_json)
+
+
+def choose_runs(
+    described: ScenarioOptions,
+    policies: str,
+    demands: Demands,
+    seeds: int,
+    folder: Path,
+    jobs: int | None,
+    *,
+    as_json: bool,
+    dry_run: bool,
+) -> None:
+    """Run policies under every constraint and print the ranking; with `dry_run`, only show the plan.
+
+    Raises:
+        ConfigError: whatever is wrong with the words.
+        typer.Exit: Ctrl-C, or runs have failed.
+    """
+    scenario, caches = build_scenario(described)
+    try:
+        plan = plan_choice(split_names(policies), scenario, seeds=seeds, caches=caches, **asdict(demands))
+    except ValueError as error:  # of a policy or a demand
+        raise ConfigError(str(error)) from error
+    if dry_run:
+        _show_plan(plan.runs, folder, jobs, as_json=as_json)
+        return
+    choice = _carried_out(lambda: run_choice(plan, out=folder, jobs=jobs), folder)
+    typer.echo(json.dumps(choice.to_mapping(), indent=1) if as_json else str(choice))
+    if any(candidate.failures for candidate in choice.candidates):
+        raise typer.Exit(EXIT_FAILURE)
+
+
+def _show_plan(plan: ScoringPlan, folder: Path, jobs: int | None, *, as_json: bool) -> None:
+    show = plan_json if as_json else plan_text
+    typer.echo(show(plan, RunStore(folder), jobs or available_cores()))
+
+
+def _carried_out(run: Callable[[], _Result], folder: Path) -> _Result:
+    """Call `run`; Ctrl-C, and results that failed runs leave too few for, end the command with one line."""
+    from metrics.checks import CurveError
+
+    try:
+        return run()
+    except StudyInterrupted as interrupt:
+        complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+    except CurveError as error:
+        complain(str(error), EXIT_FAILURE)
+        raise typer.Exit(EXIT_FAILURE) from None
+
+
+def _show_predictions(tables: Sequence[PredictionTable], folder: Path | None, *, as_json: bool) -> None:
+    picture = None
+    if folder is not None:
+        picture = folder / _PICTURE
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            draw_predictions(tables, picture)
+        except ImportError:
+            picture = None
+            typer.echo(NO_PICTURE, err=True)
+    if as_json:
+        document = {
+            "tables": [table.to_mapping() for table in tables],
+            "picture": None if picture is None else str(picture),
+        }
+        typer.echo(json.dumps(document, indent=1))
+    else:
+        parts = [*map(str, tables), *filter(None, [counted_inside(tables)])]
+        typer.echo("\n\n".join(parts))
+    if picture is not None:
+        typer.echo(f"picture {picture}", err=True)

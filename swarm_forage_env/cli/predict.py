@@ -1,0 +1,74 @@
+"""The command `predict`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import (
+    AsJson,
+    Caches,
+    DryRun,
+    Jobs,
+    Objects,
+    Out,
+    Scenario,
+    Settings,
+    refuse_options_of_runs,
+)
+
+_OF_CURVES = ("curves", "fit", "hold", "out", "as_json")
+"""Options of `predict` that go with --curves."""
+
+
+def predict(
+    context: typer.Context,
+    policy: Annotated[
+        str | None, typer.Option(help="One or more, separated by commas: names, or files of trained policies.")
+    ] = None,
+    curves: Annotated[
+        Path | None, typer.Option(help="Predict from curves in a CSV or Parquet file instead (docs/deciding.md).")
+    ] = None,
+    scenario: Scenario = "warehouse_small",
+    fit: Annotated[
+        str | None,
+        typer.Option(help="Swarm sizes that are fitted, four or more; default 1,2,4,8,16,32, or those of the file."),
+    ] = None,
+    hold: Annotated[
+        str | None, typer.Option(help="Larger sizes that are run, or in the file, but not fitted: the test.")
+    ] = None,
+    seeds: Annotated[int, typer.Option(min=2, help="Runs per size.")] = 4,
+    horizon: Annotated[float | None, typer.Option(help="Seconds per run, whole intervals of 200 s.")] = None,
+    objects: Objects = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    out: Out = None,
+    jobs: Jobs = None,
+    as_json: AsJson = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Fit performance to small swarms; predict twice and four times the largest, with intervals, and the critical size.
+
+    The critical size is the swarm size of the largest performance. Sizes of --hold are run as well and held against
+    the prediction. Runs that the folder holds already are not repeated.
+    """
+    from swarm_forage_env.cli.decision_report import predict_file, predict_runs, whole_sizes
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder
+
+    if (policy is None) == (curves is None):
+        raise typer.BadParameter("Expected either --policy or --curves.")
+    fitted = None if fit is None else whole_sizes("--fit", fit)
+    held = () if hold is None else whole_sizes("--hold", hold)
+    if curves is not None:
+        refuse_options_of_runs(context, _OF_CURVES)
+        predict_file(curves, fitted, held, out, as_json=as_json)
+        return
+    described = ScenarioOptions(
+        scenario=scenario,
+        objects=objects,
+        caches=caches,
+        horizon=horizon,
+        settings=tuple(settings or ()),
+    )
+    folder = out or default_folder(scenario)
+    predict_runs(described, policy or "", fitted, held, seeds, folder, jobs, as_json=as_json, dry_run=dry_run)

@@ -1,0 +1,156 @@
+"""The command `predict`, as a person uses it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from metrics import SizeLaw
+from swarm_forage_env.policies.registry import RandomPolicy
+from swarm_forage_env.study.runner import StudyInterrupted, StudyResult
+from swarm_forage_env.study.store import load
+
+RUNS = ("predict", "--policy", "crw", "--fit", "1,2,3,4", "--hold", "6", "--seeds", "2", "--jobs", "1")
+WORLD = ("--horizon", "4", "--set", "interval_s=2", "--objects", "20")
+
+
+@pytest.fixture
+def curves():
+    """Write curves of a known law in the current folder."""
+
+    def write(name="curves.csv"):
+        law = SizeLaw(name="contention", a=5.0, contention=0.05)
+        rows = [(n, seed, law.performance(n) * (1.0 + 0.02 * seed)) for n in (1, 2, 4, 8, 16, 32) for seed in (0, 1)]
+        lines = [f"{n},{seed},0,{value}" for n, seed, value in rows]
+        Path(name).write_text("\n".join(["n_robots,seed,interval,performance", *lines]))
+        return name
+
+    return write
+
+
+@pytest.fixture
+def one_object_per_robot(monkeypatch):
+    """Runs of four seconds deliver nothing; count a robot's ticks at work as its performance."""
+    from metrics.scoring import prediction
+    from metrics.scoring.totals import PolicyTotals, run_totals
+
+    def totals(plan, **options):
+        return tuple(
+            PolicyTotals(
+                policy=one.policy,
+                totals=tuple(
+                    {seed: 10.0 * experiment.value + seed for seed in of_seeds}
+                    for experiment, of_seeds in zip(plan.experiments, one.totals, strict=True)
+                ),
+                failures=one.failures,
+            )
+            for one in run_totals(plan, **options)
+        )
+
+    monkeypatch.setattr(prediction, "run_totals", totals)
+
+
+def test_predict_runs_all_sizes_prints_the_prediction_and_draws_it(command, one_object_per_robot):
+    code, out, err = command(*RUNS, *WORLD)
+    assert code == 0
+    assert out.splitlines()[0] == "crw in warehouse_small: objects in 4 s, fitted to 1, 2, 3, 4 robots"
+    assert "1 of 1 held-back mean inside the interval" in out
+    for word in ("law: ", "critical size: none up to 16 robots", "held back", "predicted"):
+        assert word in out
+    folder = Path("results/warehouse_small")
+    assert len(load(folder)) == 10
+    assert (folder / "prediction.png").is_file()
+    assert "picture results/warehouse_small/prediction.png" in err
+    code, out, _ = command(*RUNS, *WORLD, "--json")
+    (table,) = json.loads(out)["tables"]
+    assert [row["n_robots"] for row in table["predictions"]] == [6, 8, 16]
+
+
+def test_the_same_command_again_runs_nothing(command, one_object_per_robot, monkeypatch):
+    words = tuple("random" if word == "crw" else word for word in RUNS)
+    _, first, _ = command(*words, *WORLD)
+    monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))
+    code, again, _ = command(*words, *WORLD)
+    assert (code, again) == (0, first)
+
+
+def test_a_dry_run_shows_sizes_and_runs_nothing(command):
+    code, out, _ = command(*RUNS, *WORLD, "--dry-run")
+    assert code == 0
+    assert out.splitlines()[0] == "crw in warehouse_small, 2 seeds, records go to results/warehouse_small"
+    assert "10 runs, 10 to do: roughly" in out
+    assert not Path("results").exists()
+    _, out, _ = command(*RUNS, *WORLD, "--dry-run", "--json")
+    assert len(json.loads(out)["runs"]) == 10
+
+
+def test_curves_of_others_are_predicted_and_drawn_where_a_folder_is_given(command, curves, tmp_path):
+    file = curves()
+    code, out, err = command("predict", "--curves", file, "--hold", "32")
+    assert (code, err) == (0, "")
+    assert "law: contention, P(N) = 5.0" in out
+    assert "1 of 1 held-back mean inside" in out
+    assert not list(tmp_path.glob("*.png"))
+    code, _, err = command("predict", "--curves", file, "--out", "here")
+    assert (code, "picture here/prediction.png" in err) == (0, True)
+    assert Path("here/prediction.png").is_file()
+
+
+def test_without_matplotlib_there_is_a_table_and_a_hint(command, curves, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
+    code, out, err = command("predict", "--curves", curves(), "--out", "here", "--json")
+    assert code == 0
+    assert json.loads(out)["picture"] is None
+    assert "No picture without matplotlib" in err
+
+
+def test_ctrl_c_says_what_is_kept(command, monkeypatch):
+    def interrupted(*_, **__):
+        raise StudyInterrupted(StudyResult(records=(), failures=(), n_stored=0), 10)
+
+    monkeypatch.setattr("swarm_forage_env.study.runner.run_all", interrupted)
+    code, out, err = command(*RUNS, *WORLD)
+    assert (code, out) == (130, "")
+    assert "0 of 10 runs are finished and kept. They are in results/warehouse_small" in err
+
+
+def test_a_size_whose_runs_fail_is_left_out_and_the_command_exits_with_1(command, one_object_per_robot, monkeypatch):
+    def act(self, obs, active):
+        assert len(obs) != 2
+        return np.zeros((len(obs), 3), np.float32)
+
+    monkeypatch.setattr(RandomPolicy, "act", act)
+    words = tuple({"crw": "random", "1,2,3,4": "1,2,3,4,5"}.get(word, word) for word in RUNS)
+    code, out, _ = command(*words, *WORLD)
+    assert code == 1
+    assert "fitted to 1, 3, 4, 5 robots" in out
+    assert out.count("failed: ") == 2
+
+
+def test_runs_that_leave_nothing_to_predict_end_with_one_line(command):
+    code, out, err = command(*RUNS, *WORLD)  # nobody delivers in four seconds
+    assert (code, out) == (1, "")
+    assert "Expected a performance above 0 at some swarm size" in err.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ((), "Expected either --policy or --curves"),
+        (("--policy", "crw", "--curves", "x.csv"), "Expected either --policy or --curves"),
+        (("--curves", "gone.csv"), "Cannot read gone.csv"),
+        (("--curves", "x.csv", "--seeds", "3"), "no other options than --fit, --hold, --out and --json, got --seeds"),
+        (("--policy", "crww"), "Did you mean 'crw'?"),
+        (("--policy", "crw", "--fit", "1,2,4"), "4 or more different swarm sizes to fit, got 1, 2, 4"),
+        (("--policy", "crw", "--fit", "1,two"), "Expected --fit as whole numbers of robots"),
+        (("--policy", "crw", "--hold", "16"), "larger swarms than the fitted 32 robots, got 16"),
+        (("--policy", "crw", "--seeds", "1"), "seeds"),
+        (("--policy", "crw", "--set", "n_robots=9"), "give them by --fit and --hold"),
+        (("--policy", "crw", "--scenario", "warehouse"), "Unknown scenario 'warehouse'"),
+    ],
+)
+def test_wrong_words_are_one_line_and_exit_2(command, words, reason):
+    code, out, err = command("predict", *words)
+    assert (code, out) == (2, "")
+    assert reason in " ".join(err.split())

@@ -1,0 +1,186 @@
+"""Predictions of policies: what is run, what is fitted, what is held back, and how it is told."""
+
+import json
+
+import numpy as np
+import pytest
+
+from metrics import CurveError, SizeLaw, predict_curves, predict_policy
+from metrics.scoring.prediction import counted_inside, law_text, plan_prediction
+from metrics.scoring.prediction_plots import draw_predictions
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study.experiments import Budget, plan_experiments
+from swarm_forage_env.study.store import load
+
+WORLD = scenario("warehouse_small", n_objects=20, horizon_s=4.0, interval_s=2.0)
+LAW = SizeLaw(name="universal", a=5.0, contention=0.02, coherency=0.002)
+"""Its peak is at sqrt(0.98 / 0.002) = 22.1 robots."""
+SIZES = (1, 2, 4, 8, 16, 32, 64)
+
+
+def curves_file(path, law=LAW, *, name="mine"):
+    """Write curves of two runs per size, half of the performance in each of two intervals; seeds are nearly alike."""
+    lines = ["controller,n_robots,seed,interval,performance"]
+    for size in SIZES:
+        for seed in (0, 1):
+            half = 0.5 * float(law.performance(size)) * (1.0 + 0.01 * (2 * seed - 1))
+            lines += [f"{name},{size},{seed},{interval},{half}" for interval in (0, 1)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+class Failing:
+    """Fails in every run."""
+
+    def reset(self, task, rng):
+        raise RuntimeError("no")
+
+    def act(self, obs, active):
+        return np.zeros((len(obs), 3), np.float32)
+
+
+def test_curves_of_a_known_law_are_predicted(tmp_path):
+    (table,) = predict_curves(curves_file(tmp_path / "curves.csv"), hold=[32, 64])
+    assert (table.fit, table.hold, table.predicted_sizes) == ((1, 2, 4, 8, 16), (32, 64), (32, 64))
+    assert table.prediction.law.name == "universal"
+    for size in (32, 64):
+        value, lower, upper = table.interval(size)
+        assert value == pytest.approx(float(LAW.performance(size)), rel=0.01)
+        assert lower <= value <= upper
+        assert table.is_inside(size) is True
+        assert table.measured(size).mean == pytest.approx(float(LAW.performance(size)))
+    assert table.prediction.critical == pytest.approx(22.1, abs=0.5)
+    assert counted_inside([table]) == "2 of 2 held-back means inside the interval"
+    text = str(table)
+    assert text.splitlines()[0] == "mine: performance per run, fitted to 1, 2, 4, 8, 16 robots"
+    assert "critical size: 22 robots (interval 2" in text
+    # 5 * 64 / (1 + 0.02 * 63 + 0.002 * 64 * 63) = 320 / 10.324, measured and predicted.
+    assert next(line for line in text.splitlines() if line.startswith("64")).split()[:4] == ["64", "2", "31", "31"]
+
+
+def test_sizes_of_a_file_are_all_fitted_unless_told_otherwise(tmp_path):
+    path = curves_file(tmp_path / "curves.csv")
+    (table,) = predict_curves(path)
+    assert (table.fit, table.predicted_sizes) == (SIZES, (128, 256))
+    assert table.is_inside(128) is None
+    assert table.measured(128) is None
+    assert counted_inside([table]) == ""
+    (table,) = predict_curves(path, fit=[2, 4, 8, 16], hold=[64])
+    assert (table.fit, table.predicted_sizes) == ((2, 4, 8, 16), (32, 64))
+    with pytest.raises(CurveError, match=r"sizes that mine has in .*, 1, 2, 4, 8, 16, 32, 64, got 3"):
+        predict_curves(path, fit=[1, 2, 3, 4])
+
+
+def test_a_prediction_that_misses_says_so(tmp_path):
+    """Linear up to 16 robots, and then all of them jam: no law can know."""
+    path = tmp_path / "jam.csv"
+    rows = [(size, seed, size * (1.0 + 0.02 * seed) if size < 32 else 1.0) for size in SIZES for seed in (0, 1)]
+    lines = [f"{size},{seed},0,{value}" for size, seed, value in rows]
+    path.write_text("\n".join(["n_robots,seed,interval,performance", *lines]))
+    (table,) = predict_curves(path, hold=[32, 64])
+    assert [table.is_inside(size) for size in table.hold] == [False, False]
+    assert "held back  NO" in str(table)
+    assert counted_inside([table]) == "0 of 2 held-back means inside the interval"
+    assert table.critical_text().startswith("none up to 64 robots, 4 times the largest fitted; ")
+
+
+def test_a_table_is_ready_for_json(tmp_path):
+    (table,) = predict_curves(curves_file(tmp_path / "curves.csv"), hold=[64])
+    found = json.loads(json.dumps(table.to_mapping()))
+    assert found["law"]["name"] == "universal"
+    assert [row["n_robots"] for row in found["fit"]] == [1, 2, 4, 8, 16, 32]
+    assert [(row["n_robots"], row["inside"]) for row in found["predictions"]] == [(64, True), (128, None)]
+    assert found["critical_size"]["looked_for_up_to"] == 128.0
+    assert found["laws"]["linear"]["peak"] is None
+
+
+def test_laws_are_written_as_formulas():
+    assert law_text(LAW) == "universal, P(N) = 5 N / (1 + 0.02 (N - 1) + 0.002 N (N - 1))"
+    assert law_text(SizeLaw(name="contention", a=5.0, contention=0.1)) == "contention, P(N) = 5 N / (1 + 0.1 (N - 1))"
+    assert law_text(SizeLaw(name="linear", a=5.0)) == "linear, P(N) = 5 N"
+
+
+def test_worlds_are_those_of_the_size_sweep_of_scores():
+    plan = plan_prediction(["random"], "warehouse_small", fit=[1, 6, 12, 25], hold=[50])
+    standard = Budget(horizon_s=10_000.0, interval_s=200.0, n_seeds=2, n_sizes=5, n_levels=1)
+    assert plan.experiments == plan_experiments(scenario("warehouse_small"), ["population_size"], standard)
+    assert plan_prediction(["random"], WORLD, fit=[1, 2, 3, 4]).experiments[0].scenario.objects.n_objects == 20
+    rescue = plan_prediction(["random"], "search_and_rescue", fit=[1, 12, 51, 115]).experiments
+    assert [e.scenario.arena.width_m for e in rescue] == [16.0, 16.0, 32.0, 48.0]
+    assert [e.scenario.objects.n_objects for e in rescue] == [80, 80, 272, 368]
+    with pytest.raises(CurveError, match=r"fill one of its arenas, 1, 12, 51, 115, .*, got 2"):
+        plan_prediction(["random"], "search_and_rescue", fit=[1, 2, 12, 51])
+    with pytest.raises(CurveError, match="which grow with the swarm, got an arena 48 m wide with 50 objects"):
+        plan_prediction(["random"], scenario("search_and_rescue", n_objects=50), fit=[1, 12, 51, 115])
+
+
+@pytest.mark.compiled
+def test_a_policy_is_run_at_every_size_and_the_large_ones_are_held_back(tmp_path):
+    world = scenario("warehouse_small", n_objects=20, horizon_s=1000.0)
+    options = {"fit": [1, 2, 3, 4], "hold": [6], "seeds": 2, "out": tmp_path, "jobs": 1, "progress": False}
+    table = predict_policy("dpo", world, **options)
+    assert (table.policy, table.scenario, table.horizon_s) == ("dpo", "warehouse_small", 1000.0)
+    assert (table.fit, table.hold, table.predicted_sizes) == ((1, 2, 3, 4), (6,), (6, 8, 16))
+    runs = load(tmp_path)
+    assert len(runs) == 10
+    for size in (1, 2, 3, 4, 6):
+        totals = sorted(float(run.performance.sum()) for run in runs if run.n_robots == size)
+        assert sorted(table.totals[size]) == totals
+    assert sum(map(sum, table.totals.values())) > 0.0
+    assert str(predict_policy("dpo", world, **options)) == str(table)
+
+
+def test_swarms_that_never_deliver_predict_nothing():
+    with pytest.raises(CurveError, match="above 0 at some swarm size"):
+        predict_policy("random", WORLD, fit=[1, 2, 3, 4], seeds=2, jobs=1, progress=False)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "reason"),
+    [
+        ({"fit": [1, 2, 4]}, "4 or more different swarm sizes to fit, got 1, 2, 4"),
+        ({"fit": [1, 2, 4, 4]}, "4 or more different"),
+        ({"fit": [0, 1, 2, 4]}, "swarms of 1 robot or more, got 0"),
+        ({"fit": [1, 2, 4, 8], "hold": [8, 16]}, "larger swarms than the fitted 8 robots, got 8"),
+        ({"fit": [1, 2, 4, 8], "seeds": 1}, "two or more seeds, got 1"),
+    ],
+)
+def test_sizes_that_predict_nothing_are_refused(sizes, reason):
+    with pytest.raises(CurveError, match=reason):
+        predict_policy("random", WORLD, **sizes)
+
+
+def test_a_swarm_without_room_is_refused():
+    with pytest.raises(ConfigError):
+        plan_prediction(["random"], "warehouse_small", fit=[1, 2, 4, 8], hold=[100_000])
+
+
+def test_failed_runs_are_named():
+    with pytest.raises(CurveError, match=r"got them at 0; the first failure: .*RuntimeError: no"):
+        predict_policy(Failing, WORLD, fit=[1, 2, 3, 4], seeds=2, jobs=1, progress=False)
+
+
+def test_the_picture_shows_runs_law_interval_and_critical_size(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    figures = []
+    save = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda self, *given, **options: (figures.append(self),
+                                                                           save(self, *given, **options)))  # fmt: skip
+    mine = predict_curves(curves_file(tmp_path / "a.csv"), hold=[32, 64])
+    linear = predict_curves(curves_file(tmp_path / "b.csv", SizeLaw(name="linear", a=2.0), name="other"))
+    draw_predictions([*mine, *linear], tmp_path / "prediction.png")
+    assert (tmp_path / "prediction.png").read_bytes().startswith(b"\x89PNG")
+    figure = figures[0]
+    first, second = figure.axes
+    assert first.get_title() == "mine"
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["95% interval", "fitted law", "fitted runs", "held-back runs", "critical size"]
+    lines = {line.get_label(): line for line in first.get_lines()}
+    assert lines["fitted law"].get_linestyle() == "--"
+    assert len(lines["fitted runs"].get_xdata()) == 10
+    assert lines["held-back runs"].get_xdata().tolist() == [32, 32, 64, 64]
+    assert "critical size" not in [line.get_label() for line in second.get_lines()]
+    draw_predictions([*mine, *linear] * 2 + [*mine], tmp_path / "five.png")
+    assert [axes.axison for axes in figures[1].axes] == [True] * 5 + [False] * 3
