@@ -320,7 +320,9 @@ def _with_robots(scenario: "ScenarioConfig", n_robots: int) -> "ScenarioConfig":
             f"Expected {scenario.name} with its own arena and objects, which grow with the swarm, got an arena "
             f"{scenario.arena.width_m:g} m wide with {scenario.objects.n_objects} objects."
         )
-    sides = {presets.robots_at_density(side): side for side in presets.SEARCH_AND_RESCUE_OBJECTS}
+    sides = {
+        presets.robots_at_density(side * side, presets.DENSITY): side for side in presets.SEARCH_AND_RESCUE_OBJECTS
+    }
     side_m = min(sides.values()) if n_robots == 1 else sides.get(n_robots)
     if side_m is None:
         raise CurveError(

@@ -17,7 +17,7 @@ from swarm_forage_env.cli.options import (
 )
 
 
-def ablate(
+def ablate(  # long: one parameter per option
     scenario: Annotated[
         str, typer.Option("--scenario", help="One or more presets, separated by commas.")
     ] = "warehouse_small,warehouse_medium",

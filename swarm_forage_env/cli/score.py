@@ -33,7 +33,7 @@ _OF_CURVES = ("curves", "measures", "performance", "variant", "form", "band", "a
 """Options of `score` that go with --curves."""
 
 
-def score(
+def score(  # long: one parameter per option
     context: typer.Context,
     policy: Annotated[str | None, typer.Option(help="Name, or file of a trained policy.")] = None,
     curves: Annotated[

@@ -12,90 +12,23 @@ from baselines.tasks import TASK_DRAWS
 from swarm_forage_env.contract.codes import Event, Grip, Task
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.task_robot import TaskRobot
-
-CACHE = (72, 40)
-"""Centre cell of the cache at (14.5, 8.1) m; its square is 11.4 .. 17.6 m by 5.0 .. 11.2 m."""
-CACHE_SEEN = (7, CACHE, 12)
-HARVESTS = [Task.GENERALIST, Task.HARVESTER, Task.STARTER, Task.FINISHER]
-NEARER = (36, 40)
-"""Centre cell of a cache at (7.3, 8.1) m, nearer to the nest than the other."""
-COLLECTS = [Task.COLLECTOR, Task.TRANSFERER, Task.CACHE_COLLECTOR]
-TO_NEST = [Task.GENERALIST, Task.COLLECTOR, Task.CACHE_COLLECTOR]
+from tests.support.task_work import (
+    CACHE,
+    CACHE_SEEN,
+    COLLECTS,
+    HARVESTS,
+    TO_NEST,
+    drop,
+    give_up,
+    pick_up,
+    wait_for_drop,
+    wait_for_pickup,
+)
 
 
 @pytest.fixture
 def robot() -> TaskRobot:
     return TaskRobot()
-
-
-def wait_for_pickup(robot: TaskRobot, task: Task) -> None:
-    """Start a task and bring the robot to where it asks for an object."""
-    robot.start(task)
-    robot.finish_soon()
-    if task in COLLECTS:
-        robot.seen.caches(CACHE_SEEN)
-        robot.act()
-        assert robot.stage is VectorState.VECTOR
-        robot.seen.pose(*robot.goal)
-        robot.seen.ground("cache")
-    else:
-        robot.seen.window({(2, 0): 3})
-        robot.act()
-        robot.seen.pose(*robot.goal)
-        robot.seen.window({(0, 0): 3})
-        robot.seen.ground("object")
-    action = robot.act()
-    assert robot.activity is Activity.WAIT_PICKUP
-    assert action.tolist() == [0.0, 0.0, Grip.GRASP]
-
-
-def pick_up(robot: TaskRobot, task: Task) -> np.ndarray:
-    """Start a task and give the robot object 3 where it asks for it; returns the action after that."""
-    wait_for_pickup(robot, task)
-    robot.seen.window({})
-    robot.seen.carry(3)
-    event = Event.PICKED_FROM_CACHE if task in COLLECTS else Event.PICKED_UP
-    robot.seen.event(event, object_row=3, cache=CACHE_SEEN if task in COLLECTS else None)
-    action = robot.act()
-    robot.seen.event(Event.NONE)
-    robot.seen.ground("floor")
-    return action
-
-
-def wait_for_drop(robot: TaskRobot, task: Task) -> np.ndarray:
-    """Bring the robot to where it asks to drop; returns the action."""
-    pick_up(robot, task)
-    if task in TO_NEST:
-        robot.seen.ground("nest")
-        robot.act()
-        robot.seen.caches()
-        robot.seen.pose(3.2, 8.0)
-    elif task is Task.STARTER:
-        robot.seen.pose(*robot.goal)
-    elif task is Task.FINISHER:
-        robot.know_object(9, (80, 10))
-        robot.act()
-        robot.seen.pose(16.1, 2.7)  # the object at (16.1, 2.1) is out of the window, but near
-    else:
-        cell = NEARER if task is Task.TRANSFERER else CACHE
-        robot.seen.pose(20.5, 8.1)
-        robot.seen.caches((8, cell, 5))
-        robot.act()
-        robot.seen.pose(*robot.goal)
-        robot.seen.ground("cache")
-    action = robot.act()
-    assert robot.activity is Activity.WAIT_DROP
-    assert action[:2].tolist() == [0.0, 0.0]
-    return action
-
-
-def drop(robot: TaskRobot, event: Event = Event.DROPPED, **about) -> None:
-    """Let the drop happen, with another task to follow."""
-    robot.seen.carry(None)
-    robot.seen.ground("floor")
-    robot.seen.event(event, **about)
-    robot.act()
-    robot.seen.event(Event.NONE)
 
 
 # Sources
@@ -347,13 +280,6 @@ def test_a_drop_ends_the_task_and_the_next_one_starts_in_the_same_tick(robot, ta
     assert has_begun
 
 
-def give_up(robot: TaskRobot) -> np.ndarray:
-    robot.policy._allocation.p_abort[:] = 2.0
-    action = robot.act()
-    robot.finish_soon()
-    return action
-
-
 def test_giving_up_empty_starts_the_next_task_at_once(robot):
     wait_for_pickup(robot, Task.HARVESTER)
     robot.seen.window({})
@@ -417,85 +343,6 @@ def test_objects_that_are_let_go_are_not_left_alone(robot):
     give_up(robot)
     drop(robot, object_row=3)
     assert robot.memory.shunned[3] != robot.record.shun_round
-
-
-def test_a_transferer_adds_to_another_cache_than_it_took_from(robot):
-    pick_up(robot, Task.TRANSFERER)
-    assert robot.memory.caches[0].no_drop
-    robot.seen.pose(20.5, 8.1)
-    robot.act()
-    assert robot.stage is VectorState.IDLE, "the only cache known is the one it came from"
-
-
-@pytest.mark.parametrize(
-    ("cell", "quirks", "goes"),
-    [
-        (NEARER, Quirks(), True),
-        ((120, 40), Quirks(), False),
-        ((-1, 0), Quirks(), False),
-        ((120, 40), Quirks(transferer_goes_anywhere=True), True),
-    ],
-)
-def test_a_transferer_goes_towards_the_nest(cell, quirks, goes):
-    robot = TaskRobot(quirks=quirks)
-    pick_up(robot, Task.TRANSFERER)
-    robot.seen.pose(20.5, 8.1)
-    if cell != (-1, 0):  # else only its own is known
-        robot.know_cache(8, cell, 5)
-    robot.act()
-    assert (robot.stage is VectorState.VECTOR) == goes
-    if goes:
-        assert robot.record.target == 8
-
-
-def test_only_transferers_mind_the_way_to_the_nest(robot):
-    pick_up(robot, Task.TRANSFERER)
-    assert robot.record.cargo_from_nest_m == pytest.approx(math.dist((14.5, 8.1), (3.2, 8.0)))
-    robot.seen.carry(None)
-    robot.act()
-    pick_up(robot, Task.HARVESTER)
-    assert robot.record.cargo_from_nest_m == math.inf
-
-
-@pytest.mark.parametrize("by_identity", [False, True])
-def test_quirk_cache_goal_by_identity(by_identity):
-    robot = TaskRobot(quirks=Quirks(cache_goal_by_identity=by_identity))
-    robot.start(Task.COLLECTOR)
-    robot.finish_soon()
-    robot.seen.pose(22.0, 8.1)
-    robot.seen.caches(CACHE_SEEN)
-    robot.act(3)
-    goal = robot.goal
-    assert robot.record.target == CACHE_SEEN[0]
-    robot.seen.caches((CACHE_SEEN[0] + 1, *CACHE_SEEN[1:]))  # used up and created again in the same place
-    robot.act()
-    assert robot.stage is (VectorState.IDLE if by_identity else VectorState.VECTOR)
-    robot.act()
-    assert robot.stage is VectorState.VECTOR
-    assert (robot.goal == goal) != by_identity, "chosen anew, so another point in it"
-
-
-@pytest.mark.parametrize("next_task", [Task.TRANSFERER, Task.COLLECTOR])
-def test_caches_of_a_transfer_are_left_alone_by_the_next_transfer_only(robot, next_task):
-    wait_for_drop(robot, Task.TRANSFERER)
-    robot.policy._constants["partition_gamma"] = 1e9 if next_task is Task.TRANSFERER else 0.0
-    robot.policy._constants["tab_gamma"] = 0.0
-    drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, NEARER, 6))
-    assert robot.task is next_task
-    shunned = next_task is Task.TRANSFERER
-    marks = {int(cache.serial): (bool(cache.no_pickup), bool(cache.no_drop)) for cache in robot.memory.caches[:2]}
-    assert marks == {7: (False, shunned), 8: (shunned, False)}
-
-
-def test_a_transfer_that_moved_nothing_ends_the_shielding_of_caches(robot):
-    wait_for_drop(robot, Task.TRANSFERER)
-    robot.policy._constants["partition_gamma"] = 1e9
-    robot.policy._constants["tab_gamma"] = 0.0
-    drop(robot, Event.JOINED_CACHE, object_row=3, cache=(8, NEARER, 6))
-    assert any(cache.no_drop for cache in robot.memory.caches[:2])
-    give_up(robot)
-    assert robot.task is Task.TRANSFERER
-    assert not any(cache.no_pickup or cache.no_drop for cache in robot.memory.caches[:2])
 
 
 # The policies
