@@ -1,0 +1,100 @@
+"""What noise on one group of sensors, or on the wheels, leaves of the performance: a table per world and reading.
+
+    python scripts/noise_by_group.py            all of docs/readings.md; twenty minutes of processor time
+    python scripts/noise_by_group.py --scenario warehouse_small --sigmas 0.03 --seeds 4
+
+Numbers are performance in percent of the same policy's without noise; runs are paired by seed and kept in --out.
+"""
+
+import argparse
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study.ablation import BASES
+from swarm_forage_env.study.record import RunRecord
+from swarm_forage_env.study.runner import run_all
+from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.study.store import RunStore
+from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.noise import NOISE_GROUPS, ActuatorNoiseConfig, SensorNoiseConfig
+
+POLICIES = ("crw", "dpo", "stochm", "stochx")
+SOURCES = (*NOISE_GROUPS, "wheels", "all")
+
+
+def disturbances(source: str, sigma: float) -> tuple[WrapperConfig, ...]:
+    """Return noise on one group of sensors, on the wheels, or on everything."""
+    sensors = (
+        SensorNoiseConfig(sigma=sigma, groups=NOISE_GROUPS if source == "all" else (source,))
+        if source != "wheels"
+        else None
+    )
+    wheels = ActuatorNoiseConfig(sigma=sigma) if source in ("wheels", "all") else None
+    return tuple(config for config in (sensors, wheels) if config is not None)
+
+
+def planned(world: ScenarioConfig, source: str, sigma: float, seeds: int) -> dict[str, list[RunSpec]]:
+    """Return the runs of each policy; sigma 0 = without noise."""
+    wrappers = disturbances(source, sigma) if sigma else ()
+    return {
+        policy: [plan_run(world, policy, wrappers=wrappers, seed=seed) for seed in range(seeds)] for policy in POLICIES
+    }
+
+
+def share(records: dict[str, RunRecord], calm: Sequence[RunSpec], noisy: Sequence[RunSpec]) -> str:
+    """Return what is left of the performance, in percent."""
+    before, after = (sum(float(records[spec.run_id].performance.sum()) for spec in specs) for specs in (calm, noisy))
+    return f"{100 * after / before:.0f}" if before else "-"
+
+
+def false_obstacles(records: dict[str, RunRecord], specs: Sequence[RunSpec]) -> float:
+    """Return the share of robot time in which a false obstacle is seen: believed less true interference."""
+    own = [records[spec.run_id] for spec in specs]
+    return float(
+        np.mean([(r.contributed["believed_interference_fraction"] - r.interference_fraction).mean() for r in own])
+    )
+
+
+def lines(world: ScenarioConfig, reading: str, chosen: argparse.Namespace) -> Iterator[str]:
+    """Run what a table needs and yield its lines."""
+    calm = planned(world, "", 0.0, chosen.seeds)
+    cells = {(s, sigma): planned(world, s, sigma, chosen.seeds) for s in SOURCES for sigma in chosen.sigmas}
+    specs = [spec for runs in (calm, *cells.values()) for own in runs.values() for spec in own]
+    found = run_all(specs, store=RunStore(chosen.out), jobs=chosen.jobs, progress=True)
+    records = {record.run_id: record for record in found.records}
+    yield f"**{world.name}, {world.robots.n_robots} robots, {reading}: performance in % of that without noise**"
+    yield ""
+    yield "| noise on | " + " | ".join(f"{p} {sigma:g}" for sigma in chosen.sigmas for p in POLICIES) + " |"
+    yield "|---|" + "--:|" * (len(chosen.sigmas) * len(POLICIES))
+    for source in SOURCES:
+        shares = [share(records, calm[p], cells[source, sigma][p]) for sigma in chosen.sigmas for p in POLICIES]
+        yield f"| {source.replace('_', ' ')} | " + " | ".join(shares) + " |"
+    false = [f"{sigma:g}: {false_obstacles(records, cells['proximity', sigma]['crw']):.2f}" for sigma in chosen.sigmas]
+    yield ""
+    yield f"Share of robot time in which CRW sees a false obstacle, by sigma on proximity: {', '.join(false)}."
+
+
+def main() -> None:
+    """Print the tables of all worlds and readings."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    worlds = ("warehouse_small", "warehouse_medium", "search_and_rescue")
+    parser.add_argument("--scenario", nargs="+", default=worlds, choices=worlds)
+    parser.add_argument("--sigmas", nargs="+", type=float, default=[0.004, 0.017, 0.03, 0.1])
+    parser.add_argument("--robots", type=int, default=50)
+    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--horizon", type=float, default=2000.0, help="simulated seconds per run")
+    parser.add_argument("--jobs", type=int, help="processes; default one per core")
+    parser.add_argument("--out", type=Path, default=Path("results/noise"), help="folder for records")
+    chosen = parser.parse_args()
+    for name in chosen.scenario:
+        for reading, quirks in BASES.items():
+            world = scenario(name, n_robots=chosen.robots, horizon_s=chosen.horizon, quirks=quirks)
+            print("\n".join(lines(world, reading, chosen)), end="\n\n", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+"""The command `ablate`: tables, JSON, and what it refuses."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+ABLATE = ("ablate", "--scenario", "warehouse_small", "--robots", "8,16", "--policy", "crw,stochm", "--seeds", "2",
+          "--horizon", "400", "--jobs", "1", "--set", "interval_s=200")  # fmt: skip
+QUIRKS = ("--quirks", "explore_double_start,integer_estimates,dynamic_cache_merges_all")
+
+
+@pytest.mark.compiled
+def test_tables_show_both_readings_and_what_each_quirk_moves(command):
+    code, out, _ = command(*ABLATE, *QUIRKS)
+    assert code == 0
+    assert len(re.findall(r"^\| warehouse_small \| (8|16) \| (crw|stochm) \|", out, re.MULTILINE)) == 4
+    assert "| quirk | crw 8 | stochm 8 | crw 16 | stochm 16 | order at 8 | order at 16 |" in out
+    assert "each quirk switched off in the authors' program" in out
+    assert "| `integer_estimates` | = |" in out, "CRW has no tasks"
+    assert "`dynamic_cache_merges_all`" not in out, "there is no such cache"
+    code, again, err = command(*ABLATE, *QUIRKS)
+    assert again == out
+    assert "all runs are stored already" in err or "runs are stored already" in err
+    code, out, _ = command(*ABLATE, *QUIRKS, "--json")
+    effects = json.loads(out)["effects"]
+    assert len(effects) == 2 * 2 * 2 * 3
+    (one,) = (e for e in effects if (e["n_robots"], e["policy"], e["base"], e["quirk"]) ==
+              (8, "crw", "described", "integer_estimates"))  # fmt: skip
+    assert one["is_same"] is True
+    assert one["interference"] == {"mean": 0.0, "lower": 0.0, "upper": 0.0}
+    assert one["task_shares"] is None
+
+
+@pytest.mark.compiled
+def test_without_quirks_only_the_readings_are_compared(command):
+    code, out, _ = command(*ABLATE, "--quirks", "none", "--policy", "crw")
+    assert code == 0
+    assert "quirk |" not in out
+    assert out.count("| crw |") == 2
+
+
+def test_dry_run_makes_nothing(command):
+    code, out, _ = command(*ABLATE, *QUIRKS, "--dry-run")
+    assert code == 0
+    assert "At most 64 runs to do, 25,600 simulated seconds" in out
+    assert not Path("results").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("--robots", "8,many"), "Expected --robots as whole numbers separated by commas, got '8,many'"),
+        (("--quirks", "integer_estimate"), "Did you mean 'integer_estimates'?"),
+        (("--policy", "crv"), "Did you mean 'crw'?"),
+        (("--seeds", "1"), "'--seeds'"),
+    ],
+)
+def test_a_mistake_is_one_line_and_exit_code_2(command, words, complaint):
+    code, out, err = command("ablate", *words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert complaint in err
+    assert not Path("results").exists()
