@@ -1,6 +1,7 @@
-"""Draw two folders of run records beside each other: deliveries and interference over the size of the swarm.
+"""Draw two folders of run records beside each other: performance and interference over the size of the swarm.
 
     python scripts/compare_versions.py BEFORE AFTER PICTURE
+    python scripts/compare_versions.py PROGRAM DESCRIBED PICTURE --names program described
 
 Each folder holds one sub-folder per scenario with the records of runs that differ in controller, size and seed, for
 example those of `swarm-forage run --robots N --out BEFORE/warehouse_medium` for several N. Prints the table behind the
@@ -20,35 +21,40 @@ from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.store import load
 
 Curves = dict[str, dict[int, tuple[float, float]]]
-"""Controller -> swarm size -> deliveries per 1,000 s, and share of robot time in interference; means over seeds."""
+"""Controller -> swarm size -> performance per 1,000 s, and share of robot time in interference; means over seeds."""
 
 
 def curves(records: tuple[RunRecord, ...]) -> Curves:
     """Return the means over the seeds of each controller and size."""
     runs: dict[tuple[str, int], list[tuple[float, float]]] = defaultdict(list)
     for record in records:
-        pair = record.rate_per_1000_s("collected"), float(record.interference_fraction.mean())
+        pair = record.rate_per_1000_s("performance"), float(record.interference_fraction.mean())
         runs[record.controller, record.n_robots].append(pair)
     found: Curves = defaultdict(dict)
     for (controller, size), pairs in sorted(runs.items()):
-        deliveries, interference = np.mean(pairs, axis=0).tolist()
-        found[controller][size] = deliveries, interference
+        performance, interference = np.mean(pairs, axis=0).tolist()
+        found[controller][size] = performance, interference
     return found
 
 
-def table(scenario: str, before: Curves, after: Curves) -> Iterator[str]:
-    """Yield the lines of a table in Markdown."""
-    yield f"| {scenario} | robots | deliveries per 1,000 s, before | after | interference, before | after |"
-    yield "|---|--:|--:|--:|--:|--:|"
-    for controller, sizes in after.items():
-        for size, (deliveries, interference) in sizes.items():
-            old = before.get(controller, {}).get(size)
-            first, second = ("-", "-") if old is None else (f"{old[0]:.1f}", f"{old[1]:.3f}")
-            yield f"| {controller} | {size} | {first} | {deliveries:.1f} | {second} | {interference:.3f} |"
+def tables(scenario: str, before: Curves, after: Curves, names: tuple[str, str]) -> Iterator[str]:
+    """Yield the lines of two tables in Markdown: a row per swarm size, a column per controller."""
+    for column, (title, decimals) in enumerate((("performance per 1,000 s", 1), ("interference", 3))):
+        yield f"| {scenario}: {title}, {names[0]} → {names[1]} | {' | '.join(after)} |"
+        yield "|--:|" + "--:|" * len(after)
+        for size in sorted({size for sizes in after.values() for size in sizes}):
+            row = []
+            for controller in after:
+                pair = (version.get(controller, {}).get(size) for version in (before, after))
+                row.append(" → ".join("-" if found is None else f"{found[column]:.{decimals}f}" for found in pair))
+            yield f"| {size} | {' | '.join(row)} |"
+        yield ""
 
 
-def draw(scenarios: list[str], before: dict[str, Curves], after: dict[str, Curves], path: Path) -> None:
-    """Draw one row per scenario: deliveries on the left, interference on the right; the older version is dashed."""
+def draw(
+    scenarios: list[str], before: dict[str, Curves], after: dict[str, Curves], names: tuple[str, str], path: Path
+) -> None:
+    """Draw one row per scenario: performance on the left, interference on the right; the first folder is dashed."""
     figure, grid = plt.subplots(len(scenarios), 2, figsize=(10, 3.6 * len(scenarios)), squeeze=False)
     for axes, scenario in zip(grid, scenarios, strict=True):
         for version, style in ((before, "--"), (after, "-")):
@@ -56,12 +62,12 @@ def draw(scenarios: list[str], before: dict[str, Curves], after: dict[str, Curve
                 for axis, column in zip(axes, zip(*sizes.values(), strict=True), strict=True):
                     label = controller if style == "-" else None
                     axis.plot(list(sizes), column, style, marker="o", ms=3, color=colour, label=label)
-        for axis, title in zip(axes, ("deliveries per 1,000 s", "share of robot time in interference"), strict=True):
+        for axis, title in zip(axes, ("performance per 1,000 s", "share of robot time in interference"), strict=True):
             axis.set_xscale("log", base=2)
             axis.set_xlabel("robots")
             axis.set_title(f"{scenario}: {title}", fontsize=10)
             axis.grid(alpha=0.3)
-        axes[0].legend(title="dashed: before", fontsize=8, title_fontsize=8)
+        axes[0].legend(title=f"dashed: {names[0]}, solid: {names[1]}", fontsize=8, title_fontsize=8)
     figure.tight_layout()
     figure.savefig(path, dpi=110)
 
@@ -72,14 +78,16 @@ def main() -> None:
     parser.add_argument("before", type=Path)
     parser.add_argument("after", type=Path)
     parser.add_argument("picture", type=Path)
+    parser.add_argument("--names", nargs=2, default=("before", "after"), help="what the folders are called")
     chosen = parser.parse_args()
+    names = (chosen.names[0], chosen.names[1])
     scenarios = sorted(folder.name for folder in chosen.after.iterdir() if folder.is_dir())
     before, after = (
         {name: curves(load(folder / name)) for name in scenarios} for folder in (chosen.before, chosen.after)
     )
     for name in scenarios:
-        print("\n".join(table(name, before[name], after[name])), end="\n\n")
-    draw(scenarios, before, after, chosen.picture)
+        print("\n".join(tables(name, before[name], after[name], names)))
+    draw(scenarios, before, after, names, chosen.picture)
 
 
 if __name__ == "__main__":
