@@ -139,7 +139,7 @@ class RunRecord:
         """Return the same run with another performance; column and specification say so, the identity stays.
 
         Args:
-            performance: As in `swarm_forage_env.scenarios.performance.reading`.
+            performance: As in `swarm_forage_env.scenarios.performance.quantity`.
 
         Raises:
             ConfigError: there is no such performance.

@@ -42,7 +42,7 @@ def test_the_compact_view_matches_its_twin_along_runs(caches, noise, behind_coun
     policy = load_policy({"none": "dpo", "static": "stochm", "dynamic": "stochx"}[caches])
     policy.reset(env.swarm_spec, stream_rng(0, Stream.POLICY))
     interface = bound(env, observation="compact")
-    obs = stack.reset_batch(4)
+    obs = stack.reset_batch(1)
     kinds_seen = np.zeros(interface.layout.size)
     for tick in range(1400):
         obs, *_ = stack.step_batch(policy.act(obs, env.active), tasks=getattr(policy, "task", None))

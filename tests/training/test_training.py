@@ -48,7 +48,7 @@ def tiny_plan(**changes) -> TrainingPlan:
     return dataclasses.replace(plan, **changes)
 
 
-ROOMLESS = {"width_m": 19.2, "height_m": 19.2, "nest_centre_m": (9.6, 9.6), "nest_size_m": (3.84, 3.84)}
+ROOMLESS = {"width_m": 9.6, "height_m": 9.6, "nest_centre_m": (4.8, 4.8), "nest_size_m": (1.92, 1.92)}
 """An arena too small for the clusters of search and rescue."""
 SHORT = tiny_plan(stages=(Stage(steps=128),))
 
@@ -196,7 +196,7 @@ def test_a_training_that_kept_nothing_is_started_again(tmp_path):
             {"scenario": search_and_rescue(side_m=48.0, n_robots=4, horizon_s=200.0),
              "stages": (Stage(steps=64, scenario=ROOMLESS),)},
             0,
-            r"Cannot train in stage 1, with width_m = 19.2, .*: Expected at most \d+ objects",
+            r"Cannot train in stage 1, with width_m = 9.6, .*: Expected room for \d+ clusters",
         ),
     ],
 )  # fmt: skip

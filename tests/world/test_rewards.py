@@ -97,7 +97,7 @@ def test_nest_progress_pays_carrying_robots_by_the_metre():
 def test_interference_can_be_penalised():
     env = tidy_world(reward=replace(NOTHING, interference=-0.25))
     put(env, 0, 16.0, 8.0)
-    put(env, 1, 16.25, 8.0)
+    put(env, 1, 16.25, 8.0, np.pi)
     assert rewards_of(env, {}) == [-0.25, -0.25, 0.0, 0.0]
 
 
