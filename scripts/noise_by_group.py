@@ -14,7 +14,7 @@ import numpy as np
 
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.ablation import BASES
+from swarm_forage_env.scenarios.quirks import READINGS
 from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.runner import run_all
 from swarm_forage_env.study.spec import RunSpec, plan_run
@@ -91,7 +91,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("results/noise"), help="folder for records")
     chosen = parser.parse_args()
     for name in chosen.scenario:
-        for reading, quirks in BASES.items():
+        for reading, quirks in READINGS.items():
             world = scenario(name, n_robots=chosen.robots, horizon_s=chosen.horizon, quirks=quirks)
             print("\n".join(lines(world, reading, chosen)), end="\n\n", flush=True)
 

@@ -12,7 +12,9 @@ from swarm_forage_env.cli.options import (
     DryRun,
     Jobs,
     Out,
+    Performance,
     Settings,
+    Wrappers,
     complain,
 )
 
@@ -24,14 +26,16 @@ def ablate(  # long: one parameter per option
     policy: Annotated[
         str, typer.Option("--policy", "--controller", help="One or more, separated by commas.")
     ] = "crw,dpo,stochm,stochx",
-    robots: Annotated[str, typer.Option("--robots", help="One or more swarm sizes, separated by commas.")] = "32,128",
+    robots: Annotated[str, typer.Option("--robots", help="One or more swarm sizes, separated by commas.")] = "32,256",
     quirks: Annotated[
         str, typer.Option("--quirks", help="Which to switch, separated by commas; all; or none: the readings only.")
     ] = "all",
     seeds: Annotated[int, typer.Option(min=2, help="Runs per policy, size and switched quirk.")] = 3,
     horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
     caches: Caches = None,
+    performance: Performance = None,
     settings: Settings = None,
+    wrappers: Wrappers = None,
     out: Out = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -41,12 +45,14 @@ def ablate(  # long: one parameter per option
 
     The tables are Markdown. Records go to a folder; an interrupted command can simply be given again.
     """
+    from dataclasses import replace
     from pathlib import Path
 
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.cli.ablation_report import ablation_json, ablation_pages
     from swarm_forage_env.cli.report import estimated_seconds, plan_note
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, described_world, split_names
+    from swarm_forage_env.scenarios.performance import quantity
     from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
     from swarm_forage_env.study.ablation import plan_ablation, run_ablation
     from swarm_forage_env.study.runner import StudyInterrupted, available_cores
@@ -56,15 +62,28 @@ def ablate(  # long: one parameter per option
         sizes = [int(word) for word in split_names(robots)]
     except ValueError as error:
         raise ConfigError(f"Expected --robots as whole numbers separated by commas, got {robots!r}.") from error
-    worlds = [
-        build_scenario(ScenarioOptions(scenario=name, robots=size, horizon=horizon, settings=tuple(settings or ())))[0]
-        for name in split_names(scenario)
-        for size in sizes
+    told = ScenarioOptions(
+        scenario="",
+        horizon=horizon,
+        performance=performance,
+        settings=tuple(settings or ()),
+        wrappers=tuple(wrappers or ()),
+    )
+    described = [
+        described_world(replace(told, scenario=name, robots=size)) for name in split_names(scenario) for size in sizes
     ]
+    worlds, disturbances = [world for world, _, _ in described], described[0][2]
     every = {"all": QUIRK_NAMES, "none": ()}
     switched = every[quirks] if quirks in every else split_names(quirks)
     try:
-        plan = plan_ablation(worlds, split_names(policy), quirks=switched, seeds=range(seeds), caches=caches)
+        plan = plan_ablation(
+            worlds,
+            split_names(policy),
+            quirks=switched,
+            seeds=range(seeds),
+            caches=caches,
+            wrappers=disturbances,
+        )
     except ValueError as error:  # of a policy
         raise ConfigError(str(error)) from error
     store = RunStore(out or Path("results", "ablation"))
@@ -79,7 +98,8 @@ def ablate(  # long: one parameter per option
     except StudyInterrupted as interrupt:
         complain(f"{interrupt} They are in {store.folder}; the same command does the rest.", EXIT_INTERRUPTED)
         raise typer.Exit(EXIT_INTERRUPTED) from None
-    typer.echo(ablation_json(result) if as_json else ablation_pages(result))
+    show = ablation_json if as_json else ablation_pages
+    typer.echo(show(result, quantity(worlds[0].performance)))
     for failure in result.failures:
         typer.echo(f"failed: {failure.spec.describe()}: {failure.error}", err=True)
     if result.failures:

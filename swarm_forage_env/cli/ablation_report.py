@@ -1,141 +1,175 @@
-"""What `ablate` prints: Markdown tables of what each quirk moves, or JSON."""
+"""What `ablate` prints: Markdown tables of both readings and of what each quirk moves, or JSON."""
 
 import json
-import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from metrics.scoring.texts import plain
-from metrics.statistics import Summary, aggregate
-from swarm_forage_env.study.ablation import BASES, AblationResult, Cell, Effect
+from metrics.significance import holm, pooled_p
+from metrics.statistics import aggregate
+from swarm_forage_env.cli.report import performance_number, span
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.scenarios.performance import Quantity
+from swarm_forage_env.scenarios.quirks import READINGS
+from swarm_forage_env.study.ablation import TASK_COLUMNS, AblationResult, Cell, Effect
 
-_SWITCHED = {"described": "switched on in the description", "program": "switched off in the authors' program"}
-_NOTHING = "="
+CLOSE = 0.05
+"""Policies whose means differ by a smaller share count as equal in an order (our choice)."""
+ALPHA = 0.05
+_SWITCHED = {"DESCRIBED": "switched on in the description", "AUTHORS_PROGRAM": "switched off in the authors' program"}
+_NOTES = (
+    "`=`: the first run is the same, bit for bit, and no other was made. `*`: significant at 5 % by Student's t, with "
+    "the scatter pooled over the quirks of a column and Holm's correction over the table. `~`: means closer than 5 %. "
+    "Quirks that change no first run in a world are left out of its tables."
+)
 
 
-def ablation_pages(result: AblationResult) -> str:
+def ablation_pages(result: AblationResult, performance: Quantity) -> str:
     """Return all tables as Markdown: the two readings side by side, then what each quirk moves."""
     effects = result.effects()
-    parts = [_readings(result)]
-    if effects:
-        parts.append(
-            "`=` the first run is the same, bit for bit. `*` the 95 % interval of the difference, seed by seed, leaves "
-            "out 0. Quirks that change nothing in a world are left out of its tables."
-        )
+    parts = [_readings(result, performance), *([_NOTES] if effects else [])]
     for scenario in dict.fromkeys(cell.scenario for cell in result.records):
-        for base in BASES:
-            own = [effect for effect in effects if effect.cell.scenario == scenario and effect.cell.base == base]
+        for reading in READINGS:
+            own = [e for e in effects if (e.cell.scenario, e.cell.reading) == (scenario, reading)]
             moving = [effect for effect in own if not effect.is_same]
             if own and not moving:
-                parts.append(f"**{scenario}: each quirk {_SWITCHED[base]}**\n\nNone changes anything.")
+                parts.append(f"**{scenario}: each quirk {_SWITCHED[reading]}**\n\nNone changes a first run.")
             if moving:
-                parts += _tables(result, scenario, base, own, {effect.cell.quirk for effect in moving})
+                parts += _tables(result, own, {effect.cell.quirk for effect in moving})
     return "\n\n".join(parts)
 
 
-def ablation_json(result: AblationResult) -> str:
-    """Return every effect as a JSON document."""
-    return json.dumps({"effects": [_plain(effect) for effect in result.effects()]}, indent=1)
+def ablation_json(result: AblationResult, performance: Quantity) -> str:
+    """Return readings, effects and failures as a JSON document."""
+    readings = [
+        {**cell._asdict(), "n_runs": len(records), **dict(zip(("performance", "interference"), numbers, strict=True))}
+        for cell, records in result.records.items()
+        if not cell.quirk
+        for numbers in [_numbers(records, performance)]
+    ]
+    failures = [{"run": failure.spec.describe(), "error": failure.error} for failure in result.failures]
+    document = {
+        "performance": f"{performance.title} {span(performance)}",
+        "readings": readings,
+        "effects": [_plain(effect) for effect in result.effects()],
+        "failures": failures,
+    }
+    return json.dumps(document, indent=1)
 
 
 def _plain(effect: Effect) -> dict[str, Any]:
-    summaries = {
-        "performance": _share(effect),
-        "interference": _interference(effect),
-        "task_shares": _task_shift(effect),
-    }
+    """An effect as plain values; a quirk that changed nothing in its first run has no intervals."""
+    tasks = effect.task_shares
+    rows: dict[str, FloatArray] = {"performance": effect.performance, "interference": effect.interference}
+    if tasks is not None:
+        rows |= {name: tasks[:, column] for column, name in enumerate(TASK_COLUMNS)}
     numbers = {
-        name: None if found is None else {part: plain(getattr(found, part)) for part in ("mean", "lower", "upper")}
-        for name, found in summaries.items()
+        name: {part: plain(getattr(summary, part)) for part in ("mean", "lower", "upper")}
+        for name, values in rows.items()
+        for summary in [aggregate(values)]
     }
     return {**effect.cell._asdict(), "is_same": effect.is_same, "n_runs": len(effect.performance), **numbers}
 
 
-def _readings(result: AblationResult) -> str:
+def _numbers(records: Sequence[Any], performance: Quantity) -> tuple[float, float]:
+    done = float(np.mean([performance_number(record, performance) for record in records]))
+    return done, float(np.mean([record.interference_fraction.mean() for record in records]))
+
+
+def _readings(result: AblationResult, performance: Quantity) -> str:
     """Return a table of performance and interference under both readings."""
-    header = "| world | robots | policy | described: performance | program | described: interference | program |"
-    lines = [header, "|---|--:|---|--:|--:|--:|--:|"]
-    for cell, records in result.records.items():
-        twin = result.records.get(cell._replace(base="program"))
-        if cell.quirk or cell.base != "described" or twin is None:
-            continue
-        rates = [f"{np.mean([record.rate_per_1000_s('performance') for record in own]):.1f}" for own in (records, twin)]
-        lost = [f"{np.mean([record.interference_fraction.mean() for record in own]):.3f}" for own in (records, twin)]
-        lines.append("| " + " | ".join([cell.scenario, str(cell.n_robots), cell.policy, *rates, *lost]) + " |")
-    return "**Both readings.** Performance per 1,000 s, share of robot time in interference\n\n" + "\n".join(lines)
-
-
-def _tables(result: AblationResult, scenario: str, base: str, effects: Sequence[Effect], moving: set[str]) -> list[str]:
-    sizes = sorted({effect.cell.n_robots for effect in effects})
-    policies = tuple(dict.fromkeys(effect.cell.policy for effect in effects))
-    by_cell = {effect.cell: effect for effect in effects}
-    quirks = [quirk for quirk in dict.fromkeys(effect.cell.quirk for effect in effects) if quirk in moving]
-
-    def table(title: str, text: Callable[[Effect], str], *, with_order: bool = False) -> str:
-        columns = [(size, policy) for size in sizes for policy in policies]
-        head = ["quirk", *(f"{policy} {size}" for size, policy in columns)]
-        head += [f"order at {size}" for size in sizes] if with_order else []
-        rows = [head, ["---", *("--:" for _ in columns), *("---" for _ in sizes if with_order)]]
-        for quirk in quirks:
-            cells = [Cell(scenario, size, policy, base, quirk) for size, policy in columns]
-            row = [f"`{quirk}`", *(text(by_cell[cell]) if cell in by_cell else "-" for cell in cells)]
-            row += [_order(result, Cell(scenario, size, "", base, quirk)) for size in sizes] if with_order else []
-            rows.append(row)
-        shown = "\n".join("| " + " | ".join(row) + " |" for row in rows)
-        return f"**{scenario}, each quirk {_SWITCHED[base]}: {title}**\n\n{shown}"
-
-    orders = [" > ".join(result.order(Cell(scenario, size, "", base, ""))) for size in sizes]
-    before = "; ".join(f"at {size} robots {order}" for size, order in zip(sizes, orders, strict=True))
-    tables = [
-        table(f"performance, % of the reading's. Order without it: {before}", _performance_text, with_order=True),
-        table("interference, points of % of robot time", _interference_text),
+    lines = [
+        "| world | robots | policy | described: performance | program | described: interference | program |",
+        "|---|--:|---|--:|--:|--:|--:|",
     ]
-    if any(effect.task_shares is not None for effect in effects):
-        tables.append(table("largest change of a task's share, points of %", _task_text))
+    for cell, records in result.records.items():
+        twin = result.records.get(cell._replace(reading="AUTHORS_PROGRAM"))
+        if cell.quirk or cell.reading != "DESCRIBED" or twin is None:
+            continue
+        (done, lost), (done_there, lost_there) = (_numbers(own, performance) for own in (records, twin))
+        numbers = f"{done:.1f} | {done_there:.1f} | {lost:.3f} | {lost_there:.3f}"
+        lines.append(f"| {cell.scenario} | {cell.n_robots} | {cell.policy} | {numbers} |")
+    title = (
+        f"**Both readings.** {performance.title.capitalize()} {span(performance)}, share of robot time in interference"
+    )
+    return title + "\n\n" + "\n".join(lines)
+
+
+def _tables(result: AblationResult, effects: Sequence[Effect], moving: set[str]) -> list[str]:
+    """Tables of one world and reading: performance with orders, interference, tasks."""
+    some = effects[0].cell
+    sizes = sorted({effect.cell.n_robots for effect in effects})
+    order = [f"order at {size}: {_order(result, some._replace(n_robots=size, quirk=''))}" for size in sizes]
+    head = f"{some.scenario}, each quirk {_SWITCHED[some.reading]}"
+    orders = {
+        f"order at {size}": {
+            quirk: _changed_order(result, some._replace(n_robots=size, quirk=quirk)) for quirk in moving
+        }
+        for size in sizes
+    }
+    own = [effect for effect in effects if effect.cell.quirk in moving]
+    tables = [
+        f"**{head}: performance, % of the reading's** ({'; '.join(order)})\n\n"
+        + _table(own, _starred(own, "performance"), orders),
+        f"**{head}: interference, points of % of robot time**\n\n" + _table(own, _starred(own, "interference"), {}),
+    ]
+    if any(effect.task_shares is not None for effect in own):
+        tables.append(f"**{head}: task whose share moved most, points of %**\n\n" + _table(own, _task_text, {}))
     return tables
 
 
+def _table(effects: Sequence[Effect], text: Callable[[Effect], str], more: dict[str, dict[str, str]]) -> str:
+    """One row per quirk, one column per size and policy, and further columns by quirk."""
+    columns = sorted({(e.cell.n_robots, e.cell.policy) for e in effects}, key=lambda column: column[0])
+    policies = list(dict.fromkeys(e.cell.policy for e in effects))
+    columns.sort(key=lambda column: (column[0], policies.index(column[1])))
+    rows = [["quirk", *(f"{policy} {size}" for size, policy in columns), *more]]
+    rows.append(["---", *("--:" for _ in columns), *("---" for _ in more)])
+    texts = {(e.cell.quirk, e.cell.n_robots, e.cell.policy): text(e) for e in effects}
+    for quirk in dict.fromkeys(e.cell.quirk for e in effects):
+        cells = [texts.get((quirk, *column), "-") for column in columns]
+        rows.append([f"`{quirk}`", *cells, *(column[quirk] for column in more.values())])
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
 def _order(result: AblationResult, cell: Cell) -> str:
-    order, before = result.order(cell), result.order(cell._replace(quirk=""))
-    return "as before" if order == before else " > ".join(order)
+    """Policies, best first; those with close means are joined by "~"."""
+    means = result.means(cell)
+    joints = [" ~ " if worse >= (1.0 - CLOSE) * better else " > " for better, worse in pairwise(means.values())]
+    return "".join(name + joint for name, joint in zip(means, [*joints, ""], strict=True))
 
 
-def _share(effect: Effect) -> Summary:
-    return aggregate(effect.performance)
+def _changed_order(result: AblationResult, cell: Cell) -> str:
+    order, before = _order(result, cell), _order(result, cell._replace(quirk=""))
+    return "as before" if order == before else order
 
 
-def _interference(effect: Effect) -> Summary:
-    return aggregate(effect.interference)
+def _starred(effects: Sequence[Effect], quantity: str) -> Callable[[Effect], str]:
+    """Return what writes the mean of a quantity, with a star where it is significant."""
+    columns: dict[tuple[int, str], list[Effect]] = {}
+    for effect in effects:
+        if not effect.is_same:
+            columns.setdefault((effect.cell.n_robots, effect.cell.policy), []).append(effect)
+    cells = [effect.cell for column in columns.values() for effect in column]
+    p_values = [pooled_p(np.array([getattr(effect, quantity) for effect in column])) for column in columns.values()]
+    adjusted = dict(zip(cells, holm(np.concatenate(p_values)) if p_values else (), strict=True))
 
+    def text(effect: Effect) -> str:
+        mean = float(getattr(effect, quantity).mean())
+        if effect.is_same or np.isnan(mean):
+            return "=" if effect.is_same else "-"
+        return f"{100.0 * mean:+.1f}" + ("*" if adjusted[effect.cell] <= ALPHA else "")
 
-def _task_shift(effect: Effect) -> Summary | None:
-    """The task whose mean share moved most; None without tasks."""
-    if effect.task_shares is None:
-        return None
-    most = int(np.argmax(np.abs(effect.task_shares.mean(axis=0))))
-    return aggregate(effect.task_shares[:, most])
-
-
-def _text(summary: Summary | None, *, is_same: bool) -> str:
-    if summary is None:
-        return "-"
-    if is_same:
-        return _NOTHING
-    if math.isnan(summary.mean):
-        return "-"
-    leaves_out_0 = summary.lower > 0.0 or summary.upper < 0.0
-    return f"{100.0 * summary.mean:+.1f}" + ("*" if leaves_out_0 else "")
-
-
-def _performance_text(effect: Effect) -> str:
-    return _text(_share(effect), is_same=effect.is_same)
-
-
-def _interference_text(effect: Effect) -> str:
-    return _text(_interference(effect), is_same=effect.is_same)
+    return text
 
 
 def _task_text(effect: Effect) -> str:
-    return _text(_task_shift(effect), is_same=effect.is_same)
+    """The task whose mean share moved most, and by how much."""
+    if effect.task_shares is None or effect.is_same:
+        return "-" if effect.task_shares is None else "="
+    shifts = effect.task_shares.mean(axis=0)
+    most = int(np.argmax(np.abs(shifts)))
+    return f"{TASK_COLUMNS[most].removeprefix('task_share_').replace('_', ' ')} {100.0 * shifts[most]:+.1f}"

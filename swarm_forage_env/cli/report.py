@@ -70,7 +70,7 @@ def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[C
                     controller=controller,
                     caches=kind,
                     n_runs=len(own),
-                    performance=_estimate([_performance(record, read_as) for record in own]),
+                    performance=_estimate([performance_number(record, read_as) for record in own]),
                     deliveries_per_1000_s=_estimate([record.rate_per_1000_s("collected") for record in own]),
                     first_pickups_per_1000_s=_estimate([record.rate_per_1000_s("first_picked") for record in own]),
                     interference_fraction=float(np.mean([record.interference_fraction.mean() for record in own])),
@@ -95,7 +95,7 @@ def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummar
     other = None if first.performance == "collected" else quantity(first.performance)
     for name in ("controller", "caches"):
         table.add_column(name)
-    numbers = ["runs", *([f"{other.title}\n{_span(other)}"] if other else []), "deliveries\nper 1,000 s"]
+    numbers = ["runs", *([f"{other.title}\n{span(other)}"] if other else []), "deliveries\nper 1,000 s"]
     for name in (*numbers, "interference", "simulated s\nper wall s"):
         table.add_column(name, justify="right")
     for row in summaries:
@@ -136,7 +136,7 @@ def results_json(specs: Sequence[RunSpec], result: StudyResult, store: RunStore,
     runs = [
         {
             **record.keys(),
-            "performance": _performance(record, read_as),
+            "performance": performance_number(record, read_as),
             "deliveries_per_1000_s": record.rate_per_1000_s("collected"),
             "first_pickups_per_1000_s": record.rate_per_1000_s("first_picked"),
             "interference_fraction": float(record.interference_fraction.mean()),
@@ -208,13 +208,13 @@ def estimate(seconds: float, jobs: int, *, any_left: bool) -> str:
     )
 
 
-def _performance(record: RunRecord, read_as: Quantity) -> float:
+def performance_number(record: RunRecord, read_as: Quantity) -> float:
     """Return the performance of a run as one number: per 1,000 s for totals, else the mean over intervals."""
     return record.rate_per_1000_s("performance") if read_as.is_total else float(record.performance.mean())
 
 
-def _span(read_as: Quantity) -> str:
-    """Return what `_performance` is, in words."""
+def span(read_as: Quantity) -> str:
+    """Return what `performance_number` counts, in words."""
     return "per 1,000 s" if read_as.is_total else "mean"
 
 

@@ -6,7 +6,8 @@ reading, bit for bit, does nothing there; its other seeds are not run.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,14 +15,15 @@ from swarm_forage_env._internal.fields import ConfigError, known_name
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, QUIRK_NAMES, Quirks
+from swarm_forage_env.scenarios.quirks import QUIRK_NAMES, READINGS
 from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.runner import run_all
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.study.store import RunFailure, RunStore
 
-BASES = {"described": Quirks(), "program": AUTHORS_PROGRAM}
-"""Reading -> its quirks."""
+if TYPE_CHECKING:
+    from swarm_forage_env.wrappers.base import WrapperConfig
+
 TASK_COLUMNS = tuple(f"task_share_{task.name.lower()}" for task in Task)
 
 
@@ -31,8 +33,8 @@ class Cell(NamedTuple):
     scenario: str
     n_robots: int
     policy: str
-    base: str
-    """Key of `BASES`."""
+    reading: str
+    """Key of `scenarios.quirks.READINGS`."""
     quirk: str
     """The quirk that differs from the reading; empty = none."""
 
@@ -60,7 +62,7 @@ class Effect:
 
     cell: Cell
     is_same: bool
-    """Whether the first run equals that of the reading bit for bit; then all differences are 0."""
+    """Whether the first run equals that of the reading bit for bit. Then no other was made, and R = 1."""
     performance: FloatArray
     """(R,) difference as a share of the reading's mean performance; NaN if that is 0."""
     interference: FloatArray
@@ -84,18 +86,17 @@ class AblationResult:
             if cell.quirk and cell._replace(quirk="") in self.records
         )
 
-    def order(self, cell: Cell) -> tuple[str, ...]:
-        """Return the policies of a cell's world and rules, best mean performance first.
+    def means(self, cell: Cell) -> dict[str, float]:
+        """Return the mean performance of each policy in a cell's world under its rules, best first.
 
-        A policy whose own runs failed under these rules is left out; for one that the quirk does not touch, those of
-        its reading count.
+        A policy whose runs failed is left out. One that the quirk does not touch has the runs of its reading.
         """
-        means: dict[str, float] = {}
+        found = {}
         for policy in dict.fromkeys(other.policy for other in self.records):
             own = self.records.get(cell._replace(policy=policy))
             if own is not None:
-                means[policy] = _mean_performance(own)
-        return tuple(sorted(means, key=lambda policy: -means[policy]))
+                found[policy] = _mean_performance(own)
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 
 def plan_ablation(
@@ -105,6 +106,7 @@ def plan_ablation(
     quirks: Sequence[str] = QUIRK_NAMES,
     seeds: Sequence[int] = (0, 1, 2),
     caches: str | None = None,
+    wrappers: "Iterable[WrapperConfig]" = (),
 ) -> Ablation:
     """Return the runs that show what each quirk does.
 
@@ -114,9 +116,10 @@ def plan_ablation(
         quirks: Names of the quirks to switch; none = compare the two readings only.
         seeds: Seeds of the runs; differences are taken seed by seed.
         caches: Which caches there are; default those of each policy.
+        wrappers: Configurations of noise, throttling and population dynamics, the same in all runs.
 
     Raises:
-        ConfigError: an unknown quirk, no policy or no seed.
+        ConfigError: an unknown quirk, no policy, no seed, or two worlds of one name and size.
         ValueError: an unknown policy.
     """
     for name in quirks:
@@ -124,14 +127,16 @@ def plan_ablation(
     if not policies or not seeds:
         raise ConfigError(f"Expected one or more policies and seeds, got {len(policies)} and {len(seeds)}.")
     specs: dict[Cell, tuple[RunSpec, ...]] = {}
-    for scenario in scenarios:
-        for base, reading in BASES.items():
-            for quirk in ("", *quirks):
-                rules = replace(reading, **{quirk: not getattr(reading, quirk)}) if quirk else reading
-                for policy in policies:
-                    planned = plan_run(replace(scenario, quirks=rules), policy, caches=caches)
-                    cell = Cell(scenario.name, scenario.robots.n_robots, policy, base, quirk)
-                    specs[cell] = tuple(replace(planned, seed=seed) for seed in seeds)
+    for scenario, (reading, rules), quirk, policy in product(scenarios, READINGS.items(), ("", *quirks), policies):
+        switched = replace(rules, **{quirk: not getattr(rules, quirk)}) if quirk else rules
+        planned = plan_run(replace(scenario, quirks=switched), policy, caches=caches, wrappers=tuple(wrappers))
+        cell = Cell(scenario.name, scenario.robots.n_robots, policy, reading, quirk)
+        if cell in specs:
+            raise ConfigError(
+                f"Expected worlds that differ in name or number of robots, got {cell.scenario} with {cell.n_robots} "
+                "robots twice."
+            )
+        specs[cell] = tuple(replace(planned, seed=seed) for seed in seeds)
     return Ablation(specs=specs)
 
 
@@ -172,7 +177,8 @@ def _mean_performance(records: Sequence[RunRecord]) -> float:
 
 
 def _effect(cell: Cell, base: Sequence[RunRecord], switched: Sequence[RunRecord]) -> Effect:
-    pairs = list(zip(base, switched, strict=True))
+    is_same = _same_columns(base[0], switched[0])
+    pairs = list(zip(base, switched, strict=True))[: 1 if is_same else None]
     whole = _mean_performance(base)
     gains = np.array([after.performance.sum() - before.performance.sum() for before, after in pairs])
     shares = [
@@ -182,7 +188,7 @@ def _effect(cell: Cell, base: Sequence[RunRecord], switched: Sequence[RunRecord]
     ]
     return Effect(
         cell=cell,
-        is_same=_same_columns(*pairs[0]),
+        is_same=is_same,
         performance=gains / whole if whole else np.full(len(pairs), np.nan),
         interference=np.array(
             [after.interference_fraction.mean() - before.interference_fraction.mean() for before, after in pairs]

@@ -24,13 +24,16 @@ def test_tables_show_both_readings_and_what_each_quirk_moves(command):
     assert again == out
     assert "all runs are stored already" in err or "runs are stored already" in err
     code, out, _ = command(*ABLATE, *QUIRKS, "--json")
-    effects = json.loads(out)["effects"]
-    assert len(effects) == 2 * 2 * 2 * 3
-    (one,) = (e for e in effects if (e["n_robots"], e["policy"], e["base"], e["quirk"]) ==
-              (8, "crw", "described", "integer_estimates"))  # fmt: skip
-    assert one["is_same"] is True
-    assert one["interference"] == {"mean": 0.0, "lower": 0.0, "upper": 0.0}
-    assert one["task_shares"] is None
+    answer = json.loads(out)
+    assert len(answer["effects"]) == 2 * 2 * 2 * 3
+    (one,) = (e for e in answer["effects"] if (e["n_robots"], e["policy"], e["reading"], e["quirk"]) ==
+              (8, "crw", "DESCRIBED", "integer_estimates"))  # fmt: skip
+    assert (one["is_same"], one["n_runs"]) == (True, 1)
+    assert one["interference"] == {"mean": 0.0, "lower": None, "upper": None}
+    assert "task_share_none" not in one
+    assert len(answer["readings"]) == 2 * 2 * 2
+    assert answer["performance"] == "deliveries per 1,000 s"
+    assert answer["failures"] == []
 
 
 @pytest.mark.compiled
@@ -39,6 +42,17 @@ def test_without_quirks_only_the_readings_are_compared(command):
     assert code == 0
     assert "quirk |" not in out
     assert out.count("| crw |") == 2
+
+
+@pytest.mark.compiled
+def test_worlds_may_be_disturbed_and_performance_another(command):
+    words = ("--quirks", "obstacle_behind_counts", "--policy", "crw", "--robots", "8")
+    disturbed = ("--wrapper", "sensor_noise:sigma=0.01,groups=proximity", "--performance", "n_carrying")
+    code, out, _ = command(*ABLATE, *words, *disturbed)
+    assert code == 0
+    assert "**Both readings.** Robots carrying" in out
+    assert "per 1,000 s" not in out
+    assert "| `obstacle_behind_counts` |" in out
 
 
 def test_dry_run_makes_nothing(command):

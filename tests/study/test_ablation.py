@@ -1,5 +1,7 @@
 """Ablation of quirks: which runs are planned, which are left out, and what the differences are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, QUIRK_NAMES, Quir
 from swarm_forage_env.study.ablation import TASK_COLUMNS, Cell, plan_ablation, run_ablation
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.store import RunStore
+from swarm_forage_env.wrappers.noise import SensorNoiseConfig
 
 WORLD = scenario("warehouse_small", n_robots=6, horizon_s=40.0, interval_s=20.0, start_margin_m=6.5)
 
@@ -17,12 +20,12 @@ def test_each_quirk_is_switched_alone_in_both_readings():
     plan = plan_ablation([WORLD], ["crw"], seeds=[3])
     rules = {cell: specs[0].scenario.quirks for cell, specs in plan.specs.items()}
     assert len(rules) == 2 * (1 + len(QUIRK_NAMES))
-    assert rules[Cell("warehouse_small", 6, "crw", "described", "")] == Quirks()
-    assert rules[Cell("warehouse_small", 6, "crw", "program", "")] == AUTHORS_PROGRAM
+    assert rules[Cell("warehouse_small", 6, "crw", "DESCRIBED", "")] == Quirks()
+    assert rules[Cell("warehouse_small", 6, "crw", "AUTHORS_PROGRAM", "")] == AUTHORS_PROGRAM
     for name in QUIRK_NAMES:
-        assert rules[Cell("warehouse_small", 6, "crw", "described", name)] == Quirks(**{name: True})
+        assert rules[Cell("warehouse_small", 6, "crw", "DESCRIBED", name)] == Quirks(**{name: True})
         off = {other: other != name for other in QUIRK_NAMES}
-        assert rules[Cell("warehouse_small", 6, "crw", "program", name)] == Quirks(**off)
+        assert rules[Cell("warehouse_small", 6, "crw", "AUTHORS_PROGRAM", name)] == Quirks(**off)
 
 
 def test_a_quirk_without_effect_is_run_once_and_one_with_effect_with_every_seed(tmp_path):
@@ -34,19 +37,19 @@ def test_a_quirk_without_effect_is_run_once_and_one_with_effect_with_every_seed(
     # Nobody delivers in 40 s, so nobody leaves the nest after it; exploring starts in the first tick.
     assert len(list(tmp_path.rglob("*.parquet"))) == 4 + 2 * 1 + 2 * 2
     effects = {effect.cell[3:]: effect for effect in result.effects()}
-    assert effects.keys() == {(base, quirk) for base in ("described", "program") for quirk in quirks}
-    for base in ("described", "program"):
-        assert effects[base, "nest_left_at_random"].is_same
-        assert not effects[base, "nest_left_at_random"].interference.any()
-        assert not effects[base, "explore_double_start"].is_same
-        assert len(effects[base, "explore_double_start"].interference) == 2
+    assert effects.keys() == {(reading, quirk) for reading in ("DESCRIBED", "AUTHORS_PROGRAM") for quirk in quirks}
+    for reading in ("DESCRIBED", "AUTHORS_PROGRAM"):
+        assert effects[reading, "nest_left_at_random"].is_same
+        assert effects[reading, "nest_left_at_random"].interference.tolist() == [0.0]
+        assert not effects[reading, "explore_double_start"].is_same
+        assert len(effects[reading, "explore_double_start"].interference) == 2
     assert result.failures == ()
 
 
 def test_differences_are_those_of_the_runs_with_the_same_seed():
     world = scenario("warehouse_small", n_robots=20, n_objects=300, horizon_s=400.0)
     plan = plan_ablation([world], ["stochm"], quirks=["integer_estimates"], seeds=[0, 1])
-    effect = next(e for e in run_ablation(plan, jobs=1).effects() if e.cell.base == "described")
+    effect = next(e for e in run_ablation(plan, jobs=1).effects() if e.cell.reading == "DESCRIBED")
     pairs = [[run_one(plan.specs[effect.cell._replace(quirk=quirk)][seed]) for quirk in ("", "integer_estimates")]
              for seed in (0, 1)]  # fmt: skip
     mean = np.mean([before.performance.sum() for before, _ in pairs])
@@ -62,8 +65,20 @@ def test_differences_are_those_of_the_runs_with_the_same_seed():
 def test_policies_are_ordered_by_performance():
     world = scenario("warehouse_small", n_robots=20, horizon_s=1000.0)
     result = run_ablation(plan_ablation([world], ["random", "dpo"], quirks=[], seeds=[0]), jobs=1)
-    assert result.order(Cell("warehouse_small", 20, "", "described", "")) == ("dpo", "random")
+    assert list(result.means(Cell("warehouse_small", 20, "", "DESCRIBED", ""))) == ["dpo", "random"]
     assert result.effects() == ()
+
+
+def test_two_worlds_of_one_name_and_size_are_refused():
+    with pytest.raises(
+        ConfigError, match="differ in name or number of robots, got warehouse_small with 6 robots twice"
+    ):
+        plan_ablation([WORLD, replace(WORLD, horizon_s=60.0)], ["crw"], quirks=[])
+
+
+def test_disturbances_are_the_same_in_all_runs():
+    plan = plan_ablation([WORLD], ["crw"], quirks=["explore_double_start"], wrappers=[SensorNoiseConfig(sigma=0.01)])
+    assert {spec.wrappers for spec in plan.all} == {(SensorNoiseConfig(sigma=0.01),)}
 
 
 @pytest.mark.parametrize(
