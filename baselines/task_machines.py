@@ -25,6 +25,7 @@ from .cache_choice import cache_is_known, from_nest_m, object_is_near, select_ca
 from .cache_memory import (
     OneTaskMemory,
     TaskMemory,
+    cell_of,
     event_cache_entry,
     event_object_row,
     look_for_caches,
@@ -194,12 +195,13 @@ def follow_events(
         if task == _TRANSFERER:
             entry = event_cache_entry(robot, row, c, memory.caches)
             if entry >= 0:
-                cache = memory.caches[entry]
-                cache.no_drop = True
+                memory.caches[entry].no_drop = True
                 robot.shunned_cache_in_task = True
-                if not c.transferer_goes_anywhere:
-                    x, y = (cache.cell_x + 0.5) * c.cell_m, (cache.cell_y + 0.5) * c.cell_m
-                    robot.cargo_from_nest_m = from_nest_m(x, y, c)
+            if not c.transferer_goes_anywhere and row[c.event_cache] > 0.0:
+                # From the event: the cache may have been used up in the same tick, and be forgotten.
+                x = cell_of(row[c.event_cache + 1], c.half_width_m, c)
+                y = cell_of(row[c.event_cache + 2], c.half_height_m, c)
+                robot.cargo_from_nest_m = from_nest_m((x + 0.5) * c.cell_m, (y + 0.5) * c.cell_m, c)
     elif robot.activity == FINISHED:
         if task in (_STARTER, _FINISHER):
             shun_object(robot, memory, event_object_row(row, c))

@@ -37,6 +37,8 @@ class Quirks:
     """A Cache Finisher arrives at one distance and is accepted at another; starting within tolerance is no arrival."""
     obstacle_behind_counts: bool = False
     """A summed proximity vector that points straight back is an obstacle whatever its length."""
+    pose_sensors_exact: bool = False
+    """Sensor noise never acts on positions and headings."""
     nest_left_at_random: bool = False
     """After a delivery robots of CRW and DPO walk at random until they have left the nest."""
     explore_double_start: bool = False
@@ -66,6 +68,7 @@ AUTHORS_PROGRAM = Quirks(
     last_cache_at_every_sight=True,
     finisher_tolerance_mismatch=True,
     obstacle_behind_counts=True,
+    pose_sensors_exact=True,
     nest_left_at_random=True,
     explore_double_start=True,
     site_box_truncated=True,

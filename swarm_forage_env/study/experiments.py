@@ -19,12 +19,11 @@ from swarm_forage_env._internal.fields import ConfigError, known_name, whole
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import DENSITY, SEARCH_AND_RESCUE_OBJECTS, search_and_rescue
 from swarm_forage_env.scenarios.presets import scenario as preset_scenario
-from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.scenarios.sizing import arena_at_density, in_arena, robots_at_density
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig, square_costs
-from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, noise_levels
+from swarm_forage_env.wrappers.noise import noise_levels
 from swarm_forage_env.wrappers.population import PopulationConfig, death_levels, malfunction_levels
 from swarm_forage_env.wrappers.throttle import ThrottleConfig, sine_throttles, square_throttles
 
@@ -311,9 +310,8 @@ def _compressed(config: _Waved, factor: float) -> _Waved:
 
 
 def _noise_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
-    groups = STUDY_NOISE_GROUPS if scenario.quirks == AUTHORS_PROGRAM else NOISE_GROUPS
     levels: list[_Level] = []
-    for sensor, actuator in noise_levels(SIGMA_MAX.get(scenario.name, max(SIGMA_MAX.values())), groups=groups):
+    for sensor, actuator in noise_levels(SIGMA_MAX.get(scenario.name, max(SIGMA_MAX.values()))):
         assert isinstance(actuator.sigma, float), "levels are constant"
         levels.append((actuator.sigma, (sensor, actuator)))
     return [], levels[1:]  # the first is sigma = 0, the undisturbed run

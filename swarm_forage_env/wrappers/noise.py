@@ -24,8 +24,8 @@ from swarm_forage_env.wrappers.waveform import Signal, Waveform, gather_waveform
 
 NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
 """Groups of sensors that can be noisy, in the order of their columns."""
-STUDY_NOISE_GROUPS = NOISE_GROUPS[:4]
-"""Groups that are noisy in the authors' program; the paper speaks of all sensors."""
+POSE_GROUPS = NOISE_GROUPS[4:]
+"""Groups that the authors' program leaves exact (quirk `pose_sensors_exact`); the paper speaks of all sensors."""
 DISTRIBUTIONS = ("gaussian", "uniform")
 
 Sigma: TypeAlias = float | Waveform
@@ -63,7 +63,9 @@ class SensorNoise(SwarmWrapper):
         """Wrap `env`."""
         super().__init__(env)
         self._is_uniform = config.distribution == "uniform"
-        self._place_groups({name: sigma for name, sigma in config.group_sigmas().items() if _is_noisy(sigma)})
+        exact = POSE_GROUPS if self.unwrapped.scenario.quirks.pose_sensors_exact else ()
+        sigmas = config.group_sigmas().items()
+        self._place_groups({name: sigma for name, sigma in sigmas if _is_noisy(sigma) and name not in exact})
         self._draws: ObsArray = np.zeros((self.unwrapped.scenario.robots.n_robots, len(self._factors)), np.float32)
 
     def _place_groups(self, sigmas: dict[str, Sigma]) -> None:
@@ -267,7 +269,7 @@ def noise_levels(
         sigma_max: Highest sigma: 0.03 in the warehouses and 0.10 in search and rescue (paper; the study configuration
             of search and rescue has 0.05).
         n_levels: Levels in equal steps from 0, which is the ideal (study configuration: 8).
-        groups: Noisy sensors. The authors' program adds none to positions and headings: `STUDY_NOISE_GROUPS`.
+        groups: Noisy sensors.
     """
     return tuple(
         (SensorNoiseConfig(sigma=sigma, groups=groups), ActuatorNoiseConfig(sigma=sigma))

@@ -8,7 +8,7 @@ from baselines.machines import VectorState
 from swarm_forage_env.contract.codes import Event, Task
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.task_robot import TaskRobot
-from tests.support.task_work import CACHE_SEEN, NEARER, drop, give_up, pick_up, wait_for_drop
+from tests.support.task_work import CACHE_SEEN, NEARER, drop, give_up, pick_up, wait_for_drop, wait_for_pickup
 
 
 @pytest.fixture
@@ -43,6 +43,16 @@ def test_a_transferer_goes_towards_the_nest(cell, quirks, goes):
     assert (robot.stage is VectorState.VECTOR) == goes
     if goes:
         assert robot.record.target == 8
+
+
+def test_a_transferer_knows_where_it_took_from_even_if_the_cache_is_gone(robot):
+    wait_for_pickup(robot, Task.TRANSFERER)
+    robot.seen.caches()  # used up in the same tick, and forgotten at once
+    robot.seen.carry(3)
+    robot.seen.event(Event.PICKED_FROM_CACHE, object_row=3, cache=CACHE_SEEN)
+    robot.act()
+    assert robot.record.n_caches == 0
+    assert robot.record.cargo_from_nest_m == pytest.approx(math.dist((14.5, 8.1), (3.2, 8.0)))
 
 
 def test_only_transferers_mind_the_way_to_the_nest(robot):

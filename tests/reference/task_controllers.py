@@ -152,6 +152,7 @@ class ReferenceTaskRobot(ReferenceRobot):
             self.cargo_from = None
             if self.job == "transferer" and known:
                 known.no_drop = self.shunned_cache_now = True
+            if self.job == "transferer" and serial:
                 self.cargo_from = cell
             return
         if self.carrying and self.state == "wait for drop" and failed:

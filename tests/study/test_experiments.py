@@ -6,7 +6,6 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.study.experiments import (
     BUDGETS,
     CRITERIA,
@@ -18,7 +17,6 @@ from swarm_forage_env.study.experiments import (
     size_ladder,
     spread,
 )
-from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, SensorNoiseConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 
@@ -116,13 +114,6 @@ def test_noise_rises_in_equal_steps_from_the_undisturbed_run(name, highest):
     reference, *levels = planned(name, "noise")
     assert (reference.criterion, reference.wrappers) == (UNDISTURBED, ())
     assert [level.value for level in levels] == pytest.approx([highest * step / 7 for step in range(1, 8)])
-
-
-@pytest.mark.parametrize(("quirks", "groups"), [({}, NOISE_GROUPS), ({"quirks": AUTHORS_PROGRAM}, STUDY_NOISE_GROUPS)])
-def test_position_and_heading_are_exact_in_the_authors_reading(quirks, groups):
-    *_, strongest = planned("warehouse_small", "noise", **quirks)
-    (sensors,) = [config for config in strongest.wrappers if isinstance(config, SensorNoiseConfig)]
-    assert sensors.groups == groups
 
 
 @pytest.mark.parametrize(("name", "repair"), [("warehouse_small", 0.001022222), ("warehouse_medium", 0.001005556)])

@@ -9,10 +9,10 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.detection import sees_cache, sees_nest, sees_object, sees_obstacle
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.wrappers.kernels.gaussian import to_normal
 from swarm_forage_env.wrappers.noise import (
     NOISE_GROUPS,
-    STUDY_NOISE_GROUPS,
     ActuatorNoise,
     ActuatorNoiseConfig,
     SensorNoise,
@@ -297,13 +297,23 @@ def test_decisions_under_the_noise_of_the_study(world, sigma, obstacle, object_s
 
 
 def test_levels_of_the_study():
-    warehouses, rescue = noise_levels(), noise_levels(0.10, groups=STUDY_NOISE_GROUPS)
+    warehouses, rescue = noise_levels(), noise_levels(0.10, groups=NOISE_GROUPS[:4])
     sigmas = [sensors.sigma for sensors, _ in warehouses]
     assert sigmas == pytest.approx([0.0, 0.0043, 0.0086, 0.0129, 0.0171, 0.0214, 0.0257, 0.03], abs=5e-5)
     assert [wheels.sigma for _, wheels in warehouses] == sigmas
     assert {sensors.groups for sensors, _ in warehouses} == {NOISE_GROUPS}
     assert {sensors.groups for sensors, _ in rescue} == {("proximity", "light", "ground", "wheel_speed")}
     assert rescue[-1][0].sigma == 0.10
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_quirk_pose_sensors_exact(exact):
+    env = ForageEnv(scenario("warehouse_small", n_robots=5, quirks=Quirks(pose_sensors_exact=exact)))
+    true = env.reset_batch(0).copy()
+    stack = SensorNoise(env, SensorNoiseConfig(sigma=0.1))
+    seen = stack.reset_batch(0)
+    changed = {name: bool((seen[:, env.layout[name]] != true[:, env.layout[name]]).any()) for name in NOISE_GROUPS}
+    assert changed == {name: not exact or name not in ("position", "heading") for name in NOISE_GROUPS}
 
 
 # Draws
