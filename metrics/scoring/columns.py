@@ -39,8 +39,8 @@ CURVE_COLUMNS: dict[str, Column] = {
     "adversity": Column(
         "number",
         "1 or ticks",
-        "conditions V(t), mean over the interval: of a throttle, or the ticks that handling takes under a handling cost; "
-        "those of the reference run are I_ec",
+        "conditions V(t), mean over the interval: of a throttle, or under a handling cost the ticks that handling "
+        "takes; those of the reference run are I_ec",
     ),
     "throttle": Column("number", "1", "conditions V(t) at the end of the interval, as the paper samples them"),
     "handling_cost": Column("amount", "ticks", "likewise, under a handling cost"),

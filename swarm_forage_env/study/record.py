@@ -85,7 +85,7 @@ class RunRecord:
     n_caches: Annotated[FloatArray, Column("caches", "mean over ticks")]
     n_objects_cached: Annotated[FloatArray, Column("objects", "mean over ticks of objects inside caches")]
     adversity: Annotated[
-        FloatArray, Column("1 or ticks", "mean over ticks: V(t) of a throttle, else the ticks that handling takes, else 0")
+        FloatArray, Column("1 or ticks", "mean over ticks of a throttle, else of the ticks that handling takes, else 0")
     ]
 
     contributed: Mapping[str, FloatArray]

@@ -23,8 +23,8 @@ class HandlingCost(SwarmWrapper):
     object after tick 15. Nothing takes less time than in the scenario (`pickup_ticks`, `drop_ticks`, usually one tick).
     The paper's second kind of temporal disturbance: a penalty for handling objects.
 
-    Records what handling took: `handling_cost`, the mean ticks of a pick-up and a drop that start in the last tick of an
-    interval, and `handling_cost_mean`, its mean over the interval.
+    Records what handling took: `handling_cost`, the mean ticks of a pick-up and a drop that start in the last tick of
+    an interval, and `handling_cost_mean`, its mean over the interval.
     """
 
     stack_position: ClassVar[int] = 5

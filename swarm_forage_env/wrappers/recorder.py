@@ -106,7 +106,7 @@ class RunRecorder(SwarmWrapper):
         return columns
 
     def _adversity(self) -> np.ndarray:
-        """Conditions, (T,): the throttle if there is one, else the ticks that handling takes under a cost, else zero."""
+        """Conditions, (T,): the throttle if there is one, else what handling takes under its cost, else zero."""
         for name in ("throttle_mean", "handling_cost_mean"):
             if name in self._contributed:
                 return self._contributed[name]
