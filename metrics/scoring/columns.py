@@ -43,7 +43,7 @@ CURVE_COLUMNS: dict[str, Column] = {
         "takes; those of the reference run are I_ec",
     ),
     "throttle": Column("number", "1", "conditions V(t) at the end of the interval, as the paper samples them"),
-    "handling_cost": Column("amount", "ticks", "likewise, under a handling cost"),
+    "handling_cost": Column("number", "ticks", "likewise, under a handling cost"),
     "deaths_per_s": Column("amount", "1/s", "rate of the whole swarm, the same in each row of a run"),
     "malfunctions_per_s": Column("amount", "1/s", "likewise"),
     "births_per_s": Column("amount", "1/s", "likewise"),
