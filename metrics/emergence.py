@@ -97,8 +97,8 @@ def time_emergence(
 ) -> FloatArray:
     """Spatial self-organisation in robot time, E_R(N1, N2): positive if less time is lost per robot in a larger swarm.
 
-        L(N, t) = N t_lost(N, t)                    robots' worth of time lost at N
-        E_R = mean_t [ (N2 / N1) L(N1, t) - L(N2, t) ] = N2 mean_t [ t_lost(N1, t) - t_lost(N2, t) ]
+        W(N, t) = N t_lost(N, t)                    robots' worth of time lost at N
+        E_R = mean_t [ (N2 / N1) W(N1, t) - W(N2, t) ] = N2 mean_t [ t_lost(N1, t) - t_lost(N2, t) ]
 
     This is Eq. (2) with the time lost itself in place of the performance lost. Eq. (2) weights that time with the
     performance achieved, so a swarm that achieves nothing loses nothing, and a collapse counts as organisation: with

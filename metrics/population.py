@@ -186,9 +186,8 @@ def availability(n: int, n_min: int, ratio_out: float) -> float:
 
         p_v = sum_{j=0}^{N - N_min} q^j pi_N = (1 - q^(N - N_min + 1)) / (1 - q^(N + 1)),    q = lambda / mu
 
-    The printed 1 / rho must be lambda / mu, so this rho is mu / lambda, entering over leaving. It is the reciprocal of
-    the rho of the queue equations, which would give the probability that at least n_min robots are *away*. The paper
-    does not define pi_N, the probability that all are at work; it is
+    Printed with 1 / rho in place of q. With the rho of the queue equations, lambda / mu, that would be the probability
+    that at least n_min robots are *away*. The paper does not define pi_N, the probability that all are at work; it is
     (1 - q) / (1 - q^(N + 1)).
 
     Args:
@@ -243,19 +242,19 @@ def ratio_for_availability(n: int, n_min: int, p_v: float) -> float:
 
 
 def ratio_for_team(team: float) -> float:
-    """Ratio q = lambda / mu = (1 + L) / L at which L robots are at work on average, if the swarm had no size limit.
+    """Ratio q = lambda / mu = (1 + M) / M at which M robots are at work on average, if the swarm had no size limit.
 
-    Then k robots are at work with probability (1 - rho) rho^k, rho = mu / lambda = L / (1 + L), with mean L. A swarm of
-    N robots cannot have more than N at work, so its own mean is below L:
+    Then k robots are at work with probability (1 - 1/q) / q^k, with mean 1 / (q - 1) = M. A swarm of N robots cannot
+    have more than N at work, so its own mean is below M:
     N - `queue_statistics(PopulationRates(lambda_bd=q, mu_bd=1.0), N).truncated_length`.
 
     Args:
-        team: L > 0, robots; need not be whole.
+        team: M > 0, robots; need not be whole.
 
     Raises:
-        PopulationError: L is not positive and finite.
+        PopulationError: M is not positive and finite.
 
-    Source: our choice of the reading that gives the 0.40 of the paper's availability figure (N = 50, N_min = 5, L = 5);
+    Source: our choice of the reading that gives the 0.40 of the paper's availability figure (N = 50, N_min = 5, M = 5);
     the queue length that the paper prints gives 0.454.
     """
     check_team(team)
@@ -265,17 +264,17 @@ def ratio_for_team(team: float) -> float:
 def availability_curves(n: int, teams: Sequence[float], n_min: Sequence[int] | None = None) -> FloatArray:
     """Availability p_v over the number of robots needed, one curve per mean team, Eq. (13).
 
-        p_v = sum_{k=N_min}^{N} rho^k / sum_{k=0}^{N} rho^k,    rho = L / (1 + L)
+        p_v = sum_{k=N_min}^{N} q^-k / sum_{k=0}^{N} q^-k,    q = (1 + M) / M
 
-    This is `availability` at the ratio `ratio_for_team(L)`, and the paper's availability figure.
+    This is `availability` at the ratio `ratio_for_team(M)`, and the paper's availability figure.
 
     Args:
         n: Swarm size N.
-        teams: Mean numbers of robots at work L, K of them; see `ratio_for_team`.
-        n_min: Numbers of robots needed, M of them. Default: 1, 2, ..., N.
+        teams: Mean numbers of robots at work M, K of them; see `ratio_for_team`.
+        n_min: Numbers of robots needed, J of them. Default: 1, 2, ..., N.
 
     Returns:
-        p_v in [0, 1], shape (K, M). Higher is better.
+        p_v in [0, 1], shape (K, J). Higher is better.
 
     Raises:
         CurveError: n < 1, or a number in n_min is not whole.

@@ -65,25 +65,25 @@ def _draft(
     )
 
 
-def _conditions(runs: RunCurves, variant: Variant) -> FloatArray:
+def _conditions(runs: RunCurves, disturbance: str, variant: Variant) -> FloatArray:
     """V(t), (R, T): the mean over each interval, or its value at the end of each, as in the paper's waveforms.
 
-    What robots deliver in an interval depends on the conditions in all of it, so the corrected form uses the mean.
+    What robots deliver in an interval depends on the conditions in all of it, so the corrected form uses the mean. The
+    column of the values at the end has the name of the disturbance.
     """
-    if runs.criterion == HANDLING:
-        # Ticks that handling takes, never less than one: twice as many halve the performance of a perfect swarm.
-        return np.maximum(1.0, runs.curves["adversity"])
-    sampled = runs.curves.get("throttle")
+    sampled = runs.curves.get(disturbance)
     return runs.curves["adversity"] if sampled is None or variant == "corrected" else sampled
 
 
 def _reactivity(ideal: RunCurves, disturbed: RunCurves, *, variant: Variant) -> FloatArray:
-    of_handling = disturbed.criterion == HANDLING
+    disturbance = disturbed.criterion
+    # Twice the ticks that handling takes halve the performance of a perfect swarm.
+    corrected = "reciprocal" if disturbance == HANDLING else "linear"
     measure = partial(
         reactivity,
-        v=_conditions(disturbed, variant),
-        i_ec=np.maximum(1.0, ideal.curves["adversity"]) if of_handling else _conditions(ideal, variant),
-        model="paper" if variant == "paper" else "reciprocal" if of_handling else "linear",
+        v=_conditions(disturbed, disturbance, variant),
+        i_ec=_conditions(ideal, disturbance, variant),
+        model="paper" if variant == "paper" else corrected,
     )
     return _on_clock(measure, ideal, disturbed, variant)
 
@@ -134,8 +134,8 @@ def _distance_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -
     if variant == "sierra" and study.horizon_s is None:
         raise Uncomputable("there is no column t_end_s, the clock that this form has in its cost")
     for reference, level in levels:
-        if name == "reactivity" and variant == "paper" and _has_perfect_conditions(reference):
-            raise Uncomputable("the printed form divides by the ideal conditions, which are 0 here")
+        if name == "reactivity":
+            _check_conditions(reference, level, variant)
         floor = float(_floor(reference, variant).mean()) if len(reference.seeds) > 1 else None
         beside = _beside_distance(reference, level)
         unit = "objects (DTW with clock)" if variant == "sierra" else "objects (DTW)"
@@ -143,8 +143,14 @@ def _distance_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -
         yield draft.score(partial(_DISTANCES[name], variant=variant), floor=floor, order_matters=True)
 
 
-def _has_perfect_conditions(reference: RunCurves) -> bool:
-    return bool(reference.seeds) and bool((_conditions(reference, "paper") == 0.0).any())
+def _check_conditions(reference: RunCurves, level: RunCurves, variant: Variant) -> None:
+    """Refuse conditions that the form of reactivity cannot divide by."""
+    disturbance = level.criterion
+    conditions = [_conditions(runs, disturbance, variant) for runs in (reference, level) if runs.seeds]
+    if disturbance == HANDLING and any((ticks <= 0.0).any() for ticks in conditions):
+        raise Uncomputable("the conditions under a handling cost are the ticks that handling takes, and 0 or less here")
+    if variant == "paper" and reference.seeds and (conditions[0] == 0.0).any():
+        raise Uncomputable("the printed form divides by the ideal conditions, which are 0 here")
 
 
 def _beside_distance(reference: RunCurves, level: RunCurves) -> dict[str, float]:
@@ -156,7 +162,7 @@ def _beside_distance(reference: RunCurves, level: RunCurves) -> dict[str, float]
     beside = {"signed_difference": float(np.mean(difference))}
     if level.criterion in DISTURBANCES and "adversity" in ideal.curves and "adversity" in disturbed.curves:
         # Sampled at interval ends, which gives the paper's x axis.
-        applied, wanted = (_conditions(runs, "paper").mean(axis=0) for runs in (disturbed, ideal))
+        applied, wanted = (_conditions(runs, level.criterion, "paper").mean(axis=0) for runs in (disturbed, ideal))
         beside["environment_distance"] = environment_distance(applied, wanted)
     return beside
 

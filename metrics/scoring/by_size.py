@@ -108,8 +108,8 @@ class _SizeMeasure:
     """Whether the value is an amount of performance, which is also given relative to that of the swarm."""
     is_part: bool = False
     """Whether it is task emergence or a part of it, which is also given per robot."""
-    is_weighted: bool = False
-    """Whether it weights the time lost with the performance achieved, which misleads where performance falls."""
+    weighted_in: tuple[Variant, ...] = ()
+    """Variants that weight the time lost with the performance achieved, which misleads where performance falls."""
     order_matters: bool = False
     """As in `ScoreDraft.score`."""
 
@@ -124,7 +124,7 @@ _SIZE_MEASURES: dict[str, _SizeMeasure] = {
         from_one=True,
         needs_interference=True,
         is_gain=True,
-        is_weighted=True,
+        weighted_in=("corrected", "paper", "sierra"),
     ),
     "spatial_emergence": _SizeMeasure(
         values=_spatial_emergence,
@@ -134,7 +134,7 @@ _SIZE_MEASURES: dict[str, _SizeMeasure] = {
         of_two_sizes=True,
         needs_interference=True,
         is_gain=True,
-        is_weighted=True,
+        weighted_in=("corrected", "paper"),
     ),
     "time_emergence": _SizeMeasure(values=_time_emergence, unit="robots", of_two_sizes=True, needs_interference=True),
     "task_emergence": _SizeMeasure(
@@ -176,7 +176,7 @@ def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) ->
             at = f"N = {smaller.n_robots} to {larger.n_robots}"
         if measure.from_one:
             experiments = (one, *experiments)
-        falls = measure.is_weighted and previous is not None and _falls(previous, larger)
+        falls = variant in measure.weighted_in and previous is not None and _falls(previous, larger)
         score = ScoreDraft(
             measure=name,
             variant=variant,

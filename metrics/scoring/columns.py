@@ -36,8 +36,14 @@ CURVE_COLUMNS: dict[str, Column] = {
     "t_end_s": Column("amount", "s", "end of the interval"),
     "interference_fraction": Column("fraction", "1", "t_lost(N, t), share of active robots avoiding others or walls"),
     "n_active": Column("amount", "robots", "mean number of robots at work"),
-    "adversity": Column("number", "1", "conditions V(t), mean over the interval; those of the reference run are I_ec"),
+    "adversity": Column(
+        "number",
+        "1 or ticks",
+        "conditions V(t), mean over the interval: of a throttle, or under a handling cost the ticks that handling "
+        "takes; those of the reference run are I_ec",
+    ),
     "throttle": Column("number", "1", "conditions V(t) at the end of the interval, as the paper samples them"),
+    "handling_cost": Column("number", "ticks", "likewise, under a handling cost"),
     "deaths_per_s": Column("amount", "1/s", "rate of the whole swarm, the same in each row of a run"),
     "malfunctions_per_s": Column("amount", "1/s", "likewise"),
     "births_per_s": Column("amount", "1/s", "likewise"),

@@ -101,7 +101,7 @@ class Score:
             interval(summary),
             *([limits(*self.band)] if band else []),
             self.floor_cell(),
-            "" if self.relative is None else percent(self.relative.mean),
+            self.relative_cell(),
             runs if enters else "-",
             "higher" if self.higher_is_better else "lower",
             self.unit,
@@ -112,6 +112,13 @@ class Score:
         if self.noise_floor is None:
             return ""
         return number(self.noise_floor) + ("" if self.relative_floor is None else f" ({percent(self.relative_floor)})")
+
+    def relative_cell(self) -> str:
+        """Return the relative value, and in brackets per robot; empty for measures that are relative themselves."""
+        if self.relative is None:
+            return ""
+        per_robot = self.beside.get("per_robot")
+        return percent(self.relative.mean) + ("" if per_robot is None else f" ({percent(per_robot)} per robot)")
 
     @property
     def is_partial(self) -> bool:

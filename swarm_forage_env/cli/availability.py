@@ -18,7 +18,7 @@ _Number = TypeVar("_Number", int, float)
 
 def availability(
     robots: Annotated[str, typer.Option("--robots", help="Swarm sizes, separated by commas.")] = "50,200",
-    teams: Annotated[str, typer.Option("--teams", help="Mean numbers of robots at work.")] = "5,10,20",
+    teams: Annotated[str, typer.Option("--teams", help="Mean teams M, robots at work on average.")] = "5,10,20",
     needed: Annotated[str, typer.Option("--needed", help="Numbers of robots needed, for the table.")] = "1,5,10,20,40",
     out: Annotated[Path | None, typer.Option("--out", help="Picture to draw: .png, .svg or .pdf.")] = None,
     as_json: AsJson = False,

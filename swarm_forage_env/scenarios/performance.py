@@ -72,7 +72,7 @@ _QUANTITIES = (
     Quantity("n_carrying", "robots", words="robots carrying"),
     Quantity("n_caches", "caches", words="caches"),
     Quantity("n_objects_cached", "objects", words="objects in caches"),
-    Quantity("adversity", "1"),
+    Quantity("adversity", "1 or ticks"),
     Quantity("task_share_none", "1"),
     Quantity("task_share_generalist", "1"),
     Quantity("task_share_harvester", "1"),

@@ -85,7 +85,7 @@ class RunRecord:
     n_caches: Annotated[FloatArray, Column("caches", "mean over ticks")]
     n_objects_cached: Annotated[FloatArray, Column("objects", "mean over ticks of objects inside caches")]
     adversity: Annotated[
-        FloatArray, Column("1", "mean over ticks of V(t): of a throttle, else of a handling cost in ticks, else 0")
+        FloatArray, Column("1 or ticks", "mean over ticks of a throttle, else of the ticks that handling takes, else 0")
     ]
 
     contributed: Mapping[str, FloatArray]
@@ -258,8 +258,8 @@ KNOWN_CONTRIBUTIONS: dict[str, tuple[str, str]] = {
         "1",
         "share of active robots that see an obstacle under sensor noise, false ones included, mean over ticks",
     ),
-    "handling_cost": ("ticks", "waveform V(t) of the handling cost at the last tick of the interval"),
-    "handling_cost_mean": ("ticks", "waveform V(t) of the handling cost, mean over the ticks of the interval"),
+    "handling_cost": ("ticks", "mean ticks of a pick-up and a drop that start in the last tick of the interval"),
+    "handling_cost_mean": ("ticks", "the same, mean over the ticks of the interval"),
     "deaths": ("robots", "that died in the interval"),
     "births": ("robots", "that were born"),
     "malfunctions": ("robots", "that went into repair"),

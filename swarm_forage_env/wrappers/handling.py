@@ -23,7 +23,8 @@ class HandlingCost(SwarmWrapper):
     object after tick 15. Nothing takes less time than in the scenario (`pickup_ticks`, `drop_ticks`, usually one tick).
     The paper's second kind of temporal disturbance: a penalty for handling objects.
 
-    Records `handling_cost`, V at the last tick of an interval, and `handling_cost_mean`.
+    Records what handling took: `handling_cost`, the mean ticks of a pick-up and a drop that start in the last tick of
+    an interval, and `handling_cost_mean`, its mean over the interval.
     """
 
     stack_position: ClassVar[int] = 5
@@ -37,22 +38,24 @@ class HandlingCost(SwarmWrapper):
 
     def on_reset(self, seed: int) -> None:
         """Start the waveform."""
-        self._value = self._sum = 0.0
+        self._applied = self._sum = 0.0
         self._ticks = 0
 
     def before_step(self) -> None:
         """Set what handling costs in the coming tick."""
-        self._value = self._signal(self.unwrapped.tick + 1)
-        self._sum += self._value
+        cost = int(self._signal(self.unwrapped.tick + 1))
+        pickup, drop = max(self._pickup, cost), max(self._drop, cost)
+        self.unwrapped.set_handling_ticks(pickup=pickup, drop=drop)
+        # An object costs one pick-up and one drop, so their mean is what a policy can react to.
+        self._applied = 0.5 * (pickup + drop)
+        self._sum += self._applied
         self._ticks += 1
-        cost = int(self._value)
-        self.unwrapped.set_handling_ticks(pickup=max(self._pickup, cost), drop=max(self._drop, cost))
 
     def interval_columns(self) -> dict[str, float]:
-        """Return V at the last tick, and its mean over the ticks since the last call."""
+        """Return what handling took at the last tick, and its mean over the ticks since the last call."""
         mean = self._sum / self._ticks
         self._sum, self._ticks = 0.0, 0
-        return {"handling_cost": self._value, "handling_cost_mean": mean}
+        return {"handling_cost": self._applied, "handling_cost_mean": mean}
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

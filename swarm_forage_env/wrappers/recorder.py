@@ -106,7 +106,7 @@ class RunRecorder(SwarmWrapper):
         return columns
 
     def _adversity(self) -> np.ndarray:
-        """Conditions V(t), (T,): the throttle if there is one, else the handling cost, else zero."""
+        """Conditions, (T,): the throttle if there is one, else what handling takes under its cost, else zero."""
         for name in ("throttle_mean", "handling_cost_mean"):
             if name in self._contributed:
                 return self._contributed[name]

@@ -41,7 +41,7 @@ def test_the_page_shows_what_its_command_prints(command):
 
 
 def test_sizes_teams_and_demands_are_chosen(command):
-    # Two robots, L = 1: weights 1, 1/2, 1/4 of 0, 1, 2 at work, so a mean of 4/7, and 1/7 for both.
+    # Two robots, M = 1: weights 1, 1/2, 1/4 of 0, 1, 2 at work, so a mean of 4/7, and 1/7 for both.
     code, out, _ = command("availability", "--robots", "2", "--teams", "1", "--needed", "0, 2,3")
     assert code == 0
     assert rows(out) == [[2, 1, 0.6, 1.0, 0.143, 0.0]]
@@ -63,6 +63,10 @@ def test_json_is_the_only_thing_on_stdout(command):
     assert (curve["robots"], curve["team"], curve["needed"]) == (50, 5.0, [1, 5, 10, 20, 40])
     assert curve["at_work"] == pytest.approx(5.0, abs=0.01)
     assert curve["availability"] == availability_curves(50, [5], curve["needed"])[0].tolist()
+
+
+def test_help_has_the_symbol_of_the_page(command):
+    assert "Mean teams M" in " ".join(command("availability", "--help")[1].split())
 
 
 @pytest.mark.parametrize(

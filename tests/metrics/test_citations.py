@@ -75,6 +75,24 @@ def test_docstrings_cite_the_equations_of_the_page(function):
     assert cited(getattr(metrics, function).__doc__) == numbers_of(function)
 
 
+@pytest.mark.parametrize("function", ["availability", "ratio_for_team", "availability_curves", "time_emergence"])
+def test_l_is_robots_away_and_has_no_other_meaning(function):
+    assert "| L | mean number of robots away | robots |" in PAGE
+    assert not re.search(r"\bL\b", getattr(metrics, function).__doc__)
+
+
+@pytest.mark.parametrize(
+    "name", ["time_emergence", "interference_gain", "undisturbed_gain", "recorded_population_robustness"]
+)
+def test_measures_of_our_own_have_a_section_with_an_example(name):
+    symbol = METRICS[name].symbol.split("(")[0]
+    (section,) = [
+        part for part in re.split(r"^## ", PAGE, flags=re.MULTILINE) if symbol in part.splitlines()[0].split()
+    ]
+    assert f"{name}(" in section
+    assert "```math" in section
+
+
 @pytest.mark.parametrize("name", METRICS)
 def test_the_catalog_cites_the_equations_of_the_page(name):
     """A measure that the page does not list is not the paper's, and does not claim to be."""

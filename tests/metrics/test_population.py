@@ -189,7 +189,7 @@ PAPER_TABLE = {
     (200, 10): [0.909, 0.621, 0.386, 0.149, 0.022],
     (200, 20): [0.952, 0.784, 0.614, 0.377, 0.142],
 }
-"""(robots, desired mean at work L) -> availability of 1, 5, 10, 20, 40 robots with rho_S = L / (1 + L)."""
+"""(robots, mean team M) -> availability of 1, 5, 10, 20, 40 robots with q = (1 + M) / M."""
 
 
 @pytest.mark.parametrize("n", [50, 200])
@@ -200,7 +200,7 @@ def test_availability_of_the_papers_teams(n):
 
 
 def test_availability_curve_by_hand():
-    # L = 1: rho = 1/2. Two robots: weights 1, 1/2, 1/4 of 0, 1, 2 at work.
+    # M = 1: q = 2. Two robots: weights 1, 1/2, 1/4 of 0, 1, 2 at work.
     assert ratio_for_team(1) == 2.0
     assert availability_curves(2, [1]) == pytest.approx(np.array([[3 / 7, 1 / 7]]), abs=1e-12)
     assert availability_curves(2, [1], [0, 1, 3]) == pytest.approx(np.array([[1.0, 3 / 7, 0.0]]), abs=1e-12)
@@ -216,7 +216,7 @@ def test_availability_curves_fall_with_the_demand_and_rise_with_the_team():
 
 @pytest.mark.parametrize("n", [2, 50, 200])
 def test_the_area_under_an_availability_curve_is_the_mean_number_at_work(n):
-    # Mean = sum over k >= 1 of the probability of at least k; below L, which a swarm without a size limit would have.
+    # Mean = sum over k >= 1 of the probability of at least k; below M, which a swarm without a size limit would have.
     queue = queue_statistics(PopulationRates(lambda_bd=ratio_for_team(20), mu_bd=1.0), n)
     at_work = n - queue.truncated_length
     assert availability_curves(n, [20]).sum() == pytest.approx(at_work, rel=1e-9)

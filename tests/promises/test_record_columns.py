@@ -10,8 +10,9 @@ NOT_RECORDED = {"deaths_per_s", "malfunctions_per_s", "births_per_s", "repairs_p
 
 def recorded_units() -> dict[str, str]:
     """Unit by column of a record, contributed ones included."""
-    rows = [line.split() for line in schema_table().splitlines()[1:]]
-    return {name: unit for name, _, unit, *_ in rows}
+    header, *rows = schema_table().splitlines()
+    start, end = header.index("unit"), header.index("meaning")
+    return {row.split()[0]: row[start:end].rstrip() for row in rows}
 
 
 def test_every_column_that_measures_read_is_recorded():

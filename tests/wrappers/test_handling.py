@@ -67,8 +67,8 @@ def test_nothing_gets_faster_than_the_scenario_says():
     assert ticks_until(Event.DELIVERED, constant(4.0), **slow) == 4
 
 
-def recorded(*configs) -> RunRecorder:
-    env = tidy_world(n_robots=1, horizon_s=3.0, interval_s=1.0)
+def recorded(*configs, **options: int) -> RunRecorder:
+    env = tidy_world(n_robots=1, horizon_s=3.0, interval_s=1.0, **options)
     stack = env
     for config in configs:
         stack = config.wrap(stack)
@@ -90,6 +90,28 @@ def test_last_value_and_mean_are_recorded_and_the_mean_is_the_adversity():
     assert contributed["handling_cost"].tolist() == pytest.approx([5.0, 10.0, 15.0])
     assert contributed["handling_cost_mean"].tolist() == pytest.approx([3.0, 8.0, 13.0])
     assert recorder.columns()["adversity"].tolist() == contributed["handling_cost_mean"].tolist()
+
+
+def test_the_integer_part_is_recorded_and_at_least_one_tick():
+    half = HandlingCostConfig(waveform=Waveform(kind="table", times_s=(0.0, 3.0), values=(0.0, 7.5)))
+    # V = 0.5, 1, 1.5, ..., 7.5 takes 1, 1, 1, 2, 2 | 3, 3, 4, 4, 5 | 5, 6, 6, 7, 7 ticks.
+    contributed = recorded(half).contributed()
+    assert contributed["handling_cost"].tolist() == [2.0, 5.0, 7.0]
+    assert contributed["handling_cost_mean"].tolist() == pytest.approx([1.4, 3.8, 6.2])
+
+
+@pytest.mark.parametrize(
+    ("options", "last", "mean"),
+    [
+        ({"pickup_ticks": 10, "drop_ticks": 10}, [10.0, 10.0, 15.0], [10.0, 10.0, 13.0]),
+        # A pick-up takes 10, 10, 10, 10, 10, a drop 1, 2, 3, 4, 5 ticks: 6.5 on average, 7.5 at last.
+        ({"pickup_ticks": 10}, [7.5, 10.0, 15.0], [6.5, 9.0, 13.0]),
+    ],
+)
+def test_what_the_scenario_takes_by_itself_is_recorded(options, last, mean):
+    contributed = recorded(RAMP, **options).contributed()
+    assert contributed["handling_cost"].tolist() == last
+    assert contributed["handling_cost_mean"].tolist() == pytest.approx(mean)
 
 
 def test_under_a_throttle_as_well_the_adversity_is_the_throttle():

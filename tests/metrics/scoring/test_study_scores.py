@@ -91,24 +91,41 @@ def test_distances_come_with_noise_floor_mean_curves_and_what_they_do_not_tell()
     assert reactivity.beside["signed_difference"] == pytest.approx((np.sum(SLOWED) - np.sum(IDEAL)) / 12)
 
 
-@pytest.mark.parametrize("lowest", [0.0, 1.0])
-def test_under_a_handling_cost_twice_the_ticks_halve_what_a_reactive_swarm_does(lowest):
-    # Handling takes 1, 2, 2, 1 ticks. Perfectly reactive: 4, 2, 2, 4. Perfectly adaptable: 4, 4, 4, 4. Observed: 4, 3,
-    # 3, 4, so both distances are 1 + 1. A waveform below 1 stands for one tick, too.
-    reactivity, adaptability = scored(
-        rows(3, [[4.0] * 4], criterion="handling_cost", criterion_value=0.0, adversity=lowest),
-        rows(
-            3,
-            [[4.0, 3.0, 3.0, 4.0]],
-            criterion="handling_cost",
-            criterion_value=25.0,
-            adversity=[lowest, 2.0, 2.0, lowest],
-        ),
-        measures=["reactivity", "adaptability"],
+def handled(ideal_ticks, ticks, observed, **columns):
+    """Runs under a handling cost of so many ticks; the ideal swarm delivers 4 objects in each of four intervals."""
+    ideal_columns = {name: values[0] for name, values in columns.items()}
+    level_columns = {name: values[1] for name, values in columns.items()}
+    common = {"criterion": "handling_cost", "t_end_s": CLOCK}
+    return (
+        rows(3, [[4.0] * 4], criterion_value=0.0, adversity=ideal_ticks, **ideal_columns, **common),
+        rows(3, [observed], criterion_value=25.0, adversity=ticks, **level_columns, **common),
     )
+
+
+def test_under_a_handling_cost_twice_the_ticks_halve_what_a_reactive_swarm_does():
+    # Handling takes 1, 2, 2, 1 ticks. Perfectly reactive: 4, 2, 2, 4. Perfectly adaptable: 4, 4, 4, 4. Observed: 4, 3,
+    # 3, 4, so both distances are 1 + 1.
+    runs = handled(1.0, [1.0, 2.0, 2.0, 1.0], [4.0, 3.0, 3.0, 4.0])
+    reactivity, adaptability = scored(*runs, measures=["reactivity", "adaptability"])
     assert (reactivity.summary.mean, adaptability.summary.mean) == (2.0, 2.0)
     assert (reactivity.at, reactivity.criterion) == ("handling cost 25", "handling_cost")
     assert reactivity.beside["environment_distance"] == 2.0
+
+
+def test_a_handling_cost_is_sampled_as_a_throttle_is():
+    # Means 1, 2, 2, 1 and values at the end 1, 4, 1, 1 ticks: 3 from the ideal one. As printed c_t = V / I_ec = 1, 4,
+    # 1, 1 and the perfect swarm does 4, 16, 4, 4; 4 objects in each interval are 12 away. Corrected 4, 2, 2, 4: 2 + 2.
+    runs = handled(1.0, [1.0, 2.0, 2.0, 1.0], [4.0] * 4, handling_cost=(1.0, [1.0, 4.0, 1.0, 1.0]))
+    corrected, printed = scored(*runs, measures=["reactivity"], variants=("corrected", "paper"))
+    assert (corrected.summary.mean, printed.summary.mean) == (4.0, 12.0)
+    assert corrected.beside["environment_distance"] == 3.0
+
+
+@pytest.mark.parametrize(("ideal", "ticks"), [(0.0, 2.0), (1.0, [1.0, 0.0, 2.0, 2.0])])
+def test_handling_that_takes_no_tick_has_no_reactivity(ideal, ticks):
+    (study,) = study_curves(table(*handled(ideal, ticks, [4.0] * 4)))
+    _, missing = score_study(study, ["reactivity"])
+    assert "the ticks that handling takes, and 0 or less here" in missing["reactivity"]
 
 
 def test_another_disturbance_than_the_two_is_refused():
@@ -291,6 +308,15 @@ def test_where_performance_falls_spatial_emergence_is_marked_and_noted():
     assert "spatial_emergence, N = 2 to 4: performance is lower than that of the next smaller swarm" in shown
 
 
+def test_the_programs_form_is_not_weighted_with_performance_and_has_no_mark():
+    forms = ("corrected", "paper", "sierra")
+    found = [score for score in scored(*COLLAPSE, measures=["spatial_emergence"], variants=forms) if score.x == 4]
+    # The program compares shares of performance: 2 * 0.2 - 0.6 = -0.2, which is no organisation.
+    assert [score.summary.mean for score in found] == pytest.approx([2.24, 2.24, -0.2])
+    assert [score.is_doubtful for score in found] == [True, True, False]
+    assert found[2].note == ""
+
+
 def test_robot_time_and_the_parts_of_task_emergence_are_scored_beside_it():
     found = scored(*COLLAPSE, measures=["time_emergence", "task_emergence", "interference_gain", "undisturbed_gain"])
     values = {score.measure: score.summary.mean for score in found if score.x == 4}
@@ -301,6 +327,16 @@ def test_robot_time_and_the_parts_of_task_emergence_are_scored_beside_it():
         {"task_emergence": -0.9, "interference_gain": -0.3, "undisturbed_gain": -0.6}  # of 2 * 8 objects
     )
     assert not any(score.is_doubtful for score in found)
+    # Over the 1.6 objects of the larger swarm; in brackets over the 16 of four robots as good as each of the two.
+    cells = {
+        score.measure: dict(zip(HEADER, score.cells(), strict=True))["relative"] for score in found if score.x == 4
+    }
+    assert cells == {
+        "time_emergence": "",
+        "task_emergence": "-900 % (-90 % per robot)",
+        "interference_gain": "-300 % (-30 % per robot)",
+        "undisturbed_gain": "-600 % (-60 % per robot)",
+    }
 
 
 def test_a_swarm_without_performance_has_no_change_per_robot():
