@@ -262,7 +262,7 @@ def choose_policy(
         deliver: Performance that an undisturbed run must reach, more than 0.
         keep: Share of `deliver` that is still demanded under each disturbance.
         failures: Malfunctions per tick of the whole swarm. Robots stop where they are and are repaired one after the
-            other, at the rate at which a tenth of the swarm is at work in equilibrium, as in the study.
+            other, a little faster than they fail, see `swarm_forage_env.study.experiments.repairs_per_tick`.
         deaths: Robots that are expected to die during a run, one by one at random times; they do not come back.
         noise: Standard deviation of the noise of all sensors and wheels, see `SensorNoise` and `ActuatorNoise`.
         seeds: How many, at least two, or which. All policies and conditions share them.
@@ -384,11 +384,11 @@ def _missing(candidate: Candidate) -> str:
 
 def _failing(scenario: "ScenarioConfig", rate: float) -> "Experiment":
     """Malfunctions per tick, and repairs as in the study."""
-    from swarm_forage_env.study.experiments import AWAY_SHARE, Experiment
+    from swarm_forage_env.study.experiments import Experiment, repairs_per_tick
     from swarm_forage_env.wrappers.population import PopulationConfig
 
-    away = AWAY_SHARE * scenario.robots.n_robots  # rho / (1 - rho) with rho = malfunctions / repairs
-    config = PopulationConfig(malfunction_per_tick=rate, repair_per_tick=rate * (1.0 + 1.0 / away))
+    repair = repairs_per_tick(rate, scenario.robots.n_robots)
+    config = PopulationConfig(malfunction_per_tick=rate, repair_per_tick=repair)
     return Experiment(criterion=POPULATION, value=rate, scenario=scenario, wrappers=(config,))
 
 

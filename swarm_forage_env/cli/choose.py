@@ -25,7 +25,7 @@ def choose(
         typer.Option(
             metavar="RATE",
             help="Malfunctions per tick (0.2 s) of the whole swarm, 0.001 in the study. Robots stop and are repaired "
-            "one after the other, at a rate that leaves a tenth of the swarm at work in equilibrium.",
+            "one after the other, a little faster than they fail (docs/deciding.md).",
         ),
     ] = None,
     deaths: Annotated[
