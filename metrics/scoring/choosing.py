@@ -273,7 +273,8 @@ def choose_policy(
         progress: Show progress and an estimate on stderr.
 
     Raises:
-        CurveError: a demand or a disturbance that is no number above 0, or fewer than two seeds.
+        CurveError: a demand or a disturbance that is no number above 0, more deaths than robots, or fewer than two
+            seeds.
         ValueError: an unknown policy or scenario.
         swarm_forage_env.study.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
     """
@@ -312,6 +313,11 @@ def plan_choice(
     for name, value in given.items():
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise CurveError(f"Expected {name} as a number above 0, got {value:g}.")
+    if deaths is not None and deaths > chosen.robots.n_robots:
+        raise CurveError(
+            f"Expected at most {chosen.robots.n_robots} deaths, one for each robot, got {deaths:g}; "
+            "ask for fewer deaths or more robots."
+        )
     experiments = [Experiment(criterion=UNDISTURBED, value=0.0, scenario=chosen)]
     constraints = [Constraint(condition="undisturbed", demand=deliver)]
     disturbances = {"failures": (failures, _failing), "deaths": (deaths, _dying), "noise": (noise, _noisy)}

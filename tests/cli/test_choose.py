@@ -64,6 +64,7 @@ def test_failed_runs_are_listed_and_exit_1(command, monkeypatch):
         (("--policy", "crw"), "deliver"),
         (("--policy", "crw", "--deliver", "0"), "Expected deliver as a number above 0, got 0"),
         (("--policy", "crw", "--deliver", "9", "--noise", "-1"), "Expected noise as a number above 0, got -1"),
+        (("--policy", "crw", "--deliver", "9", "--deaths", "100"), "Expected at most 50 deaths"),
         (("--policy", "crw", "--deliver", "9", "--seeds", "1"), "seeds"),
         (("--policy", "crww", "--deliver", "9"), "Did you mean 'crw'?"),
         (("--policy", "crw", "--deliver", "9", "--horizon", "150"), "whole number of intervals"),

@@ -156,12 +156,18 @@ def test_a_choice_runs_every_condition_once_and_stores_it(tmp_path):
         ({"deliver": 0.0}, "deliver as a number above 0, got 0"),
         ({"deliver": 5.0, "keep": -1.0}, "keep as a number above 0"),
         ({"deliver": 5.0, "noise": math.inf}, "noise as a number above 0, got inf"),
+        ({"deliver": 5.0, "deaths": 5.0}, "at most 4 deaths, one for each robot, got 5; ask for fewer deaths or more"),
         ({"deliver": 5.0, "seeds": 1}, "two or more seeds, got 1"),
     ],
 )
 def test_demands_that_make_no_sense_are_refused(demand, reason):
     with pytest.raises(CurveError, match=reason):
         choose_policy(["random"], WORLD, **demand)
+
+
+def test_all_robots_may_be_expected_to_die():
+    dying = plan_choice(["random"], WORLD, deliver=5.0, deaths=4.0).runs.experiments[1]
+    assert dying.population.death_per_tick == 4.0 / 20.0  # 4 s have 20 ticks
 
 
 def test_a_failed_policy_is_shown_and_the_others_are_ranked():
