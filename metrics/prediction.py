@@ -366,8 +366,9 @@ def _least_squares(matrix: FloatArray, target: FloatArray, floor: float) -> Floa
     rest = matrix[:, 1:].copy()
     rest[:, 0] -= matrix[:, 0]
     upper = np.array([floor, math.inf])[: rest.shape[1]]
-    v, *w = lsq_linear(rest, target - floor * matrix[:, 0], bounds=(0.0, upper), method="bvls").x.tolist()
-    return np.array([floor - v, v, *w])
+    found = lsq_linear(rest, target - floor * matrix[:, 0], bounds=(0.0, upper), method="bvls")
+    others = cast("FloatArray", found.x)  # pyright: ignore[reportUnknownMemberType] - scipy ships no types
+    return np.concatenate([[floor - others[0]], others])
 
 
 def _loss(solution: FloatArray, terms: FloatArray, n: FloatArray, roots: FloatArray) -> float:

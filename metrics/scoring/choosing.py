@@ -17,7 +17,7 @@ from .columns import NOISE, POPULATION, UNDISTURBED
 from .contestants import PolicyLike
 from .plan import ScoringPlan
 from .texts import aligned, bounds, counted, interval, number, paragraph, percent, plain
-from .totals import PolicyTotals, plan_conditions, run_totals
+from .totals import PolicyTotals, plan_conditions, run_totals, unit_text
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -163,6 +163,8 @@ class Choice:
     scenario: str
     n_robots: int
     horizon_s: float
+    unit: str
+    """Of demands and performance: "objects", "robots summed over intervals"."""
 
     @property
     def reason(self) -> str:
@@ -198,6 +200,7 @@ class Choice:
             "scenario": self.scenario,
             "n_robots": self.n_robots,
             "horizon_s": self.horizon_s,
+            "unit": self.unit,
             "rule": RULE,
             "reason": self.reason,
             "ranking": [
@@ -221,7 +224,7 @@ class Choice:
             names = [(str(rank), candidate.policy), *[("", "")] * (len(candidate.evidence) - 1)]
             rows += [(*name, *evidence.cells()) for name, evidence in zip(names, candidate.evidence, strict=True)]
         failures = [f"failed: {failure}" for candidate in self.candidates for failure in candidate.failures]
-        title = f"{self.scenario}, {counted(self.n_robots, 'robot')}, runs of {self.horizon_s:,g} s"
+        title = f"{self.scenario}, {counted(self.n_robots, 'robot')}, runs of {self.horizon_s:,g} s: {self.unit}"
         return "\n".join([title, *aligned(rows), self.reason, RULE, *paragraph(failures)])
 
 
@@ -258,8 +261,9 @@ def choose_policy(
 
     Args:
         policies: As in `compare_policies`, one or more.
-        scenario: Name of a preset, or a complete configuration: it says how many robots there are, and how long a run.
-        deliver: Performance that an undisturbed run must reach, more than 0.
+        scenario: Name of a preset, or a complete configuration: it says how many robots there are, how long a run is,
+            and what performance is.
+        deliver: Performance that an undisturbed run must reach, summed over its intervals, more than 0.
         keep: Share of `deliver` that is still demanded under each disturbance.
         failures: Malfunctions per tick of the whole swarm. Robots stop where they are and are repaired one after the
             other, a little faster than they fail, see `swarm_forage_env.study.experiments.repairs_per_tick`.
@@ -352,6 +356,8 @@ def rank_policies(
         constraints: The undisturbed one first.
         scenario: Where the runs were made.
     """
+    from swarm_forage_env.scenarios.performance import quantity
+
     candidates = [
         Candidate(
             policy=one.policy,
@@ -368,6 +374,7 @@ def rank_policies(
         scenario=scenario.name,
         n_robots=scenario.robots.n_robots,
         horizon_s=scenario.horizon_s,
+        unit=unit_text(quantity(scenario.performance)),
     )
 
 

@@ -4,10 +4,22 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import AsJson, Caches, DryRun, Jobs, Objects, Out, Robots, Scenario, Settings, Side
+from swarm_forage_env.cli.options import (
+    AsJson,
+    Caches,
+    DryRun,
+    Jobs,
+    Objects,
+    Out,
+    Performance,
+    Robots,
+    Scenario,
+    Settings,
+    Side,
+)
 
 
-def choose(
+def choose(  # long: one parameter per option
     policy: Annotated[
         str,
         typer.Option(
@@ -15,7 +27,8 @@ def choose(
         ),
     ],
     deliver: Annotated[
-        float, typer.Option(help="Objects that an undisturbed run must achieve (first pick-ups in search and rescue).")
+        float,
+        typer.Option(help="Performance that an undisturbed run must reach, in all: objects or what is asked for."),
     ],
     keep: Annotated[
         float, typer.Option(help="Share of --deliver that is still demanded under each disturbance.")
@@ -45,6 +58,7 @@ def choose(
     objects: Objects = None,
     side: Side = None,
     caches: Caches = None,
+    performance: Performance = None,
     settings: Settings = None,
     out: Out = None,
     jobs: Jobs = None,
@@ -65,6 +79,7 @@ def choose(
         objects=objects,
         side=side,
         caches=caches,
+        performance=performance,
         horizon=horizon,
         settings=tuple(settings or ()),
     )

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -112,10 +113,18 @@ def test_policies_without_runs_come_last_and_are_no_reason():
 
 def test_the_table_has_a_row_for_each_policy_and_constraint():
     lines = str(chosen(a=(GOOD, BAD), b=(GOOD, GOOD))).splitlines()
-    assert lines[0] == "warehouse_small, 4 robots, runs of 4 s"
+    assert lines[0] == "warehouse_small, 4 robots, runs of 4 s: objects"
     assert " ".join(lines[2].split()) == "1 b undisturbed 10 13 10.52 to 15.48 +3 98.2 % 3 of 3 met"
     # 2 ± 4.303 / sqrt(3) stays below 5.
     assert " ".join(lines[5].split()) == "noise 0.01 5 2 -0.4841 to 4.484 -3 1.75 % 0 of 3 not met"
+
+
+def test_the_unit_is_that_of_the_performance():
+    for name, unit in {"first_picked": "objects", "n_carrying": "robots summed over intervals"}.items():
+        found = [PolicyTotals(policy="a", totals=({0: 12.0, 1: 13.0}, {0: 12.0, 1: 13.0}), failures=())]
+        choice = rank_policies(found, DEMANDS, replace(WORLD, performance=name))
+        assert str(choice).splitlines()[0] == f"warehouse_small, 4 robots, runs of 4 s: {unit}"
+        assert choice.to_mapping()["unit"] == unit
 
 
 def test_disturbances_are_those_that_the_help_describes():
