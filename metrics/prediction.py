@@ -20,7 +20,7 @@ from typing import Literal, TypeAlias, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import nnls  # type: ignore[import-untyped] - scipy ships no types
+from scipy.optimize import lsq_linear, nnls  # type: ignore[import-untyped] - scipy ships no types
 
 from .checks import CurveError, check_level, check_option, check_resamples, check_size
 from .curves import FloatArray
@@ -36,6 +36,8 @@ _MAX_STEPS = 50
 _MAX_HALVINGS = 40
 _CONVERGED = 1e-9
 """Relative change of the loss below which a fit has converged."""
+_MOST_ALONE = 10.0
+"""Largest performance of one robot that is fitted, in units of the best measured performance per robot (our choice)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +106,9 @@ def fit_law(name: LawName, sizes: Sequence[int], performance: ArrayLike) -> Size
     """Fit a law to mean performances, by least squares of their square roots.
 
     With u = (1 - s) / a, v = s / a and w = k / a, all at least 0, P(N) = N / (u + v N + w N (N - 1)). The roots are
-    linearized in u, v, w and solved by non-negative least squares, until they change no more (Gauss and Newton).
+    linearized in u, v, w and solved by non-negative least squares, until they change no more (Gauss and Newton). Where
+    one robot was not measured, 1 / a = u + v may be free to vanish: a is at most `_MOST_ALONE` times the best
+    performance per robot.
 
     Args:
         name: One of `LAWS`.
@@ -328,14 +332,15 @@ def _fit(name: LawName, n: FloatArray, roots: FloatArray) -> SizeLaw:
     if best_per_robot == 0.0:
         return SizeLaw(name=name, a=0.0)
     # First N / P, which is linear in u, v, w, with the weights that differences of roots have there.
-    start = _non_negative(terms * (roots**3 / n)[:, None], roots)
-    start[0] = max(start[0], 0.1 / best_per_robot)  # no infinite performance of one robot
+    floor = 1.0 / (_MOST_ALONE * best_per_robot)
+    start = _least_squares(terms * (roots**3 / n)[:, None], roots, floor)
+    start[0] = max(start[0], floor)
     solution, loss = start, _loss(start, terms, n, roots)
     for _step in range(_MAX_STEPS):
         cost = terms @ solution
         model = np.sqrt(n / cost)
         slope = -0.5 * (model / cost)[:, None] * terms
-        step = _non_negative(slope, roots - model + slope @ solution) - solution
+        step = _least_squares(slope, roots - model + slope @ solution, floor) - solution
         size, before = 1.0, loss
         for _halving in range(_MAX_HALVINGS):
             trial = solution + size * step
@@ -350,8 +355,20 @@ def _fit(name: LawName, n: FloatArray, roots: FloatArray) -> SizeLaw:
     return SizeLaw(name=name, a=1.0 / (u + v), contention=v / (u + v), coherency=w / (u + v))
 
 
-def _non_negative(matrix: FloatArray, target: FloatArray) -> FloatArray:
-    return cast("FloatArray", nnls(matrix, target)[0])
+def _least_squares(matrix: FloatArray, target: FloatArray, floor: float) -> FloatArray:
+    """Return the u, v, w >= 0 of least squares, as many as the matrix has columns, with u + v at least `floor`."""
+    free = cast("FloatArray", nnls(matrix, target)[0])
+    if free[:2].sum() >= floor:
+        return free
+    if free.size == 1:
+        return np.array([floor])
+    # The problem is convex, so its solution is on the bound: u = floor - v, and v and w remain.
+    rest = matrix[:, 1:].copy()
+    rest[:, 0] -= matrix[:, 0]
+    upper = np.array([floor, math.inf])[: rest.shape[1]]
+    found = lsq_linear(rest, target - floor * matrix[:, 0], bounds=(0.0, upper), method="bvls")
+    others = cast("FloatArray", found.x)  # pyright: ignore[reportUnknownMemberType] - scipy ships no types
+    return np.concatenate([[floor - others[0]], others])
 
 
 def _loss(solution: FloatArray, terms: FloatArray, n: FloatArray, roots: FloatArray) -> float:

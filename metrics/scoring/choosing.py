@@ -17,7 +17,7 @@ from .columns import NOISE, POPULATION, UNDISTURBED
 from .contestants import PolicyLike
 from .plan import ScoringPlan
 from .texts import aligned, bounds, counted, interval, number, paragraph, percent, plain
-from .totals import PolicyTotals, plan_conditions, run_totals
+from .totals import PolicyTotals, plan_conditions, run_totals, unit_text
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -163,6 +163,8 @@ class Choice:
     scenario: str
     n_robots: int
     horizon_s: float
+    unit: str
+    """Of demands and performance: "objects", "robots summed over intervals"."""
 
     @property
     def reason(self) -> str:
@@ -198,6 +200,7 @@ class Choice:
             "scenario": self.scenario,
             "n_robots": self.n_robots,
             "horizon_s": self.horizon_s,
+            "unit": self.unit,
             "rule": RULE,
             "reason": self.reason,
             "ranking": [
@@ -221,7 +224,7 @@ class Choice:
             names = [(str(rank), candidate.policy), *[("", "")] * (len(candidate.evidence) - 1)]
             rows += [(*name, *evidence.cells()) for name, evidence in zip(names, candidate.evidence, strict=True)]
         failures = [f"failed: {failure}" for candidate in self.candidates for failure in candidate.failures]
-        title = f"{self.scenario}, {counted(self.n_robots, 'robot')}, runs of {self.horizon_s:,g} s"
+        title = f"{self.scenario}, {counted(self.n_robots, 'robot')}, runs of {self.horizon_s:,g} s: {self.unit}"
         return "\n".join([title, *aligned(rows), self.reason, RULE, *paragraph(failures)])
 
 
@@ -258,11 +261,12 @@ def choose_policy(
 
     Args:
         policies: As in `compare_policies`, one or more.
-        scenario: Name of a preset, or a complete configuration: it says how many robots there are, and how long a run.
-        deliver: Performance that an undisturbed run must reach, more than 0.
+        scenario: Name of a preset, or a complete configuration: it says how many robots there are, how long a run is,
+            and what performance is.
+        deliver: Performance that an undisturbed run must reach, summed over its intervals, more than 0.
         keep: Share of `deliver` that is still demanded under each disturbance.
         failures: Malfunctions per tick of the whole swarm. Robots stop where they are and are repaired one after the
-            other, at the rate at which a tenth of the swarm is at work in equilibrium, as in the study.
+            other, a little faster than they fail, see `swarm_forage_env.study.experiments.repairs_per_tick`.
         deaths: Robots that are expected to die during a run, one by one at random times; they do not come back.
         noise: Standard deviation of the noise of all sensors and wheels, see `SensorNoise` and `ActuatorNoise`.
         seeds: How many, at least two, or which. All policies and conditions share them.
@@ -273,7 +277,8 @@ def choose_policy(
         progress: Show progress and an estimate on stderr.
 
     Raises:
-        CurveError: a demand or a disturbance that is no number above 0, or fewer than two seeds.
+        CurveError: a demand or a disturbance that is no number above 0, more deaths than robots, or fewer than two
+            seeds.
         ValueError: an unknown policy or scenario.
         swarm_forage_env.study.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
     """
@@ -312,6 +317,11 @@ def plan_choice(
     for name, value in given.items():
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise CurveError(f"Expected {name} as a number above 0, got {value:g}.")
+    if deaths is not None and deaths > chosen.robots.n_robots:
+        raise CurveError(
+            f"Expected at most {chosen.robots.n_robots} deaths, one for each robot, got {deaths:g}; "
+            "ask for fewer deaths or more robots."
+        )
     experiments = [Experiment(criterion=UNDISTURBED, value=0.0, scenario=chosen)]
     constraints = [Constraint(condition="undisturbed", demand=deliver)]
     disturbances = {"failures": (failures, _failing), "deaths": (deaths, _dying), "noise": (noise, _noisy)}
@@ -346,6 +356,8 @@ def rank_policies(
         constraints: The undisturbed one first.
         scenario: Where the runs were made.
     """
+    from swarm_forage_env.scenarios.performance import quantity
+
     candidates = [
         Candidate(
             policy=one.policy,
@@ -362,6 +374,7 @@ def rank_policies(
         scenario=scenario.name,
         n_robots=scenario.robots.n_robots,
         horizon_s=scenario.horizon_s,
+        unit=unit_text(quantity(scenario.performance)),
     )
 
 
@@ -384,11 +397,11 @@ def _missing(candidate: Candidate) -> str:
 
 def _failing(scenario: "ScenarioConfig", rate: float) -> "Experiment":
     """Malfunctions per tick, and repairs as in the study."""
-    from swarm_forage_env.study.experiments import AWAY_SHARE, Experiment
+    from swarm_forage_env.study.experiments import Experiment, repairs_per_tick
     from swarm_forage_env.wrappers.population import PopulationConfig
 
-    away = AWAY_SHARE * scenario.robots.n_robots  # rho / (1 - rho) with rho = malfunctions / repairs
-    config = PopulationConfig(malfunction_per_tick=rate, repair_per_tick=rate * (1.0 + 1.0 / away))
+    repair = repairs_per_tick(rate, scenario.robots.n_robots)
+    config = PopulationConfig(malfunction_per_tick=rate, repair_per_tick=repair)
     return Experiment(criterion=POPULATION, value=rate, scenario=scenario, wrappers=(config,))
 
 

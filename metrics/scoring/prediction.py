@@ -15,9 +15,10 @@ from metrics.statistics import Summary, aggregate
 from .columns import SIZE
 from .contestants import PolicyLike
 from .curves_file import read_curves
+from .performance import PerformanceLike
 from .plan import ScoringPlan
 from .texts import aligned, bounds, counted, number, paragraph, percent, plain
-from .totals import PolicyTotals, plan_conditions, run_totals
+from .totals import PolicyTotals, plan_conditions, run_totals, unit_text
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -25,12 +26,15 @@ if TYPE_CHECKING:
     from swarm_forage_env.scenarios.config import ScenarioConfig
 
 FIT_SIZES = (1, 2, 4, 8, 16, 32)
-"""Swarm sizes that are fitted unless others are given (our choice)."""
+"""Swarm sizes that are fitted unless others are given (our choice); for power-law clusters see `fit_sizes`."""
+N_ARENAS = 5
+"""How many arenas are fitted unless sizes are given, where the arena grows with the swarm (our choice)."""
 AHEAD = (2, 4)
 """The largest fitted size times these is always predicted."""
 _RESAMPLING_SEED = 1
 """Fixed, so that the same runs give the same prediction."""
 _BAND_POINTS = 40
+_NO_SUM = "note: this performance is no sum over robots, and the laws are about what robots achieve together"
 _HEADER = ("robots", "runs", "measured", "law", "95 % interval", "used", "inside")
 
 
@@ -49,8 +53,14 @@ class PredictionTable:
     """Sizes that are fitted."""
     hold: tuple[int, ...]
     """Sizes that were run but held back."""
+    unit: str
+    """Of performance, such as "objects in 10,000 s"."""
     prediction: SizePrediction
     """At the held-back sizes, at `AHEAD`, and at sizes between, for a picture."""
+    left_out: tuple[int, ...] = ()
+    """Sizes that were to be fitted, and have fewer than two finished runs."""
+    adds_up: bool = True
+    """Whether a swarm has what its robots have together, as the laws expect."""
     failures: tuple[str, ...] = ()
     """Runs that failed, one line each."""
 
@@ -70,9 +80,9 @@ class PredictionTable:
         return aggregate(self.totals[n_robots]) if self.totals.get(n_robots) else None
 
     def is_inside(self, n_robots: int) -> bool | None:
-        """Return whether the mean of the held-back runs lies in the interval; None without such runs."""
-        truth = self.measured(n_robots)
-        if truth is None:
+        """Return whether the mean of two or more held-back runs lies in the interval; None if there are no such."""
+        truth = self.measured(n_robots) if n_robots in self.hold else None
+        if truth is None or truth.n_used < 2:
             return None
         _, lower, upper = self.interval(n_robots)
         return lower <= truth.mean <= upper
@@ -84,10 +94,10 @@ class PredictionTable:
             "policy": self.policy,
             "scenario": self.scenario,
             "horizon_s": self.horizon_s,
-            "fit": [
-                {"n_robots": size, "runs": list(self.totals[size]), "measured": bounds(self.measured(size))}
-                for size in self.fit
-            ],
+            "unit": self.unit,
+            "adds_up": self.adds_up,
+            "fit": [self._runs_mapping(size) for size in self.fit],
+            "left_out": [self._runs_mapping(size) for size in self.left_out],
             "law": _law_mapping(found.law),
             "laws": {
                 name: {**_law_mapping(law), "error": plain(found.errors[name]), "share": found.law_shares[name]}
@@ -104,27 +114,32 @@ class PredictionTable:
             "failures": list(self.failures),
         }
 
+    def _runs_mapping(self, size: int) -> dict[str, Any]:
+        return {"n_robots": size, "runs": list(self.totals[size]), "measured": bounds(self.measured(size))}
+
     def _prediction_mapping(self, size: int) -> dict[str, Any]:
         value, lower, upper = self.interval(size)
+        is_held = size in self.hold
         return {
             "n_robots": size,
             "value": value,
             "lower": lower,
             "upper": upper,
-            "held_back": list(self.totals.get(size, ())),
-            "measured": bounds(self.measured(size)),
+            "held_back": list(self.totals[size]) if is_held else [],
+            "measured": bounds(self.measured(size)) if is_held else None,
             "inside": self.is_inside(size),
         }
 
     def __str__(self) -> str:
         where = f" in {self.scenario}" if self.scenario else ""
-        unit = "performance per run" if self.horizon_s is None else f"objects in {self.horizon_s:,g} s"
+        sizes = sorted({*self.fit, *self.left_out, *self.predicted_sizes})
         lines = [
-            f"{self.policy}{where}: {unit}, fitted to {', '.join(map(str, self.fit))} robots",
-            *aligned([_HEADER, *(self._row(size) for size in (*self.fit, *self.predicted_sizes))]),
+            f"{self.policy}{where}: {self.unit}, fitted to {', '.join(map(str, self.fit))} robots",
+            *aligned([_HEADER, *map(self._row, sizes)]),
             f"law: {law_text(self.prediction.law)}",
             f"critical size: {self.critical_text()}",
             self.laws_text(),
+            *([] if self.adds_up else [_NO_SUM]),
         ]
         return "\n".join([*lines, *paragraph([f"failed: {failure}" for failure in self.failures])])
 
@@ -149,19 +164,30 @@ class PredictionTable:
     def _row(self, size: int) -> tuple[str, ...]:
         truth = self.measured(size)
         cells = (str(size), str(len(self.totals.get(size, ()))), "-" if truth is None else number(truth.mean))
-        if size in self.fit:
-            return (*cells, number(float(self.prediction.law.performance(size))), "", "fitted", "")
-        value, lower, upper = self.interval(size)
-        inside = self.is_inside(size)
-        words = ("predicted", "") if inside is None else ("held back", "yes" if inside else "NO")
-        return (*cells, number(value), f"{number(lower)} to {number(upper)}", *words)
+        law = number(float(self.prediction.law.performance(size)))
+        if size not in self.predicted_sizes:
+            return (*cells, law, "", "fitted" if size in self.fit else "left out", "")
+        _, lower, upper = self.interval(size)
+        used = "held back" if size in self.hold else "left out" if size in self.left_out else "predicted"
+        inside = {True: "yes", False: "NO", None: ""}[self.is_inside(size)]
+        return (*cells, law, f"{number(lower)} to {number(upper)}", used, inside)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PredictionPlan:
+    """The runs of a prediction, and what becomes of each size."""
+
+    runs: ScoringPlan
+    """One experiment per size, those of `fit` and then those of `hold`."""
+    fit: tuple[int, ...]
+    hold: tuple[int, ...]
 
 
 def predict_policy(
     policy: PolicyLike,
     scenario: "str | ScenarioConfig" = "warehouse_small",
     *,
-    fit: Sequence[int] = FIT_SIZES,
+    fit: Sequence[int] | None = None,
     hold: Sequence[int] = (),
     seeds: int | Sequence[int] = 4,
     name: str | None = None,
@@ -177,8 +203,8 @@ def predict_policy(
     Args:
         policy: See `PolicyLike`.
         scenario: Name of a preset, or a complete configuration. As in scores, warehouses have enough objects for the
-            largest swarm, and the arena of search and rescue grows with the swarm.
-        fit: Swarm sizes that are fitted, `MIN_SIZES` or more.
+            largest swarm, and the arena of search and rescue grows with the swarm. It names the performance, too.
+        fit: Swarm sizes that are fitted, `MIN_SIZES` or more; default see `fit_sizes`.
         hold: Larger sizes that are run, too, and not fitted.
         seeds: How many, at least two, or which.
         name: As in `score_policy`, and so are all further arguments.
@@ -203,35 +229,44 @@ def predict_policy(
         parameters=parameters,
         caches=caches,
     )
-    return run_predictions(plan, fit, hold, out=out, jobs=jobs, executor=executor, progress=progress)[0]
+    return run_predictions(plan, out=out, jobs=jobs, executor=executor, progress=progress)[0]
 
 
 def plan_prediction(
     policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
     scenario: "str | ScenarioConfig" = "warehouse_small",
     *,
-    fit: Sequence[int] = FIT_SIZES,
+    fit: Sequence[int] | None = None,
     hold: Sequence[int] = (),
     seeds: int | Sequence[int] = 4,
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
-) -> ScoringPlan:
+) -> PredictionPlan:
     """Return the runs that `predict_policy` makes; arguments and errors as there."""
     from swarm_forage_env.scenarios.presets import scenario as preset
     from swarm_forage_env.study.experiments import Experiment
 
-    fitted, held = _checked_sizes(fit, hold)
     chosen = preset(scenario) if isinstance(scenario, str) else scenario
+    fitted, held = _checked_sizes(fit_sizes(chosen) if fit is None else fit, hold)
     experiments = [
         Experiment(criterion=SIZE, value=size, scenario=_with_robots(chosen, size)) for size in (*fitted, *held)
     ]
-    return plan_conditions(policies, chosen, experiments, seeds=seeds, parameters=parameters, caches=caches)
+    runs = plan_conditions(policies, chosen, experiments, seeds=seeds, parameters=parameters, caches=caches)
+    return PredictionPlan(runs=runs, fit=fitted, hold=held)
+
+
+def fit_sizes(scenario: "ScenarioConfig") -> tuple[int, ...]:
+    """Return the sizes that are fitted unless others are given: `FIT_SIZES`, or those that fill the smallest arenas.
+
+    Power-law clusters are in arenas that grow with the swarm. One robot is left out there: it has a density of its own.
+    """
+    if scenario.objects.placement != "power_law":
+        return FIT_SIZES
+    return tuple(size for size in sorted(_growing_worlds(scenario)) if size > 1)[:N_ARENAS]
 
 
 def run_predictions(
-    plan: ScoringPlan,
-    fit: Sequence[int],
-    hold: Sequence[int] = (),
+    plan: PredictionPlan,
     *,
     out: str | Path | None = None,
     jobs: int | None = None,
@@ -239,13 +274,16 @@ def run_predictions(
     progress: bool = True,
 ) -> tuple[PredictionTable, ...]:
     """Carry out a plan of `plan_prediction` and return one table per policy; arguments and errors as there."""
-    fitted, held = _checked_sizes(fit, hold)
-    found = run_totals(plan, out=out, jobs=jobs, executor=executor, progress=progress)
-    return tuple(_table_of_runs(plan, totals, fitted, held) for totals in found)
+    found = run_totals(plan.runs, out=out, jobs=jobs, executor=executor, progress=progress)
+    return tuple(_table_of_runs(plan, totals) for totals in found)
 
 
 def predict_curves(
-    path: str | Path, *, fit: Sequence[int] | None = None, hold: Sequence[int] = ()
+    path: str | Path,
+    *,
+    fit: Sequence[int] | None = None,
+    hold: Sequence[int] = (),
+    performance: PerformanceLike | None = None,
 ) -> tuple[PredictionTable, ...]:
     """Predict from curves of any simulator, one table per policy in the file.
 
@@ -253,12 +291,13 @@ def predict_curves(
         path: CSV or Parquet file with the columns of `CURVE_COLUMNS`; rows of criterion population_size are used.
         fit: Sizes that are fitted; default all below the held-back ones.
         hold: Sizes that are held back.
+        performance: What is read as performance, as in `score_curves`.
 
     Raises:
         CurveError: whatever is wrong with the file, or sizes that it does not have.
     """
     tables: list[PredictionTable] = []
-    for study in read_curves(path):
+    for study in read_curves(path, performance):
         totals = {runs.n_robots: tuple(runs.performance.sum(axis=-1).tolist()) for runs in study.sizes()}
         smallest_held = min(hold, default=math.inf)
         wanted = [size for size in totals if size < smallest_held] if fit is None else fit
@@ -269,7 +308,19 @@ def predict_curves(
                 f"Expected swarm sizes that {study.controller} has in {path}, {', '.join(map(str, totals))}, "
                 f"got {', '.join(map(str, missing))}."
             )
-        tables.append(_table(study.controller, "", study.horizon_s, totals, fitted, held))
+        known = study.horizon_s is not None or not study.is_total
+        tables.append(
+            _table(
+                policy=study.controller,
+                scenario="",
+                horizon_s=study.horizon_s,
+                totals=totals,
+                fit=fitted,
+                hold=held,
+                unit=unit_text(study, study.horizon_s) if known else "performance per run",
+                adds_up=study.adds_up,
+            )
+        )
     return tuple(tables)
 
 
@@ -305,74 +356,73 @@ def _checked_sizes(fit: Sequence[int], hold: Sequence[int]) -> tuple[tuple[int, 
 
 def _with_robots(scenario: "ScenarioConfig", n_robots: int) -> "ScenarioConfig":
     """Return the scenario for a swarm size, as scores have it in their size sweep."""
-    from swarm_forage_env.scenarios import presets
+    if scenario.objects.placement == "power_law":
+        worlds = _growing_worlds(scenario)
+        if n_robots not in worlds:
+            raise CurveError(
+                f"Expected swarm sizes of {scenario.name} that fill one of its arenas, "
+                f"{', '.join(map(str, sorted(worlds)))}, got {n_robots}."
+            )
+        return worlds[n_robots]
+    from swarm_forage_env.scenarios.presets import scenario as preset
     from swarm_forage_env.study.experiments import SIZE_SWEEP_OBJECTS
 
-    robots = replace(scenario.robots, n_robots=n_robots)
-    if scenario.name in SIZE_SWEEP_OBJECTS:
-        objects = scenario.objects
-        if objects.n_objects == presets.scenario(scenario.name).objects.n_objects:
-            objects = replace(objects, n_objects=SIZE_SWEEP_OBJECTS[scenario.name])
-        return replace(scenario, robots=robots, objects=objects)
-    usual = presets.search_and_rescue()
-    if (scenario.arena, scenario.objects.n_objects) != (usual.arena, usual.objects.n_objects):
-        raise CurveError(
-            f"Expected {scenario.name} with its own arena and objects, which grow with the swarm, got an arena "
-            f"{scenario.arena.width_m:g} m wide with {scenario.objects.n_objects} objects."
-        )
-    sides = {
-        presets.robots_at_density(side * side, presets.DENSITY): side for side in presets.SEARCH_AND_RESCUE_OBJECTS
-    }
-    side_m = min(sides.values()) if n_robots == 1 else sides.get(n_robots)
-    if side_m is None:
-        raise CurveError(
-            f"Expected swarm sizes of {scenario.name} that fill one of its arenas, 1, {', '.join(map(str, sides))}, "
-            f"got {n_robots}."
-        )
-    arena = presets.search_and_rescue(side_m=float(side_m))
-    objects = replace(scenario.objects, n_objects=arena.objects.n_objects)
-    return replace(scenario, arena=arena.arena, robots=robots, objects=objects)
+    objects = scenario.objects
+    enough = SIZE_SWEEP_OBJECTS.get(scenario.name)
+    if enough is not None and objects.n_objects == preset(scenario.name).objects.n_objects:
+        objects = replace(objects, n_objects=enough)
+    return replace(scenario, robots=replace(scenario.robots, n_robots=n_robots), objects=objects)
 
 
-def _table_of_runs(
-    plan: ScoringPlan, found: PolicyTotals, fit: tuple[int, ...], hold: tuple[int, ...]
-) -> PredictionTable:
-    totals = {size: tuple(of_seeds.values()) for size, of_seeds in zip((*fit, *hold), found.totals, strict=True)}
-    usable = tuple(size for size in fit if len(totals[size]) > 1)
+def _growing_worlds(scenario: "ScenarioConfig") -> "dict[int, ScenarioConfig]":
+    """Return the worlds of power-law clusters by swarm size: one robot in the smallest arena, and all arenas filled."""
+    from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, search_and_rescue
+    from swarm_forage_env.study.experiments import size_ladder
+
+    series = [search_and_rescue(side_m=float(side)) for side in SEARCH_AND_RESCUE_OBJECTS]
+    if (scenario.arena, scenario.objects.n_objects) not in [(each.arena, each.objects.n_objects) for each in series]:
+        raise CurveError(
+            f"Expected {scenario.name} with an arena and objects of search_and_rescue, because those grow with the "
+            f"swarm, got an arena {scenario.arena.width_m:g} m wide with {scenario.objects.n_objects} objects."
+        )
+    # The ladder goes by the name of the preset, not by the placement.
+    ladder = size_ladder(replace(scenario, name="search_and_rescue"), None)
+    return {world.robots.n_robots: replace(world, name=scenario.name) for world in ladder}
+
+
+def _table_of_runs(plan: PredictionPlan, found: PolicyTotals) -> PredictionTable:
+    sizes = (*plan.fit, *plan.hold)
+    totals = {size: tuple(of_seeds.values()) for size, of_seeds in zip(sizes, found.totals, strict=True)}
+    usable = tuple(size for size in plan.fit if len(totals[size]) > 1)
     if len(usable) < MIN_SIZES:
         raise CurveError(
             f"Expected two or more finished runs at {MIN_SIZES} or more sizes for {found.policy}, got them at "
             f"{len(usable)}; the first failure: {found.failures[0]}"
         )
+    scenario = plan.runs.scenario
     return _table(
-        found.policy, plan.scenario.name, plan.scenario.horizon_s, totals, usable, hold, failures=found.failures
+        policy=found.policy,
+        scenario=scenario.name,
+        horizon_s=scenario.horizon_s,
+        totals=totals,
+        fit=usable,
+        hold=plan.hold,
+        unit=unit_text(plan.runs.read_as, scenario.horizon_s),
+        adds_up=plan.runs.read_as.adds_up,
+        left_out=tuple(size for size in plan.fit if size not in usable),
+        failures=found.failures,
     )
 
 
 def _table(
-    policy: str,
-    scenario: str,
-    horizon_s: float | None,
-    totals: Mapping[int, tuple[float, ...]],
-    fit: tuple[int, ...],
-    hold: tuple[int, ...],
-    *,
-    failures: tuple[str, ...] = (),
+    *, totals: Mapping[int, tuple[float, ...]], fit: tuple[int, ...], hold: tuple[int, ...], **told: Any
 ) -> PredictionTable:
+    """Predict from the totals of runs; `told` are all other fields of a table."""
     last = max(*hold, AHEAD[-1] * fit[-1]) if hold else AHEAD[-1] * fit[-1]
     between = np.geomspace(fit[0], last, _BAND_POINTS).round().astype(int).tolist()
     at = sorted({*hold, *(factor * fit[-1] for factor in AHEAD), *between})
     prediction = predict_performance(fit, [totals[size] for size in fit], at, seed=_RESAMPLING_SEED)
-    return PredictionTable(
-        policy=policy,
-        scenario=scenario,
-        horizon_s=horizon_s,
-        totals=totals,
-        fit=fit,
-        hold=hold,
-        prediction=prediction,
-        failures=failures,
-    )
+    return PredictionTable(totals=totals, fit=fit, hold=hold, prediction=prediction, **told)
 
 
 def counted_inside(tables: Sequence[PredictionTable]) -> str:

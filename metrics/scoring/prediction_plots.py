@@ -58,8 +58,7 @@ def _draw_table(panel: Panel, table: PredictionTable, colour: str) -> None:
     panel.minorticks_off()
     panel.set_ylim(bottom=0.0)
     panel.set_xlabel("robots", fontsize=8)
-    unit = "performance per run" if table.horizon_s is None else f"objects in {table.horizon_s:,g} s"
-    panel.set_ylabel(unit, fontsize=8)
+    panel.set_ylabel(table.unit, fontsize=8)
     panel.set_title(f"{table.policy}{' in ' + table.scenario if table.scenario else ''}", fontsize=9)
     panel.tick_params(labelsize=8)
     panel.grid(alpha=0.3)

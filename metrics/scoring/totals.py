@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from metrics.checks import CurveError, chosen_seeds
 
@@ -17,6 +17,20 @@ if TYPE_CHECKING:
 
     from swarm_forage_env.scenarios.config import ScenarioConfig
     from swarm_forage_env.study.experiments import Experiment
+
+
+class ReadAs(Protocol):
+    """What the numbers of a performance are, as `ScoringPlan.read_as` and `StudyCurves` tell it."""
+
+    @property
+    def amount(self) -> str:
+        """What there is so and so much of."""
+        ...
+
+    @property
+    def is_total(self) -> bool:
+        """Whether a number is a total over its interval."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,6 +87,13 @@ def plan_conditions(
         ),
         budget_name="",
     )
+
+
+def unit_text(read_as: ReadAs, horizon_s: float | None = None) -> str:
+    """Return the unit of performance summed over a run, of that length where it is told."""
+    if not read_as.is_total:
+        return f"{read_as.amount} summed over intervals"
+    return read_as.amount if horizon_s is None else f"{read_as.amount} in {horizon_s:,g} s"
 
 
 def run_totals(

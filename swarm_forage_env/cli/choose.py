@@ -4,10 +4,22 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import AsJson, Caches, DryRun, Jobs, Objects, Out, Robots, Scenario, Settings, Side
+from swarm_forage_env.cli.options import (
+    AsJson,
+    Caches,
+    DryRun,
+    Jobs,
+    Objects,
+    Out,
+    Performance,
+    Robots,
+    Scenario,
+    Settings,
+    Side,
+)
 
 
-def choose(
+def choose(  # long: one parameter per option
     policy: Annotated[
         str,
         typer.Option(
@@ -15,7 +27,8 @@ def choose(
         ),
     ],
     deliver: Annotated[
-        float, typer.Option(help="Objects that an undisturbed run must achieve (first pick-ups in search and rescue).")
+        float,
+        typer.Option(help="Performance that an undisturbed run must reach, in all: objects or what is asked for."),
     ],
     keep: Annotated[
         float, typer.Option(help="Share of --deliver that is still demanded under each disturbance.")
@@ -25,7 +38,7 @@ def choose(
         typer.Option(
             metavar="RATE",
             help="Malfunctions per tick (0.2 s) of the whole swarm, 0.001 in the study. Robots stop and are repaired "
-            "one after the other, at a rate that leaves a tenth of the swarm at work in equilibrium.",
+            "one after the other, a little faster than they fail (docs/deciding.md).",
         ),
     ] = None,
     deaths: Annotated[
@@ -45,6 +58,7 @@ def choose(
     objects: Objects = None,
     side: Side = None,
     caches: Caches = None,
+    performance: Performance = None,
     settings: Settings = None,
     out: Out = None,
     jobs: Jobs = None,
@@ -65,6 +79,7 @@ def choose(
         objects=objects,
         side=side,
         caches=caches,
+        performance=performance,
         horizon=horizon,
         settings=tuple(settings or ()),
     )

@@ -11,7 +11,6 @@ import typer
 from metrics.scoring import ScoringPlan
 from metrics.scoring.choosing import plan_choice, run_choice
 from metrics.scoring.prediction import (
-    FIT_SIZES,
     PredictionTable,
     counted_inside,
     plan_prediction,
@@ -72,25 +71,30 @@ def predict_runs(
         ConfigError: whatever is wrong with the words.
         typer.Exit: Ctrl-C, or runs have failed.
     """
-    sizes = fit or FIT_SIZES
     if any(word.partition("=")[0] == "n_robots" for word in described.settings):
         raise ConfigError("Expected no --set n_robots=..., because sizes are varied; give them by --fit and --hold.")
     scenario, caches = build_scenario(described)
     try:
-        plan = plan_prediction(split_names(policies), scenario, fit=sizes, hold=hold, seeds=seeds, caches=caches)
+        plan = plan_prediction(split_names(policies), scenario, fit=fit, hold=hold, seeds=seeds, caches=caches)
     except ValueError as error:  # of a policy or a size
         raise ConfigError(str(error)) from error
     if dry_run:
-        _show_plan(plan, folder, jobs, as_json=as_json)
+        _show_plan(plan.runs, folder, jobs, as_json=as_json)
         return
-    tables = _carried_out(lambda: run_predictions(plan, sizes, hold, out=folder, jobs=jobs), folder)
+    tables = _carried_out(lambda: run_predictions(plan, out=folder, jobs=jobs), folder)
     _show_predictions(tables, folder, as_json=as_json)
     if any(table.failures for table in tables):
         raise typer.Exit(EXIT_FAILURE)
 
 
 def predict_file(
-    path: Path, fit: Sequence[int] | None, hold: Sequence[int], folder: Path | None, *, as_json: bool
+    path: Path,
+    fit: Sequence[int] | None,
+    hold: Sequence[int],
+    performance: str | None,
+    folder: Path | None,
+    *,
+    as_json: bool,
 ) -> None:
     """Predict from a file of curves and print; draw only where a folder is given.
 
@@ -98,7 +102,7 @@ def predict_file(
         ConfigError: whatever is wrong with the file or the sizes.
     """
     try:
-        tables = predict_curves(path, fit=fit, hold=hold)
+        tables = predict_curves(path, fit=fit, hold=hold, performance=performance)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     _show_predictions(tables, folder, as_json=as_json)

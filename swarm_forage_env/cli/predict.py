@@ -12,16 +12,17 @@ from swarm_forage_env.cli.options import (
     Jobs,
     Objects,
     Out,
+    Performance,
     Scenario,
     Settings,
     refuse_options_of_runs,
 )
 
-_OF_CURVES = ("curves", "fit", "hold", "out", "as_json")
+_OF_CURVES = ("curves", "fit", "hold", "performance", "out", "as_json")
 """Options of `predict` that go with --curves."""
 
 
-def predict(
+def predict(  # long: one parameter per option
     context: typer.Context,
     policy: Annotated[
         str | None, typer.Option(help="One or more, separated by commas: names, or files of trained policies.")
@@ -32,7 +33,10 @@ def predict(
     scenario: Scenario = "warehouse_small",
     fit: Annotated[
         str | None,
-        typer.Option(help="Swarm sizes that are fitted, four or more; default 1,2,4,8,16,32, or those of the file."),
+        typer.Option(
+            help="Swarm sizes that are fitted, four or more; default 1,2,4,8,16,32 (search_and_rescue: "
+            "12,51,115,204,320), or those of the file."
+        ),
     ] = None,
     hold: Annotated[
         str | None, typer.Option(help="Larger sizes that are run, or in the file, but not fitted: the test.")
@@ -41,6 +45,7 @@ def predict(
     horizon: Annotated[float | None, typer.Option(help="Seconds per run, whole intervals of 200 s.")] = None,
     objects: Objects = None,
     caches: Caches = None,
+    performance: Performance = None,
     settings: Settings = None,
     out: Out = None,
     jobs: Jobs = None,
@@ -61,12 +66,13 @@ def predict(
     held = () if hold is None else whole_sizes("--hold", hold)
     if curves is not None:
         refuse_options_of_runs(context, _OF_CURVES)
-        predict_file(curves, fitted, held, out, as_json=as_json)
+        predict_file(curves, fitted, held, performance, out, as_json=as_json)
         return
     described = ScenarioOptions(
         scenario=scenario,
         objects=objects,
         caches=caches,
+        performance=performance,
         horizon=horizon,
         settings=tuple(settings or ()),
     )

@@ -323,12 +323,20 @@ def _population_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Le
     return [], [(float(factor), (config,)) for factor, config in enumerate(_malfunctions(scenario.robots.n_robots), 1)]
 
 
+def repairs_per_tick(malfunction_per_tick: float, n_robots: int) -> float:
+    """Return the repair rate at which a queue without limit has `AWAY_SHARE` of the swarm in it, in equilibrium.
+
+    rho / (1 - rho) = AWAY_SHARE * N with rho = malfunctions / repairs. A swarm can lose no more robots than it has, so
+    fewer are away in its own equilibrium (docs/deciding.md).
+    """
+    return malfunction_per_tick * (1.0 + 1.0 / (AWAY_SHARE * n_robots))
+
+
 def _malfunctions(n_robots: int) -> tuple[PopulationConfig, ...]:
     """Rates of the study; for other swarm sizes rates with the same share of the swarm away (our choice)."""
     if n_robots in STUDY_SIZES_OF_MALFUNCTIONS:
         return malfunction_levels(n_robots)
-    away = AWAY_SHARE * n_robots  # rho / (1 - rho) with rho = malfunctions / repairs
-    repair = MALFUNCTION_PER_TICK * (1.0 + 1.0 / away)
+    repair = repairs_per_tick(MALFUNCTION_PER_TICK, n_robots)
     return tuple(
         PopulationConfig(malfunction_per_tick=factor * MALFUNCTION_PER_TICK, repair_per_tick=factor * repair)
         for factor in range(1, 9)

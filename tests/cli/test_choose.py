@@ -17,7 +17,7 @@ def test_choose_prints_ranking_evidence_and_reason(command):
     code, out, _ = command(*CHOOSE, *ADVERSE)
     assert code == 0
     lines = out.splitlines()
-    assert lines[0] == "warehouse_small, 3 robots, runs of 4 s"
+    assert lines[0] == "warehouse_small, 3 robots, runs of 4 s: objects"
     assert lines[1].split()[:4] == ["rank", "policy", "constraint", "demand"]
     for word in ("undisturbed", "failures 0.01", "deaths 1", "noise 0.01", "not met", "comes first: it meets 0 of 4"):
         assert word in out
@@ -32,6 +32,16 @@ def test_under_a_disturbance_a_share_of_the_demand_is_enough(command):
     demands = [evidence["demand"] for evidence in answer["ranking"][0]["evidence"]]
     assert demands == [5.0, 2.5]
     assert answer["ranking"][0]["not_met"] == ["undisturbed", "noise 0.01"]
+
+
+def test_another_performance_is_read_from_the_same_runs(command, monkeypatch):
+    command(*CHOOSE)
+    monkeypatch.setattr(RandomPolicy, "reset", lambda *_: pytest.fail("a stored run was repeated"))
+    code, out, _ = command(*CHOOSE, "--performance", "n_active")
+    assert code == 0
+    assert out.splitlines()[0] == "warehouse_small, 3 robots, runs of 4 s: robots summed over intervals"
+    # Three robots at work in each of two intervals.
+    assert " ".join(out.splitlines()[2].split()).startswith("1 random undisturbed 5 6 ")
 
 
 def test_the_same_command_again_runs_nothing(command, monkeypatch):
@@ -64,6 +74,7 @@ def test_failed_runs_are_listed_and_exit_1(command, monkeypatch):
         (("--policy", "crw"), "deliver"),
         (("--policy", "crw", "--deliver", "0"), "Expected deliver as a number above 0, got 0"),
         (("--policy", "crw", "--deliver", "9", "--noise", "-1"), "Expected noise as a number above 0, got -1"),
+        (("--policy", "crw", "--deliver", "9", "--deaths", "100"), "Expected at most 50 deaths"),
         (("--policy", "crw", "--deliver", "9", "--seeds", "1"), "seeds"),
         (("--policy", "crww", "--deliver", "9"), "Did you mean 'crw'?"),
         (("--policy", "crw", "--deliver", "9", "--horizon", "150"), "whole number of intervals"),

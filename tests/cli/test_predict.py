@@ -97,6 +97,24 @@ def test_curves_of_others_are_predicted_and_drawn_where_a_folder_is_given(comman
     assert Path("here/prediction.png").is_file()
 
 
+def test_another_performance_is_predicted_from_runs_and_from_curves(command, curves):
+    code, out, _ = command(*RUNS, *WORLD, "--performance", "n_active")
+    assert code == 0
+    assert out.startswith("crw in warehouse_small: robots summed over intervals, fitted to 1, 2, 3, 4 robots")
+    assert "law: linear, P(N) = 2 N" in out  # every robot is at work in each of two intervals
+    code, out, _ = command("predict", "--curves", curves(), "--performance", "1/performance")
+    assert code == 0
+    assert out.startswith("curves: 1/performance summed over intervals, fitted to 1, 2, 4, 8, 16, 32 robots")
+    assert "note: this performance is no sum over robots" in out
+
+
+def test_search_and_rescue_has_sizes_of_its_own(command):
+    code, out, _ = command("predict", "--policy", "crw", "--scenario", "search_and_rescue", "--dry-run")
+    assert code == 0
+    sizes = [line.split()[2] for line in out.splitlines() if line.startswith("population_size")]
+    assert sizes == ["12", "51", "115", "204", "320"]
+
+
 def test_without_matplotlib_there_is_a_table_and_a_hint(command, curves, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
     code, out, err = command("predict", "--curves", curves(), "--out", "here", "--json")
@@ -140,7 +158,10 @@ def test_runs_that_leave_nothing_to_predict_end_with_one_line(command):
         ((), "Expected either --policy or --curves"),
         (("--policy", "crw", "--curves", "x.csv"), "Expected either --policy or --curves"),
         (("--curves", "gone.csv"), "Cannot read gone.csv"),
-        (("--curves", "x.csv", "--seeds", "3"), "no other options than --fit, --hold, --out and --json, got --seeds"),
+        (
+            ("--curves", "x.csv", "--seeds", "3"),
+            "no other options than --fit, --hold, --performance, --out and --json, got --seeds",
+        ),
         (("--policy", "crww"), "Did you mean 'crw'?"),
         (("--policy", "crw", "--fit", "1,2,4"), "4 or more different swarm sizes to fit, got 1, 2, 4"),
         (("--policy", "crw", "--fit", "1,two"), "Expected --fit as whole numbers of robots"),

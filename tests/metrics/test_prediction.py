@@ -90,6 +90,46 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     assert len(inside) == 48
 
 
+PEAKED = {16: 150, 32: 280, 64: 470, 128: 600, 256: 300, 512: 60}
+"""Swarm size -> mean deliveries of a swarm that jams, without a run of one robot."""
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_swarm_that_jams_is_predicted_without_a_run_of_one_robot(seed):
+    rng = np.random.default_rng(seed)
+    runs = [rng.poisson(mean, 4) for mean in PEAKED.values()]
+    prediction = predict_performance(list(PEAKED), runs, [1024], seed=1, n_resamples=40)
+    assert prediction.law.name == "universal"
+    assert 64.0 < prediction.critical < 256.0
+    assert 0.0 <= prediction.lower[0] <= prediction.value[0] < 150.0
+    assert math.isfinite(prediction.upper[0])
+
+
+def test_one_robot_that_was_not_measured_has_at_most_ten_times_the_best_performance_per_robot():
+    # 1 / (N - 1) is N / (N (N - 1)): without a bound the best fit has w = 1 and u = v = 0, an infinite a = 1 / (u + v).
+    found = fit_law("universal", [2, 4, 8, 16], [1.0, 1.0 / 3.0, 1.0 / 7.0, 1.0 / 15.0])
+    assert found.a == pytest.approx(5.0)  # the best is two robots with 1, 0.5 each
+    # P(N) = 1 / (0.2 / N + w (N - 1)) with w a bit below 1.
+    assert found.performance([2, 16]) == pytest.approx([1.0, 1.0 / 15.0], rel=0.1)
+    # What does not need the bound is fitted as before: performance that is constant has s = 1.
+    flat = fit_law("universal", [2, 4, 8, 16], [3.0, 3.0, 3.0, 3.0])
+    assert (flat.a, flat.contention, flat.coherency) == pytest.approx((3.0, 1.0, 0.0), abs=1e-6)
+
+
+def test_peaked_performance_never_breaks_a_fit():
+    """Means that rise to a peak at any place and fall at any rate, fitted to sizes that leave one robot out."""
+    rng = np.random.default_rng(5)
+    sizes = np.array([4, 8, 16, 32, 64])
+    for _study in range(100):
+        peak, rise, fall = rng.uniform(4.0, 64.0), rng.uniform(0.5, 3.0), rng.uniform(0.5, 6.0)
+        means = 100.0 * np.where(sizes < peak, (sizes / peak) ** rise, (sizes / peak) ** -fall)
+        for name in LAWS:
+            law = fit_law(name, sizes.tolist(), means)
+            assert 0.0 < law.a <= 10.0 * (means / sizes).max() * (1.0 + 1e-9)
+            assert 0.0 <= law.contention <= 1.0
+            assert law.coherency >= 0.0
+
+
 def test_no_critical_size_where_performance_only_rises():
     prediction = predict_performance(SIZES, poisson_runs(LINEAR, 2), [64], seed=1, n_resamples=60)
     assert prediction.critical == math.inf

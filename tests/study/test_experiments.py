@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from metrics import PopulationRates, queue_statistics
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.study.experiments import (
@@ -14,6 +15,7 @@ from swarm_forage_env.study.experiments import (
     budget,
     plan_experiments,
     plan_specs,
+    repairs_per_tick,
     size_ladder,
     spread,
 )
@@ -133,6 +135,16 @@ def test_other_swarm_sizes_have_as_large_a_share_away():
         rho = lowest.population.malfunction_per_tick / lowest.population.repair_per_tick
         assert rho / (1.0 - rho) == pytest.approx(0.9 * n_robots)
         assert lowest.population.repair_per_tick == pytest.approx(repair, abs=1e-9)
+
+
+def test_a_queue_without_limit_has_more_robots_away_than_a_swarm():
+    # 50 robots: 0.001 (1 + 1 / 45). In an unlimited queue 45 are away; a swarm has 29.7 of 50 at work, 118.3 of 200.
+    assert repairs_per_tick(0.001, 50) == pytest.approx(0.001 * 46.0 / 45.0)
+    for n_robots, at_work in ((50, 29.7), (200, 118.3)):
+        rates = PopulationRates(lambda_bd=0.002, mu_bd=repairs_per_tick(0.002, n_robots))
+        equilibrium = queue_statistics(rates, n_robots)
+        assert equilibrium.length == pytest.approx(0.9 * n_robots)
+        assert n_robots - equilibrium.truncated_length == pytest.approx(at_work, abs=0.05)
 
 
 def test_search_and_rescue_has_deaths():

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -112,10 +113,18 @@ def test_policies_without_runs_come_last_and_are_no_reason():
 
 def test_the_table_has_a_row_for_each_policy_and_constraint():
     lines = str(chosen(a=(GOOD, BAD), b=(GOOD, GOOD))).splitlines()
-    assert lines[0] == "warehouse_small, 4 robots, runs of 4 s"
+    assert lines[0] == "warehouse_small, 4 robots, runs of 4 s: objects"
     assert " ".join(lines[2].split()) == "1 b undisturbed 10 13 10.52 to 15.48 +3 98.2 % 3 of 3 met"
     # 2 ± 4.303 / sqrt(3) stays below 5.
     assert " ".join(lines[5].split()) == "noise 0.01 5 2 -0.4841 to 4.484 -3 1.75 % 0 of 3 not met"
+
+
+def test_the_unit_is_that_of_the_performance():
+    for name, unit in {"first_picked": "objects", "n_carrying": "robots summed over intervals"}.items():
+        found = [PolicyTotals(policy="a", totals=({0: 12.0, 1: 13.0}, {0: 12.0, 1: 13.0}), failures=())]
+        choice = rank_policies(found, DEMANDS, replace(WORLD, performance=name))
+        assert str(choice).splitlines()[0] == f"warehouse_small, 4 robots, runs of 4 s: {unit}"
+        assert choice.to_mapping()["unit"] == unit
 
 
 def test_disturbances_are_those_that_the_help_describes():
@@ -156,12 +165,18 @@ def test_a_choice_runs_every_condition_once_and_stores_it(tmp_path):
         ({"deliver": 0.0}, "deliver as a number above 0, got 0"),
         ({"deliver": 5.0, "keep": -1.0}, "keep as a number above 0"),
         ({"deliver": 5.0, "noise": math.inf}, "noise as a number above 0, got inf"),
+        ({"deliver": 5.0, "deaths": 5.0}, "at most 4 deaths, one for each robot, got 5; ask for fewer deaths or more"),
         ({"deliver": 5.0, "seeds": 1}, "two or more seeds, got 1"),
     ],
 )
 def test_demands_that_make_no_sense_are_refused(demand, reason):
     with pytest.raises(CurveError, match=reason):
         choose_policy(["random"], WORLD, **demand)
+
+
+def test_all_robots_may_be_expected_to_die():
+    dying = plan_choice(["random"], WORLD, deliver=5.0, deaths=4.0).runs.experiments[1]
+    assert dying.population.death_per_tick == 4.0 / 20.0  # 4 s have 20 ticks
 
 
 def test_a_failed_policy_is_shown_and_the_others_are_ranked():

@@ -1,13 +1,15 @@
 """Predictions of policies: what is run, what is fitted, what is held back, and how it is told."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from metrics import CurveError, SizeLaw, predict_curves, predict_policy
-from metrics.scoring.prediction import counted_inside, law_text, plan_prediction
+from metrics.scoring.prediction import counted_inside, law_text, plan_prediction, run_predictions
 from metrics.scoring.prediction_plots import draw_predictions
+from metrics.scoring.totals import PolicyTotals
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.experiments import Budget, plan_experiments
@@ -102,17 +104,103 @@ def test_laws_are_written_as_formulas():
 
 
 def test_worlds_are_those_of_the_size_sweep_of_scores():
-    plan = plan_prediction(["random"], "warehouse_small", fit=[1, 6, 12, 25], hold=[50])
+    plan = plan_prediction(["random"], "warehouse_small", fit=[1, 6, 12, 25], hold=[50]).runs
     standard = Budget(horizon_s=10_000.0, interval_s=200.0, n_seeds=2, n_sizes=5, n_levels=1)
     assert plan.experiments == plan_experiments(scenario("warehouse_small"), ["population_size"], standard)
-    assert plan_prediction(["random"], WORLD, fit=[1, 2, 3, 4]).experiments[0].scenario.objects.n_objects == 20
-    rescue = plan_prediction(["random"], "search_and_rescue", fit=[1, 12, 51, 115]).experiments
+    assert plan_prediction(["random"], WORLD, fit=[1, 2, 3, 4]).runs.experiments[0].scenario.objects.n_objects == 20
+    rescue = plan_prediction(["random"], "search_and_rescue", fit=[1, 12, 51, 115]).runs.experiments
     assert [e.scenario.arena.width_m for e in rescue] == [16.0, 16.0, 32.0, 48.0]
     assert [e.scenario.objects.n_objects for e in rescue] == [80, 80, 272, 368]
     with pytest.raises(CurveError, match=r"fill one of its arenas, 1, 12, 51, 115, .*, got 2"):
         plan_prediction(["random"], "search_and_rescue", fit=[1, 2, 12, 51])
-    with pytest.raises(CurveError, match="which grow with the swarm, got an arena 48 m wide with 50 objects"):
+    with pytest.raises(CurveError, match="because those grow with the swarm, got an arena 48 m wide with 50 objects"):
         plan_prediction(["random"], scenario("search_and_rescue", n_objects=50), fit=[1, 12, 51, 115])
+
+
+def test_sizes_that_are_fitted_by_default_fill_the_arenas_of_the_scenario():
+    assert plan_prediction(["random"], "warehouse_quad").fit == (1, 2, 4, 8, 16, 32)
+    rescue = plan_prediction(["random"], "search_and_rescue", hold=[460])
+    # 5 % of 16^2, 32^2, 48^2, 64^2 and 80^2 m^2; one robot in 256 m^2 has another density.
+    assert (rescue.fit, rescue.hold) == ((12, 51, 115, 204, 320), (460,))
+    assert [e.scenario.arena.width_m for e in rescue.runs.experiments] == [16.0, 32.0, 48.0, 64.0, 80.0, 96.0]
+
+
+def test_only_power_law_clusters_grow_with_the_swarm_whatever_the_name():
+    own = replace(scenario("warehouse_small", n_objects=77), name="my_hall")
+    for experiment in plan_prediction(["random"], own).runs.experiments:
+        assert (experiment.scenario.arena, experiment.scenario.objects) == (own.arena, own.objects)
+    dense = scenario("warehouse_small", n_robots=50, density=0.05)
+    assert {e.scenario.arena for e in plan_prediction(["random"], dense).runs.experiments} == {dense.arena}
+    scattered = scenario("search_and_rescue", placement="random")
+    assert {e.scenario.arena for e in plan_prediction(["random"], scattered).runs.experiments} == {scattered.arena}
+    ruins = replace(scenario("search_and_rescue"), name="ruins")
+    plan = plan_prediction(["random"], ruins)
+    assert plan.fit == (12, 51, 115, 204, 320)
+    assert {e.scenario.name for e in plan.runs.experiments} == {"ruins"}
+    # 57 robots in 48 x 48 m are 2.47 %; so 57 / 2304 of 256, 1,024, 4,096, 6,400 m^2.
+    sparse = plan_prediction(["random"], scenario("search_and_rescue", side_m=48.0, n_robots=57))
+    assert sparse.fit == (6, 25, 57, 101, 158)
+
+
+def tables_of(monkeypatch, totals, *, fit=(1, 2, 4, 8, 16), hold=(), world=WORLD):
+    """Predict from runs that are given by size."""
+    plan = plan_prediction(["random"], world, fit=fit, hold=hold, seeds=2)
+    found = PolicyTotals(
+        policy="random",
+        totals=tuple(dict(enumerate(totals[size])) for size in (*fit, *hold)),
+        failures=("one: it broke",),
+    )
+    monkeypatch.setattr("metrics.scoring.prediction.run_totals", lambda *_, **__: (found,))
+    (table,) = run_predictions(plan)
+    return table
+
+
+def row(table, size):
+    return next(line.split() for line in str(table).splitlines() if line.startswith(f"{size} "))
+
+
+def test_a_size_that_lost_its_runs_is_left_out_and_not_held_back(monkeypatch):
+    runs = {1: [5.0, 5.2], 2: [10.0, 9.8], 4: [20.0, 21.0], 8: [40.0, 39.0], 16: [80.0]}
+    table = tables_of(monkeypatch, runs)
+    assert (table.fit, table.left_out, table.predicted_sizes) == ((1, 2, 4, 8), (16,), (16, 32))
+    assert row(table, 16)[:3] == ["16", "1", "80"]
+    assert row(table, 16)[-2:] == ["left", "out"]
+    assert (table.is_inside(16), counted_inside([table])) == (None, "")
+    told = table.to_mapping()
+    assert [(each["n_robots"], each["runs"]) for each in told["left_out"]] == [(16, [80.0])]
+    assert [(each["held_back"], each["measured"]) for each in told["predictions"]] == [([], None)] * 2
+    # A lost size that is not predicted has its row, too.
+    table = tables_of(monkeypatch, {**runs, 2: [], 16: [80.0, 79.0]})
+    assert (table.fit, table.left_out) == ((1, 4, 8, 16), (2,))
+    assert row(table, 2)[:3] == ["2", "0", "-"]
+    assert row(table, 2)[-2:] == ["left", "out"]
+
+
+def test_one_held_back_run_gives_no_verdict(monkeypatch):
+    runs = {1: [5.0, 5.2], 2: [10.0, 9.8], 4: [20.0, 21.0], 8: [40.0, 39.0], 16: [80.0], 20: [100.0, 101.0]}
+    table = tables_of(monkeypatch, runs, fit=(1, 2, 4, 8), hold=(16, 20))
+    assert [table.is_inside(size) for size in (16, 20)] == [None, True]
+    assert row(table, 16)[-2:] == ["held", "back"]
+    assert counted_inside([table]) == "1 of 1 held-back mean inside the interval"
+
+
+def test_the_unit_is_that_of_the_performance(monkeypatch, tmp_path):
+    runs = {size: [5.0 * size, 5.1 * size] for size in (1, 2, 4, 8)}
+    units = {
+        "collected": ("objects in 4 s", True),
+        "deaths": ("robots in 4 s", True),
+        "n_carrying": ("robots summed over intervals", True),
+        "1/interference_fraction": ("1/interference_fraction summed over intervals", False),
+    }
+    for name, told in units.items():
+        table = tables_of(monkeypatch, runs, fit=(1, 2, 4, 8), world=replace(WORLD, performance=name))
+        assert (table.unit, table.adds_up) == told
+        assert str(table).startswith(f"random in warehouse_small: {told[0]}, fitted to")
+        assert ("note: this performance is no sum over robots" in str(table)) is not told[1]
+    (table,) = predict_curves(curves_file(tmp_path / "curves.csv"), performance="1/performance")
+    assert (table.unit, table.adds_up) == ("1/performance summed over intervals", False)
+    # Each of two intervals has half of the performance 5 * 0.99, so 1/x is 2 / 4.95, twice.
+    assert table.totals[1][0] == pytest.approx(4.0 / 4.95)
 
 
 @pytest.mark.compiled
