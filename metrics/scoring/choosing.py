@@ -418,10 +418,8 @@ def _dying(scenario: "ScenarioConfig", count: float) -> "Experiment":
 
 def _noisy(scenario: "ScenarioConfig", sigma: float) -> "Experiment":
     """Noise of all sensors and wheels, as in scores."""
-    from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
     from swarm_forage_env.study.experiments import Experiment
-    from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, noise_levels
+    from swarm_forage_env.wrappers.noise import noise_levels
 
-    groups = STUDY_NOISE_GROUPS if scenario.quirks == AUTHORS_PROGRAM else NOISE_GROUPS
-    _, noisy = noise_levels(sigma, n_levels=2, groups=groups)
+    _, noisy = noise_levels(sigma, n_levels=2)
     return Experiment(criterion=NOISE, value=sigma, scenario=scenario, wrappers=noisy)

@@ -12,9 +12,8 @@ from metrics import CurveError, choose_policy
 from metrics.scoring.choosing import MET, NOT_MET, UNDECIDED, Constraint, Evidence, plan_choice, rank_policies
 from metrics.scoring.totals import PolicyTotals
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.study.store import load
-from swarm_forage_env.wrappers.noise import NOISE_GROUPS, STUDY_NOISE_GROUPS, ActuatorNoiseConfig, SensorNoiseConfig
+from swarm_forage_env.wrappers.noise import NOISE_GROUPS, ActuatorNoiseConfig, SensorNoiseConfig
 from swarm_forage_env.wrappers.population import malfunction_levels
 
 WORLD = scenario("warehouse_small", n_robots=4, n_objects=20, horizon_s=4.0, interval_s=2.0)
@@ -140,8 +139,6 @@ def test_disturbances_are_those_that_the_help_describes():
     assert failing.population.repair_per_tick == pytest.approx(study.repair_per_tick, rel=1e-6)
     assert dying.population.death_per_tick == 5 / 50_000
     assert noisy.wrappers == (SensorNoiseConfig(sigma=0.02, groups=NOISE_GROUPS), ActuatorNoiseConfig(sigma=0.02))
-    program = plan_choice(["random"], scenario("warehouse_small", quirks=AUTHORS_PROGRAM), deliver=10, noise=0.02)
-    assert program.runs.experiments[1].wrappers[0].groups == STUDY_NOISE_GROUPS
 
 
 def test_a_choice_runs_every_condition_once_and_stores_it(tmp_path):
