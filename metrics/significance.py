@@ -47,10 +47,10 @@ def pooled_p(differences: FloatArray) -> FloatArray:
     """
     n_variants, n_pairs = differences.shape
     if n_pairs < 2:
-        return np.full(n_variants, math.nan)
+        return np.full((n_variants,), math.nan)
     variance = float(differences.var(axis=1, ddof=1).mean())
     if not variance > 0.0:
-        return np.full(n_variants, math.nan)
+        return np.full((n_variants,), math.nan)
     t = np.abs(differences.mean(axis=1)) / math.sqrt(variance / n_pairs)
     return 2.0 * np.asarray(stdtr(n_variants * (n_pairs - 1), -t), dtype=np.float64)
 

@@ -172,8 +172,9 @@ class PopulationConfig(WrapperConfig):
 def malfunction_levels(n_robots: int) -> tuple[PopulationConfig, ...]:
     """Return the population dynamics of scenario 1: malfunctions and repairs at x + 1 times a base rate, x = 0 ... 7.
 
-    The ratio of the rates is such that a tenth of the swarm would be at work in equilibrium, which a run is too short
-    to reach (study configuration; it has no level without malfunctions, x = 0 is the reference).
+    The ratio of the rates is that of the study, which wanted a tenth of the swarm at work. That holds for a queue
+    without limit; in equilibrium 29.7 of 50 robots are at work, and a run is too short to reach it. (The study has no
+    level without malfunctions, x = 0 is the reference.)
 
     Args:
         n_robots: 50 (small warehouse) or 200 (medium).
