@@ -29,8 +29,8 @@ from swarm_forage_env.scenarios.sizing import (
 SCENARIO_NAMES = ("warehouse_small", "warehouse_medium", "warehouse_dual", "warehouse_quad", "search_and_rescue")
 
 SEARCH_AND_RESCUE_OBJECTS = {16: 80, 32: 272, 48: 368, 64: 448, 80: 544, 96: 1248, 112: 1408, 128: 1568}
-"""Side in metres -> objects: a number that the power-law clusters of that side always hold (our choice: the study asked
-for 4,000 everywhere and placed what fitted)."""
+"""Side in metres -> objects: what the clusters of the authors' program always hold, so that both readings have the same
+number (our choice: the study asked for 4,000 everywhere and placed what fitted)."""
 DENSITY = 0.05
 """Robots per square metre in search and rescue: 5 % (scenario 2 of the paper)."""
 _SIZES = ("n_robots", "n_objects", "side_m", *ARENA_FIELDS)
