@@ -23,7 +23,7 @@ LONG_TITLE = 48
 """Letters that fit above a panel; longer titles are smaller, so that they do not run into their neighbours."""
 _X_LABELS = {
     SIZE: "robots (the larger swarm)",
-    THROTTLE: "distance from ideal conditions (amplitude of throttle, or of handling cost in ticks)",
+    THROTTLE: "distance from ideal conditions (amplitude)",
     NOISE: "standard deviation of noise",
     POPULATION: "level of population dynamics",
 }
