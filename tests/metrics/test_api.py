@@ -45,7 +45,7 @@ SIGNATURES = {
     "fit_law": "name, sizes, performance",
     "forward_error": "name, sizes, performance",
     "predict_performance": "sizes, runs, at, *, level=0.95, n_resamples=500, seed=None",
-    "predict_policy": "policy, scenario='warehouse_small', *, fit=(1, 2, 4, 8, 16, 32), hold=(), seeds=4",
+    "predict_policy": "policy, scenario='warehouse_small', *, fit=None, hold=(), seeds=4",
     "choose_policy": "policies, scenario='warehouse_small', *, deliver, keep=1.0, failures=None, deaths=None, "
     "noise=None, seeds=4",
     "normalize": "theta, *, distance=False",

@@ -30,5 +30,5 @@ def test_two_versions_are_drawn_beside_each_other(tmp_path):
             "--set", "interval_s=4", "--jobs", "1", "--out", "runs/warehouse_small", cwd=tmp_path,
         )  # fmt: skip
     printed = run(str(ROOT / "scripts/compare_versions.py"), "runs", "runs", "picture.png", cwd=tmp_path)
-    assert "| crw | 4 |" in printed
+    assert "| 4 | 0.0 → 0.0 |" in printed
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
