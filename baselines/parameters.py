@@ -84,7 +84,7 @@ class ControllerParameters:
         # nothing else.
         for field in dataclasses.fields(self):
             value = getattr(self, field.name)
-            if field.name == "approach_ignores_obstacles":
+            if isinstance(field.default, bool):
                 if not isinstance(value, bool):
                     raise ParameterError(f"Expected {field.name} to be True or False, got {value!r}.")
                 continue

@@ -6,7 +6,6 @@ import typer
 
 from swarm_forage_env.cli.options import (
     EXIT_FAILURE,
-    EXIT_INTERRUPTED,
     AsJson,
     Caches,
     DryRun,
@@ -15,7 +14,6 @@ from swarm_forage_env.cli.options import (
     Performance,
     Settings,
     Wrappers,
-    complain,
 )
 
 
@@ -50,18 +48,16 @@ def ablate(  # long: one parameter per option
 
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.cli.ablation_report import ablation_json, ablation_pages
+    from swarm_forage_env.cli.interrupts import resumable
     from swarm_forage_env.cli.report import estimated_seconds, plan_note
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, described_world, split_names
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, described_world, split_names, split_numbers
     from swarm_forage_env.scenarios.performance import quantity
     from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
     from swarm_forage_env.study.ablation import plan_ablation, run_ablation
-    from swarm_forage_env.study.runner import StudyInterrupted, available_cores
+    from swarm_forage_env.study.runner import available_cores
     from swarm_forage_env.study.store import RunStore
 
-    try:
-        sizes = [int(word) for word in split_names(robots)]
-    except ValueError as error:
-        raise ConfigError(f"Expected --robots as whole numbers separated by commas, got {robots!r}.") from error
+    sizes = split_numbers("--robots", robots, int)
     told = ScenarioOptions(
         scenario="",
         horizon=horizon,
@@ -93,11 +89,8 @@ def ablate(  # long: one parameter per option
         note = plan_note(todo, estimated_seconds(todo, processes), processes)
         typer.echo(f"At most {note} A quirk that changes nothing needs one run instead of {seeds}.")
         return
-    try:
+    with resumable(store.folder):
         result = run_ablation(plan, store=store, jobs=jobs, progress=True)
-    except StudyInterrupted as interrupt:
-        complain(f"{interrupt} They are in {store.folder}; the same command does the rest.", EXIT_INTERRUPTED)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
     show = ablation_json if as_json else ablation_pages
     typer.echo(show(result, quantity(worlds[0].performance)))
     for failure in result.failures:

@@ -123,9 +123,8 @@ def _tables(result: AblationResult, effects: Sequence[Effect], moving: set[str])
 
 def _table(effects: Sequence[Effect], text: Callable[[Effect], str], more: dict[str, dict[str, str]]) -> str:
     """One row per quirk, one column per size and policy, and further columns by quirk."""
-    columns = sorted({(e.cell.n_robots, e.cell.policy) for e in effects}, key=lambda column: column[0])
     policies = list(dict.fromkeys(e.cell.policy for e in effects))
-    columns.sort(key=lambda column: (column[0], policies.index(column[1])))
+    columns = [(size, policy) for size in sorted({e.cell.n_robots for e in effects}) for policy in policies]
     rows = [["quirk", *(f"{policy} {size}" for size, policy in columns), *more]]
     rows.append(["---", *("--:" for _ in columns), *("---" for _ in more)])
     texts = {(e.cell.quirk, e.cell.n_robots, e.cell.policy): text(e) for e in effects}

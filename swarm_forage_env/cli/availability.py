@@ -1,7 +1,7 @@
 """The command `availability`."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -26,11 +26,12 @@ def availability(
     """Show how likely enough robots are at work, over how many are needed. Computed in equilibrium, without runs."""
     from metrics import availability_curves
     from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.cli.scenario_options import split_numbers
     from swarm_forage_env.cli.terminal import notes, output
 
-    sizes = _numbers("--robots", robots, int)
-    means = _numbers("--teams", teams, float)
-    demands = _numbers("--needed", needed, int)
+    sizes = split_numbers("--robots", robots, int)
+    means = split_numbers("--teams", teams, float)
+    demands = split_numbers("--needed", needed, int)
     if out is not None and out.suffix not in _FORMATS:
         raise ConfigError(f"Expected --out as a file ending in {', '.join(_FORMATS)}, got {str(out)!r}.")
     try:
@@ -55,17 +56,6 @@ def availability(
         except ImportError as error:
             raise ImportError(NO_PICTURE) from error
         notes().print(f"picture {out}", markup=False)
-
-
-def _numbers(option: str, text: str, kind: Callable[[str], _Number]) -> list[_Number]:
-    """Return the numbers of an option; raises ConfigError where one is none."""
-    from swarm_forage_env._internal.fields import ConfigError
-
-    try:
-        return [kind(word) for word in text.split(",")]
-    except ValueError as error:
-        whole = "whole numbers" if kind is int else "numbers"
-        raise ConfigError(f"Expected {option} as {whole} separated by commas, such as 5,20, got {text!r}.") from error
 
 
 def _mean_at_work(n: int, team: float) -> float:

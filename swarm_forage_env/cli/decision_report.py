@@ -19,10 +19,11 @@ from metrics.scoring.prediction import (
 )
 from metrics.scoring.prediction_plots import draw_predictions
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, NO_PICTURE, complain
+from swarm_forage_env.cli.interrupts import resumable
+from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, complain
 from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
 from swarm_forage_env.cli.score_report import plan_json, plan_text
-from swarm_forage_env.study.runner import StudyInterrupted, available_cores
+from swarm_forage_env.study.runner import available_cores
 from swarm_forage_env.study.store import RunStore
 
 _PICTURE = "prediction.png"
@@ -38,19 +39,6 @@ class Demands:
     failures: float | None
     deaths: float | None
     noise: float | None
-
-
-def whole_sizes(option: str, text: str) -> tuple[int, ...]:
-    """Turn swarm sizes separated by commas into numbers.
-
-    Raises:
-        ConfigError: one is no whole number, or there is none.
-    """
-    words = split_names(text)
-    try:
-        return tuple(int(word) for word in words)
-    except ValueError:
-        raise ConfigError(f"Expected {option} as whole numbers of robots separated by commas, got {text!r}.") from None
 
 
 def predict_runs(
@@ -149,10 +137,8 @@ def _carried_out(run: Callable[[], _Result], folder: Path) -> _Result:
     from metrics.checks import CurveError
 
     try:
-        return run()
-    except StudyInterrupted as interrupt:
-        complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
+        with resumable(folder):
+            return run()
     except CurveError as error:
         complain(str(error), EXIT_FAILURE)
         raise typer.Exit(EXIT_FAILURE) from None

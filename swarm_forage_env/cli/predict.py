@@ -57,13 +57,13 @@ def predict(  # long: one parameter per option
     The critical size is the swarm size of the largest performance. Sizes of --hold are run as well and held against
     the prediction. Runs that the folder holds already are not repeated.
     """
-    from swarm_forage_env.cli.decision_report import predict_file, predict_runs, whole_sizes
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder
+    from swarm_forage_env.cli.decision_report import predict_file, predict_runs
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder, split_numbers
 
     if (policy is None) == (curves is None):
         raise typer.BadParameter("Expected either --policy or --curves.")
-    fitted = None if fit is None else whole_sizes("--fit", fit)
-    held = () if hold is None else whole_sizes("--hold", hold)
+    fitted = None if fit is None else split_numbers("--fit", fit, int)
+    held = () if hold is None else split_numbers("--hold", hold, int)
     if curves is not None:
         refuse_options_of_runs(context, _OF_CURVES)
         predict_file(curves, fitted, held, performance, out, as_json=as_json)

@@ -6,7 +6,6 @@ import typer
 
 from swarm_forage_env.cli.options import (
     EXIT_FAILURE,
-    EXIT_INTERRUPTED,
     NO_PICTURE,
     AsJson,
     Caches,
@@ -22,7 +21,6 @@ from swarm_forage_env.cli.options import (
     Settings,
     Side,
     Wrappers,
-    complain,
 )
 from swarm_forage_env.cli.terminal import notes, output
 
@@ -103,14 +101,12 @@ def _show_plan(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None
 
 
 def _run_specs(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None) -> "StudyResult":
-    from swarm_forage_env.study.runner import StudyInterrupted, run_all
+    from swarm_forage_env.cli.interrupts import resumable
+    from swarm_forage_env.study.runner import run_all
 
     store.folder.mkdir(parents=True, exist_ok=True)
-    try:
+    with resumable(store.folder):
         return run_all(specs, store=store, jobs=jobs, progress=True)
-    except StudyInterrupted as interrupt:
-        complain(f"{interrupt} They are in {store.folder}; the same command does the rest.", EXIT_INTERRUPTED)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
 def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "RunStore", *, as_json: bool) -> None:

@@ -1,9 +1,9 @@
 """From command-line words to run specifications. Every wrong input raises a ConfigError here."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
@@ -14,6 +14,8 @@ from swarm_forage_env.scenarios.sizing import checked_density
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
+
+_Number = TypeVar("_Number", int, float)
 
 _TRUTH = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
@@ -49,6 +51,19 @@ def split_names(text: str) -> tuple[str, ...]:
     if not names:
         raise ConfigError(f"Expected one or more names separated by commas, got {text!r}.")
     return names
+
+
+def split_numbers(option: str, text: str, kind: Callable[[str], _Number]) -> tuple[_Number, ...]:
+    """Turn numbers separated by commas into numbers, int or float as `kind` says.
+
+    Raises:
+        ConfigError: one is no such number, or there is none.
+    """
+    try:
+        return tuple(kind(word) for word in split_names(text))
+    except ValueError as error:
+        whole = "whole numbers" if kind is int else "numbers"
+        raise ConfigError(f"Expected {option} as {whole} separated by commas, such as 5,20, got {text!r}.") from error
 
 
 def build_scenario(

@@ -12,9 +12,10 @@ from metrics.scoring.comparison import Comparison, compare_tables
 from metrics.scoring.plots import draw_scores
 from metrics.scoring.table import ScoreTable
 from metrics.scoring.texts import aligned, counted
-from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, NO_PICTURE, complain
+from swarm_forage_env.cli.interrupts import resumable
+from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE
 from swarm_forage_env.cli.report import estimate, estimated_seconds
-from swarm_forage_env.study.runner import StudyInterrupted, available_cores
+from swarm_forage_env.study.runner import available_cores
 from swarm_forage_env.study.store import RunStore
 
 
@@ -46,11 +47,8 @@ def run_and_show(
         show = plan_json if as_json else plan_text
         typer.echo(show(plan, RunStore(folder), jobs or available_cores()))
         return
-    try:
+    with resumable(folder):
         tables = run_scores(plan, out=folder, jobs=jobs, progress=True)
-    except StudyInterrupted as interrupt:
-        complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
     show_scores(tables, folder / picture, as_json=as_json, band=band)
     if any(table.failures for table in tables):
         raise typer.Exit(EXIT_FAILURE)

@@ -1,7 +1,7 @@
 """Which quirk makes which result: each one switched on in the description, and off in the authors' program.
 
 `plan_ablation` says which runs that needs and `run_ablation` makes them. A quirk whose first run equals that of its
-reading, bit for bit, does nothing there; its other seeds are not run.
+reading, bit for bit, is taken to do nothing there; its other seeds are not run.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -148,28 +148,25 @@ def run_ablation(
     First both readings and the first seed of each quirk; then the other seeds of the quirks that changed something.
     """
     found = run_all(plan.first, store=store, jobs=jobs, progress=progress)
-    by_id = {record.run_id: record for record in found.records}
-    todo: list[RunSpec] = []
-    for cell, specs in plan.specs.items():
-        first, base = by_id.get(specs[0].run_id), by_id.get(plan.specs[cell._replace(quirk="")][0].run_id)
-        if cell.quirk and first is not None and base is not None and not _same_columns(first, base):
-            todo += specs[1:]
-    rest = run_all(todo, store=store, jobs=jobs, progress=progress) if todo else None
-    by_id |= {record.run_id: record for record in (rest.records if rest else ())}
+    first = {record.run_id: record for record in found.records}
+    same = {cell for cell, specs in plan.specs.items() if cell.quirk and _changed_nothing(plan, cell, specs, first)}
+    todo = [spec for cell, specs in plan.specs.items() if cell.quirk and cell not in same for spec in specs[1:]]
+    rest = run_all(todo, store=store, jobs=jobs, progress=progress)
+    by_id = first | {record.run_id: record for record in rest.records}
     records: dict[Cell, tuple[RunRecord, ...]] = {}
-    for cell, specs in plan.specs.items():
+    for cell in plan.specs:
+        # A quirk that changed nothing has the runs of its reading.
+        specs = plan.specs[cell._replace(quirk="")] if cell in same else plan.specs[cell]
         own = tuple(by_id[spec.run_id] for spec in specs if spec.run_id in by_id)
-        is_first_alone = bool(cell.quirk) and len(own) == 1 < len(specs)
-        if is_first_alone and not any(spec in todo for spec in specs):
-            own = tuple(by_id[spec.run_id] for spec in plan.specs[cell._replace(quirk="")] if spec.run_id in by_id)
         if len(own) == len(specs):
             records[cell] = own
-    return AblationResult(records=records, failures=(*found.failures, *(rest.failures if rest else ())))
+    return AblationResult(records=records, failures=(*found.failures, *rest.failures))
 
 
-def _same_columns(one: RunRecord, other: RunRecord) -> bool:
-    mine, theirs = one.columns(), other.columns()
-    return mine.keys() == theirs.keys() and all(np.array_equal(mine[name], theirs[name]) for name in mine)
+def _changed_nothing(plan: Ablation, cell: Cell, specs: Sequence[RunSpec], first: Mapping[str, RunRecord]) -> bool:
+    """Whether the first run of a cell was made and equals that of its reading."""
+    switched, base = (first.get(spec.run_id) for spec in (specs[0], plan.specs[cell._replace(quirk="")][0]))
+    return switched is not None and base is not None and switched.same_columns(base)
 
 
 def _mean_performance(records: Sequence[RunRecord]) -> float:
@@ -177,7 +174,7 @@ def _mean_performance(records: Sequence[RunRecord]) -> float:
 
 
 def _effect(cell: Cell, base: Sequence[RunRecord], switched: Sequence[RunRecord]) -> Effect:
-    is_same = _same_columns(base[0], switched[0])
+    is_same = switched[0].same_columns(base[0])
     pairs = list(zip(base, switched, strict=True))[: 1 if is_same else None]
     whole = _mean_performance(base)
     gains = np.array([after.performance.sum() - before.performance.sum() for before, after in pairs])

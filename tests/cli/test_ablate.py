@@ -65,7 +65,7 @@ def test_dry_run_makes_nothing(command):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("--robots", "8,many"), "Expected --robots as whole numbers separated by commas, got '8,many'"),
+        (("--robots", "8,many"), "Expected --robots as whole numbers separated by commas, such as 5,20, got '8,many'"),
         (("--quirks", "integer_estimate"), "Did you mean 'integer_estimates'?"),
         (("--policy", "crv"), "Did you mean 'crw'?"),
         (("--seeds", "1"), "'--seeds'"),

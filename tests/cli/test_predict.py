@@ -164,7 +164,7 @@ def test_runs_that_leave_nothing_to_predict_end_with_one_line(command):
         ),
         (("--policy", "crww"), "Did you mean 'crw'?"),
         (("--policy", "crw", "--fit", "1,2,4"), "4 or more different swarm sizes to fit, got 1, 2, 4"),
-        (("--policy", "crw", "--fit", "1,two"), "Expected --fit as whole numbers of robots"),
+        (("--policy", "crw", "--fit", "1,two"), "Expected --fit as whole numbers separated by commas, such as 5,20"),
         (("--policy", "crw", "--hold", "16"), "larger swarms than the fitted 32 robots, got 16"),
         (("--policy", "crw", "--seeds", "1"), "seeds"),
         (("--policy", "crw", "--set", "n_robots=9"), "give them by --fit and --hold"),

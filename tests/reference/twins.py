@@ -96,7 +96,9 @@ TWINS = {
     ),
     "swarm_forage_env.wrappers.kernels.noise.perturb_readings": NOISE,
     "swarm_forage_env.wrappers.kernels.noise.share_that_sees_obstacles": Twin(
-        "sensing.interferes", "wrappers/test_noise.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
+        "sensing.interferes",
+        "wrappers/test_believed_interference.py",
+        "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch",
     ),
     "swarm_forage_env.wrappers.kernels.noise.turn_heading": NOISE,
     "swarm_forage_env.wrappers.kernels.task_shares.add_task_shares": Twin(

@@ -5,6 +5,10 @@ from typing import Any
 
 import polars as pl
 
+from metrics import ScoreForms
+from metrics.scoring.curves_table import study_curves
+from metrics.scoring.study_scores import score_study
+
 
 def rows(
     n_robots: int, runs: Sequence[Sequence[float]], *, first_seed: int = 0, **columns: Any
@@ -34,3 +38,23 @@ CROWDING = table(
     rows(4, [[3.2]], interference_fraction=0.3),
 )
 """A swarm whose robots get in each other's way, one interval; its scores are computed by hand in the tests."""
+
+IDEAL = [[4.0, 6.0, 5.0, 6.0], [5.0, 5.0, 7.0, 4.0], [6.0, 4.0, 5.0, 5.0]]
+SLOWED = [[4.0, 5.0, 2.0, 3.0], [5.0, 5.0, 3.0, 2.0], [5.0, 4.0, 2.0, 3.0]]
+CLOCK = [100.0, 200.0, 300.0, 400.0]
+SIGNAL = [0.1, 0.1, 0.6, 0.6]
+
+
+def scored(*parts, measures=None, **forms):
+    """Scores of the one study in these rows."""
+    (study,) = study_curves(table(*parts))
+    return score_study(study, measures, ScoreForms(**forms))[0]
+
+
+def throttled(ideal=IDEAL, slowed=SLOWED):
+    """Rows of a reference run and of one throttled level."""
+    common = {"criterion": "throttle", "t_end_s": CLOCK}
+    return (
+        rows(9, ideal, criterion_value=0.0, adversity=0.1, **common),
+        rows(9, slowed, criterion_value=0.3, adversity=SIGNAL, **common),
+    )

@@ -8,26 +8,7 @@ from metrics import CurveError, PopulationRates, ScoreForms
 from metrics.scoring.curves_table import study_curves
 from metrics.scoring.study_scores import score_study
 from metrics.scoring.table import HEADER, ScoreTable
-from tests.support.curve_tables import rows, table
-
-IDEAL = [[4.0, 6.0, 5.0, 6.0], [5.0, 5.0, 7.0, 4.0], [6.0, 4.0, 5.0, 5.0]]
-SLOWED = [[4.0, 5.0, 2.0, 3.0], [5.0, 5.0, 3.0, 2.0], [5.0, 4.0, 2.0, 3.0]]
-CLOCK = [100.0, 200.0, 300.0, 400.0]
-SIGNAL = [0.1, 0.1, 0.6, 0.6]
-
-
-def scored(*parts, measures=None, **forms):
-    (study,) = study_curves(table(*parts))
-    return score_study(study, measures, ScoreForms(**forms))[0]
-
-
-def throttled(ideal=IDEAL, slowed=SLOWED):
-    common = {"criterion": "throttle", "t_end_s": CLOCK}
-    return (
-        rows(9, ideal, criterion_value=0.0, adversity=0.1, **common),
-        rows(9, slowed, criterion_value=0.3, adversity=SIGNAL, **common),
-    )
-
+from tests.support.curve_tables import CLOCK, IDEAL, SIGNAL, SLOWED, rows, scored, table, throttled
 
 SIZES = (
     rows(1, [[1.0, 2.0], [2.0, 1.0]], interference_fraction=0.1, t_end_s=[10.0, 20.0]),
