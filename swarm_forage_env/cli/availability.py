@@ -3,7 +3,7 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 _FORMATS = (".png", ".svg", ".pdf")
-_Number = TypeVar("_Number", int, float)
 
 
 def availability(
