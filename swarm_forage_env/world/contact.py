@@ -6,6 +6,8 @@ c_i + c_j > 0. Then both move along the line from i to j with one common speed:
     first tick of pressing:  u = (c_i - c_j) / 2
     later ticks:             u = clip(u of the tick before, -c_j, c_i)
 
+but |u| is at least 0.3 mm/s while the commands allow it, so that equally strong robots do not stand for ever.
+
 Velocities across that line and turn rates stay as commanded. The common speed is forgotten when the pair no longer
 presses. This is what a pair of velocity motors of limited force does: pressed together both are at their limit, the
 forces cancel, and the pair keeps the speed it has. So the robot that came faster shoves the other one back. Were

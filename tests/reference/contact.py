@@ -27,10 +27,12 @@ def pressed_velocities(
             c_i, c_j = speed_i, -speed_j
             if c_i + c_j <= 0.0:
                 continue
-            if (i, j) in before:
-                u = min(max(before[i, j], -c_j), c_i)
-            else:
-                u = (c_i - c_j) / 2
+            u = before.get((i, j), (c_i - c_j) / 2)
+            if u == 0.0:  # nobody is stronger: eastwards, or northwards
+                u = 3e-4 if normal > (0.0, 0.0) else -3e-4
+            elif abs(u) < 3e-4:
+                u = 3e-4 if u > 0.0 else -3e-4
+            u = min(max(u, -c_j), c_i)
             after[i, j] = u
             wanted[i].append((c_i + c_j, ((u - speed_i) * normal[0], (u - speed_i) * normal[1])))
             wanted[j].append((c_i + c_j, ((u - speed_j) * normal[0], (u - speed_j) * normal[1])))

@@ -111,6 +111,18 @@ def test_of_two_robots_at_one_target_one_gets_there(rows, mirrored):
     assert abs(env.swarm.position[rows[1], 0] - MIDDLE[0]) < 0.02
 
 
+@pytest.mark.parametrize("rows", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("ahead_m", [0.0, 1e-9, 1e-4])
+def test_of_two_that_are_equally_strong_one_gets_there_too(rows, ahead_m):
+    poses = [(-0.30, 0.0, 0.0), (0.30 + ahead_m, 0.0, math.pi)]
+    env = world(*(poses[row] for row in rows))
+    speeds = np.array(seek(env, 1_400))
+    assert np.all(np.sign(speeds) == np.sign(speeds[0])), "it never turns round"
+    assert np.abs(speeds).min() == pytest.approx(3e-4, rel=0.01)
+    if ahead_m == 0.0:
+        assert speeds[0] > 0.0, "nobody is stronger: eastwards, whoever has the first row"
+
+
 # Several robots
 
 

@@ -7,17 +7,30 @@ from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.world.kernels.neighbours import bin_of
 
 
+LEAST_SPEED_M_S = 3e-4
+"""Slowest common speed. Our choice: two robots that are equally strong would stand against each other for ever. At this
+speed a pair leaves the point between them within 1,400 ticks of 0.2 s."""
+
+
 @kernel
-def common_speed(closing_i: float, closing_j: float, before: float) -> float:
+def common_speed(closing_i: float, closing_j: float, before: float, tie: float) -> float:
     """Speed of a pressing pair along the line from i to j, m/s, seen from i.
 
     Each robot closes in with its commanded speed (m/s, positive towards the other). `before` is the common speed of the
     tick before, NaN at first touch. Both motors work at their limit, so that the pair keeps the speed it has while
-    both press; at first touch that is the mean of the two commands.
+    both press; at first touch that is the mean of the two commands. It is never slower than `LEAST_SPEED_M_S` while
+    both want to go on; `tie` is the sign that it gets where neither is stronger: that seen from j is the opposite.
     """
-    if math.isnan(before):
-        return 0.5 * (closing_i - closing_j)
-    return min(closing_i, max(-closing_j, before))
+    speed = 0.5 * (closing_i - closing_j) if math.isnan(before) else before
+    if abs(speed) < LEAST_SPEED_M_S:
+        speed = math.copysign(LEAST_SPEED_M_S, speed if speed != 0.0 else tie)
+    return min(closing_i, max(-closing_j, speed))
+
+
+@kernel
+def east_or_north(dx: float, dy: float) -> float:
+    """Sign of a direction: of its x, of its y if that is 0. The opposite direction has the opposite sign."""
+    return dx if dx != 0.0 else dy
 
 
 @kernel
@@ -86,7 +99,8 @@ def press(
                         closing_j = -(command[j, 0] * dx + command[j, 1] * dy)
                         pressing = closing_i + closing_j
                         if pressing > 0.0:
-                            speed = common_speed(closing_i, closing_j, remembered(memory, i, int(j)))
+                            before = remembered(memory, i, int(j))
+                            speed = common_speed(closing_i, closing_j, before, east_or_north(dx, dy))
                             if n_partners[i] < partner.shape[1]:
                                 partner[i, n_partners[i]] = j
                                 partner_speed[i, n_partners[i]] = speed
