@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import njit, typeof
 from numba.core.caching import FunctionCache
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -54,6 +54,19 @@ def kernel(function: F) -> F:
         cache_file = cache._cache_file
         cache_file._version += _digest_of_sources(Path(function.__code__.co_filename).parent)
     return cast(F, compiled)
+
+
+def direct(function: F, *example: Any) -> F:
+    """Return a call of a kernel for arguments of the types of `example`, compiled here if it is not yet.
+
+    It skips the search for the version that fits, which takes 0.2 microseconds per array, ten times what the call
+    takes. So the caller must see to it that arguments keep their types: an array of another dtype raises a TypeError,
+    but one of another number of dimensions, or not contiguous where the example is, would be misread.
+    """
+    compiled = getattr(function, "compile", None)
+    if compiled is None:  # the compiler is switched off
+        return function
+    return cast(F, compiled(tuple(typeof(argument) for argument in example)))
 
 
 def inline_kernel(function: F) -> F:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from swarm_forage_env._internal import compiling
@@ -130,3 +131,25 @@ def test_every_source_of_a_kernel_is_watched(folder):
         reached.add(file)
         todo |= imported_files(file) - reached - NOT_COMPILED_IN
     assert reached <= set(compiling.sources_of(folder))
+
+
+@compiling.kernel
+def _doubled(values: np.ndarray, factor: float, out: np.ndarray) -> int:
+    for i in range(values.shape[0]):
+        out[i] = factor * values[i]
+    return values.shape[0]
+
+
+def test_a_direct_call_does_what_the_kernel_does_for_arrays_of_any_length():
+    call_it = compiling.direct(_doubled, np.zeros(3), 1.0, np.zeros(3))
+    for length in (0, 3, 7):
+        values, out = np.arange(float(length)), np.zeros(length)
+        assert call_it(values, 2.0, out) == length
+        np.testing.assert_array_equal(out, 2.0 * values)
+
+
+@pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT") == "1", reason="only compiled code has fixed types")
+def test_a_direct_call_refuses_arrays_of_another_type():
+    call_it = compiling.direct(_doubled, np.zeros(3), 1.0, np.zeros(3))
+    with pytest.raises(TypeError):
+        call_it(np.zeros(3, np.float32), 2.0, np.zeros(3))
