@@ -116,6 +116,7 @@ IN_ORDER = "only calls others, each with its twin; whole runs are in tests/promi
 WITHOUT = {
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "
     "tests/world/test_interactions_timing.py",
+    "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",
     "swarm_forage_env.world.kernels.tick.close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.meet_and_close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.observe": IN_ORDER,
