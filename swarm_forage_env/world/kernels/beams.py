@@ -132,5 +132,5 @@ def proximity(
                     near[i] = True
                     near[j] = True
                     _see_robot(dx, dy, facing, i, radius, reach, obs[i, start : start + RING_SENSORS])
-                    _see_robot(-dx, -dy, facing, j, radius, reach, obs[j, start : start + RING_SENSORS])
+                    _see_robot(-dx, -dy, facing, int(j), radius, reach, obs[j, start : start + RING_SENSORS])
                 j = next_in_bin[j]

@@ -44,13 +44,13 @@ def delivered(h: Happenings, i: int) -> float:
 
 
 @kernel
-def first_picked(h: Happenings, i: int) -> float:
+def picked_first(h: Happenings, i: int) -> float:
     """1 for a robot that picked up an object that no robot had carried since it was placed."""
     return 1.0 if h.first_picked[i] else 0.0
 
 
 @kernel
-def nest_progress(h: Happenings, i: int) -> float:
+def came_nearer(h: Happenings, i: int) -> float:
     """Metres that a carrying robot came closer to the nest centre in this tick."""
     if h.carried_object[i] < 0:
         return 0.0
@@ -65,7 +65,7 @@ def _nest_distance(h: Happenings, position: FloatArray, i: int) -> float:
 
 
 @kernel
-def interference(h: Happenings, i: int) -> float:
+def lost_time(h: Happenings, i: int) -> float:
     """1 for a robot in interference."""
     return 1.0 if h.interfering[i] else 0.0
 
@@ -74,11 +74,11 @@ def interference(h: Happenings, i: int) -> float:
 def rewards(h: Happenings, weights: Weights, total: FloatArray, reward: ObsArray) -> None:
     """Write the weighted sums to `total` (N,), and rounded to `reward` (N,) float32. Inactive robots receive none."""
     for i in range(total.shape[0]):
-        value = weights.delivery * delivered(h, i) + weights.first_pickup * first_picked(h, i)
+        value = weights.delivery * delivered(h, i) + weights.first_pickup * picked_first(h, i)
         if weights.nest_progress != 0.0:
-            value += weights.nest_progress * nest_progress(h, i)
+            value += weights.nest_progress * came_nearer(h, i)
         if weights.interference != 0.0:
-            value += weights.interference * interference(h, i)
+            value += weights.interference * lost_time(h, i)
         value += weights.tick
         total[i] = value if h.active[i] else 0.0
         reward[i] = total[i]
