@@ -263,13 +263,13 @@ def run_machine(
 def step_tasks(
     obs: ObsArray,
     active: BoolArray,
-    now: int,
     draws: FloatArray,
     constants: np.ndarray,
     robots: np.ndarray,
     memory: TaskMemory,
     allocation: Allocation,
     actions: ActionArray,
+    now: int,
 ) -> None:
     """One tick for all robots: edits `robots` (N,), `memory` and `allocation`, writes `actions` (N, 3).
 
