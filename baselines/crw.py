@@ -31,6 +31,7 @@ from .machines import (
     command,
     deliver_and_leave,
     explore_for_object,
+    explore_freely,
     follow_cargo,
     new_robots,
     sense,
@@ -62,8 +63,10 @@ def step_crw(
         robot = robots[i]
         row = obs[i]
         senses = sense(row, c)
-        follow_cargo(robot, senses, HOMING, after_delivery(c))
+        follow_cargo(robot, senses, row, c, HOMING, after_delivery(c))
         if robot.activity == ACQUIRE:
+            if explore_freely(robot, senses, row, c, draws[i], action):
+                continue
             found, x, y = explore_for_object(robot, senses, row, c, draws[i])
             if found:
                 robot.activity = WAIT_PICKUP

@@ -17,12 +17,14 @@ from .machines import (
     DELIVER,
     DRAWS,
     HOMING,
+    VECTOR_IDLE,
     WAIT_PICKUP,
     acquire,
     after_delivery,
     command,
     deliver_and_leave,
     explore_for_object,
+    explore_freely,
     follow_cargo,
     new_robots,
     sense,
@@ -59,9 +61,12 @@ def step_dpo(
         known = memory_of(memory, i)
         senses = sense(row, c)
         look_around(robot, row, c, known)
-        if follow_cargo(robot, senses, HOMING, after_delivery(c)):
+        if follow_cargo(robot, senses, row, c, HOMING, after_delivery(c)):
             forget(robot, known, object_row_of(row[c.cargo], c))
         if robot.activity == ACQUIRE:
+            is_free = robot.n_known == 0 and robot.vector_state == VECTOR_IDLE
+            if is_free and explore_freely(robot, senses, row, c, draws[i], action):
+                continue
             found, x, y = acquire(
                 robot,
                 senses,
