@@ -103,6 +103,7 @@ ROBOT_FIELDS: list[tuple[str, type]] = [
     ("window_y", np.int32),
     ("activity", np.int8),
     ("vector_state", np.int8),
+    ("sees_objects", np.bool_),  # in the window seen last
     ("is_slowing", np.bool_),  # within the slowing radius at the last arrival force
     ("is_searching", np.bool_),  # the point it goes to is where a search begins, not a goal
 ]
