@@ -101,9 +101,9 @@ ROBOT_FIELDS: list[tuple[str, type]] = [
     ("n_known", np.int32),  # remembered objects
     ("window_x", np.int32),  # lower left cell of the window seen last
     ("window_y", np.int32),
+    ("n_shown", np.int8),  # objects in that window
     ("activity", np.int8),
     ("vector_state", np.int8),
-    ("sees_objects", np.bool_),  # in the window seen last
     ("is_slowing", np.bool_),  # within the slowing radius at the last arrival force
     ("is_searching", np.bool_),  # the point it goes to is where a search begins, not a goal
 ]
