@@ -43,7 +43,10 @@ def ring_sum(readings: ObsArray) -> tuple[float, float]:
 
 @kernel
 def ring_is_empty(readings: ObsArray) -> bool:
-    """Return whether all readings of one ring are zero: their `ring_sum` is (0, 0), found out in a tenth of the time."""
+    """Return whether all readings of one ring are zero; if so, `ring_sum` is (0, 0), and needs no computing.
+
+    The readings must be float32. Negative zeros count as something, which is correct but slower.
+    """
     bits = readings.view(np.uint32)  # whole numbers are combined faster than others are compared
     something = np.uint32(0)
     for k in range(RING_SENSORS):

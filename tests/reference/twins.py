@@ -46,6 +46,7 @@ TWINS = {
     "baselines.stoch_n1.partition_probability": TASKS,
     "baselines.task_machines.step_tasks": TASKS,
     "swarm_forage_env.contract.detection.is_obstacle_vector": CRW,
+    "swarm_forage_env.contract.detection.ring_is_empty": CRW,
     "swarm_forage_env.contract.detection.ring_sum": COMPACT_VIEW,
     "swarm_forage_env.contract.detection.sees_cache": COMPACT_VIEW,
     "swarm_forage_env.contract.detection.sees_nest": COMPACT_VIEW,
