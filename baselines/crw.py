@@ -19,7 +19,7 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray
 
 from .machines import (
     ACQUIRE,
@@ -30,13 +30,14 @@ from .machines import (
     after_delivery,
     command,
     deliver_and_leave,
-    describe_robot,
     explore_for_object,
+    explore_freely,
     follow_cargo,
     new_robots,
     sense,
 )
-from .parameters import ControllerParameters, chosen_parameters, kernel_constants, require_inputs
+from .parameters import ControllerParameters, chosen_parameters, kernel_constants
+from .scripted import ScriptedPolicy
 
 
 @kernel
@@ -47,6 +48,7 @@ def step_crw(
     constants: np.ndarray,
     robots: np.ndarray,
     actions: ActionArray,
+    _now: int,
 ) -> None:
     """One tick of CRW for all robots: edits `robots` (N,) and writes `actions` (N, 3).
 
@@ -61,8 +63,10 @@ def step_crw(
         robot = robots[i]
         row = obs[i]
         senses = sense(row, c)
-        follow_cargo(robot, senses, HOMING, after_delivery(c))
+        follow_cargo(robot, senses, row, c, HOMING, after_delivery(c))
         if robot.activity == ACQUIRE:
+            if explore_freely(robot, senses, row, c, draws[i], action):
+                continue
             found, x, y = explore_for_object(robot, senses, row, c, draws[i])
             if found:
                 robot.activity = WAIT_PICKUP
@@ -71,7 +75,7 @@ def step_crw(
         command(robot, x, y, c, DELIVER, action)
 
 
-class CRWPolicy:
+class CRWPolicy(ScriptedPolicy):
     """Correlated random walk for every robot. An instance drives one run.
 
     Args:
@@ -87,29 +91,8 @@ class CRWPolicy:
 
     def __init__(self, parameters: ControllerParameters | None = None, **overrides: float) -> None:
         self.parameters = chosen_parameters(ControllerParameters(), parameters, overrides)
-        self._spec: SwarmSpec | None = None
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot explores."""
-        self._spec = spec
-        self._rng = rng
-        self._constants = kernel_constants(self.parameters, spec)
-        self._robots = new_robots(spec.n_robots)
-        self._draws = np.zeros((spec.n_robots, DRAWS))
-        self._actions = np.zeros((spec.n_robots, 3), np.float32)
-
-    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
-        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
-        require_inputs(obs, active, self._spec)
-        self._rng.random(out=self._draws)
-        step_crw(obs, active, self._draws, self._constants, self._robots, self._actions)
-        return self._actions
-
-    @property
-    def activity(self) -> CodeArray:
-        """(N,) `machines.Activity` codes, a copy."""
-        return self._robots["activity"].copy()
-
-    def describe_robot(self, row: int) -> str:
-        """Return what one robot is up to, in one line for people."""
-        return describe_robot(self._robots[row])
+        constants = kernel_constants(self.parameters, spec)
+        self._start(spec, rng, step_crw, DRAWS, constants, new_robots(spec.n_robots))

@@ -10,27 +10,29 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 
 from .machines import (
     ACQUIRE,
     DELIVER,
     DRAWS,
     HOMING,
+    VECTOR_IDLE,
     WAIT_PICKUP,
     acquire,
     after_delivery,
     command,
     deliver_and_leave,
-    describe_robot,
     explore_for_object,
+    explore_freely,
     follow_cargo,
     new_robots,
     sense,
 )
 from .memory import ObjectMemory, forget, look_around, memory_of, new_memory, object_row_of, remembered_objects
 from .object_choice import MemoryParameters, object_is_known, object_is_reached, select_object
-from .parameters import chosen_parameters, kernel_constants, require_inputs
+from .parameters import chosen_parameters, kernel_constants
+from .scripted import ScriptedPolicy
 
 
 @kernel
@@ -42,6 +44,7 @@ def step_dpo(
     robots: np.ndarray,
     memory: ObjectMemory,
     actions: ActionArray,
+    _now: int,
 ) -> None:
     """One tick of DPO for all robots: edits `robots` (N,) and `memory`, writes `actions` (N, 3).
 
@@ -58,9 +61,12 @@ def step_dpo(
         known = memory_of(memory, i)
         senses = sense(row, c)
         look_around(robot, row, c, known)
-        if follow_cargo(robot, senses, HOMING, after_delivery(c)):
+        if follow_cargo(robot, senses, row, c, HOMING, after_delivery(c)):
             forget(robot, known, object_row_of(row[c.cargo], c))
         if robot.activity == ACQUIRE:
+            is_free = robot.n_known == 0 and robot.vector_state == VECTOR_IDLE
+            if is_free and explore_freely(robot, senses, row, c, draws[i], action):
+                continue
             found, x, y = acquire(
                 robot,
                 senses,
@@ -80,7 +86,7 @@ def step_dpo(
         command(robot, x, y, c, DELIVER, action)
 
 
-class DPOPolicy:
+class DPOPolicy(ScriptedPolicy):
     """Decaying pheromone objects for every robot. An instance drives one run.
 
     Args:
@@ -108,33 +114,12 @@ class DPOPolicy:
 
     def __init__(self, parameters: MemoryParameters | None = None, **overrides: float) -> None:
         self.parameters = chosen_parameters(MemoryParameters(), parameters, overrides)
-        self._spec: SwarmSpec | None = None
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot explores and remembers nothing."""
-        self._spec = spec
-        self._rng = rng
-        self._constants = kernel_constants(self.parameters, spec, **self.parameters.derived())
-        self._robots = new_robots(spec.n_robots)
+        constants = kernel_constants(self.parameters, spec, **self.parameters.derived())
         self._memory = new_memory(spec.n_robots, spec.n_objects)
-        self._draws = np.zeros((spec.n_robots, DRAWS))
-        self._actions = np.zeros((spec.n_robots, 3), np.float32)
-
-    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
-        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
-        require_inputs(obs, active, self._spec)
-        self._rng.random(out=self._draws)
-        step_dpo(obs, active, self._draws, self._constants, self._robots, self._memory, self._actions)
-        return self._actions
-
-    @property
-    def activity(self) -> CodeArray:
-        """(N,) `machines.Activity` codes, a copy."""
-        return self._robots["activity"].copy()
-
-    def describe_robot(self, row: int) -> str:
-        """Return what one robot is up to, in one line for people."""
-        return describe_robot(self._robots[row])
+        self._start(spec, rng, step_dpo, DRAWS, constants, new_robots(spec.n_robots), self._memory)
 
     @property
     def n_known(self) -> IntArray:

@@ -17,11 +17,11 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import inline_kernel, kernel
 from swarm_forage_env.contract.codes import Event, Grip
-from swarm_forage_env.contract.detection import is_obstacle_vector, ring_sum, sees_nest, sees_object
+from swarm_forage_env.contract.detection import is_obstacle_vector, ring_is_empty, ring_sum, sees_nest, sees_object
 from swarm_forage_env.contract.layout import EVENT_SCALE, GROUND_SENSORS, RING_SENSORS
 from swarm_forage_env.contract.types import Row
 
-from .motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander
+from .motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander, wander_freely
 
 
 class Activity(IntEnum):
@@ -101,6 +101,7 @@ ROBOT_FIELDS: list[tuple[str, type]] = [
     ("n_known", np.int32),  # remembered objects
     ("window_x", np.int32),  # lower left cell of the window seen last
     ("window_y", np.int32),
+    ("n_shown", np.int8),  # objects in that window
     ("activity", np.int8),
     ("vector_state", np.int8),
     ("is_slowing", np.bool_),  # within the slowing radius at the last arrival force
@@ -144,7 +145,6 @@ class Senses(NamedTuple):
     obstacle_x: float
     """Summed proximity vector, body frame, forward."""
     obstacle_y: float
-    in_nest: bool
     carrying: bool
     event: int
     """Code of `Event`."""
@@ -156,17 +156,28 @@ class Senses(NamedTuple):
 @kernel
 def sense(row: Row, c: np.record) -> Senses:
     """Read one observation row."""
-    obstacle_x, obstacle_y = ring_sum(row[c.proximity : c.proximity + RING_SENSORS])
+    obstacle = False
+    obstacle_x = 0.0
+    obstacle_y = 0.0
+    proximity = row[c.proximity : c.proximity + RING_SENSORS]
+    if not ring_is_empty(proximity):
+        obstacle_x, obstacle_y = ring_sum(proximity)
+        obstacle = is_obstacle_vector(obstacle_x, obstacle_y, c.obstacle_behind_counts != 0)
     return Senses(
-        is_obstacle_vector(obstacle_x, obstacle_y, c.obstacle_behind_counts != 0),
+        obstacle,
         obstacle_x,
         obstacle_y,
-        sees_nest(row[c.ground : c.ground + GROUND_SENSORS]),
         row[c.carrying] > 0.5,
         int(row[c.event] * EVENT_SCALE + 0.5),
         (float(row[c.position]) + 1.0) * c.half_width_m,
         (float(row[c.position + 1]) + 1.0) * c.half_height_m,
     )
+
+
+@kernel
+def in_nest(row: Row, c: np.record) -> bool:
+    """Whether the ground sensors see the nest."""
+    return sees_nest(row[c.ground : c.ground + GROUND_SENSORS])
 
 
 @kernel
@@ -186,7 +197,7 @@ def start_carrying(robot: np.record, activity: int) -> None:
 
 
 @kernel
-def follow_cargo(robot: np.record, senses: Senses, loaded: int, emptied: int) -> bool:
+def follow_cargo(robot: np.record, senses: Senses, row: Row, c: np.record, loaded: int, emptied: int) -> bool:
     """Before the robot acts, adapt its activity to what happened since its last tick.
 
     The activity follows the cargo. So it is also right for a robot that missed an event while it was in repair, or
@@ -196,6 +207,8 @@ def follow_cargo(robot: np.record, senses: Senses, loaded: int, emptied: int) ->
     Args:
         robot: Record of the robot.
         senses: What it senses.
+        row: Its observation.
+        c: Constants of the run.
         loaded: Activity after a pick-up: HOMING or TRANSPORT.
         emptied: Activity after a drop: ACQUIRE, LEAVE_NEST or FINISHED.
 
@@ -215,7 +228,7 @@ def follow_cargo(robot: np.record, senses: Senses, loaded: int, emptied: int) ->
         robot.activity = emptied
     elif activity in (HOMING, HOMING_IN_NEST, TRANSPORT, WAIT_DROP, LET_GO) or (activity == WAIT_PICKUP and failed):
         restart_acquiring(robot)
-    if robot.activity == LEAVE_NEST and not senses.in_nest:
+    if robot.activity == LEAVE_NEST and not in_nest(row, c):
         restart_acquiring(robot)
     return False
 
@@ -278,6 +291,28 @@ def explore_for_object(
         return True, 0.0, 0.0
     walk_x, walk_y = explore(robot, senses, c, draws)
     return False, x + walk_x, y + walk_y
+
+
+@kernel
+def explore_freely(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row, action: Row) -> bool:
+    """Do one tick of `explore_for_object` and `command`, quickly, for a robot that does nothing but wander on.
+
+    Most robots are in this state most of the time. It must have no goal.
+
+    Returns:
+        False, and nothing has happened, if the robot starts to explore, avoids something or finds an object, or if
+        `wander_freely` cannot tell.
+    """
+    if robot.explore_ticks == NOT_EXPLORING or senses.obstacle:
+        return False
+    if robot.explore_ticks >= c.exploration_lock_ticks and sees_object(row[c.ground : c.ground + GROUND_SENSORS]):
+        return False
+    if not wander_freely(robot, c, draws[DRAW_WANDER], action):
+        return False
+    robot.explore_ticks += 1
+    _count_turning(robot, action)
+    action[2] = RELEASE
+    return True
 
 
 @kernel
@@ -419,10 +454,11 @@ def home(robot: np.record, senses: Senses, row: Row, c: np.record, draws: Row) -
     dx = senses.x - c.nest_x_m
     dy = senses.y - c.nest_y_m
     distance = np.sqrt(dx * dx + dy * dy)
-    if robot.activity == HOMING and senses.in_nest:
+    sees_it = in_nest(row, c)
+    if robot.activity == HOMING and sees_it:
         robot.drop_depth_m = c.drop_depth_min_m + (distance - c.drop_depth_min_m) * draws[DRAW_DEPTH]
         robot.activity = HOMING_IN_NEST
-    if robot.activity == HOMING_IN_NEST and senses.in_nest and distance <= robot.drop_depth_m:
+    if robot.activity == HOMING_IN_NEST and sees_it and distance <= robot.drop_depth_m:
         return True, 0.0, 0.0
     x, y = phototaxis(row[c.light : c.light + RING_SENSORS], c)
     if robot.activity == HOMING_IN_NEST:
@@ -451,6 +487,12 @@ def deliver_and_leave(robot: np.record, senses: Senses, row: Row, c: np.record, 
 
 
 @kernel
+def _count_turning(robot: np.record, action: Row) -> None:
+    """Count the ticks in a row in which a robot is told to turn on the spot or to stand."""
+    robot.turn_ticks = 0 if action[0] + action[1] > 0.0 else robot.turn_ticks + 1
+
+
+@kernel
 def command(robot: np.record, x: float, y: float, c: np.record, drop_grip: float, action: Row) -> None:
     """Write the action: wheels for the summed force (x, y), gripper for the activity (`drop_grip` asks to drop)."""
     activity = robot.activity
@@ -460,7 +502,7 @@ def command(robot: np.record, x: float, y: float, c: np.record, drop_grip: float
         robot.turn_ticks = 0
     else:
         drive(x, y, c, action)
-        robot.turn_ticks = 0 if action[0] + action[1] > 0.0 else robot.turn_ticks + 1
+        _count_turning(robot, action)
     if activity == WAIT_DROP:
         action[2] = drop_grip
     elif activity in (WAIT_PICKUP, HOMING, HOMING_IN_NEST, TRANSPORT):

@@ -19,7 +19,7 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.layout import WINDOW_CELLS
-from swarm_forage_env.contract.types import IntArray, ObsArray, Row
+from swarm_forage_env.contract.types import CodeArray, IntArray, ObsArray, Row
 
 _WINDOW = WINDOW_CELLS * WINDOW_CELLS
 _REACH = WINDOW_CELLS // 2
@@ -39,7 +39,9 @@ class ObjectMemory(NamedTuple):
     entry: IntArray
     """(N, M) by object row: its list entry + 1, or 0 when it is not remembered."""
     window: ObsArray
-    """(N, 25) readings of the window seen last."""
+    """(N, 27) readings of the window seen last, then those of the cell in its centre; not a number before the first."""
+    shown: CodeArray
+    """(N, 25) the robot's `n_shown` cells of that window which show an object."""
 
 
 class OneMemory(NamedTuple):
@@ -51,6 +53,7 @@ class OneMemory(NamedTuple):
     seen: Row
     entry: Row
     window: Row
+    shown: Row
 
 
 def new_memory(n_robots: int, n_objects: int) -> ObjectMemory:
@@ -65,7 +68,8 @@ def new_memory(n_robots: int, n_objects: int) -> ObjectMemory:
         cell_y=np.zeros(shape, np.int32),
         seen=np.zeros(shape, np.int32),
         entry=np.zeros(shape, np.int32),
-        window=np.zeros((n_robots, _WINDOW), np.float32),
+        window=np.full((n_robots, _WINDOW + 2), np.nan, np.float32),
+        shown=np.zeros((n_robots, _WINDOW), np.int8),
     )
 
 
@@ -79,6 +83,7 @@ def memory_of(memory: ObjectMemory, robot_index: int) -> OneMemory:
         memory.seen[robot_index],
         memory.entry[robot_index],
         memory.window[robot_index],
+        memory.shown[robot_index],
     )
 
 
@@ -119,25 +124,39 @@ def forget(robot: np.record, memory: OneMemory, object_row: int) -> None:
 
 
 @kernel
+def _sees_the_same(row: Row, c: np.record, memory: OneMemory) -> bool:
+    """Whether the robot's cell and the window are those seen last."""
+    window = row[c.los_object : c.los_object + _WINDOW].view(np.uint32)
+    before = memory.window.view(np.uint32)
+    changes = np.uint32(0)
+    for k in range(_WINDOW):
+        changes |= window[k] ^ before[k]
+    same_x = row[c.los_cell] == memory.window[_WINDOW]
+    same_y = row[c.los_cell + 1] == memory.window[_WINDOW + 1]
+    return changes == 0 and same_x and same_y
+
+
+@kernel
 def look_around(robot: np.record, row: Row, c: np.record, memory: OneMemory) -> None:
     """One tick of the memory rule above, from the window in observation `row`. Advances the robot's clock."""
     robot.clock += 1
-    left = int((float(row[c.los_cell]) + 1.0) * c.half_width_m / c.cell_m) - _REACH
-    low = int((float(row[c.los_cell + 1]) + 1.0) * c.half_height_m / c.cell_m) - _REACH
-    changed = left != robot.window_x or low != robot.window_y
-    for k in range(_WINDOW):
-        if row[c.los_object + k] != memory.window[k]:
-            changed = True
-    if changed:
+    if not _sees_the_same(row, c, memory):
+        n_shown = 0
         for k in range(_WINDOW):
             memory.window[k] = row[c.los_object + k]
-        robot.window_x = left
-        robot.window_y = low
+            if memory.window[k] > 0.0:
+                memory.shown[n_shown] = k
+                n_shown += 1
+        robot.n_shown = n_shown
+        memory.window[_WINDOW] = row[c.los_cell]
+        memory.window[_WINDOW + 1] = row[c.los_cell + 1]
+        robot.window_x = int((float(row[c.los_cell]) + 1.0) * c.half_width_m / c.cell_m) - _REACH
+        robot.window_y = int((float(row[c.los_cell + 1]) + 1.0) * c.half_height_m / c.cell_m) - _REACH
         _forget_what_is_gone(robot, c, memory)
-    for k in range(_WINDOW):
-        if memory.window[k] > 0.0:
-            object_row = object_row_of(memory.window[k], c)
-            remember(robot, memory, object_row, left + k % WINDOW_CELLS, low + k // WINDOW_CELLS)
+    for entry in range(robot.n_shown):
+        k = memory.shown[entry]
+        object_row = object_row_of(memory.window[k], c)
+        remember(robot, memory, object_row, robot.window_x + k % WINDOW_CELLS, robot.window_y + k // WINDOW_CELLS)
 
 
 @kernel

@@ -156,6 +156,26 @@ def chosen_parameters(default: P, parameters: P | None, overrides: Mapping[str, 
     return dataclasses.replace(parameters, **overrides)
 
 
+def wander_series(parameters: ControllerParameters) -> dict[str, float]:
+    """Return coefficients for the angle of the wander force, in rad, as a series in the wander angle w, in degrees.
+
+    The angle of R (cos w, sin w) - (D, 0) is w + sum over n >= 1 of (D / R)^n sin(n w) / n. With the series of the
+    sines, six odd powers of w give it to 14 digits, as long as D / R <= 0.1 and |w| <= 0.2 rad.
+
+    Returns:
+        "has_wander_series", 1 or 0: whether that holds; "wander_series_0" to "wander_series_5": the coefficients.
+    """
+    ratio = parameters.wander_circle_distance / parameters.wander_circle_radius
+    holds = ratio <= 0.1 and math.radians(parameters.wander_max_change_deg) <= 0.2
+    series: dict[str, float] = {"has_wander_series": int(holds)}
+    n = np.arange(1.0, 40.0)
+    for k in range(6):
+        power = 2 * k + 1
+        of_sines = float(np.sum(ratio**n * n ** (2 * k))) * (-1) ** k / math.factorial(power)
+        series[f"wander_series_{k}"] = ((k == 0) + of_sines) * math.radians(1.0) ** power
+    return series
+
+
 def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derived: float) -> np.ndarray:
     """Pack everything that stays constant during a run into one record, readable by name inside kernels.
 
@@ -185,8 +205,11 @@ def kernel_constants(parameters: ControllerParameters, spec: SwarmSpec, **derive
         nest_x_m=spec.nest_centre_m[0],
         nest_y_m=spec.nest_centre_m[1],
         soft_turn_rad=math.radians(parameters.soft_turn_deg),
+        per_soft_turn=1.0 / math.radians(parameters.soft_turn_deg),
+        per_wheel_scale=1.0 / spec.wheel_scale_mps,
+        wander_wheel_share=min(parameters.wander_speed_mps, spec.max_speed_mps) / spec.wheel_scale_mps,
     )
-    for name, value in derived.items():
+    for name, value in (derived | wander_series(parameters)).items():
         (whole if isinstance(value, int) else real)[name] = value
     fields = np.dtype([(name, np.int64) for name in whole] + [(name, np.float64) for name in real], align=True)
     # np.record makes fields readable as attributes also in uncompiled kernels; compiled kernels need no help.

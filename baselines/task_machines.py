@@ -189,7 +189,7 @@ def follow_events(
     """Let activity and memory follow what happened to the robot since its last tick."""
     task = a.task[i]
     loaded = HOMING if DESTINATION[task] == _NEST else TRANSPORT
-    if follow_cargo(robot, senses, loaded, FINISHED):
+    if follow_cargo(robot, senses, row, c, loaded, FINISHED):
         forget(robot, memory.objects, object_row_of(row[c.cargo], c))
         robot.cargo_from_nest_m = np.inf
         if task == _TRANSFERER:
@@ -263,13 +263,13 @@ def run_machine(
 def step_tasks(
     obs: ObsArray,
     active: BoolArray,
-    now: int,
     draws: FloatArray,
     constants: np.ndarray,
     robots: np.ndarray,
     memory: TaskMemory,
     allocation: Allocation,
     actions: ActionArray,
+    now: int,
 ) -> None:
     """One tick for all robots: edits `robots` (N,), `memory` and `allocation`, writes `actions` (N, 3).
 

@@ -6,12 +6,13 @@ from typing import ClassVar
 import numpy as np
 
 from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import CodeArray, FloatArray, IntArray
 
 from .cache_memory import new_task_memory
 from .machines import describe_robot
 from .memory import density, remembered_objects
-from .parameters import chosen_parameters, kernel_constants, require_inputs
+from .parameters import chosen_parameters, kernel_constants
+from .scripted import ScriptedPolicy
 from .stoch_n1 import new_allocation
 from .task_machines import new_task_robots, step_tasks
 from .tasks import N_TASKS, TASK_DRAWS, Goal, TaskParameters
@@ -55,7 +56,7 @@ def task_constants(parameters: TaskParameters, spec: SwarmSpec, n_tabs: int) -> 
     )
 
 
-class TaskPolicy:
+class TaskPolicy(ScriptedPolicy):
     """Every robot chooses its own tasks, from its own experience. An instance drives one run.
 
     Subclasses say which part of the task graph they use and with which numbers.
@@ -90,37 +91,14 @@ class TaskPolicy:
 
     def __init__(self, parameters: TaskParameters | None = None, **overrides: float) -> None:
         self.parameters = chosen_parameters(self.default_parameters, parameters, overrides)
-        self._spec: SwarmSpec | None = None
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: estimates are drawn, no robot has a task, and all memories are empty."""
-        self._spec = spec
-        self._rng = rng
-        self._constants = task_constants(self.parameters, spec, self.n_tabs)
-        self._robots = new_task_robots(spec.n_robots)
+        constants = task_constants(self.parameters, spec, self.n_tabs)
+        robots = new_task_robots(spec.n_robots)
         self._memory = new_task_memory(spec)
         self._allocation = new_allocation(spec.n_robots, self.parameters, spec.quirks, self.n_tabs, rng)
-        self._draws = np.zeros((spec.n_robots, TASK_DRAWS))
-        self._actions = np.zeros((spec.n_robots, 3), np.float32)
-        self._tick = 0
-
-    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
-        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
-        require_inputs(obs, active, self._spec)
-        self._tick += 1
-        self._rng.random(out=self._draws)
-        step_tasks(
-            obs,
-            active,
-            self._tick,
-            self._draws,
-            self._constants,
-            self._robots,
-            self._memory,
-            self._allocation,
-            self._actions,
-        )
-        return self._actions
+        self._start(spec, rng, step_tasks, TASK_DRAWS, constants, robots, self._memory, self._allocation)
 
     @property
     def task(self) -> CodeArray:
@@ -136,11 +114,6 @@ class TaskPolicy:
     def task_estimates(self) -> FloatArray:
         """(N, 8) expected execution times in ticks, by `Task` code, a copy; for inspection."""
         return self._allocation.estimate.copy()
-
-    @property
-    def activity(self) -> CodeArray:
-        """(N,) `machines.Activity` codes, a copy."""
-        return self._robots["activity"].copy()
 
     def describe_robot(self, row: int) -> str:
         """Return what one robot is up to, in one line for people."""

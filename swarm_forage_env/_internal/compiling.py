@@ -45,7 +45,8 @@ def sources_of(folder: Path) -> tuple[Path, ...]:
 
 def kernel(function: F) -> F:
     """Compile a function that allocates nothing; the result is cached on disk until one of its sources changes."""
-    compiled = njit(cache=True, **_OPTIONS)(function)
+    # Left to itself the compiler calls all but the smallest kernels: rows and tuples then travel over the stack.
+    compiled = njit(cache=True, forceinline=True, **_OPTIONS)(function)
     cache = getattr(compiled, "_cache", None)
     if isinstance(cache, FunctionCache):  # there is none with the compiler switched off
         # By itself numba watches only the file of the function, and would keep what it has compiled into it from

@@ -42,6 +42,19 @@ def ring_sum(readings: ObsArray) -> tuple[float, float]:
 
 
 @kernel
+def ring_is_empty(readings: ObsArray) -> bool:
+    """Return whether all readings of one ring are zero; if so, `ring_sum` is (0, 0), and needs no computing.
+
+    The readings must be float32. Negative zeros count as something, which is correct but slower.
+    """
+    bits = readings.view(np.uint32)  # whole numbers are combined faster than others are compared
+    something = np.uint32(0)
+    for k in range(RING_SENSORS):
+        something |= bits[k]
+    return something == 0
+
+
+@kernel
 def is_obstacle_vector(x: float, y: float, behind_counts: bool) -> bool:
     """Obstacle rule on a summed proximity vector (x, y): long, and within the field of view.
 
@@ -57,6 +70,8 @@ def is_obstacle_vector(x: float, y: float, behind_counts: bool) -> bool:
 @kernel
 def sees_obstacle(proximity: ObsArray, behind_counts: bool) -> bool:
     """Return whether one ring of proximity readings means an obstacle; see `is_obstacle_vector`."""
+    if ring_is_empty(proximity):
+        return False
     x, y = ring_sum(proximity)
     return is_obstacle_vector(x, y, behind_counts)
 

@@ -7,7 +7,7 @@ import pytest
 
 from baselines.crw import CRWPolicy
 from baselines.machines import new_robots
-from baselines.motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander
+from baselines.motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander, wander_freely
 from baselines.parameters import ControllerParameters, kernel_constants
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from tests.support.observations import Observations, make_spec
@@ -165,3 +165,65 @@ def test_heading_is_forgotten_at_the_expected_rate(turns_deg, seconds, cosine):
     headings = np.radians(np.cumsum(turns_deg[20:], axis=0))
     change = headings[ticks:] - headings[:-ticks]
     assert np.cos(change).mean() == pytest.approx(cosine, abs=0.02)
+
+
+def by_library(x: float, y: float, c: np.record) -> tuple[np.float32, np.float32]:
+    """Wheel commands of `drive`, by the formula in its docstring."""
+    angle, soft, most, scale = math.atan2(y, x), c.soft_turn_rad, c.max_speed_mps, c.wheel_scale_mps
+    base = min(math.sqrt(x * x + y * y), most)
+    share = (soft - abs(angle)) / soft
+    slow, fast = (base * share, base * (2.0 - share)) if abs(angle) <= soft else (-most, most)
+    left, right = (slow, fast) if angle > 0.0 else (fast, slow)
+    return np.float32(left / scale), np.float32(right / scale)
+
+
+def forces(soft_turn_rad: float) -> list[tuple[float, float]]:
+    """Forces of all sizes and directions, many near the borders where a formula changes."""
+    rng = np.random.default_rng(5)
+    borders = rng.choice([0.0, soft_turn_rad, math.atan(0.3), math.pi / 2, math.pi], 1000) * rng.choice([-1, 1], 1000)
+    offsets = rng.choice([0.0, 1e-17, 1e-16, 1e-13, 1e-9, 1e-6], 1000) * rng.choice([-1, 1], 1000)
+    every = np.concatenate([rng.uniform(-math.pi, math.pi, 3000), rng.uniform(-0.3, 0.3, 5000), borders + offsets])
+    lengths = rng.choice([1e-9, 0.01, 0.08, 0.09, 0.1, 0.17], len(every))
+    whole = [(0.0, 0.0), (-0.0, 0.0), (0.0, 0.05), (0.0, -0.05), (-0.05, 0.0), (-0.05, -0.0), (0.05, 0.0), (0.05, -0.0)]
+    return [*zip((lengths * np.cos(every)).tolist(), (lengths * np.sin(every)).tolist(), strict=True), *whole]
+
+
+@pytest.mark.parametrize("soft_turn_deg", [0.5, 15.0, 40.0, 120.0])
+def test_wheels_are_those_of_the_library_to_the_last_bit(soft_turn_deg):
+    constants = kernel_constants(ControllerParameters(soft_turn_deg=soft_turn_deg), TASK)[0]
+    action = np.zeros(3, np.float32)
+    for force in forces(constants.soft_turn_rad):
+        drive(*force, constants, action)
+        assert tuple(action[:2]) == by_library(*force, constants), force
+
+
+@pytest.mark.parametrize(
+    ("changes", "has_series"),
+    [
+        ({}, True),
+        ({"wander_circle_distance": 0.0}, True),
+        ({"wander_circle_distance": 10.0, "wander_max_change_deg": 11.0, "soft_turn_deg": 12.0}, True),
+        ({"wander_speed_mps": 0.0}, True),
+        ({"wander_circle_distance": 11.0}, False),
+        ({"wander_max_change_deg": 12.0}, False),
+    ],
+)
+def test_wandering_freely_is_wandering_to_the_last_bit(changes, has_series):
+    constants = kernel_constants(ControllerParameters(**changes), TASK)[0]
+    free, other = new_robots(2)
+    quick, slow = np.zeros(3, np.float32), np.zeros(3, np.float32)
+    rng = np.random.default_rng(6)
+    n_quick = 0
+    extremes = [0.0, 0.5, 1.0 - 2.0**-53]
+    for u in np.where(rng.random(5000) < 0.1, rng.choice(extremes, 5000), rng.random(5000)).tolist():
+        before = free.wander_deg
+        if wander_freely(free, constants, u, quick):
+            n_quick += 1
+        else:
+            assert free.wander_deg == before
+            drive(*wander(free, constants, u), constants, quick)
+        drive(*wander(other, constants, u), constants, slow)
+        assert tuple(quick[:2]) == tuple(slow[:2])
+        most = constants.wander_max_change_deg
+        assert free.wander_deg == other.wander_deg == math.fmod(before + most * (2.0 * u - 1.0), most)
+    assert (n_quick > 4000) == has_series

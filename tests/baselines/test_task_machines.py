@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from baselines.machines import Activity, VectorState
+from baselines.scripted import DrawBlocks
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
 from baselines.tasks import TASK_DRAWS
@@ -138,9 +139,8 @@ def test_quirk_explore_double_start_of_a_search(doubled):
     robot.act()
     robot.record.explore_ticks = -1
     single = robot.record.wander_deg
-    robot.policy._rng = np.random.default_rng(8)
-    draws = np.random.default_rng(8).random((1, TASK_DRAWS))[0]
     robot.act()
+    draws = robot.policy._draws[0]
     steps = [10.0 * draws[2] - 5.0] * doubled + [10.0 * draws[1] - 5.0]
     for step in steps:
         single = np.fmod(single + step, 5.0)
@@ -309,7 +309,7 @@ def test_the_abort_draw_is_compared_with_the_abort_probability(robot):
     robot.start(Task.GENERALIST)
     draws = np.random.default_rng(8).random((1, TASK_DRAWS))[0]
     for p, gives_up in [(draws[4], False), (np.nextafter(draws[4], 1.0), True)]:
-        robot.policy._rng = np.random.default_rng(8)
+        robot.policy._chance = DrawBlocks(np.random.default_rng(8), 1, TASK_DRAWS)
         robot.policy._allocation.p_abort[:] = p
         before = robot.policy._allocation.exec_start[0].max()
         robot.act()

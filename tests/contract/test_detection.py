@@ -12,6 +12,7 @@ from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.contract.detection import (
     BEAM_ANGLES_RAD,
     is_obstacle_vector,
+    ring_is_empty,
     ring_sum,
     sees_cache,
     sees_nest,
@@ -37,6 +38,15 @@ def test_beams_are_15_degrees_apart_from_7_5_degrees():
 @given(readings=ring)
 def test_ring_sum_adds_polar_vectors(readings):
     assert ring_sum(readings) == pytest.approx((vector_of(readings).real, vector_of(readings).imag), abs=1e-9)
+
+
+def test_a_ring_is_empty_when_all_its_readings_are_zero():
+    readings = np.zeros(24, np.float32)
+    assert ring_is_empty(readings)
+    for k in range(24):
+        readings[k] = np.finfo(np.float32).smallest_subnormal
+        assert not ring_is_empty(readings)
+        readings[k] = 0.0
 
 
 @given(readings=ring, scale=st.sampled_from([1.0, 0.1, 0.02]))

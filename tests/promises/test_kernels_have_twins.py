@@ -86,10 +86,19 @@ def test_a_new_kernel_is_found(tmp_path):
     assert kernels_that_need_a_twin(tmp_path) == {"metrics.fast.outer", "metrics.fast.other", "metrics.fast.shared"}
 
 
+TAKE_KERNELS = {"direct", "_start"}
+"""Functions that take a kernel and call it later."""
+
+
+def last_name(node: ast.AST) -> str | None:
+    return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else None
+
+
 def calls_in(tree: ast.AST) -> set[str]:
-    """Return the last names of everything that is called: "act" for `policy.act(...)`."""
-    called = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
-    return {f.attr if isinstance(f, ast.Attribute) else f.id for f in called if isinstance(f, ast.Attribute | ast.Name)}
+    """Return the last names of everything that is called, "act" for `policy.act(...)`, now or by `TAKE_KERNELS`."""
+    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    later = [part for call in calls if last_name(call.func) in TAKE_KERNELS for part in call.args]
+    return {name for node in (*(call.func for call in calls), *later) if (name := last_name(node))}
 
 
 @cache

@@ -18,9 +18,9 @@ class Twin(NamedTuple):
     """What the test calls: the kernel itself, or a function that leads to it."""
 
 
-CRW = Twin("controllers.ReferenceRobot", "baselines/test_controller_twins.py", "baselines.crw.CRWPolicy.act")
+CRW = Twin("controllers.ReferenceRobot", "baselines/test_controller_twins.py", "baselines.crw.CRWPolicy.reset")
 TASKS = Twin(
-    "task_controllers.ReferenceTaskRobot", "baselines/test_task_twins.py", "baselines.task_policy.TaskPolicy.act"
+    "task_controllers.ReferenceTaskRobot", "baselines/test_task_twins.py", "baselines.task_policy.TaskPolicy.reset"
 )
 COMPACT_VIEW = Twin(
     "compact_view.compact_row",
@@ -38,7 +38,7 @@ NOISE = Twin("adversity.noisy_row", "wrappers/test_noise.py", "swarm_forage_env.
 TWINS = {
     "baselines.crw.step_crw": CRW,
     "baselines.dpo.step_dpo": Twin(
-        "controllers.ReferenceRobot", "baselines/test_controller_twins.py", "baselines.dpo.DPOPolicy.act"
+        "controllers.ReferenceRobot", "baselines/test_controller_twins.py", "baselines.dpo.DPOPolicy.reset"
     ),
     "baselines.memory.density": Twin(
         "controllers.ObjectDictionary", "baselines/test_memory.py", "baselines.dpo.DPOPolicy.remembered"
@@ -46,6 +46,7 @@ TWINS = {
     "baselines.stoch_n1.partition_probability": TASKS,
     "baselines.task_machines.step_tasks": TASKS,
     "swarm_forage_env.contract.detection.is_obstacle_vector": CRW,
+    "swarm_forage_env.contract.detection.ring_is_empty": CRW,
     "swarm_forage_env.contract.detection.ring_sum": COMPACT_VIEW,
     "swarm_forage_env.contract.detection.sees_cache": COMPACT_VIEW,
     "swarm_forage_env.contract.detection.sees_nest": COMPACT_VIEW,

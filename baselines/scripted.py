@@ -1,0 +1,118 @@
+"""What the scripted controllers have in common: checked inputs, draws for every robot, one kernel for all robots."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from swarm_forage_env._internal.compiling import direct
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+
+from .machines import describe_robot
+from .parameters import require_inputs
+
+MOST_TICKS_PER_BLOCK = 64
+NUMBERS_PER_BLOCK = 8192
+"""Numbers are drawn for several ticks in one call: 64 KiB of them, which stay in a processor's cache, or 64 ticks."""
+
+
+class DrawBlocks:
+    """The uniform draws of every tick. They are those of one call of `rng.random` per tick, made in fewer calls."""
+
+    def __init__(self, rng: np.random.Generator, n_robots: int, n_draws: int) -> None:
+        """Take the generator; nobody else may draw from it from now on.
+
+        Args:
+            rng: Generator of the policy's stream.
+            n_robots: N.
+            n_draws: Numbers per robot and tick.
+        """
+        ticks = max(1, min(MOST_TICKS_PER_BLOCK, NUMBERS_PER_BLOCK // (n_robots * n_draws)))
+        self._rng = rng
+        self._block = np.empty((ticks, n_robots, n_draws))
+        self._used = ticks
+
+    def next_tick(self) -> FloatArray:
+        """Return the (N, n_draws) numbers in [0, 1) of the next tick; they may be overwritten one tick later."""
+        if self._used == len(self._block):
+            self._rng.random(out=self._block)
+            self._used = 0
+        self._used += 1
+        return self._block[self._used - 1]
+
+
+class ScriptedPolicy:
+    """Every robot decides by the same rules, from what it sees and remembers. An instance drives one run.
+
+    A subclass calls `_start` at the end of its `reset`.
+    """
+
+    _spec: SwarmSpec | None = None
+    _shapes: tuple[tuple[int, ...], tuple[int, ...]] | None = None
+
+    def _start(
+        self,
+        spec: SwarmSpec,
+        rng: np.random.Generator,
+        kernel: Callable[..., None],
+        n_draws: int,
+        constants: np.ndarray,
+        robots: np.ndarray,
+        *memory: Any,
+    ) -> None:
+        """Start a run.
+
+        Args:
+            spec: The swarm.
+            rng: Generator of the policy's stream.
+            kernel: One tick of all robots: (obs, active, draws, constants, robots, *memory, actions, now).
+            n_draws: Draws per robot and tick.
+            constants: (1,) record of `parameters.kernel_constants`.
+            robots: (N,) records of the robots.
+            memory: What else the robots remember.
+        """
+        self._spec = spec
+        self._shapes = ((spec.n_robots, spec.layout.size), (spec.n_robots,))
+        self._chance = DrawBlocks(rng, spec.n_robots, n_draws)
+        self._kernel = kernel
+        self._constants = constants
+        self._robots = robots
+        self._actions: ActionArray = np.zeros((spec.n_robots, 3), np.float32)
+        self._state = (constants, robots, *memory, self._actions)
+        self._tick = 0
+        self._bind()
+
+    def _bind(self) -> None:
+        """Find the compiled version of the kernel once, and not in every tick."""
+        readings = np.empty((1, 1), np.float32)
+        self._step = direct(self._kernel, readings, np.empty(1, np.bool_), np.empty((1, 1)), *self._state, self._tick)
+
+    def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
+        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
+        if (obs.shape, active.shape) != self._shapes:
+            require_inputs(obs, active, self._spec)
+        # The compiled version takes contiguous arrays of these types only. Most often nothing is copied here.
+        obs, active = np.ascontiguousarray(obs, np.float32), np.ascontiguousarray(active, np.bool_)
+        self._draws = self._chance.next_tick()
+        self._tick += 1
+        self._step(obs, active, self._draws, *self._state, self._tick)
+        return self._actions
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies are made of: everything but the compiled version, which cannot be stored."""
+        return {name: value for name, value in self.__dict__.items() if name != "_step"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if self._spec is not None:
+            self._bind()
+
+    @property
+    def activity(self) -> CodeArray:
+        """(N,) `machines.Activity` codes, a copy."""
+        return self._robots["activity"].copy()
+
+    def describe_robot(self, row: int) -> str:
+        """Return what one robot is up to, in one line for people."""
+        return describe_robot(self._robots[row])

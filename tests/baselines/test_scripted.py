@@ -1,0 +1,70 @@
+"""What all scripted controllers share: draws in blocks, copies in the middle of a run, arrays of any layout."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+from baselines.crw import CRWPolicy
+from baselines.dpo import DPOPolicy
+from baselines.scripted import DrawBlocks
+from baselines.stochm import STOCHMPolicy
+from baselines.stochx import STOCHXPolicy
+from tests.support.observations import Observations, make_spec
+
+N_ROBOTS = 5
+TICKS = 40
+POLICIES = [CRWPolicy, DPOPolicy, STOCHMPolicy, STOCHXPolicy]
+
+
+@pytest.mark.parametrize("n_robots", [1, 3, 700, 5000])
+def test_blocks_hold_the_numbers_of_one_call_per_tick(n_robots):
+    blocks, again = DrawBlocks(np.random.default_rng(4), n_robots, 4), np.random.default_rng(4)
+    for _ in range(150 if n_robots < 100 else 8):
+        np.testing.assert_array_equal(blocks.next_tick(), again.random((n_robots, 4)))
+
+
+def started(policy_class):
+    """A policy in the middle of a run, and observations in which robots carry, avoid and remember."""
+    spec = make_spec(N_ROBOTS, caches="dynamic")
+    seen = Observations(spec)
+    seen.obstacle(0.5, 1)
+    seen.carry(3, 2)
+    seen.window({(1, 1): 7}, 3)
+    policy = policy_class()
+    policy.reset(spec, np.random.default_rng(1))
+    for _ in range(TICKS):
+        policy.act(seen.array, np.ones(N_ROBOTS, np.bool_))
+    return policy, seen.array
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda policy: pickle.loads(pickle.dumps(policy))])  # noqa: S301 - made here
+@pytest.mark.parametrize("policy_class", POLICIES)
+def test_a_copy_continues_as_the_original_does(policy_class, copied):
+    policy, obs = started(policy_class)
+    twin = copied(policy)
+    active = np.ones(N_ROBOTS, np.bool_)
+    of_twin = [twin.act(obs, active).copy() for _ in range(2 * TICKS)]
+    of_policy = [policy.act(obs, active).copy() for _ in range(2 * TICKS)]
+    np.testing.assert_array_equal(of_twin, of_policy)
+    np.testing.assert_array_equal(twin.activity, policy.activity)
+    assert not np.array_equal(of_policy[0], of_policy[1])
+
+
+def test_a_policy_can_be_copied_before_its_first_run():
+    policy = copy.deepcopy(CRWPolicy(wander_speed_mps=0.05))
+    assert policy.parameters.wander_speed_mps == 0.05
+
+
+@pytest.mark.parametrize("policy_class", POLICIES)
+def test_the_layout_of_observations_in_memory_does_not_matter(policy_class):
+    policy, obs = started(policy_class)
+    twin = copy.deepcopy(policy)
+    wide = np.full((2 * N_ROBOTS, 2 * obs.shape[1]), np.nan, np.float32)
+    wide[::2, ::2] = obs
+    active = np.array([True, False, True, True, True])
+    there = np.repeat(active, 2)
+    there[1::2] = True
+    for other in (wide[::2, ::2], np.asfortranarray(obs), obs.astype(np.float64)):
+        np.testing.assert_array_equal(twin.act(other, there[::2]), policy.act(obs, active))
