@@ -87,7 +87,7 @@ class CRWPolicy(ScriptedPolicy):
     """
 
     caches: ClassVar[str] = "none"
-    reads: ClassVar[tuple[str, ...]] = ("proximity", "light", "ground", "position", "carrying", "event")
+    reads: ClassVar[tuple[str, ...]] = ("proximity", "light if carrying", "ground", "position", "carrying", "event")
 
     def __init__(self, parameters: ControllerParameters | None = None, **overrides: float) -> None:
         self.parameters = chosen_parameters(ControllerParameters(), parameters, overrides)

@@ -100,7 +100,7 @@ class DPOPolicy(ScriptedPolicy):
     caches: ClassVar[str] = "none"
     reads: ClassVar[tuple[str, ...]] = (
         "proximity",
-        "light",
+        "light if carrying",
         "ground",
         "wheel_speed",
         "position",

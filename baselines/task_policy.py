@@ -74,7 +74,7 @@ class TaskPolicy(ScriptedPolicy):
     """Task allocation blocks in use, from the root of the graph."""
     reads: ClassVar[tuple[str, ...]] = (
         "proximity",
-        "light",
+        "light if carrying",
         "ground",
         "wheel_speed",
         "position",

@@ -105,7 +105,8 @@ class Policy(Protocol):
 
     Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
     doing, for people (`study.stuck` shows it); the class attributes `caches` ("none", "static", "dynamic": those that
-    the policy is made for) and `reads` (names of the slices it looks at; default all).
+    the policy is made for) and `reads` (names of the slices it looks at; default all;
+    "light if carrying" = light only of robots that carry).
     """
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:

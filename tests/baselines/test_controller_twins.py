@@ -108,8 +108,10 @@ def test_only_declared_slices_are_read(policy_class):
     plain, fooled = policy_class(), policy_class()
     for policy in (plain, fooled):
         policy.reset(task, np.random.default_rng(5))
-    unread = [task.layout[name] for name in task.layout.names if name not in policy_class.reads]
+    light, carrying = task.layout["light"], task.layout["carrying"].start
+    unread = [task.layout[name] for name in task.layout.names if name not in (*policy_class.reads, "light")]
     assert unread
+    assert "light if carrying" in policy_class.reads
     active = np.ones(N_ROBOTS, bool)
     for _ in range(500):
         for i in range(N_ROBOTS):
@@ -118,6 +120,8 @@ def test_only_declared_slices_are_read(policy_class):
         other = fuzz.seen.array.copy()
         for columns in unread:
             other[:, columns] = garbage.uniform(-1, 1, other[:, columns].shape)
+        dark = np.flatnonzero(other[:, carrying] < 0.5)
+        other[dark, light] = garbage.uniform(0, 1, other[dark, light].shape)
         np.testing.assert_array_equal(fooled.act(other, active), expected)
 
 
