@@ -5,20 +5,20 @@ sensing found. Only robots that can touch something within the tick are moved in
 `swarm_forage_env/world/kernels/bodies.py` says how contacts are resolved.
 """
 
+from typing import Any
+
 import numpy as np
 
 from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.world.kernels.bodies import Work, move_bodies, tell_poses
+from swarm_forage_env.world.kernels.bodies import WALLS, Memory, Work, move_bodies, tell_poses
 from swarm_forage_env.world.physics import PARKED_M, room_of_centres
 from swarm_forage_env.world.state import SwarmState
 
 PAIRS_PER_ROBOT = 8
 """Room for pairs at the start, per robot. About six equal discs fit around one, and each pair is held once; it grows
 where more than that lie on top of each other."""
-WALLS = 4
-"""Most walls that a robot can touch."""
 
 
 class Bodies:
@@ -54,9 +54,8 @@ class Bodies:
         self._room = room_of_centres(config)
         self._shape = (config.robots.radius_m, config.dt_s, len(config.physics_substeps))
         self._make_room(PAIRS_PER_ROBOT * n_robots)
-        self._move = direct(
-            move_bodies, self._poses, self.twist, near, near, bins, self._room, *self._shape, self._pairs, self._work
-        )
+        self._memory: Memory = np.zeros(1, np.int32), np.zeros((len(self._work[-1]), 3))
+        self._move = direct(move_bodies, *self._arguments(near))
         self._tell = direct(tell_poses, self._poses, near, self._poses, np.zeros(n_robots), self._poses)
 
     def _make_room(self, n_pairs: int) -> None:
@@ -69,18 +68,22 @@ class Bodies:
             np.zeros(n_robots, np.int32),
             np.zeros(n_robots, np.bool_),
             np.zeros((n_contacts, 2), np.int32),
-            np.zeros((n_contacts, 6)),
+            np.zeros((n_contacts, 7)),
         )
 
     def advance(self, swarm: SwarmState) -> None:
         """Move all bodies by one tick along `twist` and write position, heading and facing of present robots."""
-        while self._move_once(swarm.present) > len(self._pairs):
-            self._make_room(2 * len(self._pairs))
+        while (n_pairs := self._move(*self._arguments(swarm.present))) > len(self._pairs):
+            self._make_room(2 * n_pairs)
+            n_before, before = self._memory
+            self._memory = n_before, np.zeros((len(self._work[-1]), 3))
+            self._memory[1][: len(before)] = before
         self._tell(self._poses, swarm.present, swarm.position, swarm.heading, swarm.facing)
 
-    def _move_once(self, present: BoolArray) -> int:
-        poses, near, bins, room = self._poses, self._near, self._bins, self._room
-        return self._move(poses, self.twist, present, near, bins, room, *self._shape, self._pairs, self._work)
+    def _arguments(self, present: BoolArray) -> tuple[Any, ...]:
+        """What `move_bodies` takes."""
+        where = (self._poses, self.twist, present, self._near, self._bins, self._room)
+        return (*where, *self._shape, self._pairs, self._work, self._memory)
 
     def poses(self) -> FloatArray:
         """Poses of all bodies, (N + 1, 3): x, y in m and unwrapped angle in rad; valid until the next call."""

@@ -68,6 +68,9 @@ TWINS = {
     ),
     "swarm_forage_env.policies.kernels.compact.compact_view": COMPACT_VIEW,
     "swarm_forage_env.world.kernels.beams.proximity": OBSERVED,
+    "swarm_forage_env.world.kernels.bodies.move_bodies": Twin(
+        "bodies.moved", "world/test_bodies.py", "swarm_forage_env.world.kernels.bodies.move_bodies"
+    ),
     "swarm_forage_env.world.kernels.contact.press": Twin(
         "contact.pressed_velocities", "world/test_contact.py", "swarm_forage_env.world.contact.Contact.apply"
     ),
@@ -113,6 +116,7 @@ TWINS = {
 """Kernel -> its twin."""
 
 WITHOUT = {
+    "swarm_forage_env.world.kernels.bodies.tell_poses": "compared with `unpack_poses` in tests/world/test_bodies.py",
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "
     "tests/world/test_interactions_timing.py",
     "swarm_forage_env.wrappers.kernels.gaussian.to_normal": "compared with the normal distribution function of scipy",
