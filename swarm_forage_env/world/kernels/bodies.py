@@ -15,7 +15,7 @@ substep follow from them and are worked out first. The impulses that then stop t
 before, which changes nothing where they settle. In a heap that goes on pushing they are nearly right already.
 
 All masses are equal and cancel. An impulse is given per mass, in m/s: an impulse j along n changes the velocity of a
-disc by j, friction f its turn rate by 2 f / r (the moment of a disc is m r^2 / 2). For contacts the effective masses are
+disc by j, friction f its turn rate by 2 f / r (the moment of a disc is m r^2 / 2). Effective masses of contacts are
 
     along n:   two discs m / 2, disc and wall m          across:   two discs m / 6, disc and wall m / 3
 
