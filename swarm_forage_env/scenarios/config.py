@@ -236,7 +236,7 @@ class ScenarioConfig:
     """Length of a recording interval."""
     physics: str = "chipmunk"
     """What moves the bodies and resolves contacts: "chipmunk" (`world.physics`) or "compiled" (`world.bodies`), which
-    has the same model of contact and is faster. Their runs differ as runs of two seeds do."""
+    has the same model of contact and is faster. Runs agree until heaps of several robots part them."""
     physics_substeps: tuple[float, ...] = (0.25,) * 4
     """Substeps of the engine as shares of a tick, at least `MIN_SUBSTEPS` and all equal. Free motion is exact for any
     shares. A contact is resolved one substep late, so a substep limits how deep two robots are pushed into each other

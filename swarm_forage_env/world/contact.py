@@ -13,7 +13,7 @@ presses. This is what a pair of velocity motors of limited force does: pressed t
 forces cancel, and the pair keeps the speed it has. So the robot that came faster shoves the other one back. Were
 each tick to start from the commands alone, two robots after one object would stand against each other for ever.
 
-Chipmunk comes after that. It stops who still runs into somebody, and undoes overlap.
+The engine comes after that. It stops who still runs into somebody, and undoes overlap.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ from swarm_forage_env.world.kernels.contact import press
 from swarm_forage_env.world.state import SwarmState
 
 TOUCH_SLACK_M = 0.001
-"""Gap within which two robots still touch: one that Chipmunk leaves when it undoes an overlap does not part a pair."""
+"""Gap within which two robots still touch: one that the engine leaves when it undoes an overlap does not part a pair."""
 PARTNER_SLOTS = 8
 """Pairs remembered per robot. Six equal discs fit around one; two more are for robots that overlap."""
 
