@@ -86,7 +86,7 @@ class Bodies:
         return (*where, *self._shape, self._pairs, self._work, self._memory)
 
     def poses(self) -> FloatArray:
-        """Poses of all bodies, (N + 1, 3): x, y in m and unwrapped angle in rad; valid until the next call."""
+        """Poses of all bodies, (N + 1, 3): x, y in m and unwrapped angle in rad; `advance` edits them."""
         return self._poses
 
     def park(self, row: int) -> None:

@@ -24,7 +24,7 @@ from swarm_forage_env.world.kernels.contact import press
 from swarm_forage_env.world.state import SwarmState
 
 TOUCH_SLACK_M = 0.001
-"""Gap within which two robots still touch: one that the engine leaves when it undoes an overlap does not part a pair."""
+"""Gap within which two robots still touch: what the engine leaves when it undoes an overlap does not part a pair."""
 PARTNER_SLOTS = 8
 """Pairs remembered per robot. Six equal discs fit around one; two more are for robots that overlap."""
 

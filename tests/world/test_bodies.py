@@ -191,13 +191,13 @@ def test_robots_faster_than_proximity_reaches_do_not_pass_through_each_other():
 
 
 def test_a_pile_gets_more_room_for_pairs_and_keeps_its_impulses():
-    n_robots = 40
+    n_robots = 20
     rng = np.random.default_rng(0)
     piled, swarm = bodies_at(MIDDLE + rng.uniform(-0.05, 0.05, (n_robots, 2)), np.zeros(n_robots))
     roomy, same = bodies_at(swarm.position, np.zeros(n_robots))
     roomy._make_room(n_robots**2)
     assert n_robots * (n_robots - 1) // 2 > PAIRS_PER_ROBOT * n_robots
-    for _ in range(30):
+    for _ in range(15):
         for bodies, state in ((piled, swarm), (roomy, same)):
             bodies.twist[:-1] = (0.05, 0.0, 0.0)
             bodies.advance(state)
