@@ -140,6 +140,7 @@ def test_a_wall_stops_but_does_not_hold_back_a_sliding_robot_entirely():
 WALLS_AND_CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)]
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("at", WALLS_AND_CORNERS)
 def test_a_crowd_does_not_push_anybody_through_a_wall(at):
     x_low, y_low, x_high, y_high = scenario("warehouse_small").arena.interior_m
@@ -159,6 +160,7 @@ def test_a_crowd_does_not_push_anybody_through_a_wall(at):
     assert max(deepest) < 2 * DEEPEST_OVERLAP
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("sigma", [0.5, 10.0])
 def test_noise_on_the_wheels_drives_nobody_through_a_wall(sigma):
     env = tidy_world(n_robots=40)
