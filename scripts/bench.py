@@ -24,27 +24,26 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-import swarm_forage_env.world.arena as arena_module
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
 from swarm_forage_env.scenarios.presets import warehouse_medium, warehouse_small
 from swarm_forage_env.study.run import LiveRun, build_stack, run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.pettingzoo import parallel_env
-from swarm_forage_env.world.contact import Contact
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.kernels.gaussian import to_normal
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
 OBJECTS_PER_M2 = 0.35
-PHASES = ("physics", "contact", "sensing", "policy", "recording", "rest")
+PHASES = ("drive and contact", "physics", "sensing and interactions", "policy", "recording", "rest")
 
 
 @dataclass(frozen=True)
@@ -113,13 +112,15 @@ def tick_shares(scenario: ScenarioConfig, policy_name: str, ticks: int) -> dict[
     policy = load_policy(policy_name)
     recorder = build_stack(spec.scenario, reads=getattr(policy, "reads", None))
     run = LiveRun(recorder, policy, seed=0)
+    arena = recorder.unwrapped.arena
+    compiled = SimpleNamespace(**arena._compiled._asdict())  # unlike those of a named tuple its fields can be replaced
+    vars(arena)["_compiled"] = compiled
     spent: dict[str, list[float]] = {phase: [0.0] for phase in PHASES}
     with (
         stopwatch(Physics, "advance", spent["physics"]),
-        stopwatch(Contact, "apply", spent["contact"]),
-        stopwatch(arena_module, "sense_proximity", spent["sensing"]),
-        stopwatch(arena_module, "mark_interference", spent["sensing"]),
-        stopwatch(arena_module, "sense", spent["sensing"]),
+        stopwatch(compiled, "set_out", spent["drive and contact"]),
+        stopwatch(compiled, "meet_and_close", spent["sensing and interactions"]),
+        stopwatch(compiled, "close", spent["sensing and interactions"]),
         stopwatch(policy, "act", spent["policy"]),
         stopwatch(recorder, "after_step", spent["recording"]),
     ):

@@ -68,7 +68,6 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self.max_cycles = scenario.horizon_ticks if max_cycles is None else max_cycles
         self.arena = ForagingArena(scenario, reads=reads)
         n_robots = scenario.robots.n_robots
-        self._rewards = RewardModel(scenario.reward, scenario.arena.nest_centre_m, n_robots)
         self._terminated = np.zeros(n_robots, np.bool_)
         self.possible_agents = [f"robot_{row}" for row in range(n_robots)]
         self._row_of = {agent: row for row, agent in enumerate(self.possible_agents)}
@@ -185,6 +184,9 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             seed = as_whole("seed", seed, at_least=0, or_none=True)
             self._seeds = np.random.default_rng(seed)
         obs = self.arena.reset(seed)
+        self._rewards = RewardModel(
+            self.scenario.reward, self.scenario.arena.nest_centre_m, self.arena.swarm, self.arena.events
+        )
         self.seed_value = seed
         self._terminated[:] = False
         self.agents = list(self.possible_agents)
@@ -237,10 +239,9 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             raise ActionError(
                 f"Expected wheel_gain with shape (n_robots, 2) = {(len(actions), 2)}, got {wheel_gain.shape}."
             )
-        self._rewards.remember(arena.swarm)
+        self._rewards.remember()
         obs = arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
-        reward = self._rewards.reward(arena.swarm, arena.events)
-        return obs, reward, self._terminated, arena.tick >= self.max_cycles
+        return obs, self._rewards.reward(), self._terminated, arena.tick >= self.max_cycles
 
     # Dict level
 

@@ -193,7 +193,7 @@ class CacheConfig:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RewardConfig:
-    """Weights of the reward terms in `world.rewards`; only learners use them. Zero switches a term off."""
+    """Weights of the reward terms in `world.kernels.reward`; only learners use them. Zero switches a term off."""
 
     delivery: float = 1.0
     """Per object delivered to the nest."""

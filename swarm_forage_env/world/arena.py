@@ -4,14 +4,14 @@ from collections.abc import Collection
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import known_name, whole
-from swarm_forage_env._internal.rng import Stream, stream_rng
-from swarm_forage_env.contract.codes import Counter, ObjectStatus
+from swarm_forage_env._internal.fields import whole
+from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
+from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import observation_layout
+from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
 from swarm_forage_env.scenarios.units import CELLS_PER_M
-from swarm_forage_env.world.actuators import Drive
 from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.caches import (
     create_dynamic_caches,
@@ -19,13 +19,12 @@ from swarm_forage_env.world.caches import (
     n_cache_slots,
     restore_static_caches,
 )
-from swarm_forage_env.world.contact import Contact
+from swarm_forage_env.world.compiled import compiled_tick, new_world
 from swarm_forage_env.world.interactions import Interactions
-from swarm_forage_env.world.interference import mark_interference
-from swarm_forage_env.world.object_motion import walk_objects
+from swarm_forage_env.world.kernels.tick import ALL_GOOD
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.placement import draw_source, place_all, place_objects, static_cache_centres
-from swarm_forage_env.world.sensors import SensorSuite, sense, sense_proximity
+from swarm_forage_env.world.sensors import new_sensors, read_slices
 from swarm_forage_env.world.start_poses import draw_start_poses
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
@@ -36,7 +35,7 @@ class ForagingArena:
     Attributes:
         config: The scenario.
         layout: Layout of the observation rows.
-        reads: Observation slices that are used; sensors of others may stay zero.
+        reads: Names of the observation slices that are used; sensors of others may stay zero.
         tick: Ticks done since reset.
         swarm, objects, caches, events: The state; read freely, write through the methods.
     """
@@ -46,7 +45,8 @@ class ForagingArena:
 
         Args:
             config: The scenario.
-            reads: Observation slices that are used; the sensors of others may stay zero. Default: all.
+            reads: Observation slices that are used; the sensors of others may stay zero. Default: all. "light if
+                carrying" reads light in rows of robots that carry only.
 
         Raises:
             ConfigError: `reads` holds an unknown name.
@@ -54,13 +54,11 @@ class ForagingArena:
         self.config = config
         arena = config.arena
         self.layout = observation_layout(arena.width_m, arena.height_m, config.objects.n_objects)
-        self.reads = self.layout.names if reads is None else tuple(reads)
-        for name in self.reads:
-            known_name("entry of reads", name, self.layout.names)
-        self._drive = Drive(config)
+        self.reads = read_slices(reads, self.layout)
+        self._given_reads = reads
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
-        self._scratch = np.zeros(config.objects.n_objects)
-        self._chance = np.zeros(config.robots.n_robots)
+        self._unit_gain = np.ones((config.robots.n_robots, 2))
+        self._nothing = np.zeros(config.robots.n_robots)
         self.tick = 0
 
     def reset(self, seed: int) -> ObsArray:
@@ -73,27 +71,38 @@ class ForagingArena:
         self.caches = CacheState.empty(n_cache_slots(config))
         self.events = StepEvents.empty(n_robots)
         self._placement_rng = stream_rng(seed, Stream.PLACEMENT)
-        self._motion_rng = stream_rng(seed, Stream.OBJECT_MOTION)
-        self._interaction_rng = stream_rng(seed, Stream.INTERACTION)
+        self._walk_chance = TickDraws(stream_rng(seed, Stream.OBJECT_MOTION), config.objects.n_objects)
+        self._pick_chance = TickDraws(stream_rng(seed, Stream.INTERACTION), n_robots)
         self._cache_rng = stream_rng(seed, Stream.CACHE)
         self._interactions = Interactions(config, self.swarm, self.objects, self.caches, self.events)
-        self._suite = SensorSuite.build(config, self.layout, self.reads)
         self._furnish()
         position, heading = draw_start_poses(config, stream_rng(seed, Stream.START_POSE))
         self.swarm.position[:], self.swarm.heading[:] = position, heading
         self.swarm.facing[:] = np.column_stack((np.cos(heading), np.sin(heading)))
+        sensors = new_sensors(config, self.layout, self._given_reads)
         if config.physics == "compiled":
-            self._physics = Bodies(config, position, heading, self._suite.near, self._suite.bins)
+            self._physics = Bodies(config, position, heading, sensors.near, sensors.bins)
         else:
             self._physics = Physics(config, position, heading)
-        self._contact = Contact(config)
+        self._obs = sensors.obs
+        self._world = new_world(
+            config,
+            self.swarm,
+            self.events,
+            self._interactions,
+            sensors,
+            self._physics.twist,
+            self._static_caches,
+        )
+        actions = np.zeros((n_robots, 3), np.float32)
+        self._compiled = compiled_tick(self._world, actions, self._unit_gain, self._nothing)
         self._moved = False
         return self.observe()
 
     def observe(self) -> ObsArray:
         """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
-        sense_proximity(self.swarm, self._suite)
-        return sense(self.swarm, self.objects, self.caches, self.events, self._suite)
+        self._compiled.observe(self._world)
+        return self._obs
 
     def _furnish(self) -> None:
         """Place all objects and create static caches: before the clusters if placement is "power_law", else after."""
@@ -115,35 +124,42 @@ class ForagingArena:
     ) -> ObsArray:
         """Advance the world by one tick and return the observation, (N, D); the buffer is reused.
 
+        The order of a tick stands in `kernels.tick`.
+
         Args:
-            actions: (N, 3) float32 in [-1, 1]: left wheel, right wheel, gripper.
+            actions: (N, 3) float32, contiguous, in [-1, 1]: left wheel, right wheel, gripper.
             wheel_gain: (N, 2) factor on each wheel's limited speed, or None.
             tasks: (N,) int8 `Task` codes, if the policy tells them.
+
+        Raises:
+            ActionError: an active robot's action or gain is NaN or infinite; nothing has happened.
         """
-        swarm, objects, caches, events, suite = self.swarm, self.objects, self.caches, self.events, self._suite
-        self._drive.apply(actions, wheel_gain, swarm, self._physics.twist)
-        self.tick += 1
-        if self._moved:  # since robots were last looked for
-            sense_proximity(swarm, suite)
-            self._moved = False
-        self._contact.apply(swarm, suite.near, suite.bins, self._physics.twist)
-        self._physics.advance(swarm)
-        sense_proximity(swarm, suite)
-        behind_counts = self.config.quirks.obstacle_behind_counts
-        mark_interference(swarm, events, suite.obs, suite.columns["proximity"], suite.near, behind_counts=behind_counts)
-        if self._serve_requests(actions):
+        world, compiled, tick = self._world, self._compiled, self.tick + 1
+        gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
+        refused = compiled.set_out(world, actions, gain, tick, self._moved)
+        if refused != ALL_GOOD:
+            raise ActionError(
+                f"Expected finite actions and wheel gains, got {actions[refused].tolist()} and "
+                f"{gain[refused].tolist()} for robot_{refused}; the world was not stepped."
+            )
+        self.tick, self._moved = tick, False
+        self._physics.advance(self.swarm)
+        pick_chance, walk_chance = self._draws(tick)
+        if compiled.meet_and_close(world, actions, tick, pick_chance, walk_chance):
             self._create_dynamic_caches()
             self._replace_displaced()
-        if self._static_caches:
             self._restore_caches(tasks)
-        self._walk_objects()
-        self._count_caches()
-        return sense(swarm, objects, caches, events, suite)
+            compiled.close(world, walk_chance)
+        return self._obs
 
-    def _serve_requests(self, actions: ActionArray) -> bool:
-        if self.config.caches != "none":
-            self._interaction_rng.random(out=self._chance)
-        return self._interactions.serve(actions, self.tick, self._chance)
+    def _draws(self, tick: int) -> tuple[FloatArray, FloatArray]:
+        """Return this tick's random numbers for pick-ups out of caches (N,) and for walking objects (M,), if needed."""
+        config = self.config
+        nothing = self._nothing
+        return (
+            self._pick_chance.row(tick) if config.caches != "none" else nothing,
+            self._walk_chance.row(tick) if config.objects.walk_probability > 0.0 else nothing,
+        )
 
     def _create_dynamic_caches(self) -> None:
         creators = self._interactions.creators()
@@ -175,23 +191,6 @@ class ForagingArena:
             restore_static_caches(
                 self.config, self.swarm, self.objects, self.caches, self.events, tasks, self._cache_rng
             )
-
-    def _walk_objects(self) -> None:
-        probability = self.config.objects.walk_probability
-        if probability > 0.0:
-            self.events.counters[Counter.OBJECTS_MOVED] += walk_objects(
-                self.objects,
-                self.config.arena.distributable_cells,
-                probability,
-                self._motion_rng,
-                self.config.quirks.motion_self_conflict,
-                self._scratch,
-            )
-
-    def _count_caches(self) -> None:
-        if self.config.caches != "none":
-            self.events.counters[Counter.CACHES_ALIVE] += np.count_nonzero(self.caches.alive)
-            self.events.counters[Counter.OBJECTS_CACHED] += self.caches.count.sum()
 
     def set_handling_ticks(self, *, pickup: int, drop: int) -> None:
         """Set how many ticks pick-ups and drops take that start from the next step on; a reset restores the scenario's.

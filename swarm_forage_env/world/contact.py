@@ -13,59 +13,21 @@ presses. This is what a pair of velocity motors of limited force does: pressed t
 forces cancel, and the pair keeps the speed it has. So the robot that came faster shoves the other one back. Were
 each tick to start from the commands alone, two robots after one object would stand against each other for ever.
 
-The engine comes after that. It stops who still runs into somebody, and undoes overlap.
+The rule is `kernels.contact`. The physics comes after that. It stops who still runs into somebody, and undoes overlap.
 """
 
 import numpy as np
 
-from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
-from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.world.kernels.contact import press
-from swarm_forage_env.world.state import SwarmState
+from swarm_forage_env.world.kernels.world import Memory
 
 TOUCH_SLACK_M = 0.001
-"""Gap within which two robots still touch: what the engine leaves when it undoes an overlap does not part a pair."""
+"""Gap within which two robots still touch: one that physics leaves when it undoes an overlap does not part a pair."""
 PARTNER_SLOTS = 8
 """Pairs remembered per robot. Six equal discs fit around one; two more are for robots that overlap."""
 
 
-class Contact:
-    """Common speeds of the pairs of one run; made anew at reset."""
-
-    def __init__(self, config: ScenarioConfig) -> None:
-        """Start with no pair in touch."""
-        n_robots = config.robots.n_robots
-        self._touch_m = 2 * config.robots.radius_m + TOUCH_SLACK_M
-        self._memory = _empty_memory(n_robots)
-        self._next_memory = _empty_memory(n_robots)
-        self._command: FloatArray = np.zeros((n_robots, 2))
-
-    def apply(
-        self, swarm: SwarmState, near: BoolArray, bins: tuple[float, IntArray, IntArray], twist: FloatArray
-    ) -> None:
-        """Edit the velocities of robots that press against others.
-
-        Args:
-            swarm: Read: position, present.
-            near: (N,) who has anything within reach; others are skipped.
-            bins: Robots by place as they stand now: cell size in m, first_in_bin, next_in_bin.
-            twist: (N + 1, 3) commanded world velocity x, y in m/s and turn rate in rad/s.
-        """
-        press(
-            swarm.position,
-            swarm.present,
-            near,
-            bins,
-            self._touch_m,
-            self._memory,
-            self._next_memory,
-            self._command,
-            twist,
-        )
-        self._memory, self._next_memory = self._next_memory, self._memory
-
-
-def _empty_memory(n_robots: int) -> tuple[IntArray, IntArray, FloatArray]:
+def new_memory(n_robots: int) -> Memory:
+    """Return room for the pairs in touch of a swarm, with none."""
     return (
         np.zeros(n_robots, np.int32),
         np.full((n_robots, PARTNER_SLOTS), -1, np.int32),

@@ -6,14 +6,14 @@ the same, and the condition holds, in every tick until then. A RELEASE onto open
 
 import numpy as np
 
-from swarm_forage_env.contract.types import ActionArray, FloatArray, IntArray
+from swarm_forage_env.contract.types import IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.kernels import interact as kernel
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
 
 class Interactions:
-    """Serves the gripper requests of a swarm; holds views of the state arrays and no state of its own."""
+    """What `kernels.interact` works on: views of the state arrays, constants, and lists of what it leaves."""
 
     def __init__(
         self,
@@ -25,7 +25,6 @@ class Interactions:
     ) -> None:
         """Bind the state arrays; they must not be replaced afterwards, only edited."""
         n_robots = config.robots.n_robots
-        self._happened = events.happened
         self.state = kernel.InteractionState(
             position=swarm.position,
             carried_object=swarm.carried_object,
@@ -49,6 +48,7 @@ class Interactions:
             event_cache=events.event_cache,
             first_picked=events.first_picked,
             counters=events.counters,
+            happened=events.happened,
             displaced=np.zeros(n_robots + 1, np.int32),
             creators=np.zeros(n_robots + 1, np.int32),
             queue=np.zeros(2 * n_robots, np.int32),
@@ -65,23 +65,6 @@ class Interactions:
             dynamic_caches=config.caches == "dynamic",
             serialized=config.quirks.serialized_interactions,
         )
-
-    def serve(self, actions: ActionArray, tick: int, chance: FloatArray) -> bool:
-        """Serve all requests of this tick and write the events; returns whether there was any request.
-
-        Args:
-            actions: (N, 3); the third column is the gripper.
-            tick: Current tick, for the order of robots that want the same.
-            chance: (N,) uniform in [0, 1), decides which object leaves a cache.
-        """
-        state = self.state
-        busy = kernel.clear_events(
-            actions, state.carried_object, state.pending_kind, state.active, state.code, state.first_picked
-        )
-        self._happened[0] = busy
-        if busy:
-            kernel.interact(state, self.rules, actions, tick, chance)
-        return busy
 
     def set_handling_ticks(self, *, pickup: int, drop: int) -> None:
         """Set how many ticks a pick-up and a drop take that start from now on; what is running keeps its end."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 
 
 def test_stream_numbers_are_stored_history():
@@ -39,3 +39,12 @@ def test_streams_of_one_seed_are_uncorrelated():
 def test_negative_seed_is_refused():
     with pytest.raises(ValueError, match="non-negative"):
         stream_rng(-1, Stream.POLICY)
+
+
+@pytest.mark.parametrize("n_numbers", [1, 7, 3000, 5000])
+def test_draws_by_tick_are_those_of_one_call_per_tick(n_numbers):
+    draws, rng = TickDraws(np.random.default_rng(5), n_numbers), np.random.default_rng(5)
+    for tick in range(1, 12):
+        expected = rng.random(n_numbers)
+        np.testing.assert_array_equal(draws.row(tick), expected)
+        np.testing.assert_array_equal(draws.row(tick), expected)

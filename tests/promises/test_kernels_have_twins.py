@@ -48,15 +48,20 @@ class Module:
             yield from self.uses(child, compiled)
 
 
+ORDER = "swarm_forage_env.world.kernels.tick"
+"""Only calls the kernels of the world in their order; each of those is a rule with a twin of its own."""
+
+
 def kernels_that_need_a_twin(root: Path = ROOT) -> set[str]:
-    """Return the kernels that uncompiled code or kernels of another folder call."""
+    """Return the kernels that uncompiled code, kernels of another folder or the order of the tick call."""
     modules = [Module(path, root) for package in PACKAGES for path in sorted((root / package).rglob("*.py"))]
     folder_of = {kernel: module.folder for module in modules for kernel in module.kernels}
     return {
         name
         for module in modules
         for name, compiled in module.uses(module.tree)
-        if name in folder_of and (not compiled or folder_of[name] != module.folder)
+        if name in folder_of
+        and (not compiled or folder_of[name] != module.folder or (module.name == ORDER and name not in module.kernels))
     }
 
 

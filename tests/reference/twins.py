@@ -31,7 +31,7 @@ INTERFERENCE = Twin("sensing.interferes", "world/test_interference.py", "swarm_f
 OBSERVED = Twin("sensing.observe", "world/test_sensors.py", "swarm_forage_env.world.arena.ForagingArena.observe")
 MOTION = Twin("motion.free_motion", "world/test_physics.py", "swarm_forage_env.env.ForageEnv.step_batch")
 INTERACTIONS = Twin(
-    "interacting.SlowWorld", "world/test_interactions_twin.py", "swarm_forage_env.world.interactions.Interactions.serve"
+    "interacting.SlowWorld", "world/test_interactions_twin.py", "swarm_forage_env.world.kernels.interact.serve"
 )
 NOISE = Twin("adversity.noisy_row", "wrappers/test_noise.py", "swarm_forage_env.wrappers.noise.SensorNoise.observe")
 
@@ -72,7 +72,7 @@ TWINS = {
         "bodies.moved", "world/test_bodies.py", "swarm_forage_env.world.kernels.bodies.move_bodies"
     ),
     "swarm_forage_env.world.kernels.contact.press": Twin(
-        "contact.pressed_velocities", "world/test_contact.py", "swarm_forage_env.world.contact.Contact.apply"
+        "contact.pressed_velocities", "world/test_contact.py", "swarm_forage_env.world.kernels.contact.press"
     ),
     "swarm_forage_env.world.kernels.drive.drive": MOTION,
     "swarm_forage_env.world.kernels.drive.hold_inside": Twin(
@@ -85,8 +85,7 @@ TWINS = {
     "swarm_forage_env.world.kernels.floor.ground": OBSERVED,
     "swarm_forage_env.world.kernels.floor.light": OBSERVED,
     "swarm_forage_env.world.kernels.floor.line_of_sight": OBSERVED,
-    "swarm_forage_env.world.kernels.interact.clear_events": INTERACTIONS,
-    "swarm_forage_env.world.kernels.interact.interact": INTERACTIONS,
+    "swarm_forage_env.world.kernels.interact.serve": INTERACTIONS,
     "swarm_forage_env.world.kernels.interfere.mark": INTERFERENCE,
     "swarm_forage_env.world.kernels.neighbours.bin_robots": OBSERVED,
     "swarm_forage_env.world.kernels.proprioception.own_motion": OBSERVED,
@@ -95,7 +94,7 @@ TWINS = {
         "object_placement.scatter_slowly", "world/test_placement.py", "swarm_forage_env.world.kernels.scatter.scatter"
     ),
     "swarm_forage_env.world.kernels.walk.walk": Twin(
-        "object_walk.walk_slowly", "world/test_object_motion.py", "swarm_forage_env.world.object_motion.walk_objects"
+        "object_walk.walk_slowly", "world/test_object_motion.py", "swarm_forage_env.world.kernels.walk.walk"
     ),
     "swarm_forage_env.wrappers.kernels.noise.perturb_readings": NOISE,
     "swarm_forage_env.wrappers.kernels.noise.share_that_sees_obstacles": Twin(
@@ -115,10 +114,17 @@ TWINS = {
 }
 """Kernel -> its twin."""
 
+IN_ORDER = "only calls others, each with its twin; whole runs are in tests/promises/test_golden_runs.py"
+
 WITHOUT = {
     "swarm_forage_env.world.kernels.bodies.tell_poses": "compared with `unpack_poses` in tests/world/test_bodies.py",
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "
     "tests/world/test_interactions_timing.py",
+    "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",
+    "swarm_forage_env.world.kernels.tick.close": IN_ORDER,
+    "swarm_forage_env.world.kernels.tick.meet_and_close": IN_ORDER,
+    "swarm_forage_env.world.kernels.tick.observe": IN_ORDER,
+    "swarm_forage_env.world.kernels.tick.set_out": IN_ORDER,
     "swarm_forage_env.wrappers.kernels.gaussian.to_normal": "compared with the normal distribution function of scipy",
     "swarm_forage_env.wrappers.kernels.noise.noisy_gain": "one product per wheel; by hand in "
     "tests/wrappers/test_noise.py",

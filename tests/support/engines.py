@@ -5,8 +5,10 @@ import numpy as np
 from swarm_forage_env.contract.layout import observation_layout
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.bodies import Bodies
+from swarm_forage_env.world.kernels.beams import proximity
+from swarm_forage_env.world.kernels.neighbours import bin_robots
 from swarm_forage_env.world.physics import Physics
-from swarm_forage_env.world.sensors import SensorSuite, sense_proximity
+from swarm_forage_env.world.sensors import new_sensors
 from swarm_forage_env.world.state import SwarmState
 
 CHOSEN = "chipmunk"
@@ -19,11 +21,18 @@ class SensedBodies(Bodies):
     def __init__(self, config: ScenarioConfig, swarm: SwarmState) -> None:
         arena = config.arena
         layout = observation_layout(arena.width_m, arena.height_m, config.objects.n_objects)
-        self.suite = SensorSuite.build(config, layout, ())
-        super().__init__(config, swarm.position, swarm.heading, self.suite.near, self.suite.bins)
+        self.sensors = new_sensors(config, layout, ())
+        super().__init__(config, swarm.position, swarm.heading, self.sensors.near, self.sensors.bins)
+
+    def look(self, swarm: SwarmState) -> None:
+        """Find out who is near whom."""
+        s = self.sensors
+        bin_robots(swarm.position, swarm.present, *s.bins)
+        seen = (s.bins, s.interior, s.radius_m, s.reach_m, s.obs, s.columns.proximity, s.near)
+        proximity(swarm.position, swarm.facing, swarm.present, *seen)
 
     def advance(self, swarm: SwarmState) -> None:
-        sense_proximity(swarm, self.suite)
+        self.look(swarm)
         super().advance(swarm)
 
 

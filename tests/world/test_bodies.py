@@ -11,7 +11,6 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.bodies import PAIRS_PER_ROBOT
 from swarm_forage_env.world.kernels.bodies import find_pairs, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.drive import unpack_poses
-from swarm_forage_env.world.sensors import sense_proximity
 from swarm_forage_env.world.state import SwarmState
 from tests.reference.bodies import moved
 from tests.support.engines import SensedBodies, drive_at, make_bodies
@@ -55,7 +54,7 @@ def test_compiled_bodies_are_their_slow_twin(seed, at_wall):
             poses_of(bodies), bodies.twist[:-1].tolist(), swarm.present.tolist(), *bodies_sizes(bodies), before
         )
         n_contacts, n_walls = n_contacts + len(before), n_walls + sum(type(wall) is str for _, wall in before)
-        sense_proximity(swarm, bodies.suite)
+        bodies.look(swarm)
         n_pairs = move_bodies(*bodies._arguments(swarm.present))
         assert n_pairs <= len(bodies._pairs)
         np.testing.assert_allclose(poses_of(bodies), expected, atol=1e-11)
@@ -73,10 +72,10 @@ def test_all_pairs_within_sight_are_found_in_order(speed):
     rng = np.random.default_rng(0)
     bodies, swarm = bodies_at(MIDDLE + rng.uniform(-2, 2, (150, 2)), np.zeros(150))
     swarm.present[:] = rng.random(150) < 0.9
-    sense_proximity(swarm, bodies.suite)
+    bodies.look(swarm)
     sight_m = 2 * RADIUS_M + 2 * speed * 0.2
     pairs = np.zeros((2_000, 2), np.int32)
-    n_pairs = find_pairs(bodies.poses(), swarm.present, bodies.suite.near, bodies.suite.bins, sight_m, pairs)
+    n_pairs = find_pairs(bodies.poses(), swarm.present, bodies.sensors.near, bodies.sensors.bins, sight_m, pairs)
     apart = np.linalg.norm(swarm.position[:, None] - swarm.position[None], axis=2)
     apart[~swarm.present], apart[:, ~swarm.present] = math.inf, math.inf
     np.testing.assert_array_equal(pairs[:n_pairs], np.argwhere(np.triu(apart <= sight_m, k=1)))

@@ -9,9 +9,9 @@ import pytest
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.world.contact import TOUCH_SLACK_M, Contact
-from swarm_forage_env.world.sensors import SensorSuite, sense_proximity
-from swarm_forage_env.world.state import SwarmState
+from swarm_forage_env.world.contact import TOUCH_SLACK_M
+from swarm_forage_env.world.kernels.contact import press
+from swarm_forage_env.world.kernels.tick import look
 from tests.reference.contact import pressed_velocities
 from tests.support.heaps import DIAMETER_M, RADIUS_M, heap
 from tests.support.stage import lay, put, stand, tidy_world
@@ -153,14 +153,27 @@ def test_two_that_shove_one_do_not_kick_it_ahead():
         assert 0.0 < velocity[2, 0] <= 0.10 + 1e-9
 
 
-def contact_of(places: np.ndarray, present: np.ndarray) -> tuple[Contact, SwarmState, SensorSuite]:
-    """The contact of robots that stand there, with neighbours looked up."""
-    config = with_overrides(scenario("warehouse_small"), n_robots=len(places))
-    swarm = SwarmState.empty(len(places))
-    swarm.position[:], swarm.present[:] = places, present
-    suite = SensorSuite.build(config, ForageEnv(config).layout, ())
-    sense_proximity(swarm, suite)
-    return Contact(config), swarm, suite
+class Pressing:
+    """The kernel of contact and its memory, on robots that stand at `places`."""
+
+    def __init__(self, places: np.ndarray, present: np.ndarray) -> None:
+        """Stand the robots there."""
+        env = ForageEnv(with_overrides(scenario("warehouse_small"), n_robots=len(places)))
+        env.reset_batch(0)
+        self._world = env.arena._world
+        self._memory = self._world.pressing
+        self.position = env.swarm.position
+        self.position[:], env.swarm.present[:] = places, present
+
+    def velocities(self, command: np.ndarray) -> np.ndarray:
+        """Velocities (N, 3) after contact for commanded ones (N, 3)."""
+        world = self._world
+        look(world)
+        world.twist[:-1] = command
+        touching = world.sensors.near, world.sensors.bins, world.touch_m
+        press(self.position, world.present, *touching, *self._memory, world.command, world.twist)
+        self._memory = self._memory[1], self._memory[0]
+        return world.twist[:-1].copy()
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -170,27 +183,25 @@ def test_contact_is_its_slow_twin(seed):
     places = heap(rng, n_robots)
     places += MIDDLE
     present = rng.random(n_robots) < 0.9
-    contact, swarm, suite = contact_of(places, present)
+    contact = Pressing(places, present)
     memory: dict[tuple[int, int], float] = {}
     command = rng.uniform(-0.1, 0.1, (n_robots, 3))
     n_pressing = 0
     for _ in range(8):
         changed = rng.random(n_robots) < 0.3
         command[changed] = rng.uniform(-0.1, 0.1, (n_robots, 3))[changed]
-        twist = np.vstack((command, np.zeros((1, 3))))
-        contact.apply(swarm, suite.near, suite.bins, twist)
+        velocity = contact.velocities(command)
         expected, memory = pressed_velocities(
-            [tuple(place) for place in swarm.position.tolist()],
+            [tuple(place) for place in contact.position.tolist()],
             [(x, y) for x, y, _ in command.tolist()],
             present.tolist(),
             DIAMETER_M + TOUCH_SLACK_M,
             memory,
         )
-        np.testing.assert_allclose(twist[:-1, :2], expected, atol=1e-12)
-        np.testing.assert_array_equal(twist[:-1, 2], command[:, 2])
+        np.testing.assert_allclose(velocity[:, :2], expected, atol=1e-12)
+        np.testing.assert_array_equal(velocity[:, 2], command[:, 2])
         n_pressing += len(memory)
-        swarm.position += rng.normal(0.0, 1e-4, (n_robots, 2))
-        sense_proximity(swarm, suite)
+        contact.position += rng.normal(0.0, 1e-4, (n_robots, 2))
     assert n_pressing > 50
 
 
@@ -208,15 +219,12 @@ def test_a_mirrored_or_turned_scene_moves_mirrored_or_turned(name):
     places = heap(rng, 20)
     image = SYMMETRIES[name]
     everybody = np.ones(20, np.bool_)
-    seen = [contact_of(MIDDLE + places, everybody), contact_of(MIDDLE + image(places), everybody)]
+    seen = [Pressing(MIDDLE + places, everybody), Pressing(MIDDLE + image(places), everybody)]
     for _ in range(5):
         command = rng.uniform(-0.1, 0.1, (20, 2))
         moved = []
-        for (contact, swarm, suite), velocity in zip(seen, (command, image(command)), strict=True):
-            twist = np.zeros((21, 3))
-            twist[:-1, :2] = velocity
-            contact.apply(swarm, suite.near, suite.bins, twist)
-            moved.append(twist[:-1, :2])
+        for contact, velocity in zip(seen, (command, image(command)), strict=True):
+            moved.append(contact.velocities(np.column_stack((velocity, np.zeros(20))))[:, :2])
         np.testing.assert_allclose(moved[1], image(moved[0]), atol=1e-12)
         assert np.abs(moved[0] - command).max() > 0.01
 
@@ -226,15 +234,12 @@ def test_the_order_of_rows_does_not_matter():
     places = heap(rng, 20)
     order = rng.permutation(20)
     everybody = np.ones(20, np.bool_)
-    seen = [contact_of(MIDDLE + places, everybody), contact_of(MIDDLE + places[order], everybody)]
+    seen = [Pressing(MIDDLE + places, everybody), Pressing(MIDDLE + places[order], everybody)]
     for _ in range(5):
         command = rng.uniform(-0.1, 0.1, (20, 2))
         moved = []
-        for (contact, swarm, suite), velocity in zip(seen, (command, command[order]), strict=True):
-            twist = np.zeros((21, 3))
-            twist[:-1, :2] = velocity
-            contact.apply(swarm, suite.near, suite.bins, twist)
-            moved.append(twist[:-1, :2])
+        for contact, velocity in zip(seen, (command, command[order]), strict=True):
+            moved.append(contact.velocities(np.column_stack((velocity, np.zeros(20))))[:, :2])
         np.testing.assert_allclose(moved[1], moved[0][order], atol=1e-15)
 
 

@@ -8,7 +8,7 @@ import pytest
 from swarm_forage_env.contract.codes import CELL_EMPTY, Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.world.kernels.interact import CREATE_CACHE, DELIVER_ONLY, GRASP, RELEASE, SITE, band_of
+from swarm_forage_env.world.kernels.interact import CREATE_CACHE, DELIVER_ONLY, GRASP, RELEASE, SITE, band_of, serve
 from tests.support.stage import (
     BASE_CELL,
     CORNER_CACHE,
@@ -346,7 +346,7 @@ def test_an_object_leaves_a_cache_uniformly():
     actions = np.array([[0, 0, Grip.GRASP]] + [[0, 0, Grip.RELEASE]] * 3, np.float32)
     for _ in range(rounds):
         for tick in (1, 2):
-            interactions.serve(actions, tick, rng.random(4))
+            serve(interactions.state, interactions.rules, actions, tick, rng.random(4))
         row = int(env.swarm.carried_object[0])
         tally[row] += 1
         env.swarm.carried_object[0] = -1

@@ -151,7 +151,7 @@ def test_every_tick_equals_the_twin(caches, serialized, longest):
             env.set_handling_ticks(pickup=pickup, drop=drop)
         expected = mirror(env)
         expected.serve(actions[:, 2].tolist(), tick, chance.tolist())
-        env.arena._interactions.serve(actions, tick, chance)
+        kernel.serve(env.arena._interactions.state, env.arena._interactions.rules, actions, tick, chance)
         assert_same(env, expected)
         env.arena._replace_displaced()
         assert_conserved(env)

@@ -190,6 +190,20 @@ def test_reads_may_only_skip_slices_that_nobody_reads(reads):
     np.testing.assert_array_equal(full.events.counters, partial.events.counters)
 
 
+def test_light_may_be_read_by_carriers_only():
+    config = scenario("warehouse_small", n_robots=4)
+    full, partial = ForageEnv(config), ForageEnv(config, reads=("light if carrying",))
+    expected, obs = full.reset_batch(3), partial.reset_batch(3)
+    light = full.layout["light"]
+    assert np.any(expected[:, light])
+    assert not np.any(obs[:, light])
+    for env in (full, partial):
+        load(env, 1, 0)
+    expected, obs = full.arena.observe(), partial.arena.observe()
+    np.testing.assert_array_equal(obs[1, light], expected[1, light])
+    assert not np.any(obs[[0, 2, 3], light])
+
+
 def test_reading_nothing_leaves_the_dear_slices_out():
     env = ForageEnv(scenario("warehouse_small", n_robots=3), reads=())
     obs = env.reset_batch(0)

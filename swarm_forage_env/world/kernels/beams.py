@@ -7,7 +7,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import RING_SENSORS
-from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray, Row
 from swarm_forage_env.world.kernels.neighbours import bin_of
 
 _BEAM_COS = np.cos(BEAM_ANGLES_RAD)
@@ -15,6 +15,8 @@ _BEAM_SIN = np.sin(BEAM_ANGLES_RAD)
 _CONTACT_M = 0.00989
 _READING_NUMERATOR = 0.0100527
 _READING_OFFSET_M = 0.000163144
+_HALF_RING = ((0, 0), (1, 0), (1, 1), (0, 1), (-1, 1))
+"""Steps to a cell itself and to half of its eight neighbours; the other half meets it from its own side."""
 
 
 @kernel
@@ -49,6 +51,35 @@ def _beam_to_wall(to_low: float, to_high: float, direction: float, radius: float
 
 
 @kernel
+def _see_walls(
+    gaps: tuple[float, float, float, float], facing: FloatArray, i: int, radius: float, reach: float, row: Row
+) -> None:
+    """Write robot i's readings of the walls into `row`; `gaps` = distance of its centre to west, east, south, north."""
+    west, east, south, north = gaps
+    cos_h = facing[i, 0]
+    sin_h = facing[i, 1]
+    for k in range(RING_SENSORS):
+        cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
+        sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
+        gap = min(_beam_to_wall(west, east, cos, radius), _beam_to_wall(south, north, sin, radius))
+        if gap <= reach:
+            row[k] = proximity_reading(gap)
+
+
+@kernel
+def _see_robot(dx: float, dy: float, facing: FloatArray, i: int, radius: float, reach: float, row: Row) -> None:
+    """Raise robot i's readings in `row` to those of a robot whose centre is dx, dy away."""
+    cos_h = facing[i, 0]
+    sin_h = facing[i, 1]
+    for k in range(RING_SENSORS):
+        cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
+        sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
+        gap = _beam_to_disc(dx, dy, cos, sin, radius)
+        if gap <= reach:
+            row[k] = max(row[k], proximity_reading(gap))
+
+
+@kernel
 def proximity(
     position: FloatArray,
     facing: FloatArray,
@@ -72,39 +103,34 @@ def proximity(
     sight_squared = sight * sight
     wall_sight = radius + reach
     for i in range(position.shape[0]):
-        for k in range(RING_SENSORS):
-            obs[i, start + k] = 0.0
+        row = obs[i, start : start + RING_SENSORS]
+        row[:] = 0.0
         near[i] = False
+        if present[i]:
+            x = position[i, 0]
+            y = position[i, 1]
+            gaps = (x - interior[0], interior[2] - x, y - interior[1], interior[3] - y)
+            if min(gaps[0], gaps[1], gaps[2], gaps[3]) < wall_sight:
+                near[i] = True
+                _see_walls(gaps, facing, i, radius, reach, row)
+    for i in range(position.shape[0]):
         if not present[i]:
             continue
         x = position[i, 0]
         y = position[i, 1]
-        west, east = x - interior[0], interior[2] - x
-        south, north = y - interior[1], interior[3] - y
-        cos_h = facing[i, 0]
-        sin_h = facing[i, 1]
-        if min(west, east, south, north) < wall_sight:
-            near[i] = True
-            for k in range(RING_SENSORS):
-                cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
-                sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
-                gap = min(_beam_to_wall(west, east, cos, radius), _beam_to_wall(south, north, sin, radius))
-                if gap <= reach:
-                    obs[i, start + k] = proximity_reading(gap)
         cell_x = int(x / cell_m)
         cell_y = int(y / cell_m)
-        for step_x in range(-1, 2):
-            for step_y in range(-1, 2):
-                j = first_in_bin[bin_of(cell_x + step_x, cell_y + step_y, n_bins)]
-                while j >= 0:
-                    dx = position[j, 0] - x
-                    dy = position[j, 1] - y
-                    if j != i and dx * dx + dy * dy <= sight_squared:
-                        near[i] = True
-                        for k in range(RING_SENSORS):
-                            cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
-                            sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
-                            gap = _beam_to_disc(dx, dy, cos, sin, radius)
-                            if gap <= reach:
-                                obs[i, start + k] = max(obs[i, start + k], proximity_reading(gap))
-                    j = next_in_bin[j]
+        # Each pair is met once: behind i in its own bin, or in one of the next cells on one side. A pair that hashing
+        # shows twice gives the same readings twice.
+        for k in range(5):
+            step_x, step_y = _HALF_RING[k]
+            j = next_in_bin[i] if k == 0 else first_in_bin[bin_of(cell_x + step_x, cell_y + step_y, n_bins)]
+            while j >= 0:
+                dx = position[j, 0] - x
+                dy = position[j, 1] - y
+                if j != i and dx * dx + dy * dy <= sight_squared:
+                    near[i] = True
+                    near[j] = True
+                    _see_robot(dx, dy, facing, i, radius, reach, obs[i, start : start + RING_SENSORS])
+                    _see_robot(-dx, -dy, facing, int(j), radius, reach, obs[j, start : start + RING_SENSORS])
+                j = next_in_bin[j]

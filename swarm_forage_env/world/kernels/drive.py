@@ -68,9 +68,11 @@ def drive(
         turn = (right - left) / wheel_base
         half_angle = 0.5 * turn * dt_s
         chord = 0.5 * (left + right)
-        sin_half = math.sin(half_angle)
-        cos_half = math.cos(half_angle)
+        sin_half = 0.0
+        cos_half = 1.0
         if half_angle != 0.0:
+            sin_half = math.sin(half_angle)
+            cos_half = math.cos(half_angle)
             chord *= sin_half / half_angle
         twist[i, 0] = chord * (facing[i, 0] * cos_half - facing[i, 1] * sin_half)
         twist[i, 1] = chord * (facing[i, 1] * cos_half + facing[i, 0] * sin_half)

@@ -79,18 +79,21 @@ def light(
     present: BoolArray,
     lights: FloatArray,
     intensity: float,
+    carried_object: IntArray,
+    of_carriers_only: bool,
     obs: ObsArray,
     start: int,
 ) -> None:
     """Write the ring of light readings of each robot into the columns of `obs` from `start`.
 
     Per light of `lights` (L, 3: x, y, height in m): exp(-2 distance / intensity), falling linearly to 0 at
-    90 degrees between sensor axis and light; lights add up; clamped to 1.
+    90 degrees between sensor axis and light; lights add up; clamped to 1. With `of_carriers_only` the rows of robots
+    that carry nothing stay zero.
     """
     for i in range(position.shape[0]):
         for k in range(start, start + RING_SENSORS):
             obs[i, k] = 0.0
-        if not present[i]:
+        if not present[i] or (of_carriers_only and carried_object[i] < 0):
             continue
         for lamp in range(lights.shape[0]):
             dx = lights[lamp, 0] - position[i, 0]

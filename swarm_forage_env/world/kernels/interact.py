@@ -70,6 +70,8 @@ class InteractionState(NamedTuple):
     event_cache: IntArray
     first_picked: BoolArray
     counters: np.ndarray
+    happened: BoolArray
+    """(1,) whether any robot asks for an interaction or is in one, in this tick."""
     displaced: IntArray
     """(N + 1,) object rows to re-place this tick; the last entry holds their number."""
     creators: IntArray
@@ -456,8 +458,6 @@ def interact(state: InteractionState, rules: Rules, gripper: ActionArray, tick: 
     `gripper` is the (N, 3) action array; `chance` (N,) uniform in [0, 1) decides which object leaves a cache.
     """
     n_robots = state.code.shape[0]
-    state.displaced[-1] = 0
-    state.creators[-1] = 0
     state.handler_used[:] = False
     n_queued = 0
     for k in range(n_robots):
@@ -476,3 +476,15 @@ def interact(state: InteractionState, rules: Rules, gripper: ActionArray, tick: 
             if state.queue[n_robots + place] == phase:
                 i = int(state.queue[place])
                 _serve(state, rules, _band_now(state, gripper, i), i, tick, chance[i])
+
+
+@kernel
+def serve(state: InteractionState, rules: Rules, gripper: ActionArray, tick: int, chance: FloatArray) -> None:
+    """Rewrite the events and lists of a tick: clear them, and `interact` if any robot has a request."""
+    state.displaced[-1] = 0
+    state.creators[-1] = 0
+    state.happened[0] = clear_events(
+        gripper, state.carried_object, state.pending_kind, state.active, state.code, state.first_picked
+    )
+    if state.happened[0]:
+        interact(state, rules, gripper, tick, chance)

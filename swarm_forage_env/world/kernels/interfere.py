@@ -25,7 +25,22 @@ def mark(
     counters: np.ndarray,
     interference_sum: FloatArray,
 ) -> None:
-    """Flag robots in interference and add this tick to the counters; arguments as in `interference`."""
+    """Flag active robots for which the obstacle rule holds in this tick, walls included, and count the tick.
+
+    The rule uses geometry only, so it is the same for every policy.
+
+    Args:
+        obs: (N, D) with true proximity readings.
+        proximity: Column of the first of them.
+        near: (N,) whether any beam may have hit something; others are skipped.
+        behind_counts: Quirk `obstacle_behind_counts`.
+        active: (N,) read.
+        present: (N,) read.
+        carried_object: (N,) read.
+        interfering: (N,) written.
+        counters: Added to.
+        interference_sum: (1,) the share of active robots is added, 0/0 = 0.
+    """
     n_interfering = 0
     n_active = 0
     n_present = 0

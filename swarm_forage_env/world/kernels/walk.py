@@ -57,6 +57,12 @@ def walk(
 ) -> int:
     """Move free objects one cell, in row order; each sees the moves made before it. Returns the number of moves.
 
+    Every free object takes one step with `probability` (p_rw of the paper's scenario 2), to one of the free cells of
+    `area` among the eight neighbours, drawn uniformly; if none is free it stays. The study redraws a step of -1, 0 or 1
+    cells per axis until it fits, up to 32 times. That is a uniform choice, too; only the rule of giving up after 32
+    draws is left out here. `self_conflict`: quirk `motion_self_conflict`, see `can_step`. One number belongs to each
+    object and tick, whatever its status, so that runs which share a seed stay paired.
+
     `chance` (M,) is used twice: if it is below `probability` the object moves, and then chance / probability, which is
     again uniform in [0, 1), chooses among its free neighbour cells. Writes `floor` (ny, nx) and `cell` (M, 2).
     """

@@ -1,0 +1,84 @@
+"""Reward terms of one robot in one tick, one small function each, and their weighted sum. Only learners use them."""
+
+import math
+from typing import NamedTuple
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.codes import Event
+from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+
+_DELIVERED = int(Event.DELIVERED)
+
+
+class Weights(NamedTuple):
+    """Weights of the terms, as in `scenarios.config.RewardConfig`."""
+
+    delivery: float
+    first_pickup: float
+    nest_progress: float
+    interference: float
+    tick: float
+
+
+class Happenings(NamedTuple):
+    """What the terms look at, a row per robot."""
+
+    code: CodeArray
+    """(N,) `Event` codes."""
+    first_picked: BoolArray
+    interfering: BoolArray
+    carried_object: IntArray
+    active: BoolArray
+    position: FloatArray
+    """(N, 2) m."""
+    previous_position: FloatArray
+    """(N, 2) m, before the tick."""
+    nest_centre_m: FloatArray
+    """(2,)."""
+
+
+@kernel
+def delivered(h: Happenings, i: int) -> float:
+    """1 for a robot that delivered an object to the nest in this tick."""
+    return 1.0 if h.code[i] == _DELIVERED else 0.0
+
+
+@kernel
+def picked_first(h: Happenings, i: int) -> float:
+    """1 for a robot that picked up an object that no robot had carried since it was placed."""
+    return 1.0 if h.first_picked[i] else 0.0
+
+
+@kernel
+def came_nearer(h: Happenings, i: int) -> float:
+    """Metres that a carrying robot came closer to the nest centre in this tick."""
+    if h.carried_object[i] < 0:
+        return 0.0
+    return _nest_distance(h, h.previous_position, i) - _nest_distance(h, h.position, i)
+
+
+@kernel
+def _nest_distance(h: Happenings, position: FloatArray, i: int) -> float:
+    dx = position[i, 0] - h.nest_centre_m[0]
+    dy = position[i, 1] - h.nest_centre_m[1]
+    return math.sqrt(dx * dx + dy * dy)
+
+
+@kernel
+def lost_time(h: Happenings, i: int) -> float:
+    """1 for a robot in interference."""
+    return 1.0 if h.interfering[i] else 0.0
+
+
+@kernel
+def rewards(h: Happenings, weights: Weights, total: FloatArray, reward: ObsArray) -> None:
+    """Write the weighted sums to `total` (N,), and rounded to `reward` (N,) float32. Inactive robots receive none."""
+    for i in range(total.shape[0]):
+        value = weights.delivery * delivered(h, i) + weights.first_pickup * picked_first(h, i)
+        if weights.nest_progress != 0.0:
+            value += weights.nest_progress * came_nearer(h, i)
+        if weights.interference != 0.0:
+            value += weights.interference * lost_time(h, i)
+        value += weights.tick
+        total[i] = value if h.active[i] else 0.0
+        reward[i] = total[i]

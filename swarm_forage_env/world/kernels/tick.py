@@ -1,0 +1,169 @@
+"""One tick, in its order. Here stand the phases that are compiled; each is a function of its own in another file.
+
+drive           actions -> wheel speeds -> velocities                           set_out
+press           touching robots push with the force of their motors
+(bodies move: the physics of the scenario)
+look            who is near; proximity readings                                 meet
+interfere       who loses time to avoidance
+interact        pick-ups and drops
+(objects and caches are placed, where anything is to be placed: Python, rare)
+walk            objects move by themselves                                      close
+count           caches
+sense           the rest of the observation
+"""
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.contract.types import ActionArray, FloatArray
+from swarm_forage_env.world.kernels import beams, floor, proprioception
+from swarm_forage_env.world.kernels.contact import press
+from swarm_forage_env.world.kernels.drive import drive
+from swarm_forage_env.world.kernels.interact import serve
+from swarm_forage_env.world.kernels.interfere import mark
+from swarm_forage_env.world.kernels.neighbours import bin_robots
+from swarm_forage_env.world.kernels.walk import walk
+from swarm_forage_env.world.kernels.world import World
+
+ALL_GOOD = -1
+"""Answer of `set_out`: no action was refused."""
+_CACHES_ALIVE, _OBJECTS_CACHED = int(Counter.CACHES_ALIVE), int(Counter.OBJECTS_CACHED)
+_OBJECTS_MOVED = int(Counter.OBJECTS_MOVED)
+
+
+@kernel
+def look(w: World) -> None:
+    """Find out who is near whom, and write the proximity readings: a ring of beams, 1 at contact, 0 without a hit."""
+    s = w.sensors
+    position = w.state.position
+    bin_robots(position, w.present, s.bins[0], s.bins[1], s.bins[2])
+    beams.proximity(
+        position,
+        w.facing,
+        w.present,
+        s.bins,
+        s.interior,
+        s.radius_m,
+        s.reach_m,
+        s.obs,
+        s.columns.proximity,
+        s.near,
+    )
+
+
+@kernel
+def sense(w: World) -> None:
+    """Complete the observation after `look`; slices that are not read may stay zero."""
+    s, a = w.sensors, w.state
+    c = s.columns
+    if s.reads_light:
+        floor.light(
+            a.position,
+            w.facing,
+            w.present,
+            s.lights,
+            s.intensity,
+            a.carried_object,
+            s.light_of_carriers_only,
+            s.obs,
+            c.light,
+        )
+    if s.reads_ground:
+        floor.ground(a.position, w.facing, w.present, a.floor, s.obs, c.ground)
+    proprioception.own_motion(a.position, w.facing, w.wheel_speed, w.present, s.scales, s.obs, c.wheel_speed)
+    events = (a.code, a.event_object, a.event_cache)
+    proprioception.own_status(a.carried_object, a.pending_kind, a.active, events, s.sizes, w.present, s.obs, c.carrying)
+    if s.reads_line_of_sight:
+        floor.line_of_sight(
+            a.position,
+            w.present,
+            a.floor,
+            s.sizes[2],
+            (a.cache_alive, a.cache_cell, a.cache_serial, a.cache_count),
+            s.cache_half_side,
+            s.obs,
+            (c.los_cell, c.los_object, c.los_cache),
+        )
+
+
+@kernel
+def observe(w: World) -> None:
+    """Write the observation of the world as it is now."""
+    look(w)
+    sense(w)
+
+
+@kernel
+def set_out(w: World, actions: ActionArray, wheel_gain: FloatArray, tick: int, look_first: bool) -> int:
+    """From actions to velocities of the bodies, in tick number `tick`.
+
+    `look_first`: robots came or went since the last `look`. Returns `ALL_GOOD`, or the first active row whose action or
+    gain is not finite; then nothing has happened.
+    """
+    a, s = w.state, w.sensors
+    bad = drive(actions, wheel_gain, a.active, a.pending_kind, w.facing, w.drive_limits, w.dt_s, w.wheel_speed, w.twist)
+    if bad >= 0:
+        return bad
+    if look_first:
+        look(w)
+    before, now = (w.pressing[0], w.pressing[1]) if tick % 2 == 0 else (w.pressing[1], w.pressing[0])
+    press(a.position, w.present, s.near, s.bins, w.touch_m, before, now, w.command, w.twist)
+    return ALL_GOOD
+
+
+@kernel
+def meet(w: World, actions: ActionArray, tick: int, chance: FloatArray) -> bool:
+    """After the bodies have moved: who is near, who is in interference, who picks up and drops.
+
+    `chance` (N,) uniform in [0, 1) decides which object leaves a cache. Returns whether anything is to be placed.
+    """
+    s, a = w.sensors, w.state
+    look(w)
+    mark(
+        s.obs,
+        s.columns.proximity,
+        s.near,
+        s.behind_counts,
+        a.active,
+        w.present,
+        a.carried_object,
+        w.interfering,
+        a.counters,
+        w.interference_sum,
+    )
+    serve(a, w.rules, actions, tick, chance)
+    return a.displaced[-1] > 0 or a.creators[-1] > 0 or (w.n_static_caches > 0 and _alive(w) < w.n_static_caches)
+
+
+@kernel
+def _alive(w: World) -> int:
+    n_alive = 0
+    for slot in range(w.state.cache_alive.shape[0]):
+        n_alive += w.state.cache_alive[slot]
+    return n_alive
+
+
+@kernel
+def close(w: World, walk_chance: FloatArray) -> None:
+    """After everything is placed: objects walk, caches are counted, robots sense.
+
+    `walk_chance` (M,) uniform in [0, 1); not read where objects lie still.
+    """
+    a, o = w.state, w.wandering
+    if o.probability > 0.0:
+        a.counters[_OBJECTS_MOVED] += walk(
+            a.floor, a.status, a.object_cell, walk_chance, o.probability, o.area, o.self_conflict
+        )
+    if w.has_caches:
+        a.counters[_CACHES_ALIVE] += _alive(w)
+        for slot in range(a.cache_count.shape[0]):
+            a.counters[_OBJECTS_CACHED] += a.cache_count[slot]
+    sense(w)
+
+
+@kernel
+def meet_and_close(w: World, actions: ActionArray, tick: int, chance: FloatArray, walk_chance: FloatArray) -> bool:
+    """`meet`, then `close` unless anything is to be placed; returns whether anything is: `close` is still to come."""
+    if meet(w, actions, tick, chance):
+        return True
+    close(w, walk_chance)
+    return False
