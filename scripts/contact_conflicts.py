@@ -17,11 +17,47 @@ from baselines.dpo import DPOPolicy
 from baselines.machines import ACQUIRE
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.study.run import build_stack
 from swarm_forage_env.world.contact import TOUCH_SLACK_M
 
 UNRESOLVED_TICKS = 1_000
+
+
+class ConflictCount:
+    """Conflicts of one run: look at it after every tick.
+
+    Attributes:
+        found: Of each conflict, by (robot, robot, target, first tick): its ticks, its ticks in touch, its last tick in
+            touch.
+    """
+
+    def __init__(self, touch_m: float) -> None:
+        self.found: dict[tuple[int, int, int, int], list[int]] = {}
+        self._touch_m = touch_m
+        self._open_since: dict[tuple[int, int, int], tuple[int, int]] = {}
+
+    def look(self, policy: DPOPolicy, at: FloatArray, tick: int) -> None:
+        """Note who is in conflict; `at` (N, 2) is where robots are, in m."""
+        robots = policy._robots
+        goal = np.column_stack((robots["goal_x_m"], robots["goal_y_m"]))
+        there = np.hypot(*(goal - at).T) <= policy.parameters.slowing_radius_m
+        rows = np.flatnonzero(there & (robots["activity"] == ACQUIRE) & (robots["target"] >= 0))
+        rows = rows[np.argsort(robots["target"][rows], kind="stable")]
+        by_target = np.split(rows, np.flatnonzero(np.diff(robots["target"][rows])) + 1)
+        for group in by_target:
+            for i, j in combinations(group.tolist(), 2):
+                pair = (i, j, int(robots["target"][i]))
+                begun, last = self._open_since.get(pair, (tick, tick))
+                if tick - last > 1:
+                    begun = tick
+                self._open_since[pair] = begun, tick
+                conflict = self.found.setdefault((*pair, begun), [0, 0, 0])
+                conflict[0] += 1
+                if np.hypot(*(at[i] - at[j])) <= self._touch_m:
+                    conflict[1] += 1
+                    conflict[2] = tick
 
 
 def conflicts_of_run(name: str, seed: int, seconds: float, overrides: dict[str, Any]) -> tuple[int, list[list[int]]]:
@@ -31,30 +67,11 @@ def conflicts_of_run(name: str, seed: int, seconds: float, overrides: dict[str, 
     env = build_stack(world, reads=policy.reads).unwrapped
     policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
     obs, done = env.reset_batch(seed), False
-    touch_m = 2 * world.robots.radius_m + TOUCH_SLACK_M
-    found: dict[tuple[int, int, int, int], list[int]] = {}
-    open_since: dict[tuple[int, int, int], tuple[int, int]] = {}
+    count = ConflictCount(2 * world.robots.radius_m + TOUCH_SLACK_M)
     while not done:
         obs, _, _, done = env.step_batch(policy.act(obs, env.active))
-        robots, at = policy._robots, env.swarm.position
-        goal = np.column_stack((robots["goal_x_m"], robots["goal_y_m"]))
-        there = np.hypot(*(goal - at).T) <= policy.parameters.slowing_radius_m
-        rows = np.flatnonzero(there & (robots["activity"] == ACQUIRE) & (robots["target"] >= 0))
-        rows = rows[np.argsort(robots["target"][rows], kind="stable")]
-        by_target = np.split(rows, np.flatnonzero(np.diff(robots["target"][rows])) + 1)
-        for group in by_target:
-            for i, j in combinations(group.tolist(), 2):
-                pair = (i, j, int(robots["target"][i]))
-                begun, last = open_since.get(pair, (env.tick, env.tick))
-                if env.tick - last > 1:
-                    begun = env.tick
-                open_since[pair] = begun, env.tick
-                conflict = found.setdefault((*pair, begun), [0, 0, 0])
-                conflict[0] += 1
-                if np.hypot(*(at[i] - at[j])) <= touch_m:
-                    conflict[1] += 1
-                    conflict[2] = env.tick
-    return int(env.events.counters[Counter.COLLECTED]), list(found.values())
+        count.look(policy, env.swarm.position, env.tick)
+    return int(env.events.counters[Counter.COLLECTED]), list(count.found.values())
 
 
 def main() -> None:

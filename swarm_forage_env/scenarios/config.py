@@ -18,6 +18,7 @@ from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, capacity, distri
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, EAST_WALL_M, WALL_M, WHEEL_SCALE_MPS
 
 CACHE_KINDS = ("none", "static", "dynamic")
+PHYSICS_ENGINES = ("chipmunk", "compiled")
 MAX_DISC_SHARE = 0.4
 """Robot discs may cover at most this share of the start area; with more, random start poses cannot be drawn."""
 MAX_HANDLING_TICKS = 1_000_000
@@ -233,8 +234,11 @@ class ScenarioConfig:
     horizon_s: float = 10_000.0
     interval_s: float = 200.0
     """Length of a recording interval."""
+    physics: str = "chipmunk"
+    """What moves the bodies and resolves contacts: "chipmunk" (`world.physics`) or "compiled" (`world.bodies`), which
+    has the same model of contact and is faster. Runs agree until heaps of several robots part them."""
     physics_substeps: tuple[float, ...] = (0.25,) * 4
-    """Substeps of Chipmunk as shares of a tick, at least `MIN_SUBSTEPS` and all equal. Free motion is exact for any
+    """Substeps of the engine as shares of a tick, at least `MIN_SUBSTEPS` and all equal. Free motion is exact for any
     shares. A contact is resolved one substep late, so a substep limits how deep two robots are pushed into each other
     when a tick ends: 6 % of a diameter when they drive head-on (`tests/science/test_physics_convergence.py`)."""
     quirks: Quirks = field(default_factory=Quirks)
@@ -246,6 +250,7 @@ class ScenarioConfig:
         for name, value in dataclasses.asdict(self.quirks).items():
             fields.switch(f"quirks.{name}", value)
         fields.one_of("caches", self.caches, CACHE_KINDS)
+        fields.one_of("physics", self.physics, PHYSICS_ENGINES)
         quantity(self.performance)  # refuses unknown names
         for name in ("dt_s", "horizon_s", "interval_s"):
             fields.number(f"scenario.{name}", getattr(self, name), above=0.0)

@@ -66,9 +66,12 @@ class RunSpec:
         """Short hexadecimal hash of all that can change a run; equal specifications have equal ids.
 
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
+        `physics` is left out where it is the default, so that runs in Chipmunk have the same ids with and without it.
         """
         mapping = self.to_mapping()
         del mapping["scenario"]["performance"]
+        if mapping["scenario"]["physics"] == "chipmunk":
+            del mapping["scenario"]["physics"]
         canonical = json.dumps(_canonical(mapping), sort_keys=True, separators=(",", ":"))
         return hashlib.blake2b(canonical.encode(), digest_size=RUN_ID_DIGITS // 2).hexdigest()
 

@@ -12,6 +12,7 @@ from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
 from swarm_forage_env.scenarios.units import CELLS_PER_M
+from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.caches import (
     create_dynamic_caches,
     create_static_caches,
@@ -78,8 +79,11 @@ class ForagingArena:
         position, heading = draw_start_poses(config, stream_rng(seed, Stream.START_POSE))
         self.swarm.position[:], self.swarm.heading[:] = position, heading
         self.swarm.facing[:] = np.column_stack((np.cos(heading), np.sin(heading)))
-        self._physics = Physics(config, position, heading)
         sensors = new_sensors(config, self.layout, self._given_reads)
+        if config.physics == "compiled":
+            self._physics = Bodies(config, position, heading, sensors.near, sensors.bins)
+        else:
+            self._physics = Physics(config, position, heading)
         self._obs = sensors.obs
         self._world = new_world(
             config,

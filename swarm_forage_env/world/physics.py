@@ -21,20 +21,17 @@ import pymunk.batch
 
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.world.kernels.bodies import COLLISION_SLOP_M, FRICTION, WALL_INSET_M
 from swarm_forage_env.world.kernels.drive import hold_inside, unpack_poses
 from swarm_forage_env.world.state import SwarmState
 
 TIME_UNIT_S = 40.0
 """Seconds per Chipmunk time unit."""
 MASS_KG = 1.6
-FRICTION = 0.7
-COLLISION_SLOP_M = 0.001
-"""Overlap that Chipmunk leaves alone. Its default of 0.1 m would be more than a robot's radius."""
 WALL_RADIUS_M = 0.2
 """Half the thickness of a wall."""
-WALL_INSET_M = COLLISION_SLOP_M + 1e-5
-"""How far a wall stands inside of the floor's border, so that a robot that leans on it is on the floor in spite of the
-slop; a hundredth of the slop more, or rounding would have it put back in every tick."""
+PARKED_M = -10.0
+"""Where robots are parked: far outside."""
 ITERATIONS = 80
 """Rounds of Chipmunk's solver per substep; only contacts cost. Mean of the deepest overlap per tick of 512 robots,
 packed into a corner, that all push into it, as a share of a diameter: 10 rounds (its default) or 20: 0.93, which is one
@@ -61,7 +58,7 @@ class Physics:
         self._space = pymunk.Space()
         self._space.collision_slop = COLLISION_SLOP_M
         self._space.collision_bias = 0.0  # any overlap beyond the slop is undone in the next substep
-        self._room = _room_of_centres(config)
+        self._room = room_of_centres(config)
         self._space.iterations = ITERATIONS
         self._add_walls(config)
         self._bodies: list[pymunk.Body] = []
@@ -115,7 +112,7 @@ class Physics:
         """
         body = self._bodies[row]
         self._shapes[row].filter = pymunk.ShapeFilter(categories=0, mask=0)
-        body.position = (-10.0 - row, -10.0)
+        body.position = (PARKED_M - row, PARKED_M)
         self._space.reindex_shapes_for_body(body)
 
     def place(self, row: int, x: float, y: float, angle: float) -> None:
@@ -127,7 +124,7 @@ class Physics:
         self._space.reindex_shapes_for_body(body)
 
 
-def _room_of_centres(config: ScenarioConfig) -> FloatArray:
+def room_of_centres(config: ScenarioConfig) -> FloatArray:
     """Where centres of robots can be whose bodies are inside: x low, y low, x high, y high in m."""
     x_low, y_low, x_high, y_high = config.arena.interior_m
     radius = config.robots.radius_m

@@ -22,6 +22,14 @@ def test_conflicts_over_one_object_are_counted(tmp_path):
 
 
 @pytest.mark.compiled
+def test_two_engines_are_compared(tmp_path):
+    words = ("--policy", "dpo", "--robots", "30", "--seeds", "2", "--horizon", "20")
+    lines = run(str(ROOT / "scripts/compare_engines.py"), *words, cwd=tmp_path).splitlines()
+    assert len(lines) == 2 + 9
+    assert all(line.startswith("| warehouse_small | dpo | 30 |") for line in lines[2:])
+
+
+@pytest.mark.compiled
 def test_two_versions_are_drawn_beside_each_other(tmp_path):
     pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
     for robots in ("2", "4"):

@@ -69,6 +69,9 @@ TWINS = {
     ),
     "swarm_forage_env.policies.kernels.compact.compact_view": COMPACT_VIEW,
     "swarm_forage_env.world.kernels.beams.proximity": OBSERVED,
+    "swarm_forage_env.world.kernels.bodies.move_bodies": Twin(
+        "bodies.moved", "world/test_bodies.py", "swarm_forage_env.world.kernels.bodies.move_bodies"
+    ),
     "swarm_forage_env.world.kernels.contact.press": Twin(
         "contact.pressed_velocities", "world/test_contact.py", "swarm_forage_env.world.kernels.contact.press"
     ),
@@ -115,6 +118,7 @@ TWINS = {
 IN_ORDER = "only calls others, each with its twin; whole runs are in tests/promises/test_golden_runs.py"
 
 WITHOUT = {
+    "swarm_forage_env.world.kernels.bodies.tell_poses": "compared with `unpack_poses` in tests/world/test_bodies.py",
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "
     "tests/world/test_interactions_timing.py",
     "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",

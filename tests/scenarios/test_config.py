@@ -35,6 +35,7 @@ OTHER_VALUES: dict[str, Any] = {
     "dt_s": 0.1,
     "horizon_s": 2_000.0,
     "interval_s": 100.0,
+    "physics": "compiled",
     "physics_substeps": (0.2,) * 5,
     "width_m": 50.0,
     "height_m": 52.0,
@@ -120,6 +121,7 @@ def test_mapping_uses_defaults_for_what_is_left_out():
     config = from_mapping(ScenarioConfig, mapping)
     assert config.cache == CacheConfig()
     assert config.horizon_s == 10_000.0
+    assert config.physics == "chipmunk"
 
 
 def test_mapping_refuses_unknown_keys_with_the_nearest():
@@ -194,6 +196,7 @@ def test_mapping_refuses_a_value_where_a_section_belongs():
         ({"integer_estimates": 1}, ("quirks.integer_estimates to be True or False", "got 1")),
         ({"caches": "dinamic"}, ("none, static, dynamic", "got 'dinamic'", "Did you mean 'dynamic'?")),
         ({"performance": "colected"}, ("performance to be a recorded column", "Did you mean 'collected'?")),
+        ({"physics": "compild"}, ("physics to be one of chipmunk, compiled", "Did you mean 'compiled'?")),
         ({"name": ""}, ("scenario.name to be a non-empty text", "got ''")),
         ({"dt_s": 0.0}, ("scenario.dt_s to be a finite number > 0", "got 0.0")),
         ({"horizon_s": 100.1}, ("horizon_s to be a whole number of ticks of 0.2 s", "got 100.1")),

@@ -1,6 +1,6 @@
 """How deep robots are pushed into each other, by how a tick is divided: the reason for the default substeps.
 
-Chipmunk moves bodies and resolves contacts afterwards, so a contact is met one substep late. All overlaps are shares
+Both engines move bodies and resolve contacts afterwards, so a contact is met one substep late. All overlaps are shares
 of a robot's diameter when a tick ends, the only moment at which anything looks at poses.
 """
 
@@ -13,18 +13,24 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist
 
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig, with_overrides
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.state import SwarmState
+from tests.support.engines import drive_at, make_bodies
+from tests.support.heaps import DIAMETER_M
 
-DIAMETER_M = 2 * 0.085036758
 TOLERATED = 0.06
 BASE = scenario("warehouse_small")
 DEFAULT = BASE.physics_substeps
 MIDDLE = (16.0, 8.0)
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(params=PHYSICS_ENGINES, scope="module")
+def base(request) -> ScenarioConfig:
+    """The small warehouse with each engine."""
+    return with_overrides(BASE, physics=request.param)
 
 
 def divided(config: ScenarioConfig, substeps: tuple[float, ...]) -> ScenarioConfig:
@@ -44,29 +50,24 @@ def deepest(swarm: SwarmState) -> float:
     return float(1.0 - pdist(swarm.position).min() / DIAMETER_M)
 
 
-def drive(physics: Physics, swarm: SwarmState, heading: np.ndarray) -> None:
-    """One tick at full speed in these directions."""
-    physics.twist[:-1, 0], physics.twist[:-1, 1] = 0.10 * np.cos(heading), 0.10 * np.sin(heading)
-    physics.advance(swarm)
-
-
-def head_on_overlap(substeps: tuple[float, ...]) -> float:
+def head_on_overlap(base: ScenarioConfig, substeps: tuple[float, ...]) -> float:
     """Deepest overlap of two robots that drive at each other, over many starting gaps and sideways offsets."""
-    config = divided(with_overrides(BASE, n_robots=2), substeps)
+    config = divided(with_overrides(base, n_robots=2), substeps)
     heading = np.array([0.0, math.pi])
     worst = 0.0
     for offset in np.linspace(0.0, 0.95, 12) * DIAMETER_M:
         for gap in np.linspace(0.0, 0.04, 41):
             ahead = math.sqrt(DIAMETER_M**2 - offset**2) + gap
             swarm = SwarmState.empty(2)
-            physics = Physics(config, np.array([MIDDLE, (MIDDLE[0] + ahead, MIDDLE[1] + offset)]), heading)
+            swarm.position[:] = MIDDLE, (MIDDLE[0] + ahead, MIDDLE[1] + offset)
+            physics = make_bodies(config, swarm)
             for _ in range(8):
-                drive(physics, swarm, heading)
+                drive_at(physics, swarm, heading, 0.10)
                 worst = max(worst, deepest(swarm))
     return worst
 
 
-def crowd_overlap(substeps: tuple[float, ...], n_robots: int = 60, ticks: int = 300) -> float:
+def crowd_overlap(base: ScenarioConfig, n_robots: int, ticks: int = 300) -> float:
     """Deepest overlap in a crowd in which every robot drives at one point."""
     rng = np.random.default_rng(0)
     start = rng.uniform((14.0, 6.0), (18.0, 10.0), (n_robots, 2))
@@ -75,20 +76,19 @@ def crowd_overlap(substeps: tuple[float, ...], n_robots: int = 60, ticks: int = 
         start[again] = rng.uniform((14.0, 6.0), (18.0, 10.0), (len(again), 2))
     swarm = SwarmState.empty(n_robots)
     swarm.position[:] = start
-    config = divided(with_overrides(BASE, n_robots=n_robots), substeps)
-    physics = Physics(config, start, np.zeros(n_robots))
+    physics = make_bodies(with_overrides(base, n_robots=n_robots), swarm)
     worst = 0.0
     for _ in range(ticks):
         towards = np.array(MIDDLE) - swarm.position
-        drive(physics, swarm, np.arctan2(towards[:, 1], towards[:, 0]))
+        drive_at(physics, swarm, np.arctan2(towards[:, 1], towards[:, 0]), 0.10)
         worst = max(worst, deepest(swarm))
     return worst
 
 
 @pytest.fixture(scope="module")
-def table() -> dict[int, float]:
+def table(base) -> dict[int, float]:
     """Overlap head-on by number of equal substeps."""
-    return {n_substeps: head_on_overlap(equal(n_substeps)) for n_substeps in (1, 2, 3, 4, 5, 10)}
+    return {n_substeps: head_on_overlap(base, equal(n_substeps)) for n_substeps in (1, 2, 3, 4, 5, 10)}
 
 
 def test_overlap_shrinks_with_the_number_of_substeps(table):
@@ -105,10 +105,10 @@ def test_four_is_the_smallest_number_of_equal_substeps_that_is_tolerable(table):
     assert equal(4) == DEFAULT
 
 
-def test_free_motion_does_not_depend_on_the_substeps():
+def test_free_motion_does_not_depend_on_the_substeps(base):
     ends = []
     for substeps in (equal(1), equal(10), DEFAULT):
-        env = ForageEnv(divided(with_overrides(BASE, n_robots=1, n_objects=1), substeps))
+        env = ForageEnv(divided(with_overrides(base, n_robots=1, n_objects=1), substeps))
         env.reset_batch(0)
         rng = np.random.default_rng(0)
         start = env.swarm.position[0].copy()
@@ -122,12 +122,12 @@ def test_free_motion_does_not_depend_on_the_substeps():
 
 
 @pytest.mark.parametrize("n_robots", [60, 150])
-def test_a_crowd_that_pushes_to_one_point_hardly_overlaps(n_robots):
+def test_a_crowd_that_pushes_to_one_point_hardly_overlaps(base, n_robots):
     """Far beyond what a swarm with avoidance does to itself."""
-    assert crowd_overlap(DEFAULT, n_robots) < TOLERATED
+    assert crowd_overlap(base, n_robots) < TOLERATED
 
 
-def jam(substeps: tuple[float, ...], n_robots: int, ticks: int = 600) -> float:
+def jam(base: ScenarioConfig, substeps: tuple[float, ...], n_robots: int, ticks: int = 600) -> float:
     """Mean of the deepest overlap per tick of a swarm that drives into the upper right corner, once it is there.
 
     Robots start as near as they can without overlap and their headings follow the corner. The walls hold in any case.
@@ -139,12 +139,12 @@ def jam(substeps: tuple[float, ...], n_robots: int, ticks: int = 600) -> float:
     nearest = np.argsort(np.hypot(*(grid - corner).T), kind="stable")[:n_robots]
     swarm = SwarmState.empty(n_robots)
     swarm.position[:] = grid[nearest]
-    physics = Physics(divided(with_overrides(BASE, n_robots=n_robots), substeps), swarm.position, swarm.heading)
+    physics = make_bodies(divided(with_overrides(base, n_robots=n_robots), substeps), swarm)
     overlaps = []
     room = np.array([x_low, y_low, -x_high, -y_high]) + DIAMETER_M / 2
     for tick in range(ticks):
         towards = corner - swarm.position
-        drive(physics, swarm, np.arctan2(towards[:, 1], towards[:, 0]))
+        drive_at(physics, swarm, np.arctan2(towards[:, 1], towards[:, 0]), 0.10)
         assert np.all(np.hstack((swarm.position, -swarm.position)) >= room - 1e-12), "nobody leaves the floor"
         if tick >= ticks // 2:
             apart = cKDTree(swarm.position).query(swarm.position, k=2)[0][:, 1].min()
@@ -153,22 +153,22 @@ def jam(substeps: tuple[float, ...], n_robots: int, ticks: int = 600) -> float:
 
 
 @pytest.mark.parametrize("n_robots", [50, 200, 512])
-def test_a_swarm_that_pushes_into_a_corner_overlaps_little(n_robots):
-    assert jam(DEFAULT, n_robots) < 2 * TOLERATED
+def test_a_swarm_that_pushes_into_a_corner_overlaps_little(base, n_robots):
+    assert jam(base, DEFAULT, n_robots) < 2 * TOLERATED
 
 
 @pytest.mark.parametrize("substeps", [(1.0,), equal(2), equal(3), (0.5, 0.2, 0.15, 0.15), (0.7, 0.15, 0.15)])
 def test_fewer_or_unequal_substeps_pile_robots_up(substeps):
     """Why the configuration refuses them: an overlap seen in a short substep is undone too fast in a long one."""
-    assert jam(substeps, 512, ticks=300) > 0.3
+    assert jam(BASE, substeps, 512, ticks=300) > 0.3
 
 
 @pytest.mark.parametrize(
     ("name", "n_robots"), [("warehouse_medium", 200), ("warehouse_small", 400), ("warehouse_small", 1000)]
 )
-def test_robots_that_drive_at_random_hardly_overlap(name, n_robots):
+def test_robots_that_drive_at_random_hardly_overlap(base, name, n_robots):
     """Without any avoidance, in the densities of the study and beyond."""
-    env = ForageEnv(scenario(name, n_robots=n_robots))
+    env = ForageEnv(scenario(name, n_robots=n_robots, physics=base.physics))
     env.reset_batch(0)
     rng = np.random.default_rng(0)
     worst, touching = 0.0, 0

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.base import wrap_in_order
 from tests.support.foraging import mild_wrappers
@@ -40,9 +41,10 @@ def towards(env: ForageEnv, place: str, rng: np.random.Generator) -> np.ndarray:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
 @pytest.mark.parametrize(("n_robots", "place", "wrapped"), CASES)
-def test_nobody_is_outside(n_robots, place, wrapped):
-    env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, n_objects=5))
+def test_nobody_is_outside(n_robots, place, wrapped, physics):
+    env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, n_objects=5, physics=physics))
     stack = wrap_in_order(env, mild_wrappers()) if wrapped else env
     stack.reset_batch(n_robots)
     x_low, y_low, x_high, y_high = env.scenario.arena.interior_m

@@ -89,6 +89,16 @@ def test_another_performance_is_the_same_run():
     assert other.run_id == BASE.run_id
 
 
+def test_another_engine_is_another_run():
+    assert replace(BASE, scenario=scenario("warehouse_small", physics="compiled")).run_id != BASE.run_id
+
+
+def test_a_specification_without_an_engine_is_one_in_chipmunk():
+    mapping = BASE.to_mapping()
+    assert mapping["scenario"].pop("physics") == "chipmunk"
+    assert RunSpec.from_mapping(mapping) == BASE
+
+
 @pytest.mark.parametrize("seed", [-1, 2**63, 1.0, True, "1"])
 def test_bad_seeds_are_refused(seed):
     with pytest.raises(ConfigError, match="Expected seed to be a whole number"):

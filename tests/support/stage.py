@@ -13,6 +13,7 @@ from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, C
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.caches import create_cache
+from tests.support import engines
 
 NEST_CELL = (16, 40)
 OPEN_CELL = (60, 40)
@@ -28,7 +29,7 @@ WALL_CELL = (60, 5)
 
 def tidy_world(*, n_robots: int = 4, n_objects: int = 8, caches: str = "none", **overrides: Any) -> ForageEnv:
     """A small warehouse after reset, with objects in the depot, robots in the yard and no cache standing."""
-    options: dict[str, Any] = {"respawn_scale": 0.0, **overrides}
+    options: dict[str, Any] = {"respawn_scale": 0.0, "physics": engines.CHOSEN, **overrides}
     env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, n_objects=n_objects, caches=caches, **options))
     env.reset_batch(0)
     clear(env)
@@ -65,6 +66,7 @@ def put(env: ForageEnv, robot: int, x: float, y: float, heading: float = 0.0) ->
     swarm.position[robot], swarm.heading[robot] = (x, y), heading
     swarm.facing[robot] = np.cos(heading), np.sin(heading)
     env.arena._physics.place(robot, x, y, heading)
+    env.arena._moved = True
 
 
 def stand(env: ForageEnv, robot: int, cell: tuple[int, int]) -> None:

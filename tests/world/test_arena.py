@@ -23,6 +23,8 @@ from tests.support.stage import (
     tidy_world,
 )
 
+pytestmark = pytest.mark.usefixtures("each_engine")
+
 STRAIGHT = np.array([[0.5, 0.5, Grip.GRASP]] * 4, np.float32)
 
 

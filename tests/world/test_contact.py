@@ -13,10 +13,11 @@ from swarm_forage_env.world.contact import TOUCH_SLACK_M
 from swarm_forage_env.world.kernels.contact import press
 from swarm_forage_env.world.kernels.tick import look
 from tests.reference.contact import pressed_velocities
+from tests.support.heaps import DIAMETER_M, RADIUS_M, heap
 from tests.support.stage import lay, put, stand, tidy_world
 
-RADIUS_M = 0.085036758
-DIAMETER_M = 2 * RADIUS_M
+pytestmark = pytest.mark.usefixtures("each_engine")
+
 MIDDLE = np.array([16.0, 8.0])
 FULL = 0.5
 """Wheel command of the highest centre speed, 0.10 m/s."""
@@ -152,20 +153,6 @@ def test_two_that_shove_one_do_not_kick_it_ahead():
         assert 0.0 < velocity[2, 0] <= 0.10 + 1e-9
 
 
-def scene(rng: np.random.Generator, n_robots: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A heap of robots that touch and overlap a little: places, headings, wheel commands."""
-    side = math.sqrt(n_robots) * DIAMETER_M * 0.95
-    while True:
-        places = rng.uniform(-side / 2, side / 2, (n_robots, 2))
-        for _ in range(400):  # pushed apart, not quite
-            away = places[:, None] - places[None]
-            distance = np.hypot(away[..., 0], away[..., 1]) + np.eye(n_robots)
-            overlap = np.clip(0.99 * DIAMETER_M - distance, 0.0, None) * (1 - np.eye(n_robots))
-            places = places + 0.25 * np.sum(overlap[..., None] * away / distance[..., None], axis=1)
-        if distance[~np.eye(n_robots, dtype=bool)].min() > 0.9 * DIAMETER_M:
-            return places, rng.uniform(-math.pi, math.pi, n_robots), rng.uniform(-0.5, 0.5, (n_robots, 2))
-
-
 class Pressing:
     """The kernel of contact and its memory, on robots that stand at `places`."""
 
@@ -193,7 +180,7 @@ class Pressing:
 def test_contact_is_its_slow_twin(seed):
     rng = np.random.default_rng(seed)
     n_robots = 30
-    places, _, _ = scene(rng, n_robots)
+    places = heap(rng, n_robots)
     places += MIDDLE
     present = rng.random(n_robots) < 0.9
     contact = Pressing(places, present)
@@ -229,7 +216,7 @@ SYMMETRIES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 @pytest.mark.parametrize("name", SYMMETRIES)
 def test_a_mirrored_or_turned_scene_moves_mirrored_or_turned(name):
     rng = np.random.default_rng(1)
-    places, _, _ = scene(rng, 20)
+    places = heap(rng, 20)
     image = SYMMETRIES[name]
     everybody = np.ones(20, np.bool_)
     seen = [Pressing(MIDDLE + places, everybody), Pressing(MIDDLE + image(places), everybody)]
@@ -244,7 +231,7 @@ def test_a_mirrored_or_turned_scene_moves_mirrored_or_turned(name):
 
 def test_the_order_of_rows_does_not_matter():
     rng = np.random.default_rng(2)
-    places, _, _ = scene(rng, 20)
+    places = heap(rng, 20)
     order = rng.permutation(20)
     everybody = np.ones(20, np.bool_)
     seen = [Pressing(MIDDLE + places, everybody), Pressing(MIDDLE + places[order], everybody)]

@@ -1,4 +1,4 @@
-"""Bodies in Chipmunk: free motion in closed form, contacts, walls, the batch, parked bodies."""
+"""Bodies in both engines: free motion in closed form, contacts, walls, rows, parked bodies."""
 
 import itertools
 import math
@@ -7,36 +7,38 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
 
-from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.kernels.drive import hold_inside
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.state import SwarmState
 from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig
 from tests.reference.motion import WHEEL_BASE_M, WHEEL_SCALE_MPS, free_motion, held_inside, limited_wheels
+from tests.support import engines
+from tests.support.engines import drive_at, make_bodies
+from tests.support.heaps import DIAMETER_M, RADIUS_M
 from tests.support.stage import put, tidy_world
 
-RADIUS_M = 0.085036758
-DIAMETER_M = 2 * RADIUS_M
+pytestmark = pytest.mark.usefixtures("each_engine")
+
 DEEPEST_OVERLAP = 0.06
 """Share of a diameter that two robots may overlap when a tick ends."""
 ROUNDING_M = 1e-12
 MIDDLE = (16.0, 8.0)
 
 
-def world(position, heading, **overrides) -> tuple[Physics, SwarmState, ScenarioConfig]:
-    """Physics with robots at these poses, and a state to write to."""
-    config = with_overrides(scenario("warehouse_small", n_robots=len(heading)), **overrides)
+def world(position, heading) -> tuple[Physics | Bodies, SwarmState, ScenarioConfig]:
+    """Bodies of robots at these poses, and a state to write to."""
+    config = scenario("warehouse_small", n_robots=len(heading), physics=engines.CHOSEN)
     swarm = SwarmState.empty(len(heading))
     swarm.position[:], swarm.heading[:] = position, heading
-    return Physics(config, swarm.position, swarm.heading), swarm, config
+    return make_bodies(config, swarm), swarm, config
 
 
-def drive_ahead(physics: Physics, swarm: SwarmState, speed: float = 0.10) -> None:
+def drive_ahead(physics: Physics | Bodies, swarm: SwarmState) -> None:
     """One tick in which every robot drives where it faces."""
-    physics.twist[:-1, 0] = speed * np.cos(swarm.heading)
-    physics.twist[:-1, 1] = speed * np.sin(swarm.heading)
-    physics.advance(swarm)
+    drive_at(physics, swarm, swarm.heading, 0.10)
 
 
 def deepest_overlap(swarm: SwarmState) -> float:
@@ -138,6 +140,7 @@ def test_a_wall_stops_but_does_not_hold_back_a_sliding_robot_entirely():
 WALLS_AND_CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)]
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("at", WALLS_AND_CORNERS)
 def test_a_crowd_does_not_push_anybody_through_a_wall(at):
     x_low, y_low, x_high, y_high = scenario("warehouse_small").arena.interior_m
@@ -157,6 +160,7 @@ def test_a_crowd_does_not_push_anybody_through_a_wall(at):
     assert max(deepest) < 2 * DEEPEST_OVERLAP
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("sigma", [0.5, 10.0])
 def test_noise_on_the_wheels_drives_nobody_through_a_wall(sigma):
     env = tidy_world(n_robots=40)
@@ -183,24 +187,7 @@ def test_a_body_that_was_put_back_stays_where_it_was_put():
     assert swarm.position[1] == pytest.approx((5.0, 5.0))
 
 
-# The batch
-
-
-def test_batch_rows_are_the_bodies_in_order():
-    rng = np.random.default_rng(0)
-    cells = np.array(list(itertools.product(range(6), range(5))))
-    physics, swarm, _ = world(rng.permutation(cells) * 0.3 + (4.0, 4.0), rng.uniform(-3, 3, 30))
-    assert len(physics.twist) == 31, "the space's own static body comes last"
-    physics.park(3)
-    swarm.present[3] = False
-    for _ in range(20):
-        swarm.heading += rng.uniform(-0.5, 0.5, 30)
-        drive_ahead(physics, swarm)
-        physics.twist[:] = 0.0
-    bodies = [disc.body for disc in physics._shapes]
-    expected = np.array([(*body.position, body.angle) for body in bodies])
-    np.testing.assert_array_equal(physics.poses()[:-1], expected)
-    np.testing.assert_array_equal(swarm.position[swarm.present], expected[swarm.present, :2])
+# Rows
 
 
 def test_twists_reach_the_bodies_in_order():

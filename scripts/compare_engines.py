@@ -1,0 +1,138 @@
+"""Run both engines of physics and print what differs, as a Markdown table.
+
+    python scripts/compare_engines.py --scenario warehouse_small,warehouse_medium --policy crw,dpo --robots 16,64
+
+Every case is run in Chipmunk and in the compiled engine, with the same seeds. Two runs stay together until rounding or
+a heap of several robots parts them; from then on they are two samples of one distribution if the engines are
+equivalent. A difference is compiled minus Chipmunk, the mean over seeds with a 95 % t interval.
+"""
+
+import argparse
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+from contact_conflicts import ConflictCount
+from scipy.spatial import KDTree
+
+from baselines.dpo import DPOPolicy
+from metrics.statistics import aggregate
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study.run import build_env
+from swarm_forage_env.study.spec import plan_run
+from swarm_forage_env.world.contact import TOUCH_SLACK_M
+
+MEASURES = {
+    "deliveries": 1,
+    "first pick-ups": 1,
+    "interference, %": 2,
+    "contacts per robot and 1,000 s": 2,
+    "ticks of a contact, median": 1,
+    "ticks of a contact, 90 %": 1,
+    "deepest overlap, % of a diameter": 2,
+    "conflicts over one object": 1,
+    "of these in touch": 1,
+}
+"""What is measured, and with how many decimals it is written; conflicts are counted for DPO alone."""
+
+
+class ContactCount:
+    """Contacts of one run: how long each pair touches without a break, and how deep bodies overlap."""
+
+    def __init__(self, radius_m: float) -> None:
+        self._diameter_m = 2 * radius_m
+        self._since: dict[tuple[int, int], int] = {}
+        self.durations: list[int] = []
+        self.deepest = 0.0
+
+    def look(self, at: FloatArray, tick: int) -> None:
+        """Note who touches; `at` (N, 2) is where robots are, in m."""
+        pairs = KDTree(at).query_pairs(self._diameter_m + TOUCH_SLACK_M, output_type="ndarray")
+        if len(pairs):
+            apart = np.linalg.norm(at[pairs[:, 0]] - at[pairs[:, 1]], axis=1).min()
+            self.deepest = max(self.deepest, 1.0 - float(apart) / self._diameter_m)
+        touching = {(i, j) for i, j in pairs.tolist()}
+        for pair in self._since.keys() - touching:
+            self.durations.append(tick - self._since.pop(pair))
+        for pair in touching - self._since.keys():
+            self._since[pair] = tick
+
+
+def measured(world: ScenarioConfig, policy_name: str, seed: int) -> dict[str, float]:
+    """The measures of one run, by name."""
+    policy = load_policy(policy_name)
+    env = build_env(world, reads=getattr(policy, "reads", None)).unwrapped
+    policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
+    obs, done = env.reset_batch(seed), False
+    contacts = ContactCount(world.robots.radius_m)
+    conflicts = ConflictCount(2 * world.robots.radius_m + TOUCH_SLACK_M)
+    while not done:
+        obs, _, _, done = env.step_batch(policy.act(obs, env.active), tasks=getattr(policy, "task", None))
+        contacts.look(env.swarm.position, env.tick)
+        if isinstance(policy, DPOPolicy):
+            conflicts.look(policy, env.swarm.position, env.tick)
+    counters = env.events.counters
+    durations = contacts.durations or [0]
+    values: list[float] = [
+        counters[Counter.COLLECTED],
+        counters[Counter.FIRST_PICKED],
+        100 * counters[Counter.INTERFERING] / max(1, counters[Counter.ACTIVE]),
+        1_000 * len(contacts.durations) / (world.robots.n_robots * world.horizon_s),
+        *np.percentile(durations, (50, 90)),
+        100 * contacts.deepest,
+        len(conflicts.found),
+        sum(in_touch > 0 for _, in_touch, _ in conflicts.found.values()),
+    ]
+    return dict(zip(MEASURES, map(float, values), strict=True))
+
+
+def rows_of_case(name: str, policy: str, n_robots: int, seeds: int, horizon_s: float) -> Iterator[str]:
+    """Run one case in both engines; one line of the table per measure."""
+    runs: dict[str, list[dict[str, float]]] = {}
+    for physics in PHYSICS_ENGINES:
+        world = scenario(name, n_robots=n_robots, horizon_s=horizon_s, interval_s=horizon_s, physics=physics)
+        spec = plan_run(world, policy)
+        runs[physics] = [measured(spec.scenario, policy, seed) for seed in range(seeds)]
+    for measure, decimals in MEASURES.items():
+        chipmunk, compiled = (np.array([run[measure] for run in runs[physics]]) for physics in PHYSICS_ENGINES)
+        if measure in ("conflicts over one object", "of these in touch") and policy != "dpo":
+            continue
+        difference = aggregate(compiled - chipmunk)
+        cells = (chipmunk.mean(), compiled.mean(), difference.mean, difference.lower, difference.upper)
+        before, after, mean, low, high = (written(value, decimals) for value in cells)
+        yield f"| {name} | {policy} | {n_robots} | {measure} | {before} | {after} | {mean} ({low} to {high}) |"
+
+
+def written(value: float, decimals: int) -> str:
+    """A number with so many decimals, and zero without a sign."""
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+
+
+def words(text: str) -> list[str]:
+    """Names separated by commas."""
+    return text.split(",")
+
+
+def main() -> None:
+    """Print the table, case by case."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenario", type=words, default=["warehouse_small"], help="presets, separated by commas")
+    parser.add_argument("--policy", type=words, default=["crw", "dpo"], help="policies, separated by commas")
+    parser.add_argument("--robots", type=words, default=["16", "64"], help="numbers of robots, separated by commas")
+    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--horizon", type=float, default=2_000.0, help="length of a run in s")
+    chosen = parser.parse_args()
+    print("| scenario | policy | robots | measure | Chipmunk | compiled | difference |")
+    print("|---|---|--:|---|--:|--:|--:|")
+    for name, policy, n_robots in itertools.product(chosen.scenario, chosen.policy, map(int, chosen.robots)):
+        for row in rows_of_case(name, policy, n_robots, chosen.seeds, chosen.horizon):
+            print(row, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,397 @@
+"""Discs in a rectangle: who can touch whom in a tick, and a tick of motion with contacts.
+
+The model of contact is Chipmunk's, for bodies that are all equal. In every substep
+
+    1. bodies move by their velocity, and by the push that undoes overlap;
+    2. contacts are looked up where they stand now: two discs that overlap, a disc that overlaps a wall;
+    3. impulses are worked out, contact by contact in rounds, until they settle.
+
+An impulse along the normal n stops bodies that run into each other and never pulls: it is >= 0. The impulse across it,
+friction, is at most `GRIP` times that. A push is worked out in the same way, apart from velocities: it undoes what an
+overlap is beyond the slop in the next substep and is then forgotten. So a contact is met one substep late.
+
+Velocities start every tick from the commands. What is left of the tick before are the places. The pushes of its last
+substep follow from them and are worked out first. The impulses that then stop the bodies start from those of the tick
+before, which changes nothing where they settle. In a heap that goes on pushing they are nearly right already.
+
+All masses are equal and cancel. An impulse is given per mass, in m/s: an impulse j along n changes the velocity of a
+disc by j, friction f its turn rate by 2 f / r (the moment of a disc is m r^2 / 2). Effective masses of contacts are
+
+    along n:   two discs m / 2, disc and wall m          across:   two discs m / 6, disc and wall m / 3
+
+Contacts are taken in the order of rows: pairs (i, j) with i < j first, then walls, robot by robot, west, east, south,
+north. Each has a number that grows in this order, by which it is found again in the next tick (a float, which holds
+whole numbers up to 2^53).
+"""
+
+import math
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
+from swarm_forage_env.world.kernels.drive import hold_inside
+from swarm_forage_env.world.kernels.neighbours import bin_of
+
+FRICTION = 0.7
+"""Of robots and of walls."""
+GRIP = FRICTION * FRICTION
+"""Friction of a contact: the product of both sides."""
+COLLISION_SLOP_M = 0.001
+"""Overlap that is left alone. Chipmunk's default of 0.1 m would be more than a robot's radius."""
+WALL_INSET_M = COLLISION_SLOP_M + 1e-5
+"""How far a wall stands inside of the floor's border, so that a robot that leans on it is on the floor in spite of the
+slop; a hundredth of the slop more, or rounding would have it put back in every tick."""
+ROUNDS = 160
+"""Most rounds per substep; few are needed outside of heaps. Mean of the deepest overlap per tick of robots, packed into
+a corner, that all push into it, as a share of a diameter: 512 robots 0.009 with 80 rounds and 0.007 with 160; 1,000
+robots 0.99, which is one robot on top of another, and 0.017. Chipmunk with its 80: 0.011 and 0.053."""
+SETTLED_M_S = 1e-9
+"""Impulses have settled when a round changes no velocity by more than this: a tick moves no body by 1e-9 m of it."""
+WALLS = 4
+"""Most walls that a robot can touch."""
+MARGIN_M = 0.01
+"""How much farther than by their commands two bodies may come closer in a tick, because others shove them."""
+
+Work = tuple[FloatArray, IntArray, BoolArray, IntArray, FloatArray]
+"""Arrays to work in: velocity (N, 5) = x, y, turn rate, push x, push y; rows of busy robots (N,); who is busy (N,);
+rows in contact (C, 2), -1 = wall; contacts (C, 7) = normal x, y, wanted push, impulse, friction and push so far,
+number."""
+
+Memory = tuple[IntArray, FloatArray]
+"""Contacts of the tick before: how many (1,); number, impulse and friction in m/s (C, 3)."""
+
+
+@kernel
+def find_pairs(
+    poses: FloatArray,
+    present: BoolArray,
+    near: BoolArray,
+    bins: tuple[float, IntArray, IntArray],
+    sight_m: float,
+    pairs: IntArray,
+) -> int:
+    """Write pairs i < j of present robots with centres within `sight_m` into `pairs` (P, 2), sorted by i, then j.
+
+    `near` (N,) and `bins` are those of `beams.proximity` where robots stand now; who has nobody near is passed over as
+    long as `sight_m` is within what it looked through. Returns how many pairs there are; what is beyond P is not
+    written.
+    """
+    cell_m, first_in_bin, next_in_bin = bins
+    n_bins = first_in_bin.shape[0]
+    rings = max(1, int(math.ceil(sight_m / cell_m)))
+    n_pairs = 0
+    for i in range(present.shape[0]):
+        if not present[i] or (rings == 1 and not near[i]):
+            continue
+        cell_x = int(poses[i, 0] / cell_m)
+        cell_y = int(poses[i, 1] / cell_m)
+        first = n_pairs
+        for step_x in range(-rings, rings + 1):
+            for step_y in range(-rings, rings + 1):
+                j = first_in_bin[bin_of(cell_x + step_x, cell_y + step_y, n_bins)]
+                while j >= 0:
+                    if j > i and present[j]:
+                        dx = poses[j, 0] - poses[i, 0]
+                        dy = poses[j, 1] - poses[i, 1]
+                        # Two places of the nine may share a bin.
+                        if dx * dx + dy * dy <= sight_m * sight_m and (
+                            int(poses[j, 0] / cell_m) == cell_x + step_x
+                            and int(poses[j, 1] / cell_m) == cell_y + step_y
+                        ):
+                            if n_pairs < pairs.shape[0]:
+                                insert_pair(i, int(j), first, n_pairs, pairs)
+                            n_pairs += 1
+                    j = next_in_bin[j]
+    return n_pairs
+
+
+@kernel
+def insert_pair(i: int, j: int, first: int, end: int, pairs: IntArray) -> None:
+    """Put a pair among those of i, which are rows `first` to `end` of `pairs`, so that they stay sorted by j."""
+    at = end
+    while at > first and pairs[at - 1, 1] > j:
+        pairs[at, 0] = i
+        pairs[at, 1] = pairs[at - 1, 1]
+        at -= 1
+    pairs[at, 0] = i
+    pairs[at, 1] = j
+
+
+@kernel
+def top_speed(twist: FloatArray) -> float:
+    """Greatest speed in `twist` (N + 1, 3), m/s."""
+    greatest = 0.0
+    for i in range(twist.shape[0]):
+        greatest = max(greatest, twist[i, 0] * twist[i, 0] + twist[i, 1] * twist[i, 1])
+    return math.sqrt(greatest)
+
+
+@kernel
+def list_busy(
+    poses: FloatArray, present: BoolArray, room: FloatArray, wall_m: float, pairs: IntArray, n_pairs: int, work: Work
+) -> int:
+    """List the rows of robots that are in a pair, or within `wall_m` of where a wall holds them; returns how many."""
+    busy, is_busy = work[1], work[2]
+    for i in range(present.shape[0]):
+        to_west_or_east = min(poses[i, 0] - room[0], room[2] - poses[i, 0])
+        is_busy[i] = min(to_west_or_east, poses[i, 1] - room[1], room[3] - poses[i, 1]) < wall_m
+    for k in range(n_pairs):
+        is_busy[pairs[k, 0]] = True
+        is_busy[pairs[k, 1]] = True
+    n_busy = 0
+    for i in range(present.shape[0]):
+        is_busy[i] = is_busy[i] and present[i]
+        if is_busy[i]:
+            busy[n_busy] = i
+            n_busy += 1
+    return n_busy
+
+
+@kernel
+def add_contact(
+    n: int, i: int, j: int, number: float, normal: tuple[float, float], gap_m: float, substep_s: float, work: Work
+) -> int:
+    """Write contact n of body i with body j (-1 = wall) along the normal from i; returns n + 1.
+
+    `gap_m` is negative; the push undoes what is beyond the slop in one substep.
+    """
+    touching, contact = work[3], work[4]
+    touching[n, 0] = i
+    touching[n, 1] = j
+    contact[n, 0] = normal[0]
+    contact[n, 1] = normal[1]
+    contact[n, 2] = max(0.0, -(gap_m + COLLISION_SLOP_M)) / substep_s
+    contact[n, 3] = 0.0
+    contact[n, 4] = 0.0
+    contact[n, 5] = 0.0
+    contact[n, 6] = number
+    return n + 1
+
+
+@kernel
+def find_contacts(
+    poses: FloatArray,
+    pairs: IntArray,
+    n_pairs: int,
+    n_busy: int,
+    room: FloatArray,
+    radius: float,
+    substep_s: float,
+    work: Work,
+) -> int:
+    """Write the contacts of busy robots as they stand, pairs first; returns how many there are."""
+    diameter = 2.0 * radius
+    n_robots = work[1].shape[0]
+    n = 0
+    for k in range(n_pairs):
+        i, j = pairs[k, 0], pairs[k, 1]
+        dx = poses[j, 0] - poses[i, 0]
+        dy = poses[j, 1] - poses[i, 1]
+        squared = dx * dx + dy * dy
+        if squared < diameter * diameter:
+            distance = math.sqrt(squared)
+            normal = 1.0, 0.0  # for one on top of the other, where any direction will do
+            if distance > 0.0:
+                normal = dx / distance, dy / distance
+            n = add_contact(n, i, j, float(i) * n_robots + j, normal, distance - diameter, substep_s, work)
+    busy = work[1]
+    for k in range(n_busy):
+        i = busy[k]
+        number = float(n_robots) * n_robots + WALLS * i
+        west = poses[i, 0] - room[0] - WALL_INSET_M
+        east = room[2] - poses[i, 0] - WALL_INSET_M
+        south = poses[i, 1] - room[1] - WALL_INSET_M
+        north = room[3] - poses[i, 1] - WALL_INSET_M
+        if west < 0.0:
+            n = add_contact(n, i, -1, number, (-1.0, 0.0), west, substep_s, work)
+        if east < 0.0:
+            n = add_contact(n, i, -1, number + 1, (1.0, 0.0), east, substep_s, work)
+        if south < 0.0:
+            n = add_contact(n, i, -1, number + 2, (0.0, -1.0), south, substep_s, work)
+        if north < 0.0:
+            n = add_contact(n, i, -1, number + 3, (0.0, 1.0), north, substep_s, work)
+    return n
+
+
+@kernel
+def push_discs(velocity: FloatArray, i: int, j: int, contact: FloatArray, k: int, radius: float) -> float:
+    """One round of the contact k of two discs; returns the largest change of an impulse, m/s."""
+    nx, ny = contact[k, 0], contact[k, 1]
+    dx = velocity[j, 0] - velocity[i, 0]
+    dy = velocity[j, 1] - velocity[i, 1]
+    along = dx * nx + dy * ny
+    across = dy * nx - dx * ny - radius * (velocity[i, 2] + velocity[j, 2])
+    apart = (velocity[j, 3] - velocity[i, 3]) * nx + (velocity[j, 4] - velocity[i, 4]) * ny
+    impulse = max(0.0, contact[k, 3] - 0.5 * along)
+    most = GRIP * impulse
+    friction = min(most, max(-most, contact[k, 4] - across / 6.0))
+    push = max(0.0, contact[k, 5] + 0.5 * (contact[k, 2] - apart))
+    more, more_across, more_push = impulse - contact[k, 3], friction - contact[k, 4], push - contact[k, 5]
+    contact[k, 3], contact[k, 4], contact[k, 5] = impulse, friction, push
+    give(velocity, i, -1.0, contact, k, (more, more_across, more_push), radius)
+    give(velocity, j, 1.0, contact, k, (more, more_across, more_push), radius)
+    return max(abs(more), abs(more_across), abs(more_push))
+
+
+@kernel
+def push_wall(velocity: FloatArray, i: int, contact: FloatArray, k: int, radius: float) -> float:
+    """One round of the contact k of a disc and a wall; returns the largest change of an impulse, m/s."""
+    nx, ny = contact[k, 0], contact[k, 1]
+    along = -(velocity[i, 0] * nx + velocity[i, 1] * ny)
+    across = velocity[i, 0] * ny - velocity[i, 1] * nx - radius * velocity[i, 2]
+    apart = -(velocity[i, 3] * nx + velocity[i, 4] * ny)
+    impulse = max(0.0, contact[k, 3] - along)
+    most = GRIP * impulse
+    friction = min(most, max(-most, contact[k, 4] - across / 3.0))
+    push = max(0.0, contact[k, 5] + contact[k, 2] - apart)
+    more, more_across, more_push = impulse - contact[k, 3], friction - contact[k, 4], push - contact[k, 5]
+    contact[k, 3], contact[k, 4], contact[k, 5] = impulse, friction, push
+    give(velocity, i, -1.0, contact, k, (more, more_across, more_push), radius)
+    return max(abs(more), abs(more_across), abs(more_push))
+
+
+@kernel
+def give(
+    velocity: FloatArray,
+    i: int,
+    sign: float,
+    contact: FloatArray,
+    k: int,
+    impulses: tuple[float, float, float],
+    radius: float,
+) -> None:
+    """Change the velocity of a body by impulse, friction and push of the contact k; `sign` is -1 for its first body."""
+    nx, ny = contact[k, 0], contact[k, 1]
+    along, across, push = impulses
+    velocity[i, 0] += sign * (along * nx - across * ny)
+    velocity[i, 1] += sign * (along * ny + across * nx)
+    velocity[i, 2] -= 2.0 * across / radius  # both bodies are turned the same way, like two wheels that rub
+    velocity[i, 3] += sign * push * nx
+    velocity[i, 4] += sign * push * ny
+
+
+@kernel
+def settle(n_contacts: int, radius: float, work: Work) -> None:
+    """Work out impulses and pushes of all contacts, in rounds, and change the velocities by them."""
+    velocity, touching, contact = work[0], work[3], work[4]
+    for _ in range(ROUNDS):
+        change = 0.0
+        for k in range(n_contacts):
+            i, j = touching[k, 0], touching[k, 1]
+            if j >= 0:
+                change = max(change, push_discs(velocity, i, j, contact, k, radius))
+            else:
+                change = max(change, push_wall(velocity, i, contact, k, radius))
+        if change <= SETTLED_M_S:
+            return
+
+
+@kernel
+def recall(n_contacts: int, radius: float, work: Work, memory: Memory) -> None:
+    """Start contacts that were there in the tick before with their impulses."""
+    velocity, touching, contact = work[0], work[3], work[4]
+    n_before, before = memory
+    m = 0
+    for k in range(n_contacts):
+        while m < n_before[0] and before[m, 0] < contact[k, 6]:
+            m += 1
+        if m < n_before[0] and before[m, 0] == contact[k, 6]:
+            contact[k, 3] = before[m, 1]
+            contact[k, 4] = before[m, 2]
+            given = before[m, 1], before[m, 2], 0.0
+            give(velocity, touching[k, 0], -1.0, contact, k, given, radius)
+            if touching[k, 1] >= 0:
+                give(velocity, touching[k, 1], 1.0, contact, k, given, radius)
+
+
+@kernel
+def remember(n_contacts: int, work: Work, memory: Memory) -> None:
+    """Keep the impulses of all contacts for the next tick."""
+    contact = work[4]
+    n_before, before = memory
+    n_before[0] = n_contacts
+    for k in range(n_contacts):
+        before[k, 0] = contact[k, 6]
+        before[k, 1] = contact[k, 3]
+        before[k, 2] = contact[k, 4]
+
+
+@kernel
+def move_busy(poses: FloatArray, n_busy: int, substep_s: float, work: Work) -> None:
+    """Move busy robots by one substep; pushes are spent by it."""
+    velocity, busy = work[0], work[1]
+    for k in range(n_busy):
+        i = busy[k]
+        poses[i, 0] += (velocity[i, 0] + velocity[i, 3]) * substep_s
+        poses[i, 1] += (velocity[i, 1] + velocity[i, 4]) * substep_s
+        poses[i, 2] += velocity[i, 2] * substep_s
+        velocity[i, 3] = 0.0
+        velocity[i, 4] = 0.0
+
+
+@kernel
+def tell_poses(
+    poses: FloatArray, present: BoolArray, position: FloatArray, heading: FloatArray, facing: FloatArray
+) -> None:
+    """Copy poses of present robots as `drive.unpack_poses` does; facing stays as it is where the heading does."""
+    for i in range(present.shape[0]):
+        if present[i]:
+            position[i, 0] = poses[i, 0]
+            position[i, 1] = poses[i, 1]
+            angle = poses[i, 2]
+            wrapped = angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
+            if wrapped != heading[i]:
+                heading[i] = wrapped
+                facing[i, 0] = math.cos(angle)
+                facing[i, 1] = math.sin(angle)
+
+
+@kernel
+def move_bodies(
+    poses: FloatArray,
+    twist: FloatArray,
+    present: BoolArray,
+    near: BoolArray,
+    bins: tuple[float, IntArray, IntArray],
+    room: FloatArray,
+    radius: float,
+    dt_s: float,
+    n_substeps: int,
+    pairs: IntArray,
+    work: Work,
+    memory: Memory,
+) -> int:
+    """Move present robots in `poses` (>= N, 3: x, y, angle) by one tick along `twist` (>= N, 3), with contacts.
+
+    `near` and `bins` are as in `find_pairs`; `room` = x low, y low, x high, y high of centres on the floor, in m.
+    Nobody ends outside of it. Returns the number of pairs; if it is more than `pairs` holds, nobody was moved: call
+    again with more room. `work` and `memory` have rows for as many contacts as `pairs` has rows and `WALLS` per robot.
+    """
+    fastest_m = top_speed(twist) * dt_s
+    n_pairs = find_pairs(poses, present, near, bins, 2.0 * (radius + fastest_m) + MARGIN_M, pairs)
+    if n_pairs > pairs.shape[0]:
+        return n_pairs
+    n_busy = list_busy(poses, present, room, WALL_INSET_M + fastest_m + MARGIN_M, pairs, n_pairs, work)
+    velocity, busy, is_busy = work[0], work[1], work[2]
+    for i in range(present.shape[0]):
+        if present[i] and not is_busy[i]:
+            poses[i, 0] += twist[i, 0] * dt_s
+            poses[i, 1] += twist[i, 1] * dt_s
+            poses[i, 2] += twist[i, 2] * dt_s
+    for k in range(n_busy):
+        for column in range(5):
+            velocity[busy[k], column] = 0.0
+    substep_s = dt_s / n_substeps
+    for substep in range(n_substeps):
+        n_contacts = find_contacts(poses, pairs, n_pairs, n_busy, room, radius, substep_s, work)
+        if substep == 1:
+            recall(n_contacts, radius, work, memory)
+        settle(n_contacts, radius, work)
+        if substep == 1:
+            remember(n_contacts, work, memory)
+        if substep == 0:  # so far bodies stood still and got their pushes only
+            for k in range(n_busy):
+                for column in range(3):
+                    velocity[busy[k], column] = twist[busy[k], column]
+        move_busy(poses, n_busy, substep_s, work)
+    hold_inside(poses, present, room)
+    return n_pairs

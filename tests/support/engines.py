@@ -1,0 +1,50 @@
+"""Bodies in either engine, without an arena around them; which engine a test's arenas have."""
+
+import numpy as np
+
+from swarm_forage_env.contract.layout import observation_layout
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.world.bodies import Bodies
+from swarm_forage_env.world.kernels.beams import proximity
+from swarm_forage_env.world.kernels.neighbours import bin_robots
+from swarm_forage_env.world.physics import Physics
+from swarm_forage_env.world.sensors import new_sensors
+from swarm_forage_env.world.state import SwarmState
+
+CHOSEN = "chipmunk"
+"""What `stage.tidy_world` makes; the fixture `each_engine` changes it for a test."""
+
+
+class SensedBodies(Bodies):
+    """Compiled bodies that look for neighbours before they move, as the arena does after each move."""
+
+    def __init__(self, config: ScenarioConfig, swarm: SwarmState) -> None:
+        arena = config.arena
+        layout = observation_layout(arena.width_m, arena.height_m, config.objects.n_objects)
+        self.sensors = new_sensors(config, layout, ())
+        super().__init__(config, swarm.position, swarm.heading, self.sensors.near, self.sensors.bins)
+
+    def look(self, swarm: SwarmState) -> None:
+        """Find out who is near whom."""
+        s = self.sensors
+        bin_robots(swarm.position, swarm.present, *s.bins)
+        seen = (s.bins, s.interior, s.radius_m, s.reach_m, s.obs, s.columns.proximity, s.near)
+        proximity(swarm.position, swarm.facing, swarm.present, *seen)
+
+    def advance(self, swarm: SwarmState) -> None:
+        self.look(swarm)
+        super().advance(swarm)
+
+
+def make_bodies(config: ScenarioConfig, swarm: SwarmState) -> Physics | SensedBodies:
+    """Bodies where the robots of a state are, in the engine of the configuration."""
+    if config.physics == "compiled":
+        return SensedBodies(config, swarm)
+    return Physics(config, swarm.position, swarm.heading)
+
+
+def drive_at(physics: Physics | Bodies, swarm: SwarmState, heading: np.ndarray, speed: float | np.ndarray) -> None:
+    """One tick in which robots move in these directions (N,) at this speed in m/s, without turning."""
+    physics.twist[:-1, 0] = speed * np.cos(heading)
+    physics.twist[:-1, 1] = speed * np.sin(heading)
+    physics.advance(swarm)
