@@ -21,7 +21,7 @@ from swarm_forage_env.world.caches import (
 )
 from swarm_forage_env.world.compiled import compiled_tick, new_world
 from swarm_forage_env.world.interactions import Interactions
-from swarm_forage_env.world.kernels.tick import ALL_GOOD
+from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.placement import draw_source, place_all, place_objects, static_cache_centres
 from swarm_forage_env.world.sensors import new_sensors, read_slices
@@ -95,7 +95,8 @@ class ForagingArena:
             self._static_caches,
         )
         actions = np.zeros((n_robots, 3), np.float32)
-        self._compiled = compiled_tick(self._world, actions, self._unit_gain, self._nothing)
+        bodies = self._physics.state if isinstance(self._physics, Bodies) else None
+        self._compiled = compiled_tick(self._world, bodies, actions, self._unit_gain, self._nothing)
         self._moved = False
         return self.observe()
 
@@ -134,23 +135,38 @@ class ForagingArena:
         Raises:
             ActionError: an active robot's action or gain is NaN or infinite; nothing has happened.
         """
-        world, compiled, tick = self._world, self._compiled, self.tick + 1
+        tick = self.tick + 1
         gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
-        refused = compiled.set_out(world, actions, gain, tick, self._moved)
-        if refused != ALL_GOOD:
+        pick_chance, walk_chance = self._draws(tick)
+        outcome = self._move_and_meet(actions, gain, tick, pick_chance, walk_chance)
+        if outcome >= 0:
             raise ActionError(
-                f"Expected finite actions and wheel gains, got {actions[refused].tolist()} and "
-                f"{gain[refused].tolist()} for robot_{refused}; the world was not stepped."
+                f"Expected finite actions and wheel gains, got {actions[outcome].tolist()} and "
+                f"{gain[outcome].tolist()} for robot_{outcome}; the world was not stepped."
             )
         self.tick, self._moved = tick, False
-        self._physics.advance(self.swarm)
-        pick_chance, walk_chance = self._draws(tick)
-        if compiled.meet_and_close(world, actions, tick, pick_chance, walk_chance):
+        if outcome == TO_PLACE:
             self._create_dynamic_caches()
             self._replace_displaced()
             self._restore_caches(tasks)
-            compiled.close(world, walk_chance)
+            self._compiled.close(self._world, walk_chance)
         return self._obs
+
+    def _move_and_meet(
+        self, actions: ActionArray, gain: FloatArray, tick: int, pick_chance: FloatArray, walk_chance: FloatArray
+    ) -> int:
+        """Do what of a tick is compiled, in one call if the bodies are; returns an outcome of `kernels.tick`."""
+        world, compiled, physics = self._world, self._compiled, self._physics
+        if isinstance(physics, Bodies) and compiled.whole is not None:
+            outcome = compiled.whole(world, physics.state, actions, gain, tick, self._moved, pick_chance, walk_chance)
+            if outcome != NO_ROOM:
+                return outcome
+        else:
+            outcome = compiled.set_out(world, actions, gain, tick, self._moved)
+            if outcome != DONE:
+                return outcome
+        physics.advance(self.swarm)
+        return compiled.meet_and_close(world, actions, tick, pick_chance, walk_chance)
 
     def _draws(self, tick: int) -> tuple[FloatArray, FloatArray]:
         """Return this tick's random numbers for pick-ups out of caches (N,) and for walking objects (M,), if needed."""

@@ -12,6 +12,7 @@ from swarm_forage_env.world.actuators import drive_limits
 from swarm_forage_env.world.contact import TOUCH_SLACK_M, new_memory
 from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels import tick
+from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.world import Sensors, Wandering, World
 from swarm_forage_env.world.state import StepEvents, SwarmState
 
@@ -21,8 +22,10 @@ class CompiledTick(NamedTuple):
 
     observe: Callable[[World], None]
     set_out: Callable[[World, ActionArray, FloatArray, int, bool], int]
-    meet_and_close: Callable[[World, ActionArray, int, FloatArray, FloatArray], bool]
+    meet_and_close: Callable[[World, ActionArray, int, FloatArray, FloatArray], int]
     close: Callable[[World, FloatArray], None]
+    whole: Callable[[World, BodyState, ActionArray, FloatArray, int, bool, FloatArray, FloatArray], int] | None
+    """Only with compiled bodies."""
 
 
 def new_world(
@@ -62,11 +65,16 @@ def new_world(
     )
 
 
-def compiled_tick(world: World, actions: ActionArray, wheel_gain: FloatArray, draws: FloatArray) -> CompiledTick:
+def compiled_tick(
+    world: World, bodies: BodyState | None, actions: ActionArray, wheel_gain: FloatArray, draws: FloatArray
+) -> CompiledTick:
     """Return the functions of a tick for arguments of these types; `draws` is one row of random numbers."""
     return CompiledTick(
         observe=direct(tick.observe, world),
         set_out=direct(tick.set_out, world, actions, wheel_gain, 0, False),
         meet_and_close=direct(tick.meet_and_close, world, actions, 0, draws, draws),
         close=direct(tick.close, world, draws),
+        whole=None
+        if bodies is None
+        else direct(tick.whole, world, bodies, actions, wheel_gain, 0, False, draws, draws),
     )

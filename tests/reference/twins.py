@@ -126,6 +126,7 @@ WITHOUT = {
     "swarm_forage_env.world.kernels.tick.meet_and_close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.observe": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.set_out": IN_ORDER,
+    "swarm_forage_env.world.kernels.tick.whole": IN_ORDER,
     "swarm_forage_env.wrappers.kernels.gaussian.to_normal": "compared with the normal distribution function of scipy",
     "swarm_forage_env.wrappers.kernels.noise.noisy_gain": "one product per wheel; by hand in "
     "tests/wrappers/test_noise.py",

@@ -55,8 +55,7 @@ def test_compiled_bodies_are_their_slow_twin(seed, at_wall):
         )
         n_contacts, n_walls = n_contacts + len(before), n_walls + sum(type(wall) is str for _, wall in before)
         bodies.look(swarm)
-        n_pairs = move_bodies(*bodies._arguments(swarm.present))
-        assert n_pairs <= len(bodies._pairs)
+        assert move_bodies(bodies.state, bodies.twist, swarm.present, 0.2)
         np.testing.assert_allclose(poses_of(bodies), expected, atol=1e-11)
         tell_poses(bodies.poses(), swarm.present, swarm.position, swarm.heading, swarm.facing)
     assert n_contacts > 150
@@ -64,7 +63,7 @@ def test_compiled_bodies_are_their_slow_twin(seed, at_wall):
 
 
 def bodies_sizes(bodies):
-    return tuple(bodies._room.tolist()), bodies._shape
+    return tuple(bodies.state.room.tolist()), (bodies.state.radius_m, 0.2, bodies.state.n_substeps)
 
 
 @pytest.mark.parametrize("speed", [0.1, 0.4])
@@ -194,7 +193,8 @@ def test_a_pile_gets_more_room_for_pairs_and_keeps_its_impulses():
     rng = np.random.default_rng(0)
     piled, swarm = bodies_at(MIDDLE + rng.uniform(-0.05, 0.05, (n_robots, 2)), np.zeros(n_robots))
     roomy, same = bodies_at(swarm.position, np.zeros(n_robots))
-    roomy._make_room(n_robots**2)
+    while len(roomy.state.pairs) < n_robots**2:
+        roomy.make_room()
     assert n_robots * (n_robots - 1) // 2 > PAIRS_PER_ROBOT * n_robots
     for _ in range(15):
         for bodies, state in ((piled, swarm), (roomy, same)):

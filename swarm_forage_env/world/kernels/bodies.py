@@ -25,6 +25,7 @@ whole numbers up to 2^53).
 """
 
 import math
+from typing import NamedTuple
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
@@ -58,6 +59,25 @@ number."""
 
 Memory = tuple[IntArray, FloatArray]
 """Contacts of the tick before: how many (1,); number, impulse and friction in m/s (C, 3)."""
+
+
+class BodyState(NamedTuple):
+    """Bodies of one run, and what moving them needs."""
+
+    poses: FloatArray
+    """(N + 1, 3) x, y in m and unwrapped angle in rad; the last row is nobody."""
+    near: BoolArray
+    """(N,) who has anything within reach, as of the last proximity sweep."""
+    bins: tuple[float, IntArray, IntArray]
+    """Robots by place as of that sweep: cell size in m, first_in_bin, next_in_bin."""
+    room: FloatArray
+    """x low, y low, x high, y high of centres on the floor, m."""
+    radius_m: float
+    n_substeps: int
+    pairs: IntArray
+    """(P, 2) scratch."""
+    work: Work
+    memory: Memory
 
 
 @kernel
@@ -346,31 +366,18 @@ def tell_poses(
 
 
 @kernel
-def move_bodies(
-    poses: FloatArray,
-    twist: FloatArray,
-    present: BoolArray,
-    near: BoolArray,
-    bins: tuple[float, IntArray, IntArray],
-    room: FloatArray,
-    radius: float,
-    dt_s: float,
-    n_substeps: int,
-    pairs: IntArray,
-    work: Work,
-    memory: Memory,
-) -> int:
-    """Move present robots in `poses` (>= N, 3: x, y, angle) by one tick along `twist` (>= N, 3), with contacts.
+def move_bodies(b: BodyState, twist: FloatArray, present: BoolArray, dt_s: float) -> bool:
+    """Move present robots by one tick along `twist` (>= N, 3), with contacts; nobody ends outside of `b.room`.
 
-    `near` and `bins` are as in `find_pairs`; `room` = x low, y low, x high, y high of centres on the floor, in m.
-    Nobody ends outside of it. Returns the number of pairs; if it is more than `pairs` holds, nobody was moved: call
-    again with more room. `work` and `memory` have rows for as many contacts as `pairs` has rows and `WALLS` per robot.
+    Returns False if there are more pairs than `b.pairs` holds. Then nobody was moved: call again with more room.
     """
+    poses, room, work = b.poses, b.room, b.work
     fastest_m = top_speed(twist) * dt_s
-    n_pairs = find_pairs(poses, present, near, bins, 2.0 * (radius + fastest_m) + MARGIN_M, pairs)
-    if n_pairs > pairs.shape[0]:
-        return n_pairs
-    n_busy = list_busy(poses, present, room, WALL_INSET_M + fastest_m + MARGIN_M, pairs, n_pairs, work)
+    sight_m = 2.0 * (b.radius_m + fastest_m) + MARGIN_M
+    n_pairs = find_pairs(poses, present, b.near, b.bins, sight_m, b.pairs)
+    if n_pairs > b.pairs.shape[0]:
+        return False
+    n_busy = list_busy(poses, present, room, WALL_INSET_M + fastest_m + MARGIN_M, b.pairs, n_pairs, work)
     velocity, busy, is_busy = work[0], work[1], work[2]
     for i in range(present.shape[0]):
         if present[i] and not is_busy[i]:
@@ -380,18 +387,18 @@ def move_bodies(
     for k in range(n_busy):
         for column in range(5):
             velocity[busy[k], column] = 0.0
-    substep_s = dt_s / n_substeps
-    for substep in range(n_substeps):
-        n_contacts = find_contacts(poses, pairs, n_pairs, n_busy, room, radius, substep_s, work)
+    substep_s = dt_s / b.n_substeps
+    for substep in range(b.n_substeps):
+        n_contacts = find_contacts(poses, b.pairs, n_pairs, n_busy, room, b.radius_m, substep_s, work)
         if substep == 1:
-            recall(n_contacts, radius, work, memory)
-        settle(n_contacts, radius, work)
+            recall(n_contacts, b.radius_m, work, b.memory)
+        settle(n_contacts, b.radius_m, work)
         if substep == 1:
-            remember(n_contacts, work, memory)
+            remember(n_contacts, work, b.memory)
         if substep == 0:  # so far bodies stood still and got their pushes only
             for k in range(n_busy):
                 for column in range(3):
                     velocity[busy[k], column] = twist[busy[k], column]
         move_busy(poses, n_busy, substep_s, work)
     hold_inside(poses, present, room)
-    return n_pairs
+    return True

@@ -16,6 +16,7 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import ActionArray, FloatArray
 from swarm_forage_env.world.kernels import beams, floor, proprioception
+from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.contact import press
 from swarm_forage_env.world.kernels.drive import drive
 from swarm_forage_env.world.kernels.interact import serve
@@ -24,8 +25,12 @@ from swarm_forage_env.world.kernels.neighbours import bin_robots
 from swarm_forage_env.world.kernels.walk import walk
 from swarm_forage_env.world.kernels.world import World
 
-ALL_GOOD = -1
-"""Answer of `set_out`: no action was refused."""
+DONE = -1
+"""No action was refused and nothing is left to do. Rows of refused actions are 0 and above."""
+TO_PLACE = -2
+"""Objects or caches are to be placed, then `close` is still to come."""
+NO_ROOM = -3
+"""There is no room for all pairs of robots that might touch. `set_out` is done, nobody was moved."""
 _CACHES_ALIVE, _OBJECTS_CACHED = int(Counter.CACHES_ALIVE), int(Counter.OBJECTS_CACHED)
 _OBJECTS_MOVED = int(Counter.OBJECTS_MOVED)
 
@@ -96,7 +101,7 @@ def observe(w: World) -> None:
 def set_out(w: World, actions: ActionArray, wheel_gain: FloatArray, tick: int, look_first: bool) -> int:
     """From actions to velocities of the bodies, in tick number `tick`.
 
-    `look_first`: robots came or went since the last `look`. Returns `ALL_GOOD`, or the first active row whose action or
+    `look_first`: robots came or went since the last `look`. Returns `DONE`, or the first active row whose action or
     gain is not finite; then nothing has happened.
     """
     a, s = w.state, w.sensors
@@ -107,7 +112,7 @@ def set_out(w: World, actions: ActionArray, wheel_gain: FloatArray, tick: int, l
         look(w)
     before, now = (w.pressing[0], w.pressing[1]) if tick % 2 == 0 else (w.pressing[1], w.pressing[0])
     press(a.position, w.present, s.near, s.bins, w.touch_m, before, now, w.command, w.twist)
-    return ALL_GOOD
+    return DONE
 
 
 @kernel
@@ -161,9 +166,30 @@ def close(w: World, walk_chance: FloatArray) -> None:
 
 
 @kernel
-def meet_and_close(w: World, actions: ActionArray, tick: int, chance: FloatArray, walk_chance: FloatArray) -> bool:
-    """`meet`, then `close` unless anything is to be placed; returns whether anything is: `close` is still to come."""
+def meet_and_close(w: World, actions: ActionArray, tick: int, chance: FloatArray, walk_chance: FloatArray) -> int:
+    """`meet`, then `close` unless anything is to be placed; returns `DONE` or `TO_PLACE`."""
     if meet(w, actions, tick, chance):
-        return True
+        return TO_PLACE
     close(w, walk_chance)
-    return False
+    return DONE
+
+
+@kernel
+def whole(
+    w: World,
+    b: BodyState,
+    actions: ActionArray,
+    wheel_gain: FloatArray,
+    tick: int,
+    look_first: bool,
+    chance: FloatArray,
+    walk_chance: FloatArray,
+) -> int:
+    """The whole tick, with compiled bodies; returns `DONE`, `TO_PLACE`, `NO_ROOM` or the row of a refused action."""
+    refused = set_out(w, actions, wheel_gain, tick, look_first)
+    if refused != DONE:
+        return refused
+    if not move_bodies(b, w.twist, w.present, w.dt_s):
+        return NO_ROOM
+    tell_poses(b.poses, w.present, w.state.position, w.heading, w.facing)
+    return meet_and_close(w, actions, tick, chance, walk_chance)
