@@ -45,15 +45,14 @@ def step_crw(
     obs: ObsArray,
     active: BoolArray,
     draws: FloatArray,
-    constants: np.ndarray,
-    robots: np.ndarray,
-    actions: ActionArray,
+    state: tuple[np.ndarray, np.ndarray, ActionArray],
     _now: int,
 ) -> None:
-    """One tick of CRW for all robots: edits `robots` (N,) and writes `actions` (N, 3).
+    """One tick of CRW for all robots. `state` = constants (1,), robots (N,) edited, actions (N, 3) written.
 
     `draws` is (N, DRAWS) uniform in [0, 1). Inactive robots keep their state; their action is zero.
     """
+    constants, robots, actions = state
     c = constants[0]
     for i in range(active.shape[0]):
         action = actions[i]

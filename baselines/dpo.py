@@ -40,16 +40,14 @@ def step_dpo(
     obs: ObsArray,
     active: BoolArray,
     draws: FloatArray,
-    constants: np.ndarray,
-    robots: np.ndarray,
-    memory: ObjectMemory,
-    actions: ActionArray,
+    state: tuple[np.ndarray, np.ndarray, ObjectMemory, ActionArray],
     _now: int,
 ) -> None:
-    """One tick of DPO for all robots: edits `robots` (N,) and `memory`, writes `actions` (N, 3).
+    """One tick of DPO for all robots. `state` = constants (1,), robots (N,) and memory edited, actions (N, 3) written.
 
     `draws` is (N, DRAWS) uniform in [0, 1). Inactive robots keep their state; their action is zero.
     """
+    constants, robots, memory, actions = state
     c = constants[0]
     for i in range(active.shape[0]):
         action = actions[i]

@@ -5,16 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import direct
+from swarm_forage_env._internal.compiling import Callback, direct
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 
 from .machines import describe_robot
 from .parameters import require_inputs
 
-MOST_TICKS_PER_BLOCK = 64
 NUMBERS_PER_BLOCK = 8192
-"""Numbers are drawn for several ticks in one call: 64 KiB of them, which stay in a processor's cache, or 64 ticks."""
+"""Numbers are drawn for several ticks in one call: 64 KiB of them, which stay in a processor's cache."""
 
 
 class DrawBlocks:
@@ -28,24 +27,64 @@ class DrawBlocks:
             n_robots: N.
             n_draws: Numbers per robot and tick.
         """
-        ticks = max(1, min(MOST_TICKS_PER_BLOCK, NUMBERS_PER_BLOCK // (n_robots * n_draws)))
+        ticks = max(1, NUMBERS_PER_BLOCK // (n_robots * n_draws))
         self._rng = rng
         self._block = np.empty((ticks, n_robots, n_draws))
         self._used = ticks
 
     def next_tick(self) -> FloatArray:
         """Return the (N, n_draws) numbers in [0, 1) of the next tick; they may be overwritten one tick later."""
+        numbers = self.next_ticks()[0]
+        self.use(1)
+        return numbers
+
+    def next_ticks(self) -> FloatArray:
+        """Return the (ticks, N, n_draws) numbers of the ticks to come that are drawn already, at least one tick."""
         if self._used == len(self._block):
             self._rng.random(out=self._block)
             self._used = 0
-        self._used += 1
-        return self._block[self._used - 1]
+        return self._block[self._used :]
+
+    def use(self, n_ticks: int) -> None:
+        """Count the numbers of so many ticks as used up."""
+        self._used += n_ticks
+
+
+class CompiledScript:
+    """A scripted policy as `contract.policy.CompiledPolicy`."""
+
+    def __init__(
+        self, kernel: Callable[..., None], state: tuple[Any, ...], policy: "ScriptedPolicy", chance: DrawBlocks
+    ) -> None:
+        """Compile the kernel as one that other kernels call; see `ScriptedPolicy._start`."""
+        self.state = state
+        self.task: CodeArray | None = getattr(policy, "task", None)
+        self._policy = policy
+        self._chance = chance
+        self.callback = Callback(kernel, *example_of(state))
+
+    def next_ticks(self) -> tuple[int, FloatArray]:
+        """Return the number of the next tick, and the draws (ticks, N, n_draws) of it and of some that follow."""
+        return self._policy.n_ticks + 1, self._chance.next_ticks()
+
+    def count_ticks(self, n_ticks: int) -> None:
+        """Note that the kernel has done so many ticks."""
+        self._policy.n_ticks += n_ticks
+        self._chance.use(n_ticks)
+
+
+def example_of(state: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return arguments of the types that a kernel with this state takes."""
+    return np.empty((1, 1), np.float32), np.empty(1, np.bool_), np.empty((1, 1)), state, 0
 
 
 class ScriptedPolicy:
     """Every robot decides by the same rules, from what it sees and remembers. An instance drives one run.
 
     A subclass calls `_start` at the end of its `reset`.
+
+    Attributes:
+        n_ticks: Ticks since reset.
     """
 
     _spec: SwarmSpec | None = None
@@ -66,7 +105,7 @@ class ScriptedPolicy:
         Args:
             spec: The swarm.
             rng: Generator of the policy's stream.
-            kernel: One tick of all robots: (obs, active, draws, constants, robots, *memory, actions, now).
+            kernel: One tick of all robots: (obs, active, draws, (constants, robots, *memory, actions), now).
             n_draws: Draws per robot and tick.
             constants: (1,) record of `parameters.kernel_constants`.
             robots: (N,) records of the robots.
@@ -80,13 +119,12 @@ class ScriptedPolicy:
         self._robots = robots
         self._actions: ActionArray = np.zeros((spec.n_robots, 3), np.float32)
         self._state = (constants, robots, *memory, self._actions)
-        self._tick = 0
+        self.n_ticks = 0
         self._bind()
 
     def _bind(self) -> None:
         """Find the compiled version of the kernel once, and not in every tick."""
-        readings = np.empty((1, 1), np.float32)
-        self._step = direct(self._kernel, readings, np.empty(1, np.bool_), np.empty((1, 1)), *self._state, self._tick)
+        self._step = direct(self._kernel, *example_of(self._state))
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
@@ -95,9 +133,14 @@ class ScriptedPolicy:
         # The compiled version takes contiguous arrays of these types only. Most often nothing is copied here.
         obs, active = np.ascontiguousarray(obs, np.float32), np.ascontiguousarray(active, np.bool_)
         self._draws = self._chance.next_tick()
-        self._tick += 1
-        self._step(obs, active, self._draws, *self._state, self._tick)
+        self.n_ticks += 1
+        self._step(obs, active, self._draws, self._state, self.n_ticks)
         return self._actions
+
+    def compiled(self) -> "CompiledScript | None":
+        """The policy for runs without Python between ticks; None where somebody has put another `act` in its place."""
+        is_own = type(self).act is ScriptedPolicy.act and "act" not in vars(self)
+        return CompiledScript(self._kernel, self._state, self, self._chance) if is_own else None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies are made of: everything but the compiled version, which cannot be stored."""

@@ -264,18 +264,16 @@ def step_tasks(
     obs: ObsArray,
     active: BoolArray,
     draws: FloatArray,
-    constants: np.ndarray,
-    robots: np.ndarray,
-    memory: TaskMemory,
-    allocation: Allocation,
-    actions: ActionArray,
+    state: tuple[np.ndarray, np.ndarray, TaskMemory, Allocation, ActionArray],
     now: int,
 ) -> None:
-    """One tick for all robots: edits `robots` (N,), `memory` and `allocation`, writes `actions` (N, 3).
+    """One tick for all robots.
 
-    `draws` is (N, TASK_DRAWS) uniform in [0, 1), `now` the number of this tick, from 1. Inactive robots keep their
-    state; their action is zero.
+    `state` = constants (1,), robots (N,), memory and allocation edited, actions (N, 3) written. `draws` is
+    (N, TASK_DRAWS) uniform in [0, 1), `now` the number of this tick, from 1. Inactive robots keep their state; their
+    action is zero.
     """
+    constants, robots, memory, allocation, actions = state
     c = constants[0]
     for i in range(active.shape[0]):
         action = actions[i]

@@ -11,7 +11,7 @@ from pettingzoo import ParallelEnv
 from swarm_forage_env._internal.fields import as_whole, instance
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.policy import ActionError, SwarmSpec
+from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.units import CELL_M
@@ -242,6 +242,10 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self._rewards.remember()
         obs = arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
         return obs, self._rewards.reward(), self._terminated, arena.tick >= self.max_cycles
+
+    def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
+        """Let a compiled policy drive the swarm for some ticks; see `ForagingArena.run`. Rewards are not computed."""
+        self._world.run(policy, n_ticks, task_shares)
 
     # Dict level
 

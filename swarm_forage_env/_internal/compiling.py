@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import njit, typeof
+from numba import njit, typeof, types
 from numba.core.caching import FunctionCache
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -67,7 +67,39 @@ def direct(function: F, *example: Any) -> F:
     compiled = getattr(function, "compile", None)
     if compiled is None:  # the compiler is switched off
         return function
-    return cast(F, compiled(tuple(typeof(argument) for argument in example)))
+    return cast(F, compiled(tuple(_type_of(argument) for argument in example)))
+
+
+def _type_of(argument: Any) -> Any:
+    return argument.type if isinstance(argument, Callback) else typeof(argument)
+
+
+class Callback:
+    """A kernel that another one takes as an argument: which one it is may change without compiling anything anew."""
+
+    def __init__(self, function: Callable[..., Any], *example: Any) -> None:
+        """Compile `function`, which returns nothing, for arguments of the types of `example`."""
+        self.function = function
+        if not hasattr(function, "compile"):  # the compiler is switched off
+            self.type = None
+            return
+        arguments = tuple(typeof(argument) for argument in example)
+        self.type = types.FunctionType(types.none(*arguments))
+        direct(function, *example)
+        compiled = cast(Any, function).overloads[arguments]
+        self._address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+
+    def __call__(self, *arguments: Any) -> None:
+        """Call the function itself, for kernels that are not compiled."""
+        self.function(*arguments)
+
+    def __wrapper_address__(self) -> int:  # noqa: PLW3201 - numba asks for this name
+        """Return the address that compiled code jumps to."""
+        return self._address
+
+    def signature(self) -> Any:
+        """Return numba's signature."""
+        return self.type.signature
 
 
 def inline_kernel(function: F) -> F:

@@ -52,3 +52,8 @@ class TickDraws:
             self._rng.random(out=self._rows)
             self._block = block
         return self._rows[place]
+
+    def rows(self, tick: int) -> np.ndarray:
+        """Return the rows of a tick and of those after it that are drawn already, at least one."""
+        self.row(tick)
+        return self._rows[(tick - 1) % len(self._rows) :]

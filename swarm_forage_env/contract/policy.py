@@ -5,12 +5,12 @@ A policy, scripted or trained, sees observations and never the state of the worl
 """
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from swarm_forage_env.contract.layout import ObservationLayout, observation_layout
-from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, WHEEL_SCALE_MPS
@@ -99,12 +99,40 @@ class SwarmSpec:
         )
 
 
+class CompiledPolicy(Protocol):
+    """A policy whose ticks can be run without Python in between. Policies offer it by a method `compiled`."""
+
+    @property
+    def callback(self) -> Any:
+        """The kernel of a tick, (obs, active, draws, state, tick), as `_internal.compiling.Callback`."""
+        ...
+
+    @property
+    def state(self) -> tuple[Any, ...]:
+        """What the kernel edits; the last are the actions, (N, 3) float32."""
+        ...
+
+    @property
+    def task(self) -> CodeArray | None:
+        """(N,) `Task` codes that the kernel keeps up to date, None for a policy without tasks."""
+        ...
+
+    def next_ticks(self) -> tuple[int, FloatArray]:
+        """Return the number of the next tick, and the draws (ticks, N, draws) of it and of some that follow."""
+        ...
+
+    def count_ticks(self, n_ticks: int) -> None:
+        """Note that the kernel has done so many ticks."""
+        ...
+
+
 @runtime_checkable
 class Policy(Protocol):
     """Controls every robot at once. An instance drives one run; its memory is created by `reset`.
 
     Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
-    doing, for people (`study.stuck` shows it); the class attributes `caches` ("none", "static", "dynamic": those that
+    doing, for people (`study.stuck` shows it); `compiled() -> CompiledPolicy | None`, for runs without Python
+    between ticks; the class attributes `caches` ("none", "static", "dynamic": those that
     the policy is made for) and `reads` (names of the slices it looks at; default all;
     "light if carrying" = light only of robots that carry).
     """

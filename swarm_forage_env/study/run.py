@@ -12,7 +12,7 @@ import numpy as np
 
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Grip
-from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.contract.policy import CompiledPolicy, Policy
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -48,9 +48,24 @@ class LiveRun:
         policy.reset(self.forage_env.swarm_spec, stream_rng(seed, Stream.POLICY))
         self._obs = stack.reset_batch(seed)
         self._has_tasks = hasattr(policy, "task")
+        self._compiled = self._compiled_policy()
+
+    def _compiled_policy(self) -> CompiledPolicy | None:
+        """The policy for a run without Python between ticks, if nothing has to be done there: no wrapper but a recorder."""
+        env = self.forage_env
+        is_bare = isinstance(self._stack, RunRecorder) and self._stack.env is env
+        if not (is_bare and env.scenario.physics == "compiled" and hasattr(self._policy, "compiled")):
+            return None
+        return self._policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
 
     def advance(self, *, to_tick: int | None = None) -> None:
         """Let policy and environment act in turn until `to_tick` ticks have passed since the start, or the run ends."""
+        if self._compiled is not None and isinstance(self._stack, RunRecorder):
+            end = self.forage_env.max_cycles
+            n_ticks = (end if to_tick is None else min(to_tick, end)) - self.forage_env.tick
+            self._stack.run(self._compiled, max(0, n_ticks))
+            self.over = self.forage_env.tick >= end
+            return
         world, policy, has_tasks, obs, over = self.forage_env, self._policy, self._has_tasks, self._obs, self.over
         act, step = policy.act, self._stack.step_batch
         while not over and world.tick != to_tick:

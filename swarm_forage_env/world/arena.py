@@ -1,14 +1,15 @@
 """ForagingArena: the simulated world of an environment. It owns the state arrays and fixes the order of a tick."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import numpy as np
 
+from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env._internal.fields import whole
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import observation_layout
-from swarm_forage_env.contract.policy import ActionError
+from swarm_forage_env.contract.policy import ActionError, CompiledPolicy
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
 from swarm_forage_env.scenarios.units import CELLS_PER_M
@@ -21,7 +22,7 @@ from swarm_forage_env.world.caches import (
 )
 from swarm_forage_env.world.compiled import compiled_tick, new_world
 from swarm_forage_env.world.interactions import Interactions
-from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE
+from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.placement import draw_source, place_all, place_objects, static_cache_centres
 from swarm_forage_env.world.sensors import new_sensors, read_slices
@@ -58,7 +59,8 @@ class ForagingArena:
         self._given_reads = reads
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
         self._unit_gain = np.ones((config.robots.n_robots, 2))
-        self._nothing = np.zeros(config.robots.n_robots)
+        self._nothing = np.zeros((1, config.robots.n_robots))
+        self._no_tasks = np.zeros(0, np.int8)
         self.tick = 0
 
     def reset(self, seed: int) -> ObsArray:
@@ -96,7 +98,8 @@ class ForagingArena:
         )
         actions = np.zeros((n_robots, 3), np.float32)
         bodies = self._physics.state if isinstance(self._physics, Bodies) else None
-        self._compiled = compiled_tick(self._world, bodies, actions, self._unit_gain, self._nothing)
+        self._compiled = compiled_tick(self._world, bodies, actions, self._unit_gain, self._nothing[0])
+        self._run: Callable[..., tuple[int, int]] | None = None
         self._moved = False
         return self.observe()
 
@@ -137,45 +140,94 @@ class ForagingArena:
         """
         tick = self.tick + 1
         gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
-        pick_chance, walk_chance = self._draws(tick)
-        outcome = self._move_and_meet(actions, gain, tick, pick_chance, walk_chance)
+        world, compiled, physics = self._world, self._compiled, self._physics
+        pick_chances, walk_chances = self._draws(tick)
+        draws = pick_chances[0], walk_chances[0]
+        if isinstance(physics, Bodies) and compiled.whole is not None:
+            outcome = compiled.whole(world, physics.state, actions, gain, tick, self._moved, *draws)
+        else:
+            outcome = compiled.set_out(world, actions, gain, tick, self._moved)
+            if outcome == DONE:
+                physics.advance(self.swarm)
+                outcome = compiled.meet_and_close(world, actions, tick, *draws)
+        self._conclude(outcome, tick, actions, gain, tasks, draws)
+        return self._obs
+
+    def _draws(self, tick: int) -> tuple[FloatArray, FloatArray]:
+        """Return random numbers of a tick and some after it: for pick-ups (ticks, N), for walking objects (ticks, M).
+
+        Where they are not needed there is one row of zeros for all.
+        """
+        config = self.config
+        nothing = self._nothing
+        return (
+            self._pick_chance.rows(tick) if config.caches != "none" else nothing,
+            self._walk_chance.rows(tick) if config.objects.walk_probability > 0.0 else nothing,
+        )
+
+    def _conclude(
+        self,
+        outcome: int,
+        tick: int,
+        actions: ActionArray,
+        gain: FloatArray,
+        tasks: CodeArray | None,
+        draws: tuple[FloatArray, FloatArray],
+    ) -> None:
+        """Do what is left of a tick after its compiled part, and count it."""
         if outcome >= 0:
             raise ActionError(
                 f"Expected finite actions and wheel gains, got {actions[outcome].tolist()} and "
                 f"{gain[outcome].tolist()} for robot_{outcome}; the world was not stepped."
             )
+        if outcome == NO_ROOM:
+            self._physics.advance(self.swarm)
+            outcome = self._compiled.meet_and_close(self._world, actions, tick, *draws)
         self.tick, self._moved = tick, False
         if outcome == TO_PLACE:
             self._create_dynamic_caches()
             self._replace_displaced()
             self._restore_caches(tasks)
-            self._compiled.close(self._world, walk_chance)
-        return self._obs
+            self._compiled.close(self._world, draws[1])
 
-    def _move_and_meet(
-        self, actions: ActionArray, gain: FloatArray, tick: int, pick_chance: FloatArray, walk_chance: FloatArray
-    ) -> int:
-        """Do what of a tick is compiled, in one call if the bodies are; returns an outcome of `kernels.tick`."""
-        world, compiled, physics = self._world, self._compiled, self._physics
-        if isinstance(physics, Bodies) and compiled.whole is not None:
-            outcome = compiled.whole(world, physics.state, actions, gain, tick, self._moved, pick_chance, walk_chance)
-            if outcome != NO_ROOM:
-                return outcome
-        else:
-            outcome = compiled.set_out(world, actions, gain, tick, self._moved)
-            if outcome != DONE:
-                return outcome
-        physics.advance(self.swarm)
-        return compiled.meet_and_close(world, actions, tick, pick_chance, walk_chance)
+    def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
+        """Let a compiled policy drive the world for some ticks; what happens is what `step` and `act` do by turns.
 
-    def _draws(self, tick: int) -> tuple[FloatArray, FloatArray]:
-        """Return this tick's random numbers for pick-ups out of caches (N,) and for walking objects (M,), if needed."""
-        config = self.config
-        nothing = self._nothing
-        return (
-            self._pick_chance.row(tick) if config.caches != "none" else nothing,
-            self._walk_chance.row(tick) if config.objects.walk_probability > 0.0 else nothing,
-        )
+        Bodies must be compiled, too. `task_shares` (codes,) gets the shares of active robots in each task, tick by tick.
+        """
+        physics, n_left = self._physics, n_ticks
+        assert isinstance(physics, Bodies), "Chipmunk is not compiled"
+        tasks = policy.task if policy.task is not None else self._no_tasks
+        while n_left:
+            first = self.tick + 1
+            now, policy_draws = policy.next_ticks()
+            picks, walks = self._draws(first)
+            n_drawn = min(len(rows) for rows in (policy_draws, picks, walks) if rows is not self._nothing)
+            arguments = (
+                self._world,
+                physics.state,
+                self._unit_gain,
+                first,
+                min(n_left, n_drawn),
+                self._moved,
+                policy.callback,
+                policy.state,
+                now,
+                policy_draws,
+                picks,
+                walks,
+                tasks,
+                task_shares,
+            )
+            if self._run is None:
+                self._run = direct(run, *arguments)
+            n_done, outcome = self._run(*arguments)
+            policy.count_ticks(n_done)
+            last = n_done - 1
+            draws = picks[last % len(picks)], walks[last % len(walks)]
+            told = None if policy.task is None else policy.task
+            self._conclude(outcome, self.tick + n_done, policy.state[-1], self._unit_gain, told, draws)
+            n_left -= n_done
 
     def _create_dynamic_caches(self) -> None:
         creators = self._interactions.creators()

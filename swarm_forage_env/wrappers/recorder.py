@@ -6,12 +6,13 @@ from typing import ClassVar
 import numpy as np
 
 from swarm_forage_env.contract.codes import Counter, Task
+from swarm_forage_env.contract.policy import CompiledPolicy
 from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.performance import performance_curve
 from swarm_forage_env.wrappers.base import SwarmWrapper
-from swarm_forage_env.wrappers.kernels.task_shares import add_task_shares
+from swarm_forage_env.world.kernels.task_shares import add_task_shares
 
 TOTALS: dict[str, Counter] = {
     "collected": Counter.COLLECTED,
@@ -84,6 +85,18 @@ class RunRecorder(SwarmWrapper):
         self._complete = truncated or bool(terminated[0] and terminated.all())
         if self._ticks_left == 0 or self._complete:
             self._close_interval(has_tasks=tasks is not None)
+
+    def run(self, policy: CompiledPolicy, n_ticks: int) -> None:
+        """Let a compiled policy drive a swarm without other wrappers for some ticks, at most to the horizon."""
+        env = self.unwrapped
+        while n_ticks:
+            n_steps = min(n_ticks, self._ticks_left)
+            env.run(policy, n_steps, self._task_sums)
+            n_ticks -= n_steps
+            self._ticks_left -= n_steps
+            self._complete = env.tick >= env.max_cycles
+            if self._ticks_left == 0 or self._complete:
+                self._close_interval(has_tasks=policy.task is not None)
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns of the finished run by name, (T,) each.

@@ -104,10 +104,10 @@ TWINS = {
         "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch",
     ),
     "swarm_forage_env.wrappers.kernels.noise.turn_heading": NOISE,
-    "swarm_forage_env.wrappers.kernels.task_shares.add_task_shares": Twin(
+    "swarm_forage_env.world.kernels.task_shares.add_task_shares": Twin(
         "task_shares.task_shares",
         "wrappers/test_recorder.py",
-        "swarm_forage_env.wrappers.kernels.task_shares.add_task_shares",
+        "swarm_forage_env.world.kernels.task_shares.add_task_shares",
     ),
     "swarm_forage_env.wrappers.kernels.throttle.throttle": Twin(
         "adversity.throttle_gain", "wrappers/test_throttle.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"

@@ -12,9 +12,12 @@ count           caches
 sense           the rest of the observation
 """
 
+from collections.abc import Callable
+from typing import Any
+
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import Counter
-from swarm_forage_env.contract.types import ActionArray, FloatArray
+from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray
 from swarm_forage_env.world.kernels import beams, floor, proprioception
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.contact import press
@@ -22,6 +25,7 @@ from swarm_forage_env.world.kernels.drive import drive
 from swarm_forage_env.world.kernels.interact import serve
 from swarm_forage_env.world.kernels.interfere import mark
 from swarm_forage_env.world.kernels.neighbours import bin_robots
+from swarm_forage_env.world.kernels.task_shares import add_task_shares
 from swarm_forage_env.world.kernels.walk import walk
 from swarm_forage_env.world.kernels.world import World
 
@@ -193,3 +197,53 @@ def whole(
         return NO_ROOM
     tell_poses(b.poses, w.present, w.state.position, w.heading, w.facing)
     return meet_and_close(w, actions, tick, chance, walk_chance)
+
+
+@kernel
+def run(
+    w: World,
+    b: BodyState,
+    wheel_gain: FloatArray,
+    first: int,
+    n_ticks: int,
+    look_first: bool,
+    policy: Callable[..., None],
+    policy_state: tuple[Any, ...],
+    policy_first: int,
+    policy_draws: FloatArray,
+    chances: FloatArray,
+    walk_chances: FloatArray,
+    tasks: CodeArray,
+    task_shares: FloatArray,
+) -> tuple[int, int]:
+    """Let policy and world act in turn for up to `n_ticks` ticks; it ends early where a tick is not `DONE`.
+
+    Args:
+        w: The world.
+        b: Its bodies.
+        wheel_gain: (N, 2), see `set_out`.
+        first: Number of the first tick.
+        n_ticks: How many, at most as many as there are draws.
+        look_first: See `set_out`.
+        policy: (obs, active, draws, state, tick); writes the actions, which are last in its state.
+        policy_state: Its state.
+        policy_first: Number of the first tick as the policy counts.
+        policy_draws: (ticks, N, draws of a robot).
+        chances: (ticks, N) or, where they are not read, (1, N).
+        walk_chances: (ticks, M) or, where they are not read, (1, N).
+        tasks: (N,) codes that the policy keeps up to date; (0,) for a policy without tasks.
+        task_shares: (codes,) the shares of active robots in each task are added, tick by tick.
+
+    Returns:
+        How many ticks have begun, and the outcome of the last of them.
+    """
+    obs, active, actions = w.sensors.obs, w.state.active, policy_state[-1]
+    for k in range(n_ticks):
+        policy(obs, active, policy_draws[k], policy_state, policy_first + k)
+        chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
+        outcome = whole(w, b, actions, wheel_gain, first + k, look_first and k == 0, chance, walk_chance)
+        if tasks.shape[0] > 0:
+            add_task_shares(tasks, active, task_shares)
+        if outcome != DONE:
+            return k + 1, outcome
+    return n_ticks, DONE
