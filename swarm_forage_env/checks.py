@@ -25,7 +25,7 @@ from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.codes import Task
-from swarm_forage_env.contract.layout import ObservationLayout
+from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, ObservationLayout
 from swarm_forage_env.contract.policy import Policy, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
@@ -377,7 +377,10 @@ def _without_unread(
         for part in layout:
             if part.name not in reads:
                 unread = obs[:, layout[part.name]]
-                unread[:] = rng.uniform(-1.0, 1.0, unread.shape) if filling is None else filling
+                values = rng.uniform(-1.0, 1.0, unread.shape) if filling is None else filling
+                is_read = part.name == "light" and LIGHT_IF_CARRYING in reads
+                rows = obs[:, layout["carrying"]] < 0.5 if is_read else True  # (N, 1)
+                np.copyto(unread, values, where=rows)
         yield obs
 
 
@@ -389,7 +392,7 @@ def _checked_statements(policy: Policy, layout: ObservationLayout) -> tuple[str,
     if isinstance(reads, str):
         raise CheckError(f"Expected reads as a tuple of names of slices, got {reads!r}; write ({reads!r},).")
     for name in reads:
-        if name not in layout.names:
+        if name not in (*layout.names, LIGHT_IF_CARRYING):
             raise CheckError(
                 f"Expected reads to name slices of the observation, got {name!r}.{suggestion(str(name), layout.names)} "
                 f"Known: {', '.join(layout.names)}."

@@ -9,6 +9,8 @@ from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 
 RING_SENSORS = 24
 """Proximity beams, and as many light sensors: on one ring, every 15 degrees, the first at 7.5 degrees to the left."""
+LIGHT_IF_CARRYING = "light if carrying"
+"""Entry of `reads`: light is read in rows of robots that carry; the others may stay zero."""
 GROUND_SENSORS = 4
 WINDOW_CELLS = 5
 """Side of the square line-of-sight window, in cells (1.0 m)."""

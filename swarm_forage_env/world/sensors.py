@@ -9,15 +9,13 @@ from collections.abc import Collection
 import numpy as np
 
 from swarm_forage_env._internal.fields import known_name
-from swarm_forage_env.contract.layout import ObservationLayout
+from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, ObservationLayout
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 from swarm_forage_env.world.kernels.world import Columns, Sensors
 
 PROXIMITY_RANGE_M = 0.1
 """Reach of a proximity beam beyond the body."""
-LIGHT_IF_CARRYING = "light if carrying"
-"""Entry of `reads`: light is read in rows of robots that carry; the others may stay zero."""
 
 
 def read_slices(reads: Collection[str] | None, layout: ObservationLayout) -> tuple[str, ...]:

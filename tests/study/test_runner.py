@@ -16,11 +16,11 @@ from swarm_forage_env.policies.registry import RandomPolicy, from_callable
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study import runner
 from swarm_forage_env.study.record import RecordError, RunRecord
-from swarm_forage_env.study.run import build_stack, run_one, run_policy, warm_up
+from swarm_forage_env.study.run import WARM_UP_TICKS, build_stack, run_one, run_policy, warm_up
 from swarm_forage_env.study.runner import StudyInterrupted, WorkerError, run_all, run_each
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import RunFailure, RunStore
-from swarm_forage_env.world.kernels import interact
+from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.wrappers.base import STACK_ORDER
 from tests.support.wrapper_configs import InnerConfig, OuterConfig
 
@@ -136,10 +136,15 @@ def test_warm_up_stops_after_a_few_ticks(monkeypatch):
 
 
 def test_warm_up_reaches_the_interactions_of_a_policy_that_asks_for_nothing(monkeypatch):
-    served = []
-    monkeypatch.setattr(interact, "interact", lambda *arguments: served.append(arguments[2].copy()))
+    steps, step = [], ForagingArena.step
+
+    def spied(arena, actions, **options):
+        steps.append((arena.tick, actions[:, 2].tolist()))
+        return step(arena, actions, **options)
+
+    monkeypatch.setattr(ForagingArena, "step", spied)
     warm_up(replace(SPECS[0], policy="crw"))
-    assert [actions[:, 2].tolist() for actions in served] == [[Grip.GRASP] * 3]
+    assert steps[-1] == (WARM_UP_TICKS, [Grip.GRASP] * 3)
 
 
 def test_outcomes_come_in_the_order_of_their_specifications(tmp_path):
