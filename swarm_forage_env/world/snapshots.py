@@ -40,13 +40,15 @@ class Origin:
     """Name of the class and configuration of each wrapper, outermost first; None for one without configuration."""
 
     def differences(self, other: "Origin") -> list[str]:
-        """Return what differs, each as "x is 1 there, 2 here", where `self` is there."""
+        """Return what differs, each as "x is 1 there and 2 here"; `self` is there.
+
+        Configurations are compared for wrappers that both have.
+        """
         there, here = _flat(self), _flat(other)
-        names = [*there, *(name for name in here if name not in there)]
         return [
-            f"{name} is {there.get(name, 'not set')} there, {here.get(name, 'not set')} here"
-            for name in names
-            if name not in there or name not in here or there[name] != here[name]
+            f"{name} is {value} there and {here[name]} here"
+            for name, value in there.items()
+            if name in here and here[name] != value
         ]
 
 
@@ -57,7 +59,7 @@ class Snapshot:
     As with every pickle: restore only what comes from a source that you trust.
     """
 
-    origin: Origin
+    origin: Origin = field(repr=False)
     seed: int
     """Of the run."""
     tick: int
@@ -111,7 +113,7 @@ def read(snapshot: Snapshot, origin: Origin, parts: Sequence[object]) -> list[An
         found = snapshot.origin.differences(origin)
         more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
         raise SnapshotError(
-            "Expected a snapshot of an environment like this one, with the same scenario, wrappers and version; "
+            "Expected a snapshot of an environment with the same scenario, wrappers and version as this one, got another: "
             f"{'; '.join(found[:_SHOWN])}{more}. Restore it in an environment that is made as that one was."
         )
     return _Reader(io.BytesIO(snapshot.content), [*parts, *snapshot.kept]).load()
