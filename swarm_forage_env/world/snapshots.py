@@ -113,7 +113,7 @@ def read(snapshot: Snapshot, origin: Origin, parts: Sequence[object]) -> list[An
         found = snapshot.origin.differences(origin)
         more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
         raise SnapshotError(
-            "Expected a snapshot of an environment with the same scenario, wrappers and version as this one, got another: "
+            "Expected a snapshot of an environment with the scenario, wrappers and version of this one, got another: "
             f"{'; '.join(found[:_SHOWN])}{more}. Restore it in an environment that is made as that one was."
         )
     return _Reader(io.BytesIO(snapshot.content), [*parts, *snapshot.kept]).load()

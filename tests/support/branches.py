@@ -1,6 +1,7 @@
 """Runs that are stopped, copied and continued: what a caller sees of them, as bytes."""
 
 import copy
+import pickle
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,11 @@ from tests.support.busy import BusyPolicy, change_population
 from tests.support.foraging import mild_wrappers, quick_world
 
 SEED = 17
+
+
+def pickled(value: Any) -> Any:
+    """What comes out of the pickle of a value."""
+    return pickle.loads(pickle.dumps(value))  # noqa: S301 - what was pickled right here
 
 
 class Branch:

@@ -11,7 +11,7 @@ from swarm_forage_env import SCENARIO_NAMES, Snapshot, SnapshotError, parallel_e
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
-from tests.support.branches import Branch
+from tests.support.branches import Branch, pickled
 from tests.support.busy import BusyPolicy
 from tests.support.crowded_runs import DENSE, side
 
@@ -27,10 +27,6 @@ def crowded(name: str, caches: str, physics: str) -> ForageEnv:
 
 def small(**options) -> ForageEnv:
     return parallel_env("warehouse_small", **{"n_robots": 3, "n_objects": 9, "physics": "compiled", **options})
-
-
-def pickled(value):
-    return pickle.loads(pickle.dumps(value))
 
 
 @pytest.mark.compiled
