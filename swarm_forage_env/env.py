@@ -308,12 +308,12 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             scenario=self.scenario,
             max_cycles=self.max_cycles,
             reads=self._reads,
-            wrappers=tuple((type(wrapper).__qualname__, wrapper.config) for wrapper in wrappers),
+            wrappers=tuple((type(wrapper).__qualname__, wrapper.made_from) for wrapper in wrappers),
         )
 
     def _parts(self, wrappers: Sequence[Any]) -> list[object]:
         """What a stack is made of, state aside."""
-        configs = (wrapper.config for wrapper in wrappers if wrapper.config is not None)
+        configs = (wrapper.made_from for wrapper in wrappers if wrapper.made_from is not None)
         return [self, self.arena, self.scenario, self.layout, *wrappers, *configs]
 
     # Dict level

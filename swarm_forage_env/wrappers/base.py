@@ -43,7 +43,7 @@ class SwarmWrapper(BaseParallelWrapper):
 
     Attributes:
         env: The wrapped environment.
-        config: What the wrapper was made from, None for one without a configuration.
+        made_from: Configuration of the wrapper, None for one without.
     """
 
     stack_position: ClassVar[int]
@@ -68,7 +68,7 @@ class SwarmWrapper(BaseParallelWrapper):
                 f"each at most once, is {', '.join(STACK_ORDER)}."
             )
         super().__init__(env)
-        self.config = config
+        self.made_from = config
         self._inner = env
         self._unwrapped: ForageEnv = env.unwrapped
 

@@ -122,6 +122,23 @@ def test_agents_and_observations_come_back(physics):
         assert (target.tick, target.seed_value) == (1, 1)
 
 
+@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
+def test_robots_that_left_and_came_back_are_where_they_were(physics):
+    env, other = (small(physics=physics, snapshots=True) for _ in range(2))
+    env.reset_batch(1)
+    everybody, alone = np.ones(3, np.bool_), np.array([True, False, False])
+    env.set_population(active=alone, present=alone)
+    env.step_batch(np.ones((3, 3), np.float32))
+    env.swarm.position[1] = 9.0, 9.0
+    env.set_population(active=everybody, present=everybody)
+    env.step_batch(np.ones((3, 3), np.float32))
+    other.restore(env.snapshot())
+    for target in (env, other):
+        target.step_batch(np.ones((3, 3), np.float32))
+    assert other.swarm.position.tolist() == env.swarm.position.tolist()
+    assert np.hypot(*(env.swarm.position[1] - (9.0, 9.0))) < 0.1
+
+
 def test_the_seed_of_the_next_reset_comes_back():
     env, other = small(), small()
     env.reset(seed=5)

@@ -154,6 +154,14 @@ def test_snapshots_of_other_stacks_are_refused(words, reason):
         env.unwrapped.restore(env.snapshot())
 
 
+def test_snapshots_of_wrappers_without_configuration_go_by_their_class():
+    env, other = wrapped(CarefulNumbering), wrapped(CarefulNumbering)
+    env.reset_batch(1)
+    other.unwrapped.max_cycles = 3
+    with pytest.raises(SnapshotError, match=r"another: max_cycles is 15 there and 3 here\. Restore"):
+        other.restore(env.snapshot())
+
+
 def test_observations_per_agent_are_those_that_the_wrappers_showed():
     env = build_env(small_scenario(physics="compiled"), [parse_wrapper("sensor_noise:sigma=0.1")])
     env.reset(seed=1)
