@@ -9,7 +9,7 @@ from scipy.spatial.distance import pdist
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.bodies import PAIRS_PER_ROBOT
-from swarm_forage_env.world.kernels.bodies import find_pairs, move_bodies, tell_poses
+from swarm_forage_env.world.kernels.bodies import find_pairs, move_bodies, sine_and_cosine, tell_poses
 from swarm_forage_env.world.kernels.drive import unpack_poses
 from swarm_forage_env.world.state import SwarmState
 from tests.reference.bodies import moved
@@ -26,6 +26,7 @@ def bodies_at(places, heading, physics="compiled", **overrides):
     config = scenario("warehouse_small", n_robots=len(places), physics=physics, **overrides)
     swarm = SwarmState.empty(len(places))
     swarm.position[:], swarm.heading[:] = places, heading
+    swarm.facing[:] = np.column_stack((np.cos(heading), np.sin(heading)))
     return make_bodies(config, swarm), swarm
 
 
@@ -89,8 +90,9 @@ def test_poses_are_told_as_for_chipmunk():
         poses[::2, 2] += rng.uniform(-1, 1, 26)
         tell_poses(poses, present, one.position, one.heading, one.facing)
         unpack_poses(poses, present, other.position, other.heading, other.facing)
-        for name in ("position", "heading", "facing"):
+        for name in ("position", "heading"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+        np.testing.assert_allclose(one.facing, other.facing, rtol=0, atol=1e-12)
 
 
 # The oracle
@@ -176,6 +178,24 @@ def test_absent_robots_touch_nobody_and_stay():
     twists = np.tile([(0.05, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)], (10, 1, 1))
     ended = run_heap(places, twists, present=[True, False, False])
     np.testing.assert_allclose(ended, places + np.array([(0.1, 0.0), (0.0, 0.0), (0.0, 0.0)]), atol=1e-12)
+
+
+# Turning
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.1, -0.3, 0.4999, 0.51, -3.0])
+def test_sine_and_cosine_are_those_of_the_library(angle):
+    assert sine_and_cosine(angle) == pytest.approx((math.sin(angle), math.cos(angle)), rel=1e-15, abs=1e-17)
+
+
+def test_facing_stays_the_direction_of_the_heading_for_a_whole_run():
+    bodies, swarm = bodies_at([(16.0, 8.0), (12.0, 8.0)], [3.0, -3.0])
+    rng = np.random.default_rng(0)
+    for _ in range(5_000):
+        bodies.twist[:-1, 2] = rng.uniform(-1.4, 1.4, 2)
+        bodies.advance(swarm)
+    expected = np.column_stack((np.cos(swarm.heading), np.sin(swarm.heading)))
+    np.testing.assert_allclose(swarm.facing, expected, rtol=0, atol=1e-12)
 
 
 # Nobody is missed, nothing overflows

@@ -8,7 +8,7 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray, Row
-from swarm_forage_env.world.kernels.neighbours import bin_of
+from swarm_forage_env.world.kernels.neighbours import bin_of, cell_of
 
 _BEAM_COS = np.cos(BEAM_ANGLES_RAD)
 _BEAM_SIN = np.sin(BEAM_ANGLES_RAD)
@@ -118,8 +118,8 @@ def proximity(
             continue
         x = position[i, 0]
         y = position[i, 1]
-        cell_x = int(x / cell_m)
-        cell_y = int(y / cell_m)
+        cell_x = cell_of(x, cell_m)
+        cell_y = cell_of(y, cell_m)
         # Each pair is met once: behind i in its own bin, or in one of the next cells on one side. A pair that hashing
         # shows twice gives the same readings twice.
         for k in range(5):

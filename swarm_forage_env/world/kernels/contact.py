@@ -4,7 +4,7 @@ import math
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
-from swarm_forage_env.world.kernels.neighbours import bin_of
+from swarm_forage_env.world.kernels.neighbours import bin_of, cell_of
 
 LEAST_SPEED_M_S = 3e-4
 """Slowest common speed. Our choice: two robots that are equally strong would stand against each other for ever. At this
@@ -77,8 +77,8 @@ def press(
         weight = 0.0
         change_x = 0.0
         change_y = 0.0
-        cell_x = int(position[i, 0] / cell_m)
-        cell_y = int(position[i, 1] / cell_m)
+        cell_x = cell_of(position[i, 0], cell_m)
+        cell_y = cell_of(position[i, 1], cell_m)
         for step_x in range(-1, 2):
             for step_y in range(-1, 2):
                 j = first_in_bin[bin_of(cell_x + step_x, cell_y + step_y, n_bins)]
@@ -88,8 +88,8 @@ def press(
                     distance_squared = dx * dx + dy * dy
                     # A robot is no partner of itself, and two places of the nine may share a bin.
                     if 0.0 < distance_squared <= touch_squared and (
-                        int(position[j, 0] / cell_m) == cell_x + step_x
-                        and int(position[j, 1] / cell_m) == cell_y + step_y
+                        cell_of(float(position[j, 0]), cell_m) == cell_x + step_x
+                        and cell_of(float(position[j, 1]), cell_m) == cell_y + step_y
                     ):
                         distance = math.sqrt(distance_squared)
                         dx /= distance

@@ -145,12 +145,12 @@ def line_of_sight(
         cell_y = min(ny - 1, max(0, int(position[i, 1] * CELLS_PER_M)))
         obs[i, cell_start] = (2 * cell_x + 1) / nx - 1.0
         obs[i, cell_start + 1] = (2 * cell_y + 1) / ny - 1.0
-        column = object_start
-        for y in range(cell_y - _HALF_WINDOW, cell_y + _HALF_WINDOW + 1):
-            for x in range(cell_x - _HALF_WINDOW, cell_x + _HALF_WINDOW + 1):
-                if 0 <= x < nx and 0 <= y < ny and floor[y, x] >= 0:
-                    obs[i, column] = (floor[y, x] + 1) / n_objects
-                column += 1
+        x_low, y_low = max(0, cell_x - _HALF_WINDOW), max(0, cell_y - _HALF_WINDOW)
+        for y in range(y_low, min(ny, cell_y + _HALF_WINDOW + 1)):
+            first = object_start + (y - cell_y + _HALF_WINDOW) * WINDOW_CELLS + _HALF_WINDOW - cell_x
+            for x in range(x_low, min(nx, cell_x + _HALF_WINDOW + 1)):
+                if floor[y, x] >= 0:
+                    obs[i, first + x] = (floor[y, x] + 1) / n_objects
         if caches[0].shape[0] > 0:
             _visible_caches(cell_x, cell_y, position, caches, half_side, i, obs, cache_start, (nx, ny, n_objects))
 
