@@ -1,6 +1,8 @@
 """ForagingArena: the simulated world of an environment. It owns the state arrays and fixes the order of a tick."""
 
 from collections.abc import Collection
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +21,7 @@ from swarm_forage_env.world.caches import (
     n_cache_slots,
     restore_static_caches,
 )
-from swarm_forage_env.world.compiled import compiled_tick, new_world
+from swarm_forage_env.world.compiled import CompiledTick, compiled_tick, new_world
 from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE
 from swarm_forage_env.world.physics import Physics
@@ -40,13 +42,16 @@ class ForagingArena:
         swarm, objects, caches, events: The state; read freely, write through the methods.
     """
 
-    def __init__(self, config: ScenarioConfig, *, reads: Collection[str] | None = None) -> None:
+    def __init__(
+        self, config: ScenarioConfig, *, reads: Collection[str] | None = None, snapshots: bool = False
+    ) -> None:
         """Prepare the arena; `reset` must be called before `step`.
 
         Args:
             config: The scenario.
             reads: Observation slices that are used; the sensors of others may stay zero. Default: all. "light if
                 carrying" reads light in rows of robots that carry only.
+            snapshots: Whether Chipmunk's history is kept, see `physics.History`; compiled bodies need none.
 
         Raises:
             ConfigError: `reads` holds an unknown name.
@@ -56,6 +61,7 @@ class ForagingArena:
         self.layout = observation_layout(arena.width_m, arena.height_m, config.objects.n_objects)
         self.reads = read_slices(reads, self.layout)
         self._given_reads = reads
+        self._snapshots = snapshots
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
         self._unit_gain = np.ones((config.robots.n_robots, 2))
         self._nothing = np.zeros(config.robots.n_robots)
@@ -83,7 +89,7 @@ class ForagingArena:
         if config.physics == "compiled":
             self._physics = Bodies(config, position, heading, sensors.near, sensors.bins)
         else:
-            self._physics = Physics(config, position, heading)
+            self._physics = Physics(config, position, heading, keeps_history=self._snapshots)
         self._obs = sensors.obs
         self._world = new_world(
             config,
@@ -94,11 +100,22 @@ class ForagingArena:
             self._physics.twist,
             self._static_caches,
         )
-        actions = np.zeros((n_robots, 3), np.float32)
-        bodies = self._physics.state if isinstance(self._physics, Bodies) else None
-        self._compiled = compiled_tick(self._world, bodies, actions, self._unit_gain, self._nothing)
         self._moved = False
         return self.observe()
+
+    @cached_property
+    def _compiled(self) -> CompiledTick:
+        """Found once: the types of the arrays are the same in all runs of a scenario."""
+        actions = np.zeros((self.config.robots.n_robots, 3), np.float32)
+        bodies = self._physics.state if isinstance(self._physics, Bodies) else None
+        return compiled_tick(self._world, bodies, actions, self._unit_gain, self._nothing)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
+        return {name: value for name, value in vars(self).items() if name != "_compiled"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
 
     def observe(self) -> ObsArray:
         """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""

@@ -1,6 +1,5 @@
 """RunRecorder: turns the arena's cumulative counters into columns over recording intervals."""
 
-from collections.abc import Iterator
 from typing import ClassVar
 
 import numpy as np
@@ -134,7 +133,7 @@ class RunRecorder(SwarmWrapper):
             for code, share in zip(Task, self._task_sums / self._interval_ticks, strict=True):
                 self._contribute(f"task_share_{code.name.lower()}", share)
             self._task_sums[:] = 0.0
-        for wrapper in self._wrappers_inside():
+        for wrapper in self._stack()[1:]:
             for name, value in wrapper.interval_columns().items():
                 self._contribute(name, value)
         self._interval += 1
@@ -142,9 +141,3 @@ class RunRecorder(SwarmWrapper):
 
     def _contribute(self, name: str, value: float) -> None:
         self._contributed.setdefault(name, np.zeros(self._n_intervals))[self._interval] = value
-
-    def _wrappers_inside(self) -> Iterator[SwarmWrapper]:
-        env = self._inner
-        while isinstance(env, SwarmWrapper):
-            yield env
-            env = env._inner
