@@ -87,6 +87,7 @@ class CRWPolicy(ScriptedPolicy):
 
     caches: ClassVar[str] = "none"
     reads: ClassVar[tuple[str, ...]] = ("proximity", "light if carrying", "ground", "position", "carrying", "event")
+    _kernel = staticmethod(step_crw)
 
     def __init__(self, parameters: ControllerParameters | None = None, **overrides: float) -> None:
         self.parameters = chosen_parameters(ControllerParameters(), parameters, overrides)
@@ -94,4 +95,4 @@ class CRWPolicy(ScriptedPolicy):
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run: every robot explores."""
         constants = kernel_constants(self.parameters, spec)
-        self._start(spec, rng, step_crw, DRAWS, constants, new_robots(spec.n_robots))
+        self._start(spec, rng, DRAWS, constants, new_robots(spec.n_robots))

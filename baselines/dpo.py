@@ -109,6 +109,7 @@ class DPOPolicy(ScriptedPolicy):
         "los_cell",
         "los_object",
     )
+    _kernel = staticmethod(step_dpo)
 
     def __init__(self, parameters: MemoryParameters | None = None, **overrides: float) -> None:
         self.parameters = chosen_parameters(MemoryParameters(), parameters, overrides)
@@ -117,7 +118,7 @@ class DPOPolicy(ScriptedPolicy):
         """Start a run: every robot explores and remembers nothing."""
         constants = kernel_constants(self.parameters, spec, **self.parameters.derived())
         self._memory = new_memory(spec.n_robots, spec.n_objects)
-        self._start(spec, rng, step_dpo, DRAWS, constants, new_robots(spec.n_robots), self._memory)
+        self._start(spec, rng, DRAWS, constants, new_robots(spec.n_robots), self._memory)
 
     @property
     def n_known(self) -> IntArray:

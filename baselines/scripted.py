@@ -1,7 +1,7 @@
 """What the scripted controllers have in common: checked inputs, draws for every robot, one kernel for all robots."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -81,12 +81,15 @@ def example_of(state: tuple[Any, ...]) -> tuple[Any, ...]:
 class ScriptedPolicy:
     """Every robot decides by the same rules, from what it sees and remembers. An instance drives one run.
 
-    A subclass calls `_start` at the end of its `reset`.
+    A subclass names its kernel and calls `_start` at the end of its `reset`.
 
     Attributes:
         n_ticks: Ticks since reset.
     """
 
+    _kernel: ClassVar[Callable[..., None]]
+    """One tick of all robots: (obs, active, draws, (constants, robots, *memory, actions), now). A static method of the
+    class: a pickle would take a copy of it along, which another process had to compile anew."""
     _spec: SwarmSpec | None = None
     _shapes: tuple[tuple[int, ...], tuple[int, ...]] | None = None
 
@@ -94,7 +97,6 @@ class ScriptedPolicy:
         self,
         spec: SwarmSpec,
         rng: np.random.Generator,
-        kernel: Callable[..., None],
         n_draws: int,
         constants: np.ndarray,
         robots: np.ndarray,
@@ -105,7 +107,6 @@ class ScriptedPolicy:
         Args:
             spec: The swarm.
             rng: Generator of the policy's stream.
-            kernel: One tick of all robots: (obs, active, draws, (constants, robots, *memory, actions), now).
             n_draws: Draws per robot and tick.
             constants: (1,) record of `parameters.kernel_constants`.
             robots: (N,) records of the robots.
@@ -114,7 +115,6 @@ class ScriptedPolicy:
         self._spec = spec
         self._shapes = ((spec.n_robots, spec.layout.size), (spec.n_robots,))
         self._chance = DrawBlocks(rng, spec.n_robots, n_draws)
-        self._kernel = kernel
         self._constants = constants
         self._robots = robots
         self._actions: ActionArray = np.zeros((spec.n_robots, 3), np.float32)

@@ -88,6 +88,7 @@ class TaskPolicy(ScriptedPolicy):
         "los_object",
         "los_cache",
     )
+    _kernel = staticmethod(step_tasks)
 
     def __init__(self, parameters: TaskParameters | None = None, **overrides: float) -> None:
         self.parameters = chosen_parameters(self.default_parameters, parameters, overrides)
@@ -98,7 +99,7 @@ class TaskPolicy(ScriptedPolicy):
         robots = new_task_robots(spec.n_robots)
         self._memory = new_task_memory(spec)
         self._allocation = new_allocation(spec.n_robots, self.parameters, spec.quirks, self.n_tabs, rng)
-        self._start(spec, rng, step_tasks, TASK_DRAWS, constants, robots, self._memory, self._allocation)
+        self._start(spec, rng, TASK_DRAWS, constants, robots, self._memory, self._allocation)
 
     @property
     def task(self) -> CodeArray:

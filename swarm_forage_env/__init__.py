@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.study.runner import run_all
     from swarm_forage_env.study.spec import RunSpec, plan_run
     from swarm_forage_env.views.pettingzoo import parallel_env
+    from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
     from swarm_forage_env.wrappers.handling import HandlingCost, HandlingCostConfig
     from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig, SensorNoise, SensorNoiseConfig
     from swarm_forage_env.wrappers.population import PopulationConfig, PopulationDynamics
@@ -62,6 +63,8 @@ __all__ = [
     "ScenarioConfig",
     "SensorNoise",
     "SensorNoiseConfig",
+    "Snapshot",
+    "SnapshotError",
     "SwarmSpec",
     "Task",
     "Throttle",
@@ -108,6 +111,8 @@ _HOMES = {
     "ScenarioConfig": "scenarios.config",
     "SensorNoise": "wrappers.noise",
     "SensorNoiseConfig": "wrappers.noise",
+    "Snapshot": "world.snapshots",
+    "SnapshotError": "world.snapshots",
     "SwarmSpec": "contract.policy",
     "Task": "contract.codes",
     "Throttle": "wrappers.throttle",

@@ -93,7 +93,7 @@ class Callback:
         """Call the function itself, for kernels that are not compiled."""
         self.function(*arguments)
 
-    def __wrapper_address__(self) -> int:  # noqa: PLW3201 - numba asks for this name
+    def __wrapper_address__(self) -> int:
         """Return the address that compiled code jumps to."""
         return self._address
 

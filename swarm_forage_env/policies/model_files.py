@@ -7,7 +7,7 @@ wherever the name of a policy may.
 import hashlib
 import pickle
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -117,11 +117,11 @@ class ModelPolicy(LearnedPolicy):
 
 def deterministic_choice(model: Any) -> Choose:
     """Return how a model of stable-baselines3, or its policy network, chooses without exploration."""
+    return partial(_predicted, model)
 
-    def choose(rows: ObsArray, rng: np.random.Generator) -> np.ndarray:  # noqa: ARG001 - nothing is drawn
-        return model.predict(rows, deterministic=True)[0]
 
-    return choose
+def _predicted(model: Any, rows: ObsArray, rng: np.random.Generator) -> np.ndarray:  # noqa: ARG001 - nothing is drawn
+    return model.predict(rows, deterministic=True)[0]
 
 
 def _read_note(note: Any, path: Path) -> tuple[InterfaceConfig, str]:

@@ -78,7 +78,11 @@ class LiveRun:
 
 
 def build_env(
-    scenario: ScenarioConfig, wrappers: Iterable[WrapperConfig] = (), *, reads: tuple[str, ...] | None = None
+    scenario: ScenarioConfig,
+    wrappers: Iterable[WrapperConfig] = (),
+    *,
+    reads: tuple[str, ...] | None = None,
+    snapshots: bool = False,
 ) -> ForageEnv | SwarmWrapper:
     """Build the environment with its wrappers, in the documented order.
 
@@ -86,15 +90,20 @@ def build_env(
         scenario: The scenario.
         wrappers: Wrapper configurations in any order, each kind at most once.
         reads: Observation slices that the policy looks at; default all.
+        snapshots: Keep what copies and snapshots need; see `ForageEnv`.
     """
-    return wrap_in_order(ForageEnv(scenario, reads=reads), wrappers)
+    return wrap_in_order(ForageEnv(scenario, reads=reads, snapshots=snapshots), wrappers)
 
 
 def build_stack(
-    scenario: ScenarioConfig, wrappers: Iterable[WrapperConfig] = (), *, reads: tuple[str, ...] | None = None
+    scenario: ScenarioConfig,
+    wrappers: Iterable[WrapperConfig] = (),
+    *,
+    reads: tuple[str, ...] | None = None,
+    snapshots: bool = False,
 ) -> RunRecorder:
     """Build the environment by `build_env`, with a recorder around it; the horizon must be whole intervals."""
-    return RunRecorder(build_env(scenario, wrappers, reads=reads))
+    return RunRecorder(build_env(scenario, wrappers, reads=reads, snapshots=snapshots))
 
 
 def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:

@@ -14,7 +14,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.arenas import ArenaStep
-from swarm_forage_env.views.learner_arena import LearnerArena, plan_arena
+from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot, plan_arena
 from swarm_forage_env.views.processes import open_arenas
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_configs
@@ -42,6 +42,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         wrappers: Iterable[WrapperConfig | str] = (),
         max_cycles: int | None = None,
         render_mode: str | None = None,
+        snapshots: bool = False,
         **overrides: Any,
     ) -> None:
         """Create the environment.
@@ -54,13 +55,20 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
                 ("population:death_per_tick=0.01").
             max_cycles: Ticks until truncation; default the scenario's horizon.
             render_mode: None or "rgb_array".
+            snapshots: Keep what copies and snapshots need; see `ForageEnv`.
             overrides: Scenario fields by name (`n_robots=20`).
 
         Raises:
             ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
         """
         plan = plan_arena(
-            scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
+            scenario,
+            overrides,
+            interface=interface,
+            wrappers=wrappers,
+            max_cycles=max_cycles,
+            render_mode=render_mode,
+            snapshots=snapshots,
         )
         self._arena = LearnerArena(plan)
         self._is_discrete = plan.interface.actions == "discrete"
@@ -104,6 +112,15 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         rewards = np.zeros(self.forage_env.scenario.robots.n_robots)  # float64: sums do not depend on the order
         _, terminated, truncated = self._arena.step(np.asarray(action), rewards)
         return self._arena.observe(), float(rewards.sum()), terminated, truncated, self._info()
+
+    def snapshot(self) -> LearnerSnapshot:
+        """Return the state of the run as a value; see `ForageEnv.snapshot`."""
+        return self._arena.snapshot()
+
+    def restore(self, snapshot: LearnerSnapshot) -> tuple[ObsArray, dict[str, Any]]:
+        """Go back to a snapshot; returns observations (N, d) and info. See `ForageEnv.restore`."""
+        self._arena.restore(snapshot)
+        return self._arena.observe(), self._info()
 
     def render(self) -> np.ndarray | None:
         """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""

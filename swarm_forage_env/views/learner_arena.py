@@ -1,6 +1,6 @@
 """One arena for learning: environment, wrappers, interface, seeds, and fields overridden for a curriculum."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any
@@ -14,6 +14,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, LearnerInterface, chosen_interface
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig, field_sections, scenario_of_same_size
 from swarm_forage_env.scenarios.presets import chosen_scenario
+from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.registry import wrapper_configs
 
@@ -34,6 +35,8 @@ class ArenaPlan:
     max_cycles: int | None = None
     """Ticks until truncation; default the scenario's horizon."""
     render_mode: str | None = None
+    snapshots: bool = False
+    """Keep what copies and snapshots need; see `ForageEnv`."""
 
     def build(self, overrides: Mapping[str, Any]) -> ForageEnv | SwarmWrapper:
         """Build the environment with its wrappers, with scenario fields overridden by name.
@@ -42,7 +45,13 @@ class ArenaPlan:
             ConfigError: unknown fields, values that do not fit together, or another number of robots.
         """
         scenario = scenario_of_same_size(self.scenario, overrides)
-        env = ForageEnv(scenario, max_cycles=self.max_cycles, render_mode=self.render_mode, reads=self.interface.reads)
+        env = ForageEnv(
+            scenario,
+            max_cycles=self.max_cycles,
+            render_mode=self.render_mode,
+            reads=self.interface.reads,
+            snapshots=self.snapshots,
+        )
         return wrap_in_order(env, self.wrappers)
 
 
@@ -54,6 +63,7 @@ def plan_arena(
     wrappers: Iterable[WrapperConfig | str] = (),
     max_cycles: int | None = None,
     render_mode: str | None = None,
+    snapshots: bool = False,
 ) -> ArenaPlan:
     """Plan an arena from the arguments that the constructors of environments take.
 
@@ -64,6 +74,7 @@ def plan_arena(
         wrappers: See `wrapper_configs`.
         max_cycles: Ticks until truncation; default the scenario's horizon.
         render_mode: None or "rgb_array".
+        snapshots: Keep what copies and snapshots need; see `ForageEnv`.
 
     Raises:
         ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
@@ -74,7 +85,23 @@ def plan_arena(
         interface=chosen_interface(interface),
         max_cycles=max_cycles,
         render_mode=render_mode,
+        snapshots=snapshots,
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, slots=True)
+class LearnerSnapshot:
+    """The state of a `LearnerArena` or of a view of it; as `world.snapshots.Snapshot`, it can be pickled."""
+
+    stack: Snapshot
+    """Of the environment and its wrappers."""
+    interface: InterfaceConfig
+    overrides: Mapping[str, Any]
+    """Scenario fields that a reset has overridden."""
+    seeds: Mapping[str, Any]
+    """State of the generator of the next seeds."""
+    agents: tuple[str, ...] = ()
+    """Agents of a parallel environment that are left."""
 
 
 class LearnerArena:
@@ -145,6 +172,41 @@ class LearnerArena:
             if truncated or all_dead:
                 break
         return dead, all_dead, truncated
+
+    def snapshot(self, *, agents: Sequence[str] = ()) -> LearnerSnapshot:
+        """Return the state of the run and of the sequence of seeds; see `ForageEnv.snapshot`."""
+        return LearnerSnapshot(
+            stack=self.env.snapshot(),
+            interface=self._plan.interface,
+            overrides=dict(self._overrides),
+            seeds=self._seeds.bit_generator.state,
+            agents=tuple(agents),
+        )
+
+    def restore(self, snapshot: LearnerSnapshot) -> None:
+        """Go back to a snapshot of this arena or of one of the same plan; see `ForageEnv.restore`.
+
+        Raises:
+            SnapshotError: not such a snapshot, or one of another interface, scenario, stack or version; nothing
+                changes.
+        """
+        if not isinstance(snapshot, LearnerSnapshot):  # pyright: ignore[reportUnnecessaryIsInstance] - from users
+            raise SnapshotError(
+                f"Expected a LearnerSnapshot, as `snapshot()` of an environment with an interface returns it, got "
+                f"{type(snapshot).__name__}."
+            )
+        if snapshot.interface != self._plan.interface:
+            raise SnapshotError(
+                f"Expected a snapshot of an environment with {self._plan.interface}, got one with {snapshot.interface}."
+            )
+        is_same = snapshot.overrides == self._overrides
+        env = self.env if is_same else self._plan.build(snapshot.overrides)
+        obs = env.restore_batch(snapshot.stack)
+        if not is_same:
+            self._adopt(env)
+            self._overrides = dict(snapshot.overrides)
+        self._obs = obs
+        self._seeds.bit_generator.state = snapshot.seeds
 
     def observe(self, out: ObsArray | None = None) -> ObsArray:
         """Return what the learner sees now, (N, d): a new array, or `out`."""

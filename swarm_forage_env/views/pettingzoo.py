@@ -11,7 +11,7 @@ from pettingzoo.utils.conversions import parallel_to_aec
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.views.learner_arena import LearnerArena, plan_arena
+from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot, plan_arena
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
 Infos = dict[str, dict[str, Any]]
@@ -35,6 +35,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         wrappers: Iterable[WrapperConfig | str] = (),
         max_cycles: int | None = None,
         render_mode: str | None = None,
+        snapshots: bool = False,
         **overrides: Any,
     ) -> None:
         """Create the environment.
@@ -48,13 +49,20 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
                 "population:deaths=absorbing,...".
             max_cycles: Ticks until truncation; default the scenario's horizon.
             render_mode: None or "rgb_array".
+            snapshots: Keep what copies and snapshots need; see `ForageEnv`.
             overrides: Scenario fields by name (`n_robots=20`).
 
         Raises:
             ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
         """
         plan = plan_arena(
-            scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
+            scenario,
+            overrides,
+            interface=interface,
+            wrappers=wrappers,
+            max_cycles=max_cycles,
+            render_mode=render_mode,
+            snapshots=snapshots,
         )
         self._is_discrete = plan.interface.actions == "discrete"
         self._arena = LearnerArena(plan)
@@ -133,6 +141,16 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         self.agents = [] if truncated else [agent for agent in self.agents if not dead[self._row_of[agent]]]
         return results
 
+    def snapshot(self) -> LearnerSnapshot:
+        """Return the state of the run as a value; see `ForageEnv.snapshot`."""
+        return self._arena.snapshot(agents=self.agents)
+
+    def restore(self, snapshot: LearnerSnapshot) -> dict[str, np.ndarray]:
+        """Go back to a snapshot; returns observations per agent. See `ForageEnv.restore`."""
+        self._arena.restore(snapshot)
+        self.agents = list(snapshot.agents)
+        return self._per_agent(self._arena.observe())
+
     def _chosen(self, actions: dict[str, Any]) -> np.ndarray:
         """Return one row per robot; zeros for robots that have left."""
         space = self.interface.action_space
@@ -177,6 +195,7 @@ def parallel_env(
     wrappers: tuple[()] = ...,
     max_cycles: int | None = ...,
     render_mode: str | None = ...,
+    snapshots: bool = ...,
     **overrides: Any,
 ) -> ForageEnv: ...
 @overload
@@ -187,6 +206,7 @@ def parallel_env(
     wrappers: Iterable[WrapperConfig | str] = ...,
     max_cycles: int | None = ...,
     render_mode: str | None = ...,
+    snapshots: bool = ...,
     **overrides: Any,
 ) -> ForageEnv | SwarmWrapper | ParallelLearnerEnv: ...
 def parallel_env(
@@ -196,6 +216,7 @@ def parallel_env(
     wrappers: Iterable[WrapperConfig | str] = (),
     max_cycles: int | None = None,
     render_mode: str | None = None,
+    snapshots: bool = False,
     **overrides: Any,
 ) -> ForageEnv | SwarmWrapper | ParallelLearnerEnv:
     """Create a parallel environment; `pettingzoo.make("parallel", id, ...)` calls this function, too.
@@ -208,6 +229,7 @@ def parallel_env(
             ("population:death_per_tick=0.01").
         max_cycles: Steps until truncation; default the scenario's horizon.
         render_mode: None or "rgb_array".
+        snapshots: Keep what copies and snapshots need; see `ForageEnv`.
         overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
 
     Returns:
@@ -223,9 +245,12 @@ def parallel_env(
             wrappers=wrappers,
             max_cycles=max_cycles,
             render_mode=render_mode,
+            snapshots=snapshots,
             **overrides,
         )
-    plan = plan_arena(scenario, overrides, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode)
+    plan = plan_arena(
+        scenario, overrides, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode, snapshots=snapshots
+    )
     return plan.build({})
 
 

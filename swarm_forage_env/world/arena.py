@@ -1,6 +1,8 @@
 """ForagingArena: the simulated world of an environment. It owns the state arrays and fixes the order of a tick."""
 
 from collections.abc import Callable, Collection
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from swarm_forage_env.world.caches import (
     n_cache_slots,
     restore_static_caches,
 )
-from swarm_forage_env.world.compiled import compiled_tick, new_world
+from swarm_forage_env.world.compiled import CompiledTick, compiled_tick, new_world
 from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
 from swarm_forage_env.world.physics import Physics
@@ -39,15 +41,19 @@ class ForagingArena:
         reads: Names of the observation slices that are used; sensors of others may stay zero.
         tick: Ticks done since reset.
         swarm, objects, caches, events: The state; read freely, write through the methods.
+        obs: (N, D) the observation, rewritten in every tick.
     """
 
-    def __init__(self, config: ScenarioConfig, *, reads: Collection[str] | None = None) -> None:
+    def __init__(
+        self, config: ScenarioConfig, *, reads: Collection[str] | None = None, snapshots: bool = False
+    ) -> None:
         """Prepare the arena; `reset` must be called before `step`.
 
         Args:
             config: The scenario.
             reads: Observation slices that are used; the sensors of others may stay zero. Default: all. "light if
                 carrying" reads light in rows of robots that carry only.
+            snapshots: Whether Chipmunk's history is kept, see `physics.History`; compiled bodies need none.
 
         Raises:
             ConfigError: `reads` holds an unknown name.
@@ -57,6 +63,7 @@ class ForagingArena:
         self.layout = observation_layout(arena.width_m, arena.height_m, config.objects.n_objects)
         self.reads = read_slices(reads, self.layout)
         self._given_reads = reads
+        self._snapshots = snapshots
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
         self._unit_gain = np.ones((config.robots.n_robots, 2))
         self._nothing = np.zeros((1, config.robots.n_robots))
@@ -85,8 +92,8 @@ class ForagingArena:
         if config.physics == "compiled":
             self._physics = Bodies(config, position, heading, sensors.near, sensors.bins)
         else:
-            self._physics = Physics(config, position, heading)
-        self._obs = sensors.obs
+            self._physics = Physics(config, position, heading, keeps_history=self._snapshots)
+        self.obs = sensors.obs
         self._world = new_world(
             config,
             self.swarm,
@@ -96,17 +103,27 @@ class ForagingArena:
             self._physics.twist,
             self._static_caches,
         )
-        actions = np.zeros((n_robots, 3), np.float32)
-        bodies = self._physics.state if isinstance(self._physics, Bodies) else None
-        self._compiled = compiled_tick(self._world, bodies, actions, self._unit_gain, self._nothing[0])
-        self._run: Callable[..., tuple[int, int]] | None = None
         self._moved = False
         return self.observe()
+
+    @cached_property
+    def _compiled(self) -> CompiledTick:
+        """Found once: the types of the arrays are the same in all runs of a scenario."""
+        actions = np.zeros((self.config.robots.n_robots, 3), np.float32)
+        bodies = self._physics.state if isinstance(self._physics, Bodies) else None
+        return compiled_tick(self._world, bodies, actions, self._unit_gain, self._nothing[0])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
+        return {name: value for name, value in vars(self).items() if name != "_compiled"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
 
     def observe(self) -> ObsArray:
         """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
         self._compiled.observe(self._world)
-        return self._obs
+        return self.obs
 
     def _furnish(self) -> None:
         """Place all objects and create static caches: before the clusters if placement is "power_law", else after."""
@@ -151,7 +168,7 @@ class ForagingArena:
                 physics.advance(self.swarm)
                 outcome = compiled.meet_and_close(world, actions, tick, *draws)
         self._conclude(outcome, tick, actions, gain, tasks, draws)
-        return self._obs
+        return self.obs
 
     def _draws(self, tick: int) -> tuple[FloatArray, FloatArray]:
         """Return random numbers of a tick and some after it: for pick-ups (ticks, N), for walking objects (ticks, M).
@@ -198,6 +215,7 @@ class ForagingArena:
         physics, n_left = self._physics, n_ticks
         assert isinstance(physics, Bodies), "Chipmunk is not compiled"
         tasks = policy.task if policy.task is not None else self._no_tasks
+        run_compiled: Callable[..., tuple[int, int]] | None = None
         while n_left:
             first = self.tick + 1
             now, policy_draws = policy.next_ticks()
@@ -219,14 +237,13 @@ class ForagingArena:
                 tasks,
                 task_shares,
             )
-            if self._run is None:
-                self._run = direct(run, *arguments)
-            n_done, outcome = self._run(*arguments)
+            if run_compiled is None:
+                run_compiled = direct(run, *arguments)
+            n_done, outcome = run_compiled(*arguments)
             policy.count_ticks(n_done)
             last = n_done - 1
             draws = picks[last % len(picks)], walks[last % len(walks)]
-            told = None if policy.task is None else policy.task
-            self._conclude(outcome, self.tick + n_done, policy.state[-1], self._unit_gain, told, draws)
+            self._conclude(outcome, self.tick + n_done, policy.state[-1], self._unit_gain, policy.task, draws)
             n_left -= n_done
 
     def _create_dynamic_caches(self) -> None:

@@ -5,6 +5,8 @@ sensing found. Only robots that can touch something within the tick are moved in
 `swarm_forage_env/world/kernels/bodies.py` says how contacts are resolved.
 """
 
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -61,8 +63,19 @@ class Bodies:
             n_substeps=len(config.physics_substeps),
             **_room_for(n_robots, PAIRS_PER_ROBOT * n_robots),
         )
-        self._move = direct(move_bodies, self.state, self.twist, near, config.dt_s)
-        self._tell = direct(tell_poses, poses, near, poses, np.zeros(n_robots), poses)
+
+    @cached_property
+    def _move(self) -> Callable[[BodyState, FloatArray, BoolArray, float], bool]:
+        return direct(move_bodies, self.state, self.twist, self.state.near, self._dt_s)
+
+    @cached_property
+    def _tell(self) -> Callable[[FloatArray, BoolArray, FloatArray, FloatArray, FloatArray], None]:
+        poses = self.state.poses
+        return direct(tell_poses, poses, self.state.near, poses, np.zeros(len(poses) - 1), poses)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
+        return {name: value for name, value in vars(self).items() if name not in ("_move", "_tell")}
 
     def make_room(self) -> None:
         """Make room for twice as many pairs; what is remembered of the last tick is kept."""

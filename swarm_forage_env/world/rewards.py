@@ -1,5 +1,9 @@
 """Rewards of a swarm: the terms of `kernels.reward`, weighted by `scenarios.config.RewardConfig`, for learners."""
 
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
 import numpy as np
 
 from swarm_forage_env._internal.compiling import direct
@@ -32,7 +36,14 @@ class RewardModel:
             previous_position=np.zeros_like(swarm.position),
             nest_centre_m=np.array(nest_centre_m, np.float64),
         )
-        self._rewards = direct(rewards, self._happenings, self._weights, self._total, self._reward)
+
+    @cached_property
+    def _rewards(self) -> Callable[[Happenings, Weights, np.ndarray, np.ndarray], None]:
+        return direct(rewards, self._happenings, self._weights, self._total, self._reward)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
+        return {name: value for name, value in vars(self).items() if name != "_rewards"}
 
     def remember(self) -> None:
         """Keep the positions before a step, if a term needs them."""

@@ -15,6 +15,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.scenarios import config as configs
+from swarm_forage_env.world.snapshots import Snapshot
 
 STACK_ORDER = (
     "RunRecorder",
@@ -37,15 +38,19 @@ class SwarmWrapper(BaseParallelWrapper):
     state from `self.unwrapped` (`swarm`, `events`, `tick` ...) and change the world only by `set_population` and
     `set_handling_ticks` of `self.unwrapped`.
 
+    Snapshots, copies and pickles hold all attributes of a wrapper. One that has something which cannot be pickled, or
+    should not go back to what it was, leaves it out by `__getstate__`.
+
     Attributes:
         env: The wrapped environment.
+        made_from: Configuration of the wrapper, None for one without.
     """
 
     stack_position: ClassVar[int]
     """Place in `STACK_ORDER`; each place is taken at most once."""
 
-    def __init__(self, env: "ForageEnv | SwarmWrapper") -> None:
-        """Wrap `env`.
+    def __init__(self, env: "ForageEnv | SwarmWrapper", config: "WrapperConfig | None" = None) -> None:
+        """Wrap `env`. Snapshots tell wrappers with different configurations apart.
 
         Raises:
             TypeError: `env` is neither a ForageEnv nor a SwarmWrapper. A wrapper from another library in between would
@@ -63,6 +68,7 @@ class SwarmWrapper(BaseParallelWrapper):
                 f"each at most once, is {', '.join(STACK_ORDER)}."
             )
         super().__init__(env)
+        self.made_from = config
         self._inner = env
         self._unwrapped: ForageEnv = env.unwrapped
 
@@ -123,7 +129,8 @@ class SwarmWrapper(BaseParallelWrapper):
         drawn = self.unwrapped.seed_value
         assert drawn is not None, "an environment that was reset has a seed"
         self.on_reset(drawn)
-        return self.observe(obs)
+        self._last_obs = self.observe(obs)
+        return self._last_obs
 
     def step_batch(
         self, actions: ActionArray, *, wheel_gain: FloatArray | None = None, tasks: CodeArray | None = None
@@ -143,9 +150,29 @@ class SwarmWrapper(BaseParallelWrapper):
         obs, reward, terminated, truncated = self._inner.step_batch(
             actions, wheel_gain=self.gain(actions, wheel_gain), tasks=tasks
         )
-        obs = self.observe(obs)
+        obs = self._last_obs = self.observe(obs)
         self.after_step(tasks, terminated, truncated)
         return obs, reward, terminated, truncated
+
+    def snapshot(self) -> Snapshot:
+        """Return the state of the whole stack; see `ForageEnv.snapshot`."""
+        return self.unwrapped.snapshot_through(self._stack())
+
+    def restore(self, snapshot: Snapshot) -> dict[str, Any]:
+        """Go back to a snapshot of a whole stack; returns observations per agent. See `ForageEnv.restore`."""
+        return self.unwrapped.per_agent(self.restore_batch(snapshot))
+
+    def restore_batch(self, snapshot: Snapshot) -> ObsArray:
+        """Restore at array level and return the last observations, (N, D) float32; see `ForageEnv.restore_batch`."""
+        self.unwrapped.restore_through(snapshot, self._stack())
+        return self._last_obs
+
+    def _stack(self) -> list["SwarmWrapper"]:
+        """Return all wrappers from this one inwards."""
+        return [self, *(self._inner._stack() if isinstance(self._inner, SwarmWrapper) else ())]
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None

@@ -31,7 +31,7 @@ class HandlingCost(SwarmWrapper):
 
     def __init__(self, env: ForageEnv | SwarmWrapper, config: "HandlingCostConfig") -> None:
         """Wrap `env`."""
-        super().__init__(env)
+        super().__init__(env, config)
         scenario = self.unwrapped.scenario
         self._pickup, self._drop = scenario.objects.pickup_ticks, scenario.objects.drop_ticks
         self._signal = config.waveform.signal(scenario.dt_s)

@@ -61,7 +61,7 @@ class SensorNoise(SwarmWrapper):
 
     def __init__(self, env: ForageEnv | SwarmWrapper, config: "SensorNoiseConfig") -> None:
         """Wrap `env`."""
-        super().__init__(env)
+        super().__init__(env, config)
         self._is_uniform = config.distribution == "uniform"
         exact = POSE_GROUPS if self.unwrapped.scenario.quirks.pose_sensors_exact else ()
         sigmas = config.group_sigmas().items()
@@ -140,7 +140,7 @@ class ActuatorNoise(SwarmWrapper):
 
     def __init__(self, env: ForageEnv | SwarmWrapper, config: "ActuatorNoiseConfig") -> None:
         """Wrap `env`."""
-        super().__init__(env)
+        super().__init__(env, config)
         scenario, sigma = self.unwrapped.scenario, config.sigma
         self._is_uniform = config.distribution == "uniform"
         self._is_noisy = _is_noisy(sigma)

@@ -46,7 +46,7 @@ class PopulationDynamics(SwarmWrapper):
         Raises:
             ConfigError: more robots at the start than the scenario has, or births although all robots are there.
         """
-        super().__init__(env)
+        super().__init__(env, config)
         scenario = self.unwrapped.scenario
         n_robots = scenario.robots.n_robots
         initial = n_robots if config.initial_robots is None else config.initial_robots

@@ -1,6 +1,5 @@
 """RunRecorder: turns the arena's cumulative counters into columns over recording intervals."""
 
-from collections.abc import Iterator
 from typing import ClassVar
 
 import numpy as np
@@ -11,8 +10,8 @@ from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.performance import performance_curve
-from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.world.kernels.task_shares import add_task_shares
+from swarm_forage_env.wrappers.base import SwarmWrapper
 
 TOTALS: dict[str, Counter] = {
     "collected": Counter.COLLECTED,
@@ -147,7 +146,7 @@ class RunRecorder(SwarmWrapper):
             for code, share in zip(Task, self._task_sums / self._interval_ticks, strict=True):
                 self._contribute(f"task_share_{code.name.lower()}", share)
             self._task_sums[:] = 0.0
-        for wrapper in self._wrappers_inside():
+        for wrapper in self._stack()[1:]:
             for name, value in wrapper.interval_columns().items():
                 self._contribute(name, value)
         self._interval += 1
@@ -155,9 +154,3 @@ class RunRecorder(SwarmWrapper):
 
     def _contribute(self, name: str, value: float) -> None:
         self._contributed.setdefault(name, np.zeros(self._n_intervals))[self._interval] = value
-
-    def _wrappers_inside(self) -> Iterator[SwarmWrapper]:
-        env = self._inner
-        while isinstance(env, SwarmWrapper):
-            yield env
-            env = env._inner

@@ -33,7 +33,7 @@ class Throttle(SwarmWrapper):
 
     def __init__(self, env: ForageEnv | SwarmWrapper, config: "ThrottleConfig") -> None:
         """Wrap `env`."""
-        super().__init__(env)
+        super().__init__(env, config)
         scenario = self.unwrapped.scenario
         self._only_carriers = config.carriers
         self._signal = config.waveform.signal(scenario.dt_s)

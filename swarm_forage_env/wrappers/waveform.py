@@ -17,6 +17,7 @@ import bisect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any, TypeAlias
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, several
@@ -125,39 +126,49 @@ class Waveform:
         return self.offset + shift + abs(self.amplitude)
 
     def signal(self, dt_s: float) -> Signal:
-        """Return V as a function of the tick, for ticks of `dt_s` seconds."""
+        """Return V as a function of the tick, for ticks of `dt_s` seconds; it can be pickled."""
         amplitude, offset, phase = self.amplitude, self.offset, self.phase
         if self.kind == "constant":
-            return lambda _: amplitude
+            return partial(_constant, amplitude)
         if self.kind == "table":
-            return _interpolation([time_s / dt_s for time_s in self.times_s], self.values)
+            return partial(_table, [time_s / dt_s for time_s in self.times_s], self.values)
         if self.kind == "step":
             assert self.start_s is not None, "checked at construction"
             # Half a millionth of a tick absorbs the rounding of start_s / dt_s.
-            start = self.start_s / dt_s - 5e-7
-            return lambda tick: offset + amplitude if tick >= start else offset
+            return partial(_step, self.start_s / dt_s - 5e-7, amplitude, offset)
         assert self.period_s is not None, "checked at construction"
-        period = self.period_s / dt_s
-        if self.kind == "sawtooth":
-            return lambda tick: offset + 2.0 * amplitude * (tick / period - math.floor(tick / period + 0.5) + phase)
-        if self.kind == "sine":
-            return lambda tick: offset + amplitude * math.sin(2.0 * math.pi * (tick / period) + phase)
-        return lambda tick: (
-            offset + (amplitude if math.sin(2.0 * math.pi * (tick / period) + phase) >= 0.0 else -amplitude)
-        )
+        function = {"sine": _sine, "square": _square, "sawtooth": _sawtooth}[self.kind]
+        return partial(function, self.period_s / dt_s, amplitude, offset, phase)
 
 
-def _interpolation(ticks: list[float], values: tuple[float, ...]) -> Signal:
-    def value(tick: int) -> float:
-        after = bisect.bisect_right(ticks, tick)
-        if after == 0:
-            return values[0]
-        if after == len(ticks):
-            return values[-1]
-        share = (tick - ticks[after - 1]) / (ticks[after] - ticks[after - 1])
-        return values[after - 1] + share * (values[after] - values[after - 1])
+def _constant(amplitude: float, _tick: int) -> float:
+    return amplitude
 
-    return value
+
+def _sine(period: float, amplitude: float, offset: float, phase: float, tick: int) -> float:
+    return offset + amplitude * math.sin(2.0 * math.pi * (tick / period) + phase)
+
+
+def _square(period: float, amplitude: float, offset: float, phase: float, tick: int) -> float:
+    return offset + (amplitude if math.sin(2.0 * math.pi * (tick / period) + phase) >= 0.0 else -amplitude)
+
+
+def _sawtooth(period: float, amplitude: float, offset: float, phase: float, tick: int) -> float:
+    return offset + 2.0 * amplitude * (tick / period - math.floor(tick / period + 0.5) + phase)
+
+
+def _step(start: float, amplitude: float, offset: float, tick: int) -> float:
+    return offset + amplitude if tick >= start else offset
+
+
+def _table(ticks: list[float], values: tuple[float, ...], tick: int) -> float:
+    after = bisect.bisect_right(ticks, tick)
+    if after == 0:
+        return values[0]
+    if after == len(ticks):
+        return values[-1]
+    share = (tick - ticks[after - 1]) / (ticks[after] - ticks[after - 1])
+    return values[after - 1] + share * (values[after] - values[after - 1])
 
 
 def gather_waveform(mapping: Mapping[str, Any], key: str, owner: type) -> dict[str, Any]:

@@ -52,6 +52,13 @@ def test_a_copy_continues_as_the_original_does(policy_class, copied):
     assert not np.array_equal(of_policy[0], of_policy[1])
 
 
+@pytest.mark.parametrize("policy_class", POLICIES)
+def test_a_pickle_takes_no_compiled_function_along(policy_class):
+    """Another process would have to compile a copy of it anew, which takes a minute."""
+    policy, _ = started(policy_class)
+    assert b"numba" not in pickle.dumps(policy)
+
+
 def test_a_policy_can_be_copied_before_its_first_run():
     policy = copy.deepcopy(CRWPolicy(wander_speed_mps=0.05))
     assert policy.parameters.wander_speed_mps == 0.05

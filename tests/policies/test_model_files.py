@@ -1,5 +1,6 @@
 """Trained policies in files: found by their suffix, opened with care, applied as they were trained."""
 
+import copy
 import sys
 import zipfile
 from pathlib import Path
@@ -21,6 +22,7 @@ from swarm_forage_env.study.experiments import Budget
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.pettingzoo import parallel_env
+from tests.support.branches import pickled
 
 TINY = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=1, n_sizes=2, n_levels=1)
 ENV = parallel_env("warehouse_small", n_robots=4, n_objects=20)
@@ -74,6 +76,17 @@ def test_actions_are_those_of_the_algorithm_itself(tmp_path, algorithm, options)
     actions = policy.act(OBS, ACTIVE)
     np.testing.assert_array_equal(actions, expected)
     assert (actions.shape, actions.dtype) == ((4, 3), np.float32)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, pickled])
+@pytest.mark.parametrize("algorithm", ["PPO", "SAC"])
+def test_a_copy_acts_as_the_original_does(tmp_path, algorithm, copied):
+    _, path = model(algorithm, tmp_path)
+    policy = started(path, interface={"decision_ticks": 2})
+    policy.act(OBS, ACTIVE)
+    twin = copied(policy)
+    for obs in (OBS, -OBS, OBS / 2):
+        np.testing.assert_array_equal(twin.act(obs, ACTIVE), policy.act(obs, ACTIVE))
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Networks in files: evaluated as by hand, read back as written, refused when broken."""
 
+import copy
 import json
 
 import numpy as np
@@ -12,6 +13,7 @@ from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.views.pettingzoo import parallel_env
+from tests.support.branches import pickled
 
 
 def small_network(**about) -> Network:
@@ -235,3 +237,20 @@ def test_a_state_dict_without_all_of_its_layers_is_refused(lost):
     state = {name: array for name, array in state_dict().items() if name != lost}
     with pytest.raises(NetworkError, match="layers that follow on each other"):
         Network.from_state_dict(state, small_network().about)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, pickled])
+def test_a_copy_continues_as_the_original_does(copied):
+    """Between two decisions, with actions that are drawn."""
+    env = parallel_env("warehouse_small", n_robots=6, n_objects=20)
+    interface = InterfaceConfig(observation="compact", actions="discrete", decision_ticks=3)
+    policy = NetworkPolicy(compact_network(11, np.random.default_rng(1), interface=interface, samples=True))
+    policy.reset(env.swarm_spec, np.random.default_rng(2))
+    obs = env.reset_batch(3)
+    for _ in range(4):
+        policy.act(obs, env.active)
+    twin = copied(policy)
+    of_twin = [twin.act(obs, env.active).copy() for _ in range(12)]
+    of_policy = [policy.act(obs, env.active).copy() for _ in range(12)]
+    np.testing.assert_array_equal(of_twin, of_policy)
+    assert not np.array_equal(of_policy[0], of_policy[3])

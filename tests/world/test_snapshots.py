@@ -1,0 +1,254 @@
+"""Snapshots, copies and pickles of an environment: the run goes on from them bit for bit, under both engines."""
+
+import copy
+import pickle
+import re
+
+import numpy as np
+import pytest
+
+from swarm_forage_env import SCENARIO_NAMES, Snapshot, SnapshotError, parallel_env, scenario
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
+from tests.support.branches import Branch, pickled
+from tests.support.busy import BusyPolicy
+from tests.support.crowded_runs import DENSE, side
+
+CACHES = ("none", "static", "dynamic")
+
+
+def crowded(name: str, caches: str, physics: str) -> ForageEnv:
+    world = scenario(
+        name, caches=caches, physics=physics, n_objects=DENSE[name], n_robots=20, walk_probability=0.01, **side(name)
+    )
+    return ForageEnv(world, snapshots=True)
+
+
+def small(**options) -> ForageEnv:
+    return parallel_env("warehouse_small", **{"n_robots": 3, "n_objects": 9, "physics": "compiled", **options})
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
+@pytest.mark.parametrize("caches", CACHES)
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_a_run_goes_on_from_a_snapshot(name, caches, physics):
+    run = Branch(crowded(name, caches, physics), BusyPolicy()).go_on(150)
+    snapshot = run.env.snapshot()
+    branches = [run.beside(env, env.restore_batch(snapshot)) for env in [crowded(name, caches, physics)]]
+    branches += [run.beside(env, run.obs) for env in (copy.deepcopy(run.env), pickled(run.env))]
+    expected = run.beside(run.env, run.obs).go_on(50)
+    branches.append(run.beside(run.env, run.env.restore_batch(snapshot)))
+    assert expected.env.events.counters.any()
+    for branch in branches:
+        assert branch.go_on(50).seen == expected.seen
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
+def test_a_heap_of_robots_goes_on_from_a_snapshot(physics):
+    """All push into one corner, so that what an engine remembers of contacts matters."""
+    world = scenario("warehouse_small", n_robots=60, width_m=8.0, height_m=8.0, nest_centre_m=(2.0, 4.0),
+                     nest_size_m=(1.0, 2.0), n_objects=5, physics=physics)  # fmt: skip
+    env = ForageEnv(world, snapshots=True)
+    env.reset_batch(3)
+    swarm = env.swarm
+
+    def towards_the_corner(target: ForageEnv, ticks: int) -> bytes:
+        seen = b""
+        for _ in range(ticks):
+            position, heading = target.swarm.position, target.swarm.heading
+            turn = np.sin(np.arctan2(-position[:, 1], -position[:, 0]) - heading) * 0.5
+            actions = np.column_stack((0.5 - turn, 0.5 + turn, np.zeros(60))).astype(np.float32)
+            target.step_batch(actions)
+            seen += target.swarm.position.tobytes() + target.swarm.heading.tobytes()
+        return seen
+
+    towards_the_corner(env, 400)
+    distance = np.hypot(*(swarm.position[:, None] - swarm.position[None]).T) + np.eye(60)
+    assert (distance < 2.01 * world.robots.radius_m).sum() > 60, "they touch"
+    snapshot, other = env.snapshot(), ForageEnv(world, snapshots=True)
+    expected = towards_the_corner(env, 60)
+    other.restore(snapshot)
+    assert towards_the_corner(other, 60) == expected
+    env.restore(snapshot)
+    assert towards_the_corner(env, 60) == expected
+
+
+@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
+def test_a_snapshot_stays_as_it_is(physics):
+    env = small(physics=physics, snapshots=True)
+    run = Branch(env, load_policy("crw")).go_on(70)  # Chipmunk's history has a full block
+    start = run.beside(env, run.obs)
+    snapshot = env.snapshot()
+    expected = run.go_on(20).seen[-20:]
+    for given in (snapshot, snapshot, pickled(snapshot)):
+        branch = start.beside(env, env.restore_batch(given))
+        assert branch.go_on(20).seen == expected
+    assert (snapshot.tick, snapshot.seed) == (70, 17)
+    assert isinstance(snapshot, Snapshot)
+
+
+def test_a_snapshot_of_a_snapshot_is_the_same_and_shares_the_history():
+    env = parallel_env("warehouse_small", n_robots=20, n_objects=9, snapshots=True)
+    Branch(env, load_policy("crw")).go_on(140)
+    first = env.snapshot()
+    env.restore(first)
+    second = env.snapshot()
+    assert (len(first.kept), second.kept) == (2, first.kept)
+    assert all(mine is yours for mine, yours in zip(second.kept, first.kept, strict=True))
+    other = parallel_env("warehouse_small", n_robots=20, n_objects=9, snapshots=True)
+    other.restore(second)
+    np.testing.assert_array_equal(other.state(), env.state())
+
+
+@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
+def test_agents_and_observations_come_back(physics):
+    env = small(physics=physics, snapshots=True)
+    env.reset(seed=1)
+    dead = np.array([False, True, False])
+    env.set_population(active=~dead, present=~dead, terminated=dead)
+    obs, *_ = env.step({agent: np.ones(3, np.float32) for agent in env.agents})
+    snapshot, state = env.snapshot(), env.state()
+    env.reset(seed=2)
+    other = small(physics=physics, snapshots=True)
+    for target in (env, other):
+        restored = target.restore(snapshot)
+        assert target.agents == list(restored) == ["robot_0", "robot_2"]
+        for agent, row in restored.items():
+            np.testing.assert_array_equal(row, obs[agent])
+        np.testing.assert_array_equal(target.state(), state)
+        assert (target.tick, target.seed_value) == (1, 1)
+
+
+@pytest.mark.parametrize("physics", PHYSICS_ENGINES)
+def test_robots_that_left_and_came_back_are_where_they_were(physics):
+    env, other = (small(physics=physics, snapshots=True) for _ in range(2))
+    env.reset_batch(1)
+    everybody, alone = np.ones(3, np.bool_), np.array([True, False, False])
+    env.set_population(active=alone, present=alone)
+    env.step_batch(np.ones((3, 3), np.float32))
+    env.swarm.position[1] = 9.0, 9.0
+    env.set_population(active=everybody, present=everybody)
+    env.step_batch(np.ones((3, 3), np.float32))
+    other.restore(env.snapshot())
+    for target in (env, other):
+        target.step_batch(np.ones((3, 3), np.float32))
+    assert other.swarm.position.tolist() == env.swarm.position.tolist()
+    assert np.hypot(*(env.swarm.position[1] - (9.0, 9.0))) < 0.1
+
+
+def test_the_seed_of_the_next_reset_comes_back():
+    env, other = small(), small()
+    env.reset(seed=5)
+    env.reset()
+    snapshot = env.snapshot()
+    env.reset()
+    expected = env.seed_value
+    other.restore(snapshot)
+    other.reset()
+    assert other.seed_value == expected
+
+
+def test_a_finished_run_is_finished_after_a_restore_and_can_be_left():
+    env = small(max_cycles=3)
+    env.reset(seed=1)
+    beginning = env.snapshot()
+    for _ in range(3):
+        env.step({agent: np.ones(3, np.float32) for agent in env.agents})
+    end = env.snapshot()
+    assert list(env.restore(beginning)) == env.possible_agents
+    assert env.restore(end) == {}
+    with pytest.raises(RuntimeError, match="All agents are done"):
+        env.step({})
+    env.restore(beginning)
+    env.step({agent: np.ones(3, np.float32) for agent in env.agents})
+    assert env.tick == 1
+
+
+def test_the_picture_is_that_of_the_environment_that_restores():
+    seen = small(render_mode="rgb_array")
+    env = small()
+    env.reset(seed=1)
+    seen.restore(env.snapshot())
+    assert seen.render().ndim == 3
+    env.restore(seen.snapshot())
+    assert env.render() is None
+
+
+def test_an_environment_can_be_copied_before_its_first_run():
+    for env in (parallel_env("warehouse_small", n_robots=3), small()):
+        for twin in (copy.deepcopy(env), pickled(env)):
+            np.testing.assert_array_equal(twin.reset_batch(4), env.reset_batch(4))
+
+
+def test_a_snapshot_needs_a_run():
+    with pytest.raises(RuntimeError, match="before the first reset"):
+        small().snapshot()
+
+
+@pytest.mark.parametrize("way", [ForageEnv.snapshot, copy.deepcopy, pickle.dumps])
+def test_chipmunk_says_what_a_copy_needs(way):
+    env = small(physics="chipmunk")
+    env.reset(seed=1)
+    with pytest.raises(
+        SnapshotError, match=re.escape("physics='compiled', or an environment made with snapshots=True")
+    ):
+        way(env)
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"n_robots": 4}, r"scenario\.robots\.n_robots is 4 there and 3 here"),
+        ({"physics": "chipmunk", "snapshots": True}, r"scenario\.physics is chipmunk there and compiled here"),
+        ({"max_cycles": 9}, r"max_cycles is 9 there and 50000 here"),
+        ({"wrappers": ["throttle:waveform=constant,amplitude=0.1"]}, "wrappers is Throttle there and none here"),
+    ],
+)
+def test_snapshots_of_others_are_refused(options, reason):
+    env, other = small(), small(**options)
+    env.reset(seed=1)
+    other.reset(seed=2)
+    before = env.state()
+    with pytest.raises(SnapshotError, match=reason):
+        env.restore(other.snapshot())
+    np.testing.assert_array_equal(env.state(), before)
+    assert env.seed_value == 1
+
+
+def test_snapshots_with_other_sensors_are_refused():
+    world = scenario("warehouse_small", n_robots=3, physics="compiled")
+    some, carriers = ForageEnv(world, reads=("light",)), ForageEnv(world, reads=("light if carrying",))
+    some.reset(seed=1)
+    with pytest.raises(SnapshotError, match="reads is light there and light if carrying here"):
+        carriers.restore(some.snapshot())
+
+
+def test_snapshots_of_other_versions_are_refused(monkeypatch):
+    env = small()
+    env.reset(seed=1)
+    snapshot = env.snapshot()
+    monkeypatch.setattr("swarm_forage_env.env.package_version", lambda: "9.0")
+    with pytest.raises(
+        SnapshotError, match=r"version is swarm_forage_v1 of \S+ there and swarm_forage_v1 of 9\.0 here"
+    ):
+        env.restore(snapshot)
+
+
+def test_many_differences_are_counted():
+    env, other = small(), small(n_robots=4, n_objects=8, max_cycles=7, caches="static", dt_s=0.1)
+    other.reset(seed=1)
+    with pytest.raises(SnapshotError, match=r"here and \d more\. Restore it"):
+        env.restore(other.snapshot())
+
+
+def test_what_is_no_snapshot_is_refused():
+    with pytest.raises(SnapshotError, match=r"Expected a Snapshot, as `snapshot\(\)` returns it, got dict"):
+        small().restore({})
+
+
+def test_the_switch_is_checked():
+    with pytest.raises(ValueError, match="snapshots to be True or False, got 'yes'"):
+        small(snapshots="yes")

@@ -1,0 +1,174 @@
+"""Snapshots of a whole stack: every wrapper goes on as it would have, and so does the record."""
+
+import copy
+import hashlib
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from swarm_forage_env import SCENARIO_NAMES, SnapshotError, load_policy
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
+from swarm_forage_env.study.run import LiveRun, build_env
+from swarm_forage_env.wrappers.base import SwarmWrapper
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.support.branches import Branch, pickled, whole_stack
+from tests.support.fake_arena import small_scenario
+
+ROOT = Path(__file__).resolve().parents[2]
+POLICY_OF = {"none": "dpo", "static": "stochm", "dynamic": "stochx"}
+RUNS = [
+    (name, caches, physics)
+    for place, name in enumerate(SCENARIO_NAMES)
+    for caches in (tuple(POLICY_OF)[place % 3],)
+    for physics in PHYSICS_ENGINES
+]
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("name", "caches", "physics"), RUNS)
+def test_a_stack_goes_on_from_a_snapshot_to_the_same_record(name, caches, physics):
+    stack = whole_stack(name, physics, caches)
+    run = Branch(stack, load_policy(POLICY_OF[caches])).go_on(300)
+    snapshot = stack.snapshot()
+    fresh = whole_stack(name, physics, caches)
+    branches = [run.beside(env, env.restore_batch(snapshot)) for env in (fresh,)]
+    branches += [run.beside(env, run.obs) for env in (copy.deepcopy(stack), pickled(stack))]
+    expected = run.beside(stack, run.obs).go_on(200)
+    columns = expected.columns()
+    assert sum(columns["deaths"]) > 0
+    assert sum(columns["repairs"]) > 0
+    branches.append(run.beside(stack, stack.restore_batch(snapshot)))  # after the end of the run
+    for branch in branches:
+        assert branch.go_on(200).seen == expected.seen
+        assert branch.columns() == columns
+
+
+CHILD = """
+import hashlib, pickle, sys
+from pathlib import Path
+from tests.support.branches import whole_stack
+for file in sys.argv[1:]:
+    snapshot, run, stack = pickle.loads(Path(file).read_bytes())
+    fresh = whole_stack("warehouse_small", snapshot.origin.scenario.physics, "dynamic")
+    for branch in (run.beside(fresh, fresh.restore_batch(snapshot)), run.beside(stack, run.obs)):
+        print(hashlib.sha256(b"".join(branch.go_on(200).seen)).hexdigest(), branch.columns())
+"""
+
+
+@pytest.mark.compiled
+def test_another_process_goes_on_from_files(tmp_path):
+    expected = []
+    for physics in PHYSICS_ENGINES:
+        stack = whole_stack("warehouse_small", physics, "dynamic")
+        run = Branch(stack, load_policy("stochx")).go_on(300)
+        (tmp_path / physics).write_bytes(pickle.dumps((stack.snapshot(), run.beside(None, run.obs), stack)))
+        end = run.beside(stack, run.obs).go_on(200)
+        expected += [f"{hashlib.sha256(b''.join(end.seen)).hexdigest()} {end.columns()}"] * 2
+    files = [str(tmp_path / physics) for physics in PHYSICS_ENGINES]
+    child = subprocess.run([sys.executable, "-c", CHILD, *files], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert child.stdout.splitlines() == expected, child.stderr
+
+
+@pytest.mark.compiled
+def test_a_live_run_is_resumed_from_its_pickle():
+    def started() -> LiveRun:
+        return LiveRun(whole_stack("warehouse_small", "compiled"), load_policy("crw"), 3)
+
+    run = started()
+    run.advance(to_tick=120)
+    resumed = pickled(run)
+    run.advance()
+    resumed.advance()
+    assert resumed.over
+    np.testing.assert_array_equal(resumed.forage_env.state(), run.forage_env.state())
+    assert resumed.forage_env.events.counters.tolist() == run.forage_env.events.counters.tolist()
+
+
+class Numbering(SwarmWrapper):
+    """Adds the number of the tick to every observation; what it keeps open cannot be pickled."""
+
+    stack_position: ClassVar[int] = 0
+
+    def __init__(self, env):
+        super().__init__(env)
+        self.opened = (line for line in "abc")
+
+    def on_reset(self, seed):
+        self.world, self.number = self.unwrapped.arena, 0
+
+    def observe(self, obs):
+        self.number += 1
+        return obs + np.float32(self.number)
+
+
+class CarefulNumbering(Numbering):
+    def __getstate__(self):
+        return {name: value for name, value in vars(self).items() if name != "opened"}
+
+
+def wrapped(kind, *words):
+    world = small_scenario(physics="compiled")
+    return kind(build_env(world, [parse_wrapper(word) for word in words]))
+
+
+def test_a_wrapper_leaves_out_what_cannot_be_pickled():
+    env, other = wrapped(CarefulNumbering), wrapped(CarefulNumbering)
+    run = Branch(env, load_policy("crw")).go_on(4)
+    snapshot, kept_open = env.snapshot(), other.opened
+    expected = run.beside(env, run.obs).go_on(3).seen
+    branch = run.beside(other, other.restore_batch(snapshot))
+    assert branch.go_on(3).seen == expected
+    assert other.opened is kept_open
+    assert other.world is other.unwrapped.arena, "parts of the stack are those of the environment that restores"
+    assert other.number == 8, "the first observation, and seven ticks"
+
+
+def test_a_wrapper_with_something_that_cannot_be_pickled_is_told_so():
+    env = wrapped(Numbering)
+    env.reset_batch(1)
+    with pytest.raises(SnapshotError, match=r"got TypeError: .*generator.*leaves it out by `__getstate__`"):
+        env.snapshot()
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["sensor_noise:sigma=0.2"], r"SensorNoise\.sigma is 0\.1 there and 0\.2 here"),
+        ([], "wrappers is SensorNoise there and none here"),
+        (["throttle:waveform=constant,amplitude=0.1"], "wrappers is SensorNoise there and Throttle here"),
+    ],
+)
+def test_snapshots_of_other_stacks_are_refused(words, reason):
+    world = small_scenario(physics="compiled")
+    env = build_env(world, [parse_wrapper("sensor_noise:sigma=0.1")])
+    env.reset_batch(1)
+    other = build_env(world, [parse_wrapper(word) for word in words])
+    with pytest.raises(SnapshotError, match=reason):
+        other.restore(env.snapshot())
+    with pytest.raises(SnapshotError, match="wrappers is SensorNoise there and none here"):
+        env.unwrapped.restore(env.snapshot())
+
+
+def test_snapshots_of_wrappers_without_configuration_go_by_their_class():
+    env, other = wrapped(CarefulNumbering), wrapped(CarefulNumbering)
+    env.reset_batch(1)
+    other.unwrapped.max_cycles = 3
+    with pytest.raises(SnapshotError, match=r"another: max_cycles is 15 there and 3 here\. Restore"):
+        other.restore(env.snapshot())
+
+
+def test_observations_per_agent_are_those_that_the_wrappers_showed():
+    env = build_env(small_scenario(physics="compiled"), [parse_wrapper("sensor_noise:sigma=0.1")])
+    env.reset(seed=1)
+    obs, *_ = env.step({agent: np.ones(3, np.float32) for agent in env.agents})
+    snapshot = env.snapshot()
+    env.step({agent: np.ones(3, np.float32) for agent in env.agents})
+    restored = env.restore(snapshot)
+    assert list(restored) == list(obs)
+    for agent, row in restored.items():
+        np.testing.assert_array_equal(row, obs[agent])
