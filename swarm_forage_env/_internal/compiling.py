@@ -80,8 +80,8 @@ class Callback:
     def __init__(self, function: Callable[..., Any], *example: Any) -> None:
         """Compile `function`, which returns nothing, for arguments of the types of `example`."""
         self.function = function
+        self.type: Any = None
         if not hasattr(function, "compile"):  # the compiler is switched off
-            self.type = None
             return
         arguments = tuple(typeof(argument) for argument in example)
         self.type = types.FunctionType(types.none(*arguments))

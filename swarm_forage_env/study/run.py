@@ -51,7 +51,7 @@ class LiveRun:
         self._compiled = self._compiled_policy()
 
     def _compiled_policy(self) -> CompiledPolicy | None:
-        """The policy for a run without Python between ticks, if nothing has to be done there: no wrapper but a recorder."""
+        """The policy for a run without Python between ticks, where nothing is to be done: no wrapper but a recorder."""
         env = self.forage_env
         is_bare = isinstance(self._stack, RunRecorder) and self._stack.env is env
         if not (is_bare and env.scenario.physics == "compiled" and hasattr(self._policy, "compiled")):

@@ -210,7 +210,7 @@ class ForagingArena:
     def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
         """Let a compiled policy drive the world for some ticks; what happens is what `step` and `act` do by turns.
 
-        Bodies must be compiled, too. `task_shares` (codes,) gets the shares of active robots in each task, tick by tick.
+        Bodies must be compiled, too. `task_shares` (codes,) gets the share of active robots in each task, tick by tick.
         """
         physics, n_left = self._physics, n_ticks
         assert isinstance(physics, Bodies), "Chipmunk is not compiled"

@@ -86,7 +86,7 @@ def test_a_new_kernel_is_found(tmp_path):
     assert kernels_that_need_a_twin(tmp_path) == {"metrics.fast.outer", "metrics.fast.other", "metrics.fast.shared"}
 
 
-TAKE_KERNELS = {"direct", "_start"}
+TAKE_KERNELS = {"direct", "staticmethod"}
 """Functions that take a kernel and call it later."""
 
 
@@ -109,6 +109,10 @@ def calls_of_functions() -> dict[str, set[str]]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef):
                 found.setdefault(node.name, set()).update(calls_in(node))
+            elif isinstance(node, ast.ClassDef):  # what stands in its body belongs to all methods
+                shared = {name for item in node.body if isinstance(item, ast.Assign) for name in calls_in(item)}
+                for method in (item for item in node.body if isinstance(item, ast.FunctionDef)):
+                    found.setdefault(method.name, set()).update(shared)
     return found
 
 

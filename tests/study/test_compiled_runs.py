@@ -1,0 +1,78 @@
+"""Runs of compiled policies in worlds with compiled bodies: without Python between ticks, and the same bit for bit."""
+
+import numpy as np
+import pytest
+
+from baselines.crw import CRWPolicy
+from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study.run import LiveRun, build_stack
+from swarm_forage_env.wrappers.recorder import RunRecorder
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.support.foraging import quick_world
+
+
+def tick_by_tick(policy: Policy) -> Policy:
+    """The policy with an `act` of somebody else, so that Python is asked in every tick."""
+    act = policy.act
+    policy.act = lambda obs, active: act(obs, active)
+    return policy
+
+
+def recorded(world: ScenarioConfig, policy: Policy, *stops: int) -> RunRecorder:
+    recorder = build_stack(world, reads=policy.reads)
+    run = LiveRun(recorder, policy, seed=4)
+    for tick in stops:
+        run.advance(to_tick=tick)
+        assert run.forage_env.tick == tick
+        assert not run.over
+    run.advance()
+    assert run.over
+    return recorder
+
+
+WORLDS = [
+    ("crw", "warehouse_small", {"n_robots": 1}),
+    ("crw", "warehouse_small", {}),
+    ("dpo", "search_and_rescue", {}),
+    ("stochm", "warehouse_small", {"nest_centre_m": (3.2, 8.0), "nest_size_m": (3.2, 12.8)}),
+    ("stochx", "warehouse_medium", {}),
+]
+
+
+@pytest.mark.parametrize(("policy", "name", "fields"), WORLDS)
+def test_a_run_without_python_is_the_run_with_it(policy, name, fields):
+    caches = load_policy(policy).caches
+    world = quick_world(name, physics="compiled", caches=caches, interval_s=60.0, **fields)
+    one = recorded(world, load_policy(policy), 7, 299, 301)
+    other = recorded(world, tick_by_tick(load_policy(policy)))
+    expected = other.columns() | other.contributed()
+    assert (one.columns() | one.contributed()).keys() == expected.keys()
+    for column, values in (one.columns() | one.contributed()).items():
+        np.testing.assert_array_equal(values, expected[column], err_msg=column)
+    for state in ("position", "heading", "carried_object"):
+        np.testing.assert_array_equal(getattr(one.unwrapped.swarm, state), getattr(other.unwrapped.swarm, state))
+    np.testing.assert_array_equal(one.unwrapped.arena.obs, other.unwrapped.arena.obs)
+    if not fields:
+        assert one.columns()["first_picked"].sum() > 0
+
+
+def is_compiled(world: ScenarioConfig, policy: Policy, *wrappers: str) -> bool:
+    stack = build_stack(world, [parse_wrapper(text) for text in wrappers], reads=policy.reads)
+    return LiveRun(stack, policy, seed=0)._compiled is not None
+
+
+class Slow(CRWPolicy):
+    def act(self, obs, active):
+        return 0.5 * super().act(obs, active)
+
+
+def test_python_is_asked_wherever_it_has_a_say():
+    world = scenario("warehouse_small", n_robots=2, physics="compiled")
+    assert is_compiled(world, CRWPolicy())
+    assert not is_compiled(world, Slow())
+    assert not is_compiled(world, tick_by_tick(CRWPolicy()))
+    assert not is_compiled(world, CRWPolicy(), "sensor_noise:sigma=0.01")
+    assert not is_compiled(scenario("warehouse_small", n_robots=2), CRWPolicy())
