@@ -93,6 +93,10 @@ class Callback:
         """Call the function itself, for kernels that are not compiled."""
         self.function(*arguments)
 
+    def __reduce__(self) -> Any:
+        """Refuse copies for another process: the address is one of this process."""
+        raise TypeError("A Callback cannot be pickled; make it anew from its function.")
+
     def __wrapper_address__(self) -> int:
         """Return the address that compiled code jumps to."""
         return self._address

@@ -104,7 +104,10 @@ class CompiledPolicy(Protocol):
 
     @property
     def callback(self) -> Any:
-        """The kernel of a tick, (obs, active, draws, state, tick), as `_internal.compiling.Callback`."""
+        """The kernel of a tick, (obs, active, draws, state, tick), as `_internal.compiling.Callback`.
+
+        It must not raise: an exception inside of it is printed, but does not stop the run.
+        """
         ...
 
     @property

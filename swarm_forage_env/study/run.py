@@ -48,22 +48,28 @@ class LiveRun:
         policy.reset(self.forage_env.swarm_spec, stream_rng(seed, Stream.POLICY))
         self._obs = stack.reset_batch(seed)
         self._has_tasks = hasattr(policy, "task")
-        self._compiled = self._compiled_policy()
 
-    def _compiled_policy(self) -> CompiledPolicy | None:
-        """The policy for a run without Python between ticks, where nothing is to be done: no wrapper but a recorder."""
-        env = self.forage_env
-        is_bare = isinstance(self._stack, RunRecorder) and self._stack.env is env
-        if not (is_bare and env.scenario.physics == "compiled" and hasattr(self._policy, "compiled")):
+    @property
+    def compiled_policy(self) -> CompiledPolicy | None:
+        """The policy for a run without Python between ticks; None where anybody might have a say there.
+
+        That is a wrapper other than the recorder, a subclass, a method that was replaced, or Chipmunk.
+        """
+        stack, env, policy = self._stack, self.forage_env, self._policy
+        is_bare = type(stack) is RunRecorder and stack.env is env and type(env) is ForageEnv
+        if not is_bare or env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
             return None
-        return self._policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
+        if "after_step" in vars(stack) or "step_batch" in {*vars(stack), *vars(env)}:
+            return None
+        return policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
 
     def advance(self, *, to_tick: int | None = None) -> None:
         """Let policy and environment act in turn until `to_tick` ticks have passed since the start, or the run ends."""
-        if self._compiled is not None and isinstance(self._stack, RunRecorder):
+        compiled = self.compiled_policy
+        if compiled is not None and isinstance(self._stack, RunRecorder):
             end = self.forage_env.max_cycles
             n_ticks = (end if to_tick is None else min(to_tick, end)) - self.forage_env.tick
-            self._stack.run(self._compiled, max(0, n_ticks))
+            self._stack.run(compiled, max(0, n_ticks))
             self.over = self.forage_env.tick >= end
             return
         world, policy, has_tasks, obs, over = self.forage_env, self._policy, self._has_tasks, self._obs, self.over

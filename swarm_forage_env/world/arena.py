@@ -24,7 +24,7 @@ from swarm_forage_env.world.caches import (
 )
 from swarm_forage_env.world.compiled import CompiledTick, compiled_tick, new_world
 from swarm_forage_env.world.interactions import Interactions
-from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
+from swarm_forage_env.world.kernels.tick import BAD_TASKS, DONE, NO_ROOM, TO_PLACE, run
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.placement import draw_source, place_all, place_objects, static_cache_centres
 from swarm_forage_env.world.sensors import new_sensors, read_slices
@@ -213,7 +213,8 @@ class ForagingArena:
         Bodies must be compiled, too. `task_shares` (codes,) gets the share of active robots in each task, tick by tick.
         """
         physics, n_left = self._physics, n_ticks
-        assert isinstance(physics, Bodies), "Chipmunk is not compiled"
+        if not isinstance(physics, Bodies):
+            raise RuntimeError('Expected physics "compiled" for a run without Python between ticks, got "chipmunk".')
         tasks = policy.task if policy.task is not None else self._no_tasks
         run_compiled: Callable[..., tuple[int, int]] | None = None
         while n_left:
@@ -241,6 +242,11 @@ class ForagingArena:
                 run_compiled = direct(run, *arguments)
             n_done, outcome = run_compiled(*arguments)
             policy.count_ticks(n_done)
+            if outcome == BAD_TASKS:
+                raise ValueError(f"Expected tasks with shape {self.swarm.active.shape} and codes of Task, got {tasks}.")
+            if outcome >= 0:  # the last of these ticks has not happened
+                self.tick, self._moved = self.tick + n_done - 1, self._moved and n_done == 1
+                n_done = 1
             last = n_done - 1
             draws = picks[last % len(picks)], walks[last % len(walks)]
             self._conclude(outcome, self.tick + n_done, policy.state[-1], self._unit_gain, policy.task, draws)

@@ -86,9 +86,16 @@ class RunRecorder(SwarmWrapper):
             self._close_interval(has_tasks=tasks is not None)
 
     def run(self, policy: CompiledPolicy, n_ticks: int) -> None:
-        """Let a compiled policy drive a swarm without other wrappers for some ticks, at most to the horizon."""
+        """Let a compiled policy drive a swarm for some ticks, at most to the horizon.
+
+        Raises:
+            RuntimeError: there are other wrappers, which this would pass by, or bodies that are not compiled.
+        """
         env = self.unwrapped
-        while n_ticks:
+        if self._inner is not env:
+            raise RuntimeError("Expected no wrapper besides the recorder; step tick by tick.")
+        n_ticks = min(n_ticks, env.max_cycles - env.tick)
+        while n_ticks > 0:
             n_steps = min(n_ticks, self._ticks_left)
             env.run(policy, n_steps, self._task_sums)
             n_ticks -= n_steps

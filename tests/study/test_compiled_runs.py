@@ -8,7 +8,7 @@ from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.run import LiveRun, build_stack
+from swarm_forage_env.study.run import LiveRun, build_env, build_stack
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.foraging import quick_world
@@ -61,7 +61,25 @@ def test_a_run_without_python_is_the_run_with_it(policy, name, fields):
 
 def is_compiled(world: ScenarioConfig, policy: Policy, *wrappers: str) -> bool:
     stack = build_stack(world, [parse_wrapper(text) for text in wrappers], reads=policy.reads)
-    return LiveRun(stack, policy, seed=0)._compiled is not None
+    return LiveRun(stack, policy, seed=0).compiled_policy is not None
+
+
+class Proxy:
+    """Hands everything on but what it does itself, as wrappers of policies often do."""
+
+    def __init__(self, policy):
+        self.policy = policy
+
+    def __getattr__(self, name):
+        return getattr(self.policy, name)
+
+    def act(self, obs, active):
+        return 0.5 * self.policy.act(obs, active)
+
+
+class Watcher(RunRecorder):
+    def after_step(self, tasks, terminated, truncated):
+        super().after_step(tasks, terminated, truncated)
 
 
 class Slow(CRWPolicy):
@@ -73,6 +91,11 @@ def test_python_is_asked_wherever_it_has_a_say():
     world = scenario("warehouse_small", n_robots=2, physics="compiled")
     assert is_compiled(world, CRWPolicy())
     assert not is_compiled(world, Slow())
+    assert not is_compiled(world, Proxy(CRWPolicy()))
+    assert LiveRun(Watcher(build_env(world)), CRWPolicy(), seed=0).compiled_policy is None
+    patched = build_stack(world)
+    patched.after_step = lambda *arguments: None
+    assert LiveRun(patched, CRWPolicy(), seed=0).compiled_policy is None
     assert not is_compiled(world, tick_by_tick(CRWPolicy()))
     assert not is_compiled(world, CRWPolicy(), "sensor_noise:sigma=0.01")
     assert not is_compiled(scenario("warehouse_small", n_robots=2), CRWPolicy())

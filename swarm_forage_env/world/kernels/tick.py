@@ -35,6 +35,8 @@ TO_PLACE = -2
 """Objects or caches are to be placed, then `close` is still to come."""
 NO_ROOM = -3
 """There is no room for all pairs of robots that might touch. `set_out` is done, nobody was moved."""
+BAD_TASKS = -4
+"""The policy's task codes are not one per robot, or none of `Task`."""
 _CACHES_ALIVE, _OBJECTS_CACHED = int(Counter.CACHES_ALIVE), int(Counter.OBJECTS_CACHED)
 _OBJECTS_MOVED = int(Counter.OBJECTS_MOVED)
 
@@ -242,8 +244,8 @@ def run(
         policy(obs, active, policy_draws[k], policy_state, policy_first + k)
         chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
         outcome = whole(w, b, actions, wheel_gain, first + k, look_first and k == 0, chance, walk_chance)
-        if tasks.shape[0] > 0:
-            add_task_shares(tasks, active, task_shares)
+        if outcome < 0 and tasks.shape[0] > 0 and not add_task_shares(tasks, active, task_shares):
+            return k + 1, BAD_TASKS
         if outcome != DONE:
             return k + 1, outcome
     return n_ticks, DONE
