@@ -51,7 +51,7 @@ class DrawBlocks:
 
 
 class CompiledScript:
-    """A scripted policy as `contract.policy.CompiledPolicy`."""
+    """A scripted policy as `swarm_forage_env.contract.policy.CompiledPolicy`."""
 
     def __init__(
         self, kernel: Callable[..., None], state: tuple[Any, ...], policy: "ScriptedPolicy", chance: DrawBlocks
