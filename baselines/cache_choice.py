@@ -8,8 +8,8 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import Row
 
 from .cache_memory import OneTaskMemory, covers, keep_away_m
-from .machines import ACQUIRE, TRANSPORT, Senses
 from .memory import OneMemory, density
+from .robots import ACQUIRE, TRANSPORT, Senses
 from .tasks import DRAW_POINT_X, DRAW_POINT_Y
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 
 from .cache_memory import OneTaskMemory, keep_away_m
-from .machines import Senses
+from .robots import Senses
 from .tasks import DRAW_POINT_X, DRAW_POINT_Y
 
 _RIM_M = 1e-6

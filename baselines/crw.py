@@ -1,6 +1,6 @@
 """CRW: the correlated random walk controller. It has no memory; robots carry objects that they meet to the light.
 
-States and exits (`machines.Activity`):
+States and exits (`robots.Activity`):
 
     ACQUIRE         random walk; ground sensors see an object, after 10 s    -> WAIT_PICKUP
     WAIT_PICKUP     stand, ask; cargo -> HOMING; refused or vanished         -> ACQUIRE
@@ -22,21 +22,16 @@ from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, ObsArray
 
 from .machines import (
-    ACQUIRE,
     DELIVER,
-    DRAWS,
-    HOMING,
-    WAIT_PICKUP,
     after_delivery,
     command,
     deliver_and_leave,
     explore_for_object,
     explore_freely,
     follow_cargo,
-    new_robots,
-    sense,
 )
 from .parameters import ControllerParameters, chosen_parameters, kernel_constants
+from .robots import ACQUIRE, DRAWS, HOMING, WAIT_PICKUP, new_robots, sense
 from .scripted import ScriptedPolicy
 
 

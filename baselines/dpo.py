@@ -13,12 +13,7 @@ from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 
 from .machines import (
-    ACQUIRE,
     DELIVER,
-    DRAWS,
-    HOMING,
-    VECTOR_IDLE,
-    WAIT_PICKUP,
     acquire,
     after_delivery,
     command,
@@ -26,12 +21,11 @@ from .machines import (
     explore_for_object,
     explore_freely,
     follow_cargo,
-    new_robots,
-    sense,
 )
 from .memory import ObjectMemory, forget, look_around, memory_of, new_memory, object_row_of, remembered_objects
 from .object_choice import MemoryParameters, object_is_known, object_is_reached, select_object
 from .parameters import chosen_parameters, kernel_constants
+from .robots import ACQUIRE, DRAWS, HOMING, VECTOR_IDLE, WAIT_PICKUP, new_robots, sense
 from .scripted import ScriptedPolicy
 
 

@@ -12,9 +12,9 @@ from swarm_forage_env.contract.detection import sees_object
 from swarm_forage_env.contract.layout import GROUND_SENSORS
 from swarm_forage_env.contract.types import Row
 
-from .machines import Senses
 from .memory import OneMemory, density
 from .parameters import ControllerParameters, ParameterError
+from .robots import Senses
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -9,8 +9,8 @@ from swarm_forage_env._internal.compiling import Callback, direct
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 
-from .machines import describe_robot
 from .parameters import require_inputs
+from .robots import describe_robot
 
 NUMBERS_PER_BLOCK = 8192
 """Numbers are drawn for several ticks in one call: 64 KiB of them, which stay in a processor's cache."""
@@ -153,7 +153,7 @@ class ScriptedPolicy:
 
     @property
     def activity(self) -> CodeArray:
-        """(N,) `machines.Activity` codes, a copy."""
+        """(N,) `robots.Activity` codes, a copy."""
         return self._robots["activity"].copy()
 
     def describe_robot(self, row: int) -> str:

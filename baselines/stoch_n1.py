@@ -22,7 +22,7 @@ from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray, Row
 from swarm_forage_env.scenarios.quirks import Quirks
 
-from .machines import ACQUIRE, TRANSPORT, WAIT_DROP, WAIT_PICKUP
+from .robots import ACQUIRE, TRANSPORT, WAIT_DROP, WAIT_PICKUP
 from .tasks import N_TABS, N_TASKS, ROOTED_TAB, SOURCE, TAB_CHILDREN, TAB_ROOT, Goal, Tab, TaskParameters
 
 NO_TASK = int(Task.NONE)

@@ -37,6 +37,22 @@ from .cache_memory import (
 )
 from .cache_sites import select_site
 from .machines import (
+    acquire,
+    command,
+    deliver_and_leave,
+    explore,
+    explore_for_object,
+    follow_cargo,
+    go_to_goal,
+    random_walk,
+    restart_acquiring,
+    start_carrying,
+    start_vector,
+    stop_vector,
+)
+from .memory import forget, look_around, object_row_of
+from .object_choice import object_is_known, object_is_reached, select_best_object
+from .robots import (
     ACQUIRE,
     DRAW_RESTART,
     DRAW_WANDER,
@@ -48,23 +64,9 @@ from .machines import (
     WAIT_DROP,
     WAIT_PICKUP,
     Senses,
-    acquire,
-    command,
-    deliver_and_leave,
-    explore,
-    explore_for_object,
-    follow_cargo,
-    go_to_goal,
     new_robots,
-    random_walk,
-    restart_acquiring,
     sense,
-    start_carrying,
-    start_vector,
-    stop_vector,
 )
-from .memory import forget, look_around, object_row_of
-from .object_choice import object_is_known, object_is_reached, select_best_object
 from .stoch_n1 import NO_TASK, Allocation, after_tick, end_task, next_task
 from .tasks import DESTINATION, DRAW_ABORT, DRAW_MOVE, DRAW_PARTITION, DRAW_SWITCH, DROP_GRIP, SOURCE, Goal
 

@@ -9,9 +9,9 @@ from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import CodeArray, FloatArray, IntArray
 
 from .cache_memory import new_task_memory
-from .machines import describe_robot
 from .memory import density, remembered_objects
 from .parameters import chosen_parameters, kernel_constants
+from .robots import describe_robot
 from .scripted import ScriptedPolicy
 from .stoch_n1 import new_allocation
 from .task_machines import new_task_robots, step_tasks

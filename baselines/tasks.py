@@ -20,9 +20,9 @@ import numpy as np
 
 from swarm_forage_env.contract.codes import Grip, Task
 
-from .machines import DRAWS
 from .object_choice import MemoryParameters
 from .parameters import ParameterError
+from .robots import DRAWS
 
 
 class Goal(IntEnum):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from baselines.dpo import DPOPolicy
-from baselines.machines import ACQUIRE
+from baselines.robots import ACQUIRE
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import FloatArray

@@ -14,7 +14,7 @@ from baselines.cache_choice import (
     select_cache,
     select_isolated_object,
 )
-from baselines.machines import Activity
+from baselines.robots import Activity
 from baselines.stochm import STOCHMPolicy
 from baselines.task_machines import select_goal
 from baselines.tasks import DRAW_POINT_X, DRAW_POINT_Y, TASK_DRAWS, Goal

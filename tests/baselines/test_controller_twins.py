@@ -7,7 +7,7 @@ import pytest
 
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
-from baselines.machines import DRAWS, VectorState
+from baselines.robots import DRAWS, VectorState
 from swarm_forage_env.contract.codes import Event
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from tests.reference.controllers import ObjectDictionary, ReferenceRobot

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baselines.crw import CRWPolicy
-from baselines.machines import Activity
+from baselines.robots import Activity
 from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.observations import Observations, make_spec

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from baselines.dpo import DPOPolicy
-from baselines.machines import Activity, VectorState, restart_acquiring
+from baselines.machines import restart_acquiring
 from baselines.memory import OneMemory, remember
 from baselines.object_choice import MemoryParameters, object_utility
 from baselines.parameters import kernel_constants
+from baselines.robots import Activity, VectorState
 from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.observations import Observations, make_spec

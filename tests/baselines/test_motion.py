@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from baselines.crw import CRWPolicy
-from baselines.machines import new_robots
 from baselines.motion import arrival, avoidance, drive, is_standing, phototaxis, recovery, wander, wander_freely
 from baselines.parameters import ControllerParameters, kernel_constants
+from baselines.robots import new_robots
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from tests.support.observations import Observations, make_spec
 

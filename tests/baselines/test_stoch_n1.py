@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from baselines import stoch_n1
-from baselines.machines import Activity
+from baselines.robots import Activity
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
 from baselines.task_policy import task_constants

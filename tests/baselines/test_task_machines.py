@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from baselines.machines import Activity, VectorState
+from baselines.robots import Activity, VectorState
 from baselines.scripted import DrawBlocks
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy

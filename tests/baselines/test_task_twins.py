@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from baselines.machines import Activity
+from baselines.robots import Activity
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
 from baselines.tasks import TASK_DRAWS, Goal

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from baselines.machines import VectorState
+from baselines.robots import VectorState
 from swarm_forage_env.contract.codes import Event, Task
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.task_robot import TaskRobot

@@ -12,7 +12,10 @@ SOURCES = sorted(file for package in PACKAGES for file in (ROOT / package).rglob
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 PAGES.remove(ROOT / "CHANGELOG.md")  # it tells of names that are no more
 CHANGELOG = (ROOT / "CHANGELOG.md").read_text()
-OBJECTS = {"env", "interface", "layout", "plan", "policy", "rng", "spec", "state", "training", "world", "wrapper"}
+OBJECTS = {
+    *("env", "interface", "layout", "plan", "policy", "rng"),
+    *("robots", "spec", "state", "training", "world", "wrapper"),
+}
 """Old and new modules whose names are also those of objects: of these, only classes and what has moved count."""
 FOREIGN = {"gymnasium", "pettingzoo"}
 """Other packages of which a module of ours has the name."""

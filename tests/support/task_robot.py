@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from baselines.cache_memory import OneTaskMemory, remember_cache
-from baselines.machines import Activity, VectorState, restart_acquiring, sense
+from baselines.machines import restart_acquiring
 from baselines.memory import OneMemory, remember
+from baselines.robots import Activity, VectorState, sense
 from baselines.stochx import STOCHXPolicy
 from baselines.task_policy import TaskPolicy
 from baselines.tasks import ROOTED_TAB, TAB_CHILDREN

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from baselines.machines import Activity, VectorState
+from baselines.robots import Activity, VectorState
 from swarm_forage_env.contract.codes import Event, Grip, Task
 from tests.support.task_robot import TaskRobot
 

@@ -1,0 +1,168 @@
+"""A robot of the scripted controllers: its inner state, its draws, and what it makes of its observation.
+
+Conventions of all functions that handle one robot: `robot` is one record of `ROBOT_FIELDS`, edited in place; `row` its
+observation; `c` the record of `parameters.kernel_constants`; `draws` its uniform draws of this tick, one column per
+use, so that no decision shifts the randomness of another.
+"""
+
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.detection import is_obstacle_vector, ring_is_empty, ring_sum, sees_nest
+from swarm_forage_env.contract.layout import EVENT_SCALE, GROUND_SENSORS, RING_SENSORS
+from swarm_forage_env.contract.types import Row
+
+
+class Activity(IntEnum):
+    """What a robot is busy with."""
+
+    ACQUIRE = 0
+    """Looking for an object, or on the way to one."""
+    WAIT_PICKUP = 1
+    """Standing on an object, asking for it."""
+    HOMING = 2
+    """Carrying, outside the nest, towards the light."""
+    HOMING_IN_NEST = 3
+    """Carrying, inside the nest, looking for a place to drop."""
+    WAIT_DROP = 4
+    """Standing at the destination, asking to drop."""
+    LEAVE_NEST = 5
+    """Empty, wandering until the nest is left."""
+    TRANSPORT = 6
+    """Carrying, looking for a destination other than the nest, or on the way to it."""
+    FINISHED = 7
+    """Just dropped: the task is done."""
+    LET_GO = 8
+    """Giving up while carrying: standing, releasing the object here."""
+
+
+class VectorState(IntEnum):
+    """Stages of going to a point."""
+
+    IDLE = 0
+    VECTOR = 1
+    AVOIDANCE = 2
+    RECOVERY = 3
+
+
+ACQUIRE = int(Activity.ACQUIRE)
+WAIT_PICKUP = int(Activity.WAIT_PICKUP)
+HOMING = int(Activity.HOMING)
+HOMING_IN_NEST = int(Activity.HOMING_IN_NEST)
+WAIT_DROP = int(Activity.WAIT_DROP)
+LEAVE_NEST = int(Activity.LEAVE_NEST)
+TRANSPORT = int(Activity.TRANSPORT)
+FINISHED = int(Activity.FINISHED)
+LET_GO = int(Activity.LET_GO)
+VECTOR_IDLE = int(VectorState.IDLE)
+VECTOR = int(VectorState.VECTOR)
+VECTOR_AVOIDANCE = int(VectorState.AVOIDANCE)
+VECTOR_RECOVERY = int(VectorState.RECOVERY)
+
+NOT_EXPLORING = -1
+
+DRAW_DEPTH = 0
+"""Draw column: drop distance from the nest centre."""
+DRAW_WANDER = 1
+"""Draw column: wandering while exploring, in the nest, leaving it."""
+DRAW_RESTART = 2
+"""Draw column: the second wander of an exploration's first tick (quirk `explore_double_start`)."""
+DRAW_VECTOR = 3
+"""Draw column: wandering to break free on the way to a point."""
+DRAWS = 4
+
+ROBOT_FIELDS: list[tuple[str, type]] = [
+    ("wander_deg", np.float64),  # wander angle
+    ("drop_depth_m", np.float64),  # deliver at most this far from the nest centre
+    ("goal_x_m", np.float64),
+    ("goal_y_m", np.float64),
+    ("goal_tolerance_m", np.float64),
+    ("target", np.int32),  # identity of the goal: row of an object, or serial of a cache
+    ("explore_ticks", np.int32),  # since exploration started, or NOT_EXPLORING
+    ("recovery_ticks", np.int32),  # driven straight on after avoiding
+    ("turn_ticks", np.int32),  # in a row, up to now, in which it was told to turn on the spot or to stand
+    ("clock", np.int32),  # ticks lived through while active
+    ("n_known", np.int32),  # remembered objects
+    ("window_x", np.int32),  # lower left cell of the window seen last
+    ("window_y", np.int32),
+    ("n_shown", np.int8),  # objects in that window
+    ("activity", np.int8),
+    ("vector_state", np.int8),
+    ("is_slowing", np.bool_),  # within the slowing radius at the last arrival force
+    ("is_searching", np.bool_),  # the point it goes to is where a search begins, not a goal
+]
+"""Inner state of one robot; a controller may add fields of its own."""
+
+NO_WINDOW = -(2**30)
+
+
+def new_robots(n_robots: int, more_fields: Sequence[tuple[str, type]] = ()) -> np.ndarray:
+    """Return (n_robots,) records of `ROBOT_FIELDS` and `more_fields` that start to acquire and have seen nothing."""
+    # With the common fields first, numba would treat a longer record as a subtype of the shorter one, and warn.
+    fields = np.dtype([*more_fields, *ROBOT_FIELDS], align=True)
+    # np.record makes fields readable as attributes also in uncompiled kernels; compiled kernels need no help.
+    robots = np.zeros(n_robots, np.dtype((np.record, fields)))
+    robots["explore_ticks"] = NOT_EXPLORING
+    robots["target"] = -1
+    robots["window_x"] = NO_WINDOW
+    robots["window_y"] = NO_WINDOW
+    return robots
+
+
+def describe_robot(robot: np.record) -> str:
+    """Return what a robot is up to in one line for people: activity, and how it goes to which point, if to any."""
+    told = Activity(int(robot.activity)).name.lower()
+    if robot.vector_state != VectorState.IDLE:
+        stage = VectorState(int(robot.vector_state)).name.lower()
+        purpose = "start of a search" if robot.is_searching else "goal"
+        goal = f"({robot.goal_x_m:.2f}, {robot.goal_y_m:.2f}) within {robot.goal_tolerance_m:g} m"
+        return f"{told}, {stage}, {purpose} {goal}"
+    if robot.explore_ticks != NOT_EXPLORING:
+        told += f", exploring for {robot.explore_ticks} ticks"
+    return told
+
+
+class Senses(NamedTuple):
+    """What a robot makes of its observation in every tick."""
+
+    obstacle: bool
+    obstacle_x: float
+    """Summed proximity vector, body frame, forward."""
+    obstacle_y: float
+    carrying: bool
+    event: int
+    """Code of `Event`."""
+    x: float
+    """Believed position, m."""
+    y: float
+
+
+@kernel
+def sense(row: Row, c: np.record) -> Senses:
+    """Read one observation row."""
+    obstacle = False
+    obstacle_x = 0.0
+    obstacle_y = 0.0
+    proximity = row[c.proximity : c.proximity + RING_SENSORS]
+    if not ring_is_empty(proximity):
+        obstacle_x, obstacle_y = ring_sum(proximity)
+        obstacle = is_obstacle_vector(obstacle_x, obstacle_y, c.obstacle_behind_counts != 0)
+    return Senses(
+        obstacle,
+        obstacle_x,
+        obstacle_y,
+        row[c.carrying] > 0.5,
+        int(row[c.event] * EVENT_SCALE + 0.5),
+        (float(row[c.position]) + 1.0) * c.half_width_m,
+        (float(row[c.position + 1]) + 1.0) * c.half_height_m,
+    )
+
+
+@kernel
+def in_nest(row: Row, c: np.record) -> bool:
+    """Whether the ground sensors see the nest."""
+    return sees_nest(row[c.ground : c.ground + GROUND_SENSORS])
