@@ -58,6 +58,11 @@ def kernel(function: F) -> F:
     return cast(F, compiled)
 
 
+def is_compiled(function: Callable[..., Any]) -> bool:
+    """Whether calls of a kernel run compiled code; not so where the compiler is switched off."""
+    return hasattr(function, "compile")
+
+
 def direct(function: F, *example: Any) -> F:
     """Return a call of a kernel for arguments of the types of `example`, compiled here if it is not yet.
 
@@ -86,6 +91,8 @@ def _kind_of(argument: Any) -> Any:
         return argument.dtype, argument.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned, flags.writeable
     if isinstance(argument, tuple):
         return type(argument), *map(_kind_of, argument)
+    if type(argument) in (bool, int, float):
+        return type(argument)
     return _type_of(argument)
 
 
@@ -100,7 +107,7 @@ class Callback:
         """Compile `function`, which returns nothing, for arguments of the types of `example`."""
         self.function = function
         self.type: Any = None
-        if not hasattr(function, "compile"):  # the compiler is switched off
+        if not is_compiled(function):
             return
         arguments = tuple(typeof(argument) for argument in example)
         self.type = types.FunctionType(types.none(*arguments))
