@@ -51,12 +51,11 @@ def share(records: dict[str, RunRecord], calm: Sequence[RunSpec], noisy: Sequenc
     return f"{100 * after / before:.0f}" if before else "-"
 
 
-def false_obstacles(records: dict[str, RunRecord], specs: Sequence[RunSpec]) -> float:
+def false_obstacles(records: dict[str, RunRecord], specs: Sequence[RunSpec]) -> str:
     """Return the share of robot time in which a false obstacle is seen: believed less true interference."""
     own = [records[spec.run_id] for spec in specs]
-    return float(
-        np.mean([(r.contributed["believed_interference_fraction"] - r.interference_fraction).mean() for r in own])
-    )
+    mean = np.mean([(r.contributed["believed_interference_fraction"] - r.interference_fraction).mean() for r in own])
+    return f"{round(float(mean), 2) + 0.0:.2f}"  # zero without a sign
 
 
 def lines(world: ScenarioConfig, reading: str, chosen: argparse.Namespace) -> Iterator[str]:
@@ -73,7 +72,7 @@ def lines(world: ScenarioConfig, reading: str, chosen: argparse.Namespace) -> It
     for source in SOURCES:
         shares = [share(records, calm[p], cells[source, sigma][p]) for sigma in chosen.sigmas for p in POLICIES]
         yield f"| {source.replace('_', ' ')} | " + " | ".join(shares) + " |"
-    false = [f"{sigma:g}: {false_obstacles(records, cells['proximity', sigma]['crw']):.2f}" for sigma in chosen.sigmas]
+    false = [f"{sigma:g}: {false_obstacles(records, cells['proximity', sigma]['crw'])}" for sigma in chosen.sigmas]
     yield ""
     yield f"Share of robot time in which CRW sees a false obstacle, by sigma on proximity: {', '.join(false)}."
 
