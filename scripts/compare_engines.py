@@ -17,13 +17,12 @@ from scipy.spatial import KDTree
 
 from baselines.dpo import DPOPolicy
 from metrics.statistics import aggregate
-from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.run import build_env
+from swarm_forage_env.study.run import LiveRun, build_env
 from swarm_forage_env.study.spec import plan_run
 from swarm_forage_env.world.contact import TOUCH_SLACK_M
 
@@ -66,13 +65,12 @@ class ContactCount:
 def measured(world: ScenarioConfig, policy_name: str, seed: int) -> dict[str, float]:
     """The measures of one run, by name."""
     policy = load_policy(policy_name)
-    env = build_env(world, reads=getattr(policy, "reads", None)).unwrapped
-    policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
-    obs, done = env.reset_batch(seed), False
+    run = LiveRun(build_env(world, reads=getattr(policy, "reads", None)), policy, seed)
+    env = run.forage_env
     contacts = ContactCount(world.robots.radius_m)
     conflicts = ConflictCount(2 * world.robots.radius_m + TOUCH_SLACK_M)
-    while not done:
-        obs, _, _, done = env.step_batch(policy.act(obs, env.active), tasks=getattr(policy, "task", None))
+    while not run.over:
+        run.advance(to_tick=env.tick + 1)
         contacts.look(env.swarm.position, env.tick)
         if isinstance(policy, DPOPolicy):
             conflicts.look(policy, env.swarm.position, env.tick)

@@ -15,11 +15,10 @@ import numpy as np
 
 from baselines.dpo import DPOPolicy
 from baselines.robots import ACQUIRE
-from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.study.run import build_stack
+from swarm_forage_env.study.run import LiveRun, build_env
 from swarm_forage_env.world.contact import TOUCH_SLACK_M
 
 UNRESOLVED_TICKS = 1_000
@@ -64,12 +63,11 @@ def conflicts_of_run(name: str, seed: int, seconds: float, overrides: dict[str, 
     """Deliveries of one run of DPO, and of each conflict its ticks, its ticks in touch, its last tick in touch."""
     world = scenario(name, horizon_s=seconds, interval_s=seconds, **overrides)
     policy = DPOPolicy()
-    env = build_stack(world, reads=policy.reads).unwrapped
-    policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
-    obs, done = env.reset_batch(seed), False
+    run = LiveRun(build_env(world, reads=policy.reads), policy, seed)
+    env = run.forage_env
     count = ConflictCount(2 * world.robots.radius_m + TOUCH_SLACK_M)
-    while not done:
-        obs, _, _, done = env.step_batch(policy.act(obs, env.active))
+    while not run.over:
+        run.advance(to_tick=env.tick + 1)
         count.look(policy, env.swarm.position, env.tick)
     return int(env.events.counters[Counter.COLLECTED]), list(count.found.values())
 
