@@ -1,6 +1,6 @@
 """What noise on one group of sensors, or on the wheels, leaves of the performance: a table per world and reading.
 
-    python scripts/noise_by_group.py            all of docs/readings.md; twenty minutes of processor time
+    python scripts/noise_by_group.py            all worlds, groups and readings; shows how much time is left
     python scripts/noise_by_group.py --scenario warehouse_small --sigmas 0.03 --seeds 4
 
 Numbers are performance in percent of the same policy's without noise; runs are paired by seed and kept in --out.
