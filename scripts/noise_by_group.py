@@ -8,7 +8,7 @@ Numbers are performance in percent of the same policy's without noise; runs are 
 
 import argparse
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -53,12 +53,10 @@ class TablePlan:
     """Those with it, by source and sigma, and then by policy."""
 
 
-def planned(world: ScenarioConfig, source: str, sigma: float, seeds: int) -> dict[str, list[RunSpec]]:
-    """Return the runs of each policy; sigma 0 = without noise."""
+def with_noise(calm: dict[str, list[RunSpec]], source: str, sigma: float) -> dict[str, list[RunSpec]]:
+    """Return the same runs of each policy with noise."""
     wrappers = disturbances(source, sigma) if sigma else ()
-    return {
-        policy: [plan_run(world, policy, wrappers=wrappers, seed=seed) for seed in range(seeds)] for policy in POLICIES
-    }
+    return {policy: [replace(spec, wrappers=wrappers) for spec in specs] for policy, specs in calm.items()}
 
 
 def share(records: dict[str, RunRecord], calm: Sequence[RunSpec], noisy: Sequence[RunSpec]) -> str:
@@ -79,8 +77,9 @@ def tables(chosen: argparse.Namespace) -> Iterator[TablePlan]:
     for name in chosen.scenario:
         for reading, quirks in READINGS.items():
             world = scenario(name, n_robots=chosen.robots, horizon_s=chosen.horizon, quirks=quirks)
-            cells = {(s, sigma): planned(world, s, sigma, chosen.seeds) for s in SOURCES for sigma in chosen.sigmas}
-            yield TablePlan(world, reading, chosen.sigmas, planned(world, "", 0.0, chosen.seeds), cells)
+            calm = {p: [plan_run(world, p, seed=seed) for seed in range(chosen.seeds)] for p in POLICIES}
+            noisy = {(s, sigma): with_noise(calm, s, sigma) for s in SOURCES for sigma in chosen.sigmas}
+            yield TablePlan(world, reading, chosen.sigmas, calm, noisy)
 
 
 def lines(plan: TablePlan, store: RunStore, jobs: int | None) -> Iterator[str]:

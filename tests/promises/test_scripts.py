@@ -48,7 +48,11 @@ def test_two_versions_are_drawn_beside_each_other(tmp_path):
         ("noise_by_group", "--seeds 0", "argument --seeds: expected a whole number >= 1, got '0'"),
         ("noise_by_group", "--horizon 300", "Expected a horizon of a whole number of intervals of 200 s, got 300 s"),
         ("noise_by_group", "--sigmas -1", "Expected sensor_noise.sigma to be a finite number >= 0, got -1.0"),
-        ("noise_by_group", "--out taken/noise", "[Errno 20] Not a directory: 'taken/noise'"),
+        (
+            "noise_by_group",
+            "--scenario warehouse_small --sigmas 0.1 --out taken/noise",
+            "[Errno 20] Not a directory: 'taken/noise'",
+        ),
         ("contact_conflicts", "--seconds 0.3", "Expected horizon_s to be a whole number of ticks of 0.2 s, got 0.3"),
         ("compare_engines", "--robots 4,many", "argument --robots: expected a whole number >= 1, got 'many'"),
         ("compare_engines", "--policy crv", "Unknown policy 'crv'. Did you mean 'crw'?"),
