@@ -6,55 +6,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swarm_forage_env._internal.compiling import Callback, direct
+from swarm_forage_env._internal.rng import TickDraws
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 
 from .parameters import require_inputs
 from .robots import describe_robot
 
-NUMBERS_PER_BLOCK = 8192
-"""Numbers are drawn for several ticks in one call: 64 KiB of them, which stay in a processor's cache."""
-
-
-class DrawBlocks:
-    """The uniform draws of every tick. They are those of one call of `rng.random` per tick, made in fewer calls."""
-
-    def __init__(self, rng: np.random.Generator, n_robots: int, n_draws: int) -> None:
-        """Take the generator; nobody else may draw from it from now on.
-
-        Args:
-            rng: Generator of the policy's stream.
-            n_robots: N.
-            n_draws: Numbers per robot and tick.
-        """
-        ticks = max(1, NUMBERS_PER_BLOCK // (n_robots * n_draws))
-        self._rng = rng
-        self._block = np.empty((ticks, n_robots, n_draws))
-        self._used = ticks
-
-    def next_tick(self) -> FloatArray:
-        """Return the (N, n_draws) numbers in [0, 1) of the next tick; they may be overwritten one tick later."""
-        numbers = self.next_ticks()[0]
-        self.use(1)
-        return numbers
-
-    def next_ticks(self) -> FloatArray:
-        """Return the (ticks, N, n_draws) numbers of the ticks to come that are drawn already, at least one tick."""
-        if self._used == len(self._block):
-            self._rng.random(out=self._block)
-            self._used = 0
-        return self._block[self._used :]
-
-    def use(self, n_ticks: int) -> None:
-        """Count the numbers of so many ticks as used up."""
-        self._used += n_ticks
-
 
 class CompiledScript:
     """A scripted policy as `swarm_forage_env.contract.policy.CompiledPolicy`."""
 
     def __init__(
-        self, kernel: Callable[..., None], state: tuple[Any, ...], policy: "ScriptedPolicy", chance: DrawBlocks
+        self, kernel: Callable[..., None], state: tuple[Any, ...], policy: "ScriptedPolicy", chance: TickDraws
     ) -> None:
         """Compile the kernel as one that other kernels call; see `ScriptedPolicy._start`."""
         self.state = state
@@ -65,12 +29,12 @@ class CompiledScript:
 
     def next_ticks(self) -> tuple[int, FloatArray]:
         """Return the number of the next tick, and the draws (ticks, N, n_draws) of it and of some that follow."""
-        return self._policy.n_ticks + 1, self._chance.next_ticks()
+        tick = self._policy.n_ticks + 1
+        return tick, self._chance.rows(tick)
 
     def count_ticks(self, n_ticks: int) -> None:
         """Note that the kernel has done so many ticks."""
         self._policy.n_ticks += n_ticks
-        self._chance.use(n_ticks)
 
 
 def example_of(state: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -114,7 +78,7 @@ class ScriptedPolicy:
         """
         self._spec = spec
         self._shapes = ((spec.n_robots, spec.layout.size), (spec.n_robots,))
-        self._chance = DrawBlocks(rng, spec.n_robots, n_draws)
+        self._chance = TickDraws(rng, spec.n_robots, n_draws)
         self._constants = constants
         self._robots = robots
         self._actions: ActionArray = np.zeros((spec.n_robots, 3), np.float32)
@@ -132,8 +96,8 @@ class ScriptedPolicy:
             require_inputs(obs, active, self._spec)
         # The compiled version takes contiguous arrays of these types only. Most often nothing is copied here.
         obs, active = np.ascontiguousarray(obs, np.float32), np.ascontiguousarray(active, np.bool_)
-        self._draws = self._chance.next_tick()
         self.n_ticks += 1
+        self._draws = self._chance.row(self.n_ticks)
         self._step(obs, active, self._draws, self._state, self.n_ticks)
         return self._actions
 

@@ -9,22 +9,23 @@ equivalent. A difference is compiled minus Chipmunk, the mean over seeds with a 
 
 import argparse
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
+from arguments import whole
 from contact_conflicts import ConflictCount
 from scipy.spatial import KDTree
 
 from baselines.dpo import DPOPolicy
 from metrics.statistics import aggregate
-from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.run import build_env
-from swarm_forage_env.study.spec import plan_run
+from swarm_forage_env.study.run import LiveRun, build_env
+from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.world.contact import TOUCH_SLACK_M
 
 MEASURES = {
@@ -66,13 +67,12 @@ class ContactCount:
 def measured(world: ScenarioConfig, policy_name: str, seed: int) -> dict[str, float]:
     """The measures of one run, by name."""
     policy = load_policy(policy_name)
-    env = build_env(world, reads=getattr(policy, "reads", None)).unwrapped
-    policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
-    obs, done = env.reset_batch(seed), False
+    run = LiveRun(build_env(world, reads=getattr(policy, "reads", None)), policy, seed)
+    env = run.forage_env
     contacts = ContactCount(world.robots.radius_m)
     conflicts = ConflictCount(2 * world.robots.radius_m + TOUCH_SLACK_M)
-    while not done:
-        obs, _, _, done = env.step_batch(policy.act(obs, env.active), tasks=getattr(policy, "task", None))
+    while not run.over:
+        run.advance(to_tick=env.tick + 1)
         contacts.look(env.swarm.position, env.tick)
         if isinstance(policy, DPOPolicy):
             conflicts.look(policy, env.swarm.position, env.tick)
@@ -91,15 +91,18 @@ def measured(world: ScenarioConfig, policy_name: str, seed: int) -> dict[str, fl
     return dict(zip(MEASURES, map(float, values), strict=True))
 
 
-def rows_of_case(name: str, policy: str, n_robots: int, seeds: int, horizon_s: float) -> Iterator[str]:
+def case(name: str, policy: str, n_robots: int, horizon_s: float) -> list[RunSpec]:
+    """Plan a run in each engine, in the order of `PHYSICS_ENGINES`."""
+    world = scenario(name, n_robots=n_robots, horizon_s=horizon_s, interval_s=horizon_s)
+    return [plan_run(replace(world, physics=physics), policy) for physics in PHYSICS_ENGINES]
+
+
+def rows_of_case(specs: Sequence[RunSpec], seeds: int) -> Iterator[str]:
     """Run one case in both engines; one line of the table per measure."""
-    runs: dict[str, list[dict[str, float]]] = {}
-    for physics in PHYSICS_ENGINES:
-        world = scenario(name, n_robots=n_robots, horizon_s=horizon_s, interval_s=horizon_s, physics=physics)
-        spec = plan_run(world, policy)
-        runs[physics] = [measured(spec.scenario, policy, seed) for seed in range(seeds)]
+    name, policy, n_robots = specs[0].scenario.name, specs[0].policy, specs[0].scenario.robots.n_robots
+    runs = [[measured(spec.scenario, policy, seed) for seed in range(seeds)] for spec in specs]
     for measure, decimals in MEASURES.items():
-        chipmunk, compiled = (np.array([run[measure] for run in runs[physics]]) for physics in PHYSICS_ENGINES)
+        chipmunk, compiled = (np.array([run[measure] for run in of_engine]) for of_engine in runs)
         if measure in ("conflicts over one object", "of these in touch") and policy != "dpo":
             continue
         difference = aggregate(compiled - chipmunk)
@@ -118,19 +121,30 @@ def words(text: str) -> list[str]:
     return text.split(",")
 
 
+def numbers(text: str) -> list[int]:
+    """Whole numbers separated by commas."""
+    return [whole(at_least=1)(word) for word in words(text)]
+
+
 def main() -> None:
     """Print the table, case by case."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenario", type=words, default=["warehouse_small"], help="presets, separated by commas")
     parser.add_argument("--policy", type=words, default=["crw", "dpo"], help="policies, separated by commas")
-    parser.add_argument("--robots", type=words, default=["16", "64"], help="numbers of robots, separated by commas")
-    parser.add_argument("--seeds", type=int, default=4)
+    parser.add_argument("--robots", type=numbers, default=[16, 64], help="numbers of robots, separated by commas")
+    parser.add_argument(
+        "--seeds", type=whole(at_least=2), default=4, help="runs of a case, for an interval two or more"
+    )
     parser.add_argument("--horizon", type=float, default=2_000.0, help="length of a run in s")
     chosen = parser.parse_args()
+    try:
+        cases = [case(*of, chosen.horizon) for of in itertools.product(chosen.scenario, chosen.policy, chosen.robots)]
+    except ValueError as error:  # a scenario, a policy or a number that there is not
+        parser.error(str(error))
     print("| scenario | policy | robots | measure | Chipmunk | compiled | difference |")
     print("|---|---|--:|---|--:|--:|--:|")
-    for name, policy, n_robots in itertools.product(chosen.scenario, chosen.policy, map(int, chosen.robots)):
-        for row in rows_of_case(name, policy, n_robots, chosen.seeds, chosen.horizon):
+    for specs in cases:
+        for row in rows_of_case(specs, chosen.seeds):
             print(row, flush=True)
 
 

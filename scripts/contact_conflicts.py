@@ -9,17 +9,18 @@ It is unresolved if the pair is still in touch when the run ends and has been fo
 
 import argparse
 from itertools import combinations
-from typing import Any
 
 import numpy as np
+from arguments import whole
 
 from baselines.dpo import DPOPolicy
 from baselines.robots import ACQUIRE
-from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.study.run import build_stack
+from swarm_forage_env.study.run import LiveRun, build_env
 from swarm_forage_env.world.contact import TOUCH_SLACK_M
 
 UNRESOLVED_TICKS = 1_000
@@ -60,16 +61,14 @@ class ConflictCount:
                     conflict[2] = tick
 
 
-def conflicts_of_run(name: str, seed: int, seconds: float, overrides: dict[str, Any]) -> tuple[int, list[list[int]]]:
+def conflicts_of_run(world: ScenarioConfig, seed: int) -> tuple[int, list[list[int]]]:
     """Deliveries of one run of DPO, and of each conflict its ticks, its ticks in touch, its last tick in touch."""
-    world = scenario(name, horizon_s=seconds, interval_s=seconds, **overrides)
     policy = DPOPolicy()
-    env = build_stack(world, reads=policy.reads).unwrapped
-    policy.reset(env.swarm_spec, stream_rng(seed, Stream.POLICY))
-    obs, done = env.reset_batch(seed), False
+    run = LiveRun(build_env(world, reads=policy.reads), policy, seed)
+    env = run.forage_env
     count = ConflictCount(2 * world.robots.radius_m + TOUCH_SLACK_M)
-    while not done:
-        obs, _, _, done = env.step_batch(policy.act(obs, env.active))
+    while not run.over:
+        run.advance(to_tick=env.tick + 1)
         count.look(policy, env.swarm.position, env.tick)
     return int(env.events.counters[Counter.COLLECTED]), list(count.found.values())
 
@@ -78,14 +77,19 @@ def main() -> None:
     """Run the seeds and print one line each, and one for all."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenario", choices=SCENARIO_NAMES, default="warehouse_medium")
-    parser.add_argument("--robots", type=int, help="default: those of the scenario")
-    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--robots", type=whole(at_least=1), help="default: those of the scenario")
+    parser.add_argument("--seeds", type=whole(at_least=1), default=10)
     parser.add_argument("--seconds", type=float, default=2_000.0)
     arguments = parser.parse_args()
     overrides = {} if arguments.robots is None else {"n_robots": arguments.robots}
+    seconds = {"horizon_s": arguments.seconds, "interval_s": arguments.seconds}
+    try:
+        world = scenario(arguments.scenario, **seconds, **overrides)
+    except ConfigError as error:
+        parser.error(str(error))
     delivered, conflicts = 0, []
     for seed in range(arguments.seeds):
-        deliveries, of_run = conflicts_of_run(arguments.scenario, seed, arguments.seconds, overrides)
+        deliveries, of_run = conflicts_of_run(world, seed)
         print(line(f"seed {seed}", deliveries, of_run, arguments.seconds))
         delivered, conflicts = delivered + deliveries, conflicts + of_run
     print(line("all", delivered, conflicts, arguments.seconds))

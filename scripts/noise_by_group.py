@@ -1,6 +1,6 @@
 """What noise on one group of sensors, or on the wheels, leaves of the performance: a table per world and reading.
 
-    python scripts/noise_by_group.py            all of docs/readings.md; twenty minutes of processor time
+    python scripts/noise_by_group.py            all worlds, groups and readings; shows how much time is left
     python scripts/noise_by_group.py --scenario warehouse_small --sigmas 0.03 --seeds 4
 
 Numbers are performance in percent of the same policy's without noise; runs are paired by seed and kept in --out.
@@ -8,14 +8,17 @@ Numbers are performance in percent of the same policy's without noise; runs are 
 
 import argparse
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from arguments import whole
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import READINGS
-from swarm_forage_env.study.record import RunRecord
+from swarm_forage_env.study.record import RecordError, RunRecord
 from swarm_forage_env.study.runner import run_all
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.study.store import RunStore
@@ -37,12 +40,23 @@ def disturbances(source: str, sigma: float) -> tuple[WrapperConfig, ...]:
     return tuple(config for config in (sensors, wheels) if config is not None)
 
 
-def planned(world: ScenarioConfig, source: str, sigma: float, seeds: int) -> dict[str, list[RunSpec]]:
-    """Return the runs of each policy; sigma 0 = without noise."""
+@dataclass(frozen=True)
+class TablePlan:
+    """The runs of one table."""
+
+    world: ScenarioConfig
+    reading: str
+    sigmas: Sequence[float]
+    calm: dict[str, list[RunSpec]]
+    """Runs without noise, by policy."""
+    noisy: dict[tuple[str, float], dict[str, list[RunSpec]]]
+    """Those with it, by source and sigma, and then by policy."""
+
+
+def with_noise(calm: dict[str, list[RunSpec]], source: str, sigma: float) -> dict[str, list[RunSpec]]:
+    """Return the same runs of each policy with noise."""
     wrappers = disturbances(source, sigma) if sigma else ()
-    return {
-        policy: [plan_run(world, policy, wrappers=wrappers, seed=seed) for seed in range(seeds)] for policy in POLICIES
-    }
+    return {policy: [replace(spec, wrappers=wrappers) for spec in specs] for policy, specs in calm.items()}
 
 
 def share(records: dict[str, RunRecord], calm: Sequence[RunSpec], noisy: Sequence[RunSpec]) -> str:
@@ -51,29 +65,37 @@ def share(records: dict[str, RunRecord], calm: Sequence[RunSpec], noisy: Sequenc
     return f"{100 * after / before:.0f}" if before else "-"
 
 
-def false_obstacles(records: dict[str, RunRecord], specs: Sequence[RunSpec]) -> float:
+def false_obstacles(records: dict[str, RunRecord], specs: Sequence[RunSpec]) -> str:
     """Return the share of robot time in which a false obstacle is seen: believed less true interference."""
     own = [records[spec.run_id] for spec in specs]
-    return float(
-        np.mean([(r.contributed["believed_interference_fraction"] - r.interference_fraction).mean() for r in own])
-    )
+    mean = np.mean([(r.contributed["believed_interference_fraction"] - r.interference_fraction).mean() for r in own])
+    return f"{round(float(mean), 2) + 0.0:.2f}"  # zero without a sign
 
 
-def lines(world: ScenarioConfig, reading: str, chosen: argparse.Namespace) -> Iterator[str]:
+def tables(chosen: argparse.Namespace) -> Iterator[TablePlan]:
+    """Plan all tables."""
+    for name in chosen.scenario:
+        for reading, quirks in READINGS.items():
+            world = scenario(name, n_robots=chosen.robots, horizon_s=chosen.horizon, quirks=quirks)
+            calm = {p: [plan_run(world, p, seed=seed) for seed in range(chosen.seeds)] for p in POLICIES}
+            noisy = {(s, sigma): with_noise(calm, s, sigma) for s in SOURCES for sigma in chosen.sigmas}
+            yield TablePlan(world, reading, chosen.sigmas, calm, noisy)
+
+
+def lines(plan: TablePlan, store: RunStore, jobs: int | None) -> Iterator[str]:
     """Run what a table needs and yield its lines."""
-    calm = planned(world, "", 0.0, chosen.seeds)
-    cells = {(s, sigma): planned(world, s, sigma, chosen.seeds) for s in SOURCES for sigma in chosen.sigmas}
-    specs = [spec for runs in (calm, *cells.values()) for own in runs.values() for spec in own]
-    found = run_all(specs, store=RunStore(chosen.out), jobs=chosen.jobs, progress=True)
+    specs = [spec for runs in (plan.calm, *plan.noisy.values()) for own in runs.values() for spec in own]
+    found = run_all(specs, store=store, jobs=jobs, progress=True)
     records = {record.run_id: record for record in found.records}
-    yield f"**{world.name}, {world.robots.n_robots} robots, {reading}: performance in % of that without noise**"
+    world, sigmas = plan.world, plan.sigmas
+    yield f"**{world.name}, {world.robots.n_robots} robots, {plan.reading}: performance in % of that without noise**"
     yield ""
-    yield "| noise on | " + " | ".join(f"{p} {sigma:g}" for sigma in chosen.sigmas for p in POLICIES) + " |"
-    yield "|---|" + "--:|" * (len(chosen.sigmas) * len(POLICIES))
+    yield "| noise on | " + " | ".join(f"{p} {sigma:g}" for sigma in sigmas for p in POLICIES) + " |"
+    yield "|---|" + "--:|" * (len(sigmas) * len(POLICIES))
     for source in SOURCES:
-        shares = [share(records, calm[p], cells[source, sigma][p]) for sigma in chosen.sigmas for p in POLICIES]
+        shares = [share(records, plan.calm[p], plan.noisy[source, sigma][p]) for sigma in sigmas for p in POLICIES]
         yield f"| {source.replace('_', ' ')} | " + " | ".join(shares) + " |"
-    false = [f"{sigma:g}: {false_obstacles(records, cells['proximity', sigma]['crw']):.2f}" for sigma in chosen.sigmas]
+    false = [f"{sigma:g}: {false_obstacles(records, plan.noisy['proximity', sigma]['crw'])}" for sigma in sigmas]
     yield ""
     yield f"Share of robot time in which CRW sees a false obstacle, by sigma on proximity: {', '.join(false)}."
 
@@ -84,16 +106,19 @@ def main() -> None:
     worlds = ("warehouse_small", "warehouse_medium", "search_and_rescue")
     parser.add_argument("--scenario", nargs="+", default=worlds, choices=worlds)
     parser.add_argument("--sigmas", nargs="+", type=float, default=[0.004, 0.017, 0.03, 0.1])
-    parser.add_argument("--robots", type=int, default=50)
-    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--robots", type=whole(at_least=1), default=50)
+    parser.add_argument("--seeds", type=whole(at_least=1), default=2)
     parser.add_argument("--horizon", type=float, default=2000.0, help="simulated seconds per run")
-    parser.add_argument("--jobs", type=int, help="processes; default one per core")
+    parser.add_argument("--jobs", type=whole(at_least=1), help="processes; default one per core")
     parser.add_argument("--out", type=Path, default=Path("results/noise"), help="folder for records")
     chosen = parser.parse_args()
-    for name in chosen.scenario:
-        for reading, quirks in READINGS.items():
-            world = scenario(name, n_robots=chosen.robots, horizon_s=chosen.horizon, quirks=quirks)
-            print("\n".join(lines(world, reading, chosen)), end="\n\n", flush=True)
+    try:
+        store, plans = RunStore(chosen.out), list(tables(chosen))
+        chosen.out.mkdir(parents=True, exist_ok=True)
+    except (ConfigError, RecordError, OSError) as error:
+        parser.error(str(error))
+    for plan in plans:
+        print("\n".join(lines(plan, store, chosen.jobs)), end="\n\n", flush=True)
 
 
 if __name__ == "__main__":

@@ -32,9 +32,10 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import CACHE_KINDS, ScenarioConfig, with_overrides
 from swarm_forage_env.scenarios.presets import scenario as preset
-from swarm_forage_env.study.run import LiveRun, build_stack
+from swarm_forage_env.study.run import LiveRun, build_env, build_stack
 from swarm_forage_env.study.spec import chosen_caches
 from swarm_forage_env.wrappers.base import SwarmWrapper
+from swarm_forage_env.wrappers.recorder import RunRecorder
 
 INTERVAL_TICKS = 10
 """Length of a recording interval in compared records. Our choice: short, so that small differences are seen."""
@@ -209,7 +210,8 @@ def check_policy(
     The policy acts for a while, with some robots away and then with all robots away. Its actions must have the right
     shape, type and range, and `task` must hold codes of `Task`. Then it gets the same observations again: after a reset
     it must act in the same way, also if the slices that it does not read hold other values, and if an observation array
-    is overwritten after `act`. Last it gets another number of robots.
+    is overwritten after `act`. If it offers `compiled`, a run by that must be the run by `act`. Last it gets another
+    number of robots.
 
     Args:
         policy: A registered name, the path of a policy file, a class that needs no arguments, or an object (which is
@@ -246,6 +248,7 @@ def check_policy(
                 f"Expected equal actions when the slices that are not in reads = {reads!r} hold {words}",
                 "name every slice that act looks at in reads; the others are not computed in runs.",
             )
+    _check_compiled(subject, config, seed, ticks)
     n_robots = config.robots.n_robots
     other = ForageEnv(with_overrides(config, n_robots=n_robots // 2 if n_robots > 1 else 2))
     for _ in _act_in(subject, other, seed, min(ticks, INTERVAL_TICKS), away=False):
@@ -384,6 +387,32 @@ def _without_unread(
         yield obs
 
 
+class _TickByTick(RunRecorder):
+    """A recorder with which policies are asked by `act`: `LiveRun` makes compiled runs for the plain one only."""
+
+
+def _check_compiled(policy: Policy, config: ScenarioConfig, seed: int, ticks: int) -> None:
+    """Compare a run by `compiled`, if the policy offers it, with one by `act`."""
+    if not hasattr(type(policy), "compiled"):
+        return
+    config = _recorded_often(replace(config, physics="compiled"), ticks * config.dt_s)
+    reads = getattr(policy, "reads", None)
+    by_act = _results(_TickByTick(build_env(config, reads=reads)), policy, seed)
+    try:
+        by_compiled = _results(build_stack(config, reads=reads), policy, seed)
+    except Exception as error:
+        raise CheckError(
+            f"Expected what compiled returns to drive a run, got {type(error).__name__}: {error}. "
+            "See contract.policy.CompiledPolicy, or leave compiled out."
+        ) from error
+    different = _first_difference(by_act, by_compiled)
+    if different:
+        raise CheckError(
+            f"Expected what compiled returns to do what act does, got another {different} in a run of "
+            f"{config.horizon_ticks} ticks; let both call one kernel, with the same draws in every tick."
+        )
+
+
 def _checked_statements(policy: Policy, layout: ObservationLayout) -> tuple[str, ...] | None:
     """Return `reads` of a policy, None = all; raises CheckError when `reads` names no slice."""
     reads = getattr(policy, "reads", None)
@@ -425,29 +454,40 @@ def check_determinism(
     if not len(seeds):
         raise ValueError("Expected seeds to run, got none; give at least one.")
     build = _factory(policy)
-    config = _config_for(_built(build), scenario)
-    interval_s = INTERVAL_TICKS * config.dt_s
-    config = replace(config, interval_s=interval_s, horizon_s=max(1, round(seconds / interval_s)) * interval_s)
+    config = _recorded_often(_config_for(_built(build), scenario), seconds)
     for seed in seeds:
-        first, again = (_results(_built(build), config, seed) for _ in range(2))
-        for name, values in first.items():
-            if not np.array_equal(values, again.get(name, np.empty(0))):
-                raise CheckError(
-                    f"Expected two runs with seed {seed} to be equal, got another {name}; draw random numbers from the "
-                    "generator that reset is given only, and let runs share nothing (class attributes, globals)."
-                )
+        policies = (_built(build), _built(build))
+        runs = (_results(build_stack(config, reads=getattr(each, "reads", None)), each, seed) for each in policies)
+        different = _first_difference(*runs)
+        if different:
+            raise CheckError(
+                f"Expected two runs with seed {seed} to be equal, got another {different}; draw random numbers from "
+                "the generator that reset is given only, and let runs share nothing (class attributes, globals)."
+            )
 
 
-def _results(policy: Policy, config: ScenarioConfig, seed: int) -> dict[str, np.ndarray]:
-    """Return the columns of a run's record, and the positions at its end, which show differences first."""
-    recorder = build_stack(config, reads=getattr(policy, "reads", None))
+def _recorded_often(config: ScenarioConfig, seconds: float) -> ScenarioConfig:
+    """Return a scenario with intervals of `INTERVAL_TICKS`, about as long as this and at least one interval."""
+    interval_s = INTERVAL_TICKS * config.dt_s
+    return replace(config, interval_s=interval_s, horizon_s=max(1, round(seconds / interval_s)) * interval_s)
+
+
+def _results(recorder: RunRecorder, policy: Policy, seed: int) -> dict[str, np.ndarray]:
+    """Make a run; return its columns, and the poses at its end, which show differences first."""
     run = LiveRun(recorder, policy, seed)
     run.advance()
+    swarm = run.forage_env.swarm
     return {
-        "position of the robots at the end": run.forage_env.swarm.position.copy(),
+        "position of the robots at the end": swarm.position.copy(),
+        "heading of the robots at the end": swarm.heading.copy(),
         **recorder.columns(),
         **recorder.contributed(),
     }
+
+
+def _first_difference(run: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> str:
+    """Return the name of the first result that differs, "" if none does."""
+    return next((name for name in run if not np.array_equal(run[name], other.get(name, np.empty(0)))), "")
 
 
 # ---------------------------------------------------------------------------------------- from arguments to policies

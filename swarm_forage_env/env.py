@@ -291,7 +291,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     def snapshot(self) -> Snapshot:
         """Return the state of the run as a value, which does not change when the run goes on; it can be pickled.
 
-        Random generators of the spaces are no part of it.
+        Random generators of the spaces are no part of it, nor attributes that a subclass adds.
 
         Raises:
             RuntimeError: before the first reset.

@@ -8,7 +8,10 @@ from gymnasium import spaces
 from pettingzoo.utils import BaseParallelWrapper
 
 import swarm_forage_env
+from baselines.crw import CRWPolicy
+from baselines.scripted import example_of
 from swarm_forage_env import CheckError, check_determinism, check_env, check_policy
+from swarm_forage_env._internal.compiling import Callback, kernel
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import from_callable, policy_names
@@ -347,6 +350,65 @@ class UnknownCaches(Sound):
 def test_each_fault_of_a_policy_is_found(policy, fault):
     with pytest.raises(CheckError, match=fault):
         check_policy(policy, SMALL)
+
+
+@kernel
+def stand(_obs, _active, _draws, state, _now):
+    actions = state[-1]
+    for i in range(actions.shape[0]):
+        actions[i, 0], actions[i, 1], actions[i, 2] = 0.0, 0.0, 0.0
+
+
+@kernel
+def go_nowhere(_obs, _active, _draws, state, _now):
+    actions = state[-1]
+    for i in range(actions.shape[0]):
+        actions[i, 0] = np.nan
+
+
+class StandsWhenCompiled(CRWPolicy):
+    other = staticmethod(stand)
+
+    def compiled(self):
+        script = super().compiled()
+        script.callback = Callback(self.other, *example_of(script.state))
+        return script
+
+
+class FailsWhenCompiled(StandsWhenCompiled):
+    other = staticmethod(go_nowhere)
+
+
+class ForgetsTicksWhenCompiled(CRWPolicy):
+    """Draws the same numbers again and again."""
+
+    def compiled(self):
+        script = super().compiled()
+        script.count_ticks = lambda n_ticks: None
+        return script
+
+
+class NotCompiledToday(CRWPolicy):
+    def compiled(self):
+        return None
+
+
+@pytest.mark.parametrize(
+    ("policy", "fault"),
+    [
+        (StandsWhenCompiled, "do what act does, got another position of the robots at the end in a run of 150 ticks"),
+        (ForgetsTicksWhenCompiled, "do what act does, got another position"),
+        (FailsWhenCompiled, r"drive a run, got ActionError: .* got \[nan, .* for robot_0"),
+    ],
+)
+def test_compiled_must_do_what_act_does(policy, fault):
+    with pytest.raises(CheckError, match=fault):
+        check_policy(policy, SMALL)
+
+
+@pytest.mark.parametrize("policy", [CRWPolicy, NotCompiledToday])
+def test_what_compiles_to_the_same_or_not_at_all_passes(policy):
+    check_policy(policy, SMALL)
 
 
 def test_actions_of_inactive_robots_may_be_anything():

@@ -1,7 +1,7 @@
 """The Policy protocol, and what a policy knows before a run.
 
 A policy, scripted or trained, sees observations and never the state of the world. `baselines` imports only this folder,
-`Quirks`, and the tools `compiling` and `spelling`, and nothing else of `swarm_forage_env`.
+`Quirks`, and the tools `compiling`, `rng` and `spelling`, and nothing else of `swarm_forage_env`.
 """
 
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.layout import ObservationLayout, observation_layout
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -18,6 +19,14 @@ from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, WHEEL_SCALE_MP
 
 class ActionError(ValueError):
     """Actions of the wrong shape, or not finite."""
+
+
+def refused_tasks(tasks: CodeArray, n_robots: int) -> ValueError:
+    """Return the error about tasks that are not one code of `Task` per robot."""
+    return ValueError(
+        f"Expected tasks with shape (n_robots,) = ({n_robots},) and codes of Task (0 to {len(Task) - 1}), "
+        f"got shape {tasks.shape} with codes {np.unique(tasks).tolist()}."
+    )
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -11,7 +11,7 @@ from swarm_forage_env._internal.fields import whole
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import observation_layout
-from swarm_forage_env.contract.policy import ActionError, CompiledPolicy
+from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, refused_tasks
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
 from swarm_forage_env.scenarios.units import CELLS_PER_M
@@ -25,7 +25,7 @@ from swarm_forage_env.world.caches import (
 from swarm_forage_env.world.compiled import CompiledTick, new_world
 from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels.bodies import BodyState
-from swarm_forage_env.world.kernels.tick import BAD_TASKS, DONE, NO_ROOM, TO_PLACE, run
+from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
 from swarm_forage_env.world.kernels.world import World
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.placement import draw_source, place_all, place_objects, static_cache_centres
@@ -217,10 +217,15 @@ class ForagingArena:
         """Let a compiled policy drive the world for some ticks; what happens is what `step` and `act` do by turns.
 
         Bodies must be compiled, too. `task_shares` (codes,) gets the share of active robots in each task, tick by tick.
+
+        Raises:
+            ActionError: as in `step`; the ticks before have happened.
+            ValueError: task codes that cannot be counted; their tick has happened.
+            RuntimeError: bodies that are not compiled.
         """
         bodies, n_left = self.bodies, n_ticks
         tasks = policy.task if policy.task is not None else self._no_tasks
-        run_compiled: Callable[..., tuple[int, int]] | None = None
+        run_compiled: Callable[..., tuple[int, int, bool]] | None = None
         while n_left:
             first = self.tick + 1
             now, policy_draws = policy.next_ticks()
@@ -244,12 +249,12 @@ class ForagingArena:
             )
             if run_compiled is None:
                 run_compiled = direct(run, *arguments)
-            n_done, outcome = run_compiled(*arguments)
+            n_done, outcome, tasks_counted = run_compiled(*arguments)
             policy.count_ticks(n_done)
-            if outcome == BAD_TASKS:
-                raise ValueError(f"Expected tasks with shape {self.swarm.active.shape} and codes of Task, got {tasks}.")
             self.tick, self.has_changed = self.tick + n_done - 1, self.has_changed and n_done == 1
             self.conclude(outcome, policy.state[-1], self._unit_gain, policy.task)
+            if not tasks_counted:
+                raise refused_tasks(tasks, len(self.swarm.active))
             n_left -= n_done
 
     # For `world.rack`

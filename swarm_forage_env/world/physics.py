@@ -226,9 +226,8 @@ class Physics:
         for tick in range(history.n_ticks + 1):
             for change in history.changes.get(tick, ()):
                 if isinstance(change, bytes):
-                    present = np.frombuffer(
-                        change, np.bool_
-                    ).copy()  # kernels are compiled for arrays that can be written
+                    # A copy, because kernels are compiled for arrays that can be written.
+                    present = np.frombuffer(change, np.bool_).copy()
                 elif len(change) == 1:
                     self._park(*change)
                 else:

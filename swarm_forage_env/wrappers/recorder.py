@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 
 from swarm_forage_env.contract.codes import Counter, Task
-from swarm_forage_env.contract.policy import CompiledPolicy
+from swarm_forage_env.contract.policy import CompiledPolicy, refused_tasks
 from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import whole_intervals
@@ -75,10 +75,7 @@ class RunRecorder(SwarmWrapper):
         if self._complete:
             return
         if tasks is not None and not add_task_shares(tasks, self.unwrapped.active, self._task_sums):
-            raise ValueError(
-                f"Expected tasks with shape (n_robots,) = {self.unwrapped.active.shape} and codes of Task "
-                f"(0 to {len(Task) - 1}), got shape {tasks.shape} with codes {np.unique(tasks).tolist()}."
-            )
+            raise refused_tasks(tasks, len(self.unwrapped.active))
         self._ticks_left -= 1
         # Checking the first row alone is fast, and in almost every tick it is enough.
         self._complete = truncated or bool(terminated[0] and terminated.all())

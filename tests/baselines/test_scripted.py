@@ -1,4 +1,4 @@
-"""What all scripted controllers share: draws in blocks, copies in the middle of a run, arrays of any layout."""
+"""What all scripted controllers share: copies in the middle of a run, arrays of any layout."""
 
 import copy
 import pickle
@@ -8,7 +8,6 @@ import pytest
 
 from baselines.crw import CRWPolicy
 from baselines.dpo import DPOPolicy
-from baselines.scripted import DrawBlocks
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
 from tests.support.observations import Observations, make_spec
@@ -16,13 +15,6 @@ from tests.support.observations import Observations, make_spec
 N_ROBOTS = 5
 TICKS = 40
 POLICIES = [CRWPolicy, DPOPolicy, STOCHMPolicy, STOCHXPolicy]
-
-
-@pytest.mark.parametrize("n_robots", [1, 3, 700, 5000])
-def test_blocks_hold_the_numbers_of_one_call_per_tick(n_robots):
-    blocks, again = DrawBlocks(np.random.default_rng(4), n_robots, 4), np.random.default_rng(4)
-    for _ in range(150 if n_robots < 100 else 8):
-        np.testing.assert_array_equal(blocks.next_tick(), again.random((n_robots, 4)))
 
 
 def started(policy_class):

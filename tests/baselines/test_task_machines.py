@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from baselines.robots import Activity, VectorState
-from baselines.scripted import DrawBlocks
 from baselines.stochm import STOCHMPolicy
 from baselines.stochx import STOCHXPolicy
-from baselines.tasks import TASK_DRAWS
 from swarm_forage_env.contract.codes import Event, Grip, Task
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.support.task_robot import TaskRobot
@@ -307,13 +305,12 @@ def test_giving_up_while_waiting_cancels_the_interaction(robot):
 
 def test_the_abort_draw_is_compared_with_the_abort_probability(robot):
     robot.start(Task.GENERALIST)
-    draws = np.random.default_rng(8).random((1, TASK_DRAWS))[0]
-    for p, gives_up in [(draws[4], False), (np.nextafter(draws[4], 1.0), True)]:
-        robot.policy._chance = DrawBlocks(np.random.default_rng(8), 1, TASK_DRAWS)
-        robot.policy._allocation.p_abort[:] = p
+    for rounding in (0.0, 1.0):
+        chance = robot.policy._chance.row(robot.policy.n_ticks + 1)[0, 4]
+        robot.policy._allocation.p_abort[:] = np.nextafter(chance, rounding)
         before = robot.policy._allocation.exec_start[0].max()
         robot.act()
-        assert (robot.policy._allocation.exec_start[0].max() > before) == gives_up
+        assert (robot.policy._allocation.exec_start[0].max() > before) == (rounding == 1.0)
 
 
 # Exception lists

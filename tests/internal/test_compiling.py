@@ -1,7 +1,9 @@
-"""Compiled functions: outdated results are never taken from the cache."""
+"""Compiled functions: outdated results are never taken from the cache; kernels that are handed to other kernels."""
 
 import ast
+import copy
 import os
+import pickle
 import re
 import subprocess
 import sys
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal import compiling
+from swarm_forage_env._internal.compiling import Callback, direct, kernel
 
 INNER = """
 from swarm_forage_env._internal.compiling import kernel
@@ -117,6 +120,7 @@ NOT_COMPILED_IN = {
         "contract/types",  # annotations
         "contract/policy",  # a protocol and a dataclass, for the policies beside the kernels
         "scenarios/quirks",  # a dataclass; kernels are handed single switches
+        "_internal/rng",  # kernels are handed the numbers
         "_internal/spelling",  # error messages
     )
 }
@@ -155,3 +159,42 @@ def test_a_direct_call_refuses_arrays_of_another_type():
     call_it = compiling.direct(_doubled, np.zeros(3), 1.0, np.zeros(3))
     with pytest.raises(TypeError):
         call_it(np.zeros(3, np.float32), 2.0, np.zeros(3))
+
+
+@kernel
+def double(numbers):
+    for i in range(numbers.size):
+        numbers[i] *= 2.0
+
+
+@kernel
+def negate(numbers):
+    for i in range(numbers.size):
+        numbers[i] = -numbers[i]
+
+
+@kernel
+def change_thrice(change, numbers):
+    for _ in range(3):
+        change(numbers)
+
+
+def test_a_kernel_takes_any_function_of_a_type_as_an_argument():
+    """Compiled once, for one function; another takes its place."""
+    numbers = np.array([1.0, 3.0])
+    call = direct(change_thrice, Callback(double, numbers), numbers)
+    for function, expected in ((double, [8.0, 24.0]), (negate, [-8.0, -24.0])):
+        call(Callback(function, numbers), numbers)
+        assert numbers.tolist() == expected
+
+
+def test_a_callback_can_be_called_from_python():
+    numbers = np.array([1.0, 3.0])
+    Callback(double, numbers)(numbers)
+    assert numbers.tolist() == [2.0, 6.0]
+
+
+@pytest.mark.parametrize("copied", [pickle.dumps, copy.deepcopy, copy.copy])
+def test_a_callback_is_not_taken_to_another_process(copied):
+    with pytest.raises(TypeError, match="cannot be pickled; make it anew from its function"):
+        copied(Callback(double, np.zeros(2)))

@@ -41,10 +41,28 @@ def test_negative_seed_is_refused():
         stream_rng(-1, Stream.POLICY)
 
 
-@pytest.mark.parametrize("n_numbers", [1, 7, 3000, 5000])
-def test_draws_by_tick_are_those_of_one_call_per_tick(n_numbers):
-    draws, rng = TickDraws(np.random.default_rng(5), n_numbers), np.random.default_rng(5)
-    for tick in range(1, 12):
-        expected = rng.random(n_numbers)
-        np.testing.assert_array_equal(draws.row(tick), expected)
-        np.testing.assert_array_equal(draws.row(tick), expected)
+@pytest.mark.parametrize("shape", [(1,), (7,), (9000,), (0,), (3, 4), (700, 4)])
+def test_draws_by_tick_are_those_of_one_call_per_tick(shape):
+    draws, rng = TickDraws(np.random.default_rng(5), *shape), np.random.default_rng(5)
+    for tick in range(1, 12 if shape != (1,) else 10_000):
+        expected = rng.random(shape)
+        np.testing.assert_array_equal(draws.row(tick), expected, strict=True)
+        np.testing.assert_array_equal(draws.row(tick), expected, strict=True)
+
+
+@pytest.mark.parametrize("shape", [(2000,), (500, 4)])
+def test_rows_are_of_the_ticks_that_are_drawn_already(shape):
+    draws, again = TickDraws(np.random.default_rng(5), *shape), np.random.default_rng(5).random((12, *shape))
+    tick = 1
+    while tick <= 8:
+        rows = draws.rows(tick)
+        np.testing.assert_array_equal(rows, again[tick - 1 : tick - 1 + len(rows)], strict=True)
+        np.testing.assert_array_equal(draws.rows(tick + len(rows) - 1), rows[-1:], strict=True)
+        tick += len(rows)
+
+
+def test_a_tick_may_be_left_out():
+    """Also so many that numbers of a whole block are asked for by nobody."""
+    draws, again = TickDraws(np.random.default_rng(5), 4000), np.random.default_rng(5).random((9, 4000))
+    for tick in (1, 4, 9):
+        np.testing.assert_array_equal(draws.row(tick), again[tick - 1])

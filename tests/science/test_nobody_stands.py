@@ -13,10 +13,15 @@ pytestmark = [pytest.mark.slow, pytest.mark.compiled]
 CONTROLLERS = ["crw", "dpo", "stochm", "stochx"]
 SMALL = ("warehouse_small", {"horizon_s": 4000.0})
 CROWDED = ("warehouse_small", {"horizon_s": 2000.0, "n_robots": 128})
+MEDIUM = ("warehouse_medium", {"horizon_s": 2000.0})
 RESCUE = ("search_and_rescue", {"horizon_s": 3000.0, "side_m": 32.0})
 NOISES = ["sensor_noise:sigma=0.005", "actuator_noise:sigma=0.03"]
 TOUCH_M = 0.175
 """Centres of touching robots are 0.170 m apart."""
+
+under_both_readings = pytest.mark.parametrize(
+    "quirks", [Quirks(), AUTHORS_PROGRAM], ids=["as described", "authors' program"]
+)
 
 
 def named_reason(one: StuckRobot, noise: str | None) -> str:
@@ -37,7 +42,7 @@ def unexplained(name, fields, policy, seed, quirks, noise=None) -> list[StuckRob
     return [one for one in find_stuck(spec) if not named_reason(one, noise)]
 
 
-@pytest.mark.parametrize("quirks", [Quirks(), AUTHORS_PROGRAM], ids=["as described", "authors' program"])
+@under_both_readings
 @pytest.mark.parametrize("policy", CONTROLLERS)
 @pytest.mark.parametrize("world", [SMALL, RESCUE], ids=["small", "rescue"])
 def test_nobody_stands_in_calm(world, policy, quirks):
@@ -50,12 +55,18 @@ def test_nobody_stands_under_noise(policy, noise):
     assert unexplained(*SMALL, policy, 8, Quirks(), noise) == []
 
 
+@under_both_readings
+@pytest.mark.parametrize("noise", [None, NOISES[0]], ids=["calm", "sensor noise"])
+def test_nobody_stands_among_two_hundred(noise, quirks):
+    assert unexplained(*MEDIUM, "dpo", 5, quirks, noise) == []
+
+
 @pytest.mark.parametrize("policy", CONTROLLERS)
 def test_nobody_stands_in_a_crowd(policy):
     assert unexplained(*CROWDED, policy, 6, Quirks()) == []
 
 
-@pytest.mark.parametrize("quirks", [Quirks(), AUTHORS_PROGRAM], ids=["as described", "authors' program"])
+@under_both_readings
 def test_cache_starters_move_on_from_places_that_are_refused(quirks):
     """They stood for up to 4,300 s in this run."""
     assert unexplained("warehouse_small", {}, "stochx", 1, quirks) == []

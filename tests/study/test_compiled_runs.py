@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from baselines.crw import CRWPolicy
-from swarm_forage_env.contract.policy import Policy
+from baselines.stochm import STOCHMPolicy
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.contract.policy import ActionError, Policy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
@@ -12,6 +15,7 @@ from swarm_forage_env.study.run import LiveRun, build_env, build_stack
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.foraging import quick_world
+from tests.support.stage import assert_same_world, snapshot
 
 
 def tick_by_tick(policy: Policy) -> Policy:
@@ -99,3 +103,56 @@ def test_python_is_asked_wherever_it_has_a_say():
     assert not is_compiled(world, tick_by_tick(CRWPolicy()))
     assert not is_compiled(world, CRWPolicy(), "sensor_noise:sigma=0.01")
     assert not is_compiled(scenario("warehouse_small", n_robots=2), CRWPolicy())
+
+
+LAST_TICK = 5
+"""Of the faulty policies."""
+NO_TASK = max(Task) + 1
+
+
+@kernel
+def drive_until_nan(_obs, active, _draws, state, now):
+    actions = state[-1]
+    for i in range(active.size):
+        actions[i, 0], actions[i, 1], actions[i, 2] = 0.5, 0.4, -1.0
+    if now == LAST_TICK:
+        actions[2, 1] = np.nan
+
+
+@kernel
+def drive_until_no_task(_obs, active, _draws, state, now):
+    allocation, actions = state[-2], state[-1]
+    for i in range(active.size):
+        actions[i, 0], actions[i, 1], actions[i, 2] = 0.5, 0.4, -1.0
+    if now == LAST_TICK:
+        allocation.task[1] = NO_TASK
+
+
+class UntilNaN(CRWPolicy):
+    _kernel = staticmethod(drive_until_nan)
+
+
+class UntilNoTask(STOCHMPolicy):
+    _kernel = staticmethod(drive_until_no_task)
+
+
+@pytest.mark.parametrize(
+    ("policy_class", "error", "message", "ticks"),
+    [
+        (UntilNaN, ActionError, r"got \[0.5, nan, -1.0\] and \[1.0, 1.0\] for robot_2", LAST_TICK - 1),
+        (UntilNoTask, ValueError, rf"tasks with shape .* = \(4,\) .* codes \[.*{NO_TASK}\]", LAST_TICK),
+    ],
+)
+@pytest.mark.parametrize("start", [0, LAST_TICK - 1])
+def test_a_fault_ends_a_run_where_it_ends_with_python(policy_class, error, message, ticks, start):
+    world = scenario("warehouse_small", n_robots=4, n_objects=20, caches=policy_class.caches, physics="compiled")
+    ended = []
+    for policy in (policy_class(), tick_by_tick(policy_class())):
+        run = LiveRun(build_stack(world, reads=policy.reads), policy, seed=4)
+        run.advance(to_tick=start)
+        with pytest.raises(error, match=message):
+            run.advance()
+        assert policy.n_ticks == LAST_TICK
+        ended.append(snapshot(run.forage_env))
+    assert ended[0]["tick"] == ticks
+    assert_same_world(*ended)

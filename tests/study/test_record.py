@@ -1,6 +1,8 @@
 """RunRecord and its file."""
 
+import ast
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -234,6 +236,22 @@ def test_versions_are_known_for_every_package():
     versions = software_versions()
     assert set(recording.PACKAGES) <= versions.keys()
     assert versions["numpy"] == np.__version__
+
+
+IN_A_RUN = ("_internal", "contract", "scenarios", "world", "wrappers")
+"""Folders of swarm_forage_env that every tick of a run may go through."""
+
+
+def test_every_library_that_computes_in_a_run_is_in_its_record():
+    package = Path(recording.__file__).parents[1]
+    files = [file for folder in IN_A_RUN for file in (package / folder).rglob("*.py")]
+    files += (package.parent / "baselines").rglob("*.py")
+    imports = [node for file in files for node in ast.walk(ast.parse(file.read_text()))]
+    modules = {node.module for node in imports if isinstance(node, ast.ImportFrom) and node.level == 0}
+    modules |= {alias.name for node in imports if isinstance(node, ast.Import) for alias in node.names}
+    libraries = {module.split(".")[0] for module in modules} - sys.stdlib_module_names - {package.name}
+    assert "numpy" in libraries
+    assert libraries <= set(recording.PACKAGES)
 
 
 def test_the_commit_is_absent_outside_a_checkout(tmp_path, monkeypatch):

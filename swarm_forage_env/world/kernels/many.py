@@ -98,7 +98,7 @@ def sensors_at(s: Sensors, at: np.ndarray) -> Sensors:
 
 @kernel
 def world_at(w: World, at: np.ndarray) -> World:
-    """World like `w` whose arrays are `at` (50,) these addresses, in the order of `rack.arrays_of`."""
+    """World like `w` whose arrays are `at` (50,) these addresses, in the order of `world.rack.addresses`."""
     before, now = w.pressing
     return World(
         state_at(w.state, at[:28]),

@@ -35,8 +35,6 @@ TO_PLACE = -2
 """Objects or caches are to be placed, then `close` is still to come."""
 NO_ROOM = -3
 """There is no room for all pairs of robots that might touch. `set_out` is done, nobody was moved."""
-BAD_TASKS = -4
-"""The policy's task codes are not one per robot, or none of `Task`."""
 _CACHES_ALIVE, _OBJECTS_CACHED = int(Counter.CACHES_ALIVE), int(Counter.OBJECTS_CACHED)
 _OBJECTS_MOVED = int(Counter.OBJECTS_MOVED)
 
@@ -217,8 +215,10 @@ def run(
     walk_chances: FloatArray,
     tasks: CodeArray,
     task_shares: FloatArray,
-) -> tuple[int, int]:
-    """Let policy and world act in turn for up to `n_ticks` ticks; it ends early where a tick is not `DONE`.
+) -> tuple[int, int, bool]:
+    """Let policy and world act in turn for up to `n_ticks` ticks.
+
+    It ends early with a tick that is not `DONE`, or of which the tasks cannot be counted.
 
     Args:
         w: The world.
@@ -237,15 +237,15 @@ def run(
         task_shares: (codes,) the shares of active robots in each task are added, tick by tick.
 
     Returns:
-        How many ticks have begun, and the outcome of the last of them.
+        How many ticks have begun, the outcome of the last of them, and whether its tasks were codes of `Task`, one per
+        robot. Tasks of a tick with a refused action are not looked at.
     """
     obs, active, actions = w.sensors.obs, w.state.active, policy_state[-1]
     for k in range(n_ticks):
         policy(obs, active, policy_draws[k], policy_state, policy_first + k)
         chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
         outcome = whole(w, b, actions, wheel_gain, first + k, look_first and k == 0, chance, walk_chance)
-        if outcome < 0 and tasks.shape[0] > 0 and not add_task_shares(tasks, active, task_shares):
-            return k + 1, BAD_TASKS
-        if outcome != DONE:
-            return k + 1, outcome
-    return n_ticks, DONE
+        counted = outcome >= 0 or tasks.shape[0] == 0 or add_task_shares(tasks, active, task_shares)
+        if outcome != DONE or not counted:
+            return k + 1, outcome, counted
+    return n_ticks, DONE, True
