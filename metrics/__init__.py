@@ -12,9 +12,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .breakdown import Breakdowns, Survival, breakdown_probability, find_breakdowns, time_to_breakdown
     from .catalog import METRICS, Measure
     from .checks import CurveError, PopulationError
     from .distance import aligned_l1, dtw, noise_floor
+    from .distributions import interquartile_mean, probability_of_improvement
     from .earlier_papers import fractional_maintenance, projective_performance, weighted_combination
     from .emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
     from .environment import environment_distance, environment_scaling, waveform
@@ -49,7 +51,8 @@ if TYPE_CHECKING:
         score_curves,
         score_policy,
     )
-    from .statistics import Summary, aggregate, bootstrap_measure, normalize
+    from .significance import paired_tests
+    from .statistics import Estimate, Summary, aggregate, bootstrap_measure, normalize
 
 __all__ = [
     # from policies and files of curves to tables of scores
@@ -121,6 +124,16 @@ __all__ = [
     "Summary",
     "aggregate",
     "bootstrap_measure",
+    "Estimate",
+    "interquartile_mean",
+    "probability_of_improvement",
+    "paired_tests",
+    # runs that break down
+    "find_breakdowns",
+    "breakdown_probability",
+    "time_to_breakdown",
+    "Breakdowns",
+    "Survival",
     # measures of earlier papers
     "fractional_maintenance",
     "projective_performance",
@@ -132,6 +145,11 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Breakdowns": "breakdown",
+    "Survival": "breakdown",
+    "breakdown_probability": "breakdown",
+    "find_breakdowns": "breakdown",
+    "time_to_breakdown": "breakdown",
     "METRICS": "catalog",
     "Measure": "catalog",
     "CurveError": "checks",
@@ -139,6 +157,8 @@ _HOMES = {
     "aligned_l1": "distance",
     "dtw": "distance",
     "noise_floor": "distance",
+    "interquartile_mean": "distributions",
+    "probability_of_improvement": "distributions",
     "fractional_maintenance": "earlier_papers",
     "projective_performance": "earlier_papers",
     "weighted_combination": "earlier_papers",
@@ -191,6 +211,8 @@ _HOMES = {
     "predict_policy": "scoring",
     "score_curves": "scoring",
     "score_policy": "scoring",
+    "paired_tests": "significance",
+    "Estimate": "statistics",
     "Summary": "statistics",
     "aggregate": "statistics",
     "bootstrap_measure": "statistics",

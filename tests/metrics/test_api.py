@@ -49,6 +49,12 @@ SIGNATURES = {
     "choose_policy": "policies, scenario='warehouse_small', *, deliver, keep=1.0, failures=None, deaths=None, "
     "noise=None, seeds=4",
     "normalize": "theta, *, distance=False",
+    "find_breakdowns": "perf, reference, *, window=5, share=0.5, interval_s=1.0",
+    "breakdown_probability": "breakdowns, *, method='wilson', level=0.95",
+    "time_to_breakdown": "breakdowns, *, level=0.95",
+    "interquartile_mean": "values, *, level=0.95, seed=None, n_resamples=2000",
+    "probability_of_improvement": "first, second, *, higher_is_better=True, level=0.95, seed=None",
+    "paired_tests": "first, second",
     "aggregate": "values, *, method='t', level=0.95, seed=None",
 }
 
