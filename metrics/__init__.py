@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .breakdown import Breakdowns, Survival, breakdown_probability, find_breakdowns, time_to_breakdown
     from .catalog import METRICS, Measure
     from .checks import CurveError, PopulationError
+    from .claims import CLAIMS, Claim, Panel, Verdict, check_claim
     from .distance import aligned_l1, dtw, noise_floor
     from .distributions import interquartile_mean, probability_of_improvement
     from .earlier_papers import fractional_maintenance, projective_performance, weighted_combination
@@ -134,6 +135,12 @@ __all__ = [
     "time_to_breakdown",
     "Breakdowns",
     "Survival",
+    # claims of the paper
+    "CLAIMS",
+    "check_claim",
+    "Claim",
+    "Panel",
+    "Verdict",
     # measures of earlier papers
     "fractional_maintenance",
     "projective_performance",
@@ -154,6 +161,11 @@ _HOMES = {
     "Measure": "catalog",
     "CurveError": "checks",
     "PopulationError": "checks",
+    "CLAIMS": "claims",
+    "Claim": "claims",
+    "Panel": "claims",
+    "Verdict": "claims",
+    "check_claim": "claims",
     "aligned_l1": "distance",
     "dtw": "distance",
     "noise_floor": "distance",

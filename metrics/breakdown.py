@@ -167,7 +167,7 @@ def time_to_breakdown(breakdowns: Breakdowns, *, level: float = 0.95) -> Surviva
     times = np.unique(time[broken])
     at_risk: FloatArray = (time >= times[:, None]).sum(axis=1, dtype=np.float64)
     falling: FloatArray = ((time == times[:, None]) & broken).sum(axis=1, dtype=np.float64)
-    surviving: FloatArray = np.cumprod(1.0 - falling / at_risk)
+    surviving: FloatArray = np.cumprod(1.0 - falling / at_risk, dtype=np.float64)
     z = float(ndtri(0.5 + 0.5 * level))
     with np.errstate(divide="ignore", invalid="ignore"):  # the last run breaks down: nothing survives
         spread = np.sqrt(np.cumsum(falling / (at_risk * (at_risk - falling)))) / -np.log(surviving)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import metrics
+import metrics.claims
 import metrics.scoring
 
 FOLDER = Path(metrics.__file__).parent
@@ -55,6 +56,8 @@ SIGNATURES = {
     "interquartile_mean": "values, *, level=0.95, seed=None, n_resamples=2000",
     "probability_of_improvement": "first, second, *, higher_is_better=True, level=0.95, seed=None",
     "paired_tests": "first, second",
+    "Panel": "*, levels, scores",
+    "check_claim": "claim, panels",
     "aggregate": "values, *, method='t', level=0.95, seed=None",
 }
 
@@ -80,7 +83,7 @@ def test_type_checkers_and_the_interpreter_see_the_same_names():
     assert set(homes) == set(metrics.__all__)
 
 
-@pytest.mark.parametrize("package", [metrics, metrics.scoring], ids=["metrics", "scoring"])
+@pytest.mark.parametrize("package", [metrics, metrics.claims, metrics.scoring], ids=["metrics", "claims", "scoring"])
 def test_no_public_name_is_that_of_a_module(package):
     modules = {module.name for module in pkgutil.iter_modules(package.__path__)}
     assert not modules & {*package.__all__, *(name for name in vars(package) if callable(vars(package)[name]))}
