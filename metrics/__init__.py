@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from .environment import environment_distance, environment_scaling, waveform
     from .flexibility import adaptability, reactivity
     from .interference import fractional_loss, performance_lost, t_lost_fraction
+    from .ladder import Ladder, LawFit, fit_ladder
+    from .laws import SizeLaw, fit_law
     from .population import (
         availability,
         availability_curves,
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
         ratio_for_team,
         recorded_population_robustness,
     )
-    from .prediction import SizeLaw, SizePrediction, fit_law, forward_error, predict_performance
+    from .prediction import SizePrediction, forward_error, predict_performance
     from .queues import PopulationRates, QueueStats, mean_away, queue_statistics
     from .robustness import mean_signed_difference, noise_robustness
     from .scaling import efficiency, raw_performance, scalability, skipped_intervals
@@ -114,7 +116,10 @@ __all__ = [
     "availability_curves",
     "ratio_for_availability",
     "ratio_for_team",
-    # prediction of larger swarms
+    # laws of swarm size, and prediction of larger swarms
+    "fit_ladder",
+    "Ladder",
+    "LawFit",
     "predict_performance",
     "fit_law",
     "forward_error",
@@ -194,9 +199,12 @@ _HOMES = {
     "ratio_for_availability": "population",
     "ratio_for_team": "population",
     "recorded_population_robustness": "population",
-    "SizeLaw": "prediction",
+    "Ladder": "ladder",
+    "LawFit": "ladder",
+    "fit_ladder": "ladder",
+    "SizeLaw": "laws",
+    "fit_law": "laws",
     "SizePrediction": "prediction",
-    "fit_law": "prediction",
     "forward_error": "prediction",
     "predict_performance": "prediction",
     "PopulationRates": "queues",

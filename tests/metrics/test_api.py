@@ -45,6 +45,7 @@ SIGNATURES = {
     "ratio_for_team": "team",
     "fit_law": "name, sizes, performance",
     "forward_error": "name, sizes, performance",
+    "fit_ladder": "sizes, runs, *, level=0.95, n_resamples=200, seed=None",
     "predict_performance": "sizes, runs, at, *, level=0.95, n_resamples=500, seed=None",
     "predict_policy": "policy, scenario='warehouse_small', *, fit=None, hold=(), seeds=4",
     "choose_policy": "policies, scenario='warehouse_small', *, deliver, keep=1.0, failures=None, deaths=None, "
