@@ -35,7 +35,15 @@ if TYPE_CHECKING:
         recorded_population_robustness,
     )
     from .prediction import SizePrediction, forward_error, predict_performance
-    from .queues import PopulationRates, QueueStats, mean_away, queue_statistics
+    from .queues import (
+        PopulationComparison,
+        PopulationRates,
+        QueueStats,
+        compare_population,
+        mean_away,
+        queue_statistics,
+        robots_at_work,
+    )
     from .robustness import mean_signed_difference, noise_robustness
     from .scaling import efficiency, raw_performance, scalability, skipped_intervals
     from .scoring import (
@@ -109,6 +117,9 @@ __all__ = [
     "QueueStats",
     "queue_statistics",
     "mean_away",
+    "robots_at_work",
+    "compare_population",
+    "PopulationComparison",
     "population_robustness",
     "recorded_population_robustness",
     "population_weight",
@@ -207,7 +218,10 @@ _HOMES = {
     "SizePrediction": "prediction",
     "forward_error": "prediction",
     "predict_performance": "prediction",
+    "PopulationComparison": "queues",
     "PopulationRates": "queues",
+    "compare_population": "queues",
+    "robots_at_work": "queues",
     "QueueStats": "queues",
     "mean_away": "queues",
     "queue_statistics": "queues",

@@ -36,6 +36,8 @@ SIGNATURES = {
     "PopulationRates": "lambda_d=0.0, lambda_bd=0.0, mu_b=0.0, mu_bd=0.0",
     "queue_statistics": "rates, n=None, *, per_robot=False",
     "mean_away": "rates, n, horizon, *, per_robot=False",
+    "robots_at_work": "rates, n, interval_ends, *, per_robot=False",
+    "compare_population": "n_active, rates, n, interval_ends, *, per_robot=False, level=0.95",
     "population_robustness": "perf, perf_ideal, rates, *, horizon, n=None, ideal_rates=None, weight='transient', "
     "reduce='sum'",
     "recorded_population_robustness": "perf, n_active, perf_ideal, n_active_ideal, *, reduce='sum', relative=False",
