@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
     from .environment import environment_distance, environment_scaling, waveform
     from .flexibility import adaptability, reactivity
+    from .foraging_model import ForagingRates, MeanField, SteadyState, estimate_rates, mean_field, steady_state
     from .interference import fractional_loss, performance_lost, t_lost_fraction
     from .ladder import Ladder, LawFit, fit_ladder
     from .laws import SizeLaw, fit_law
@@ -136,6 +137,13 @@ __all__ = [
     "forward_error",
     "SizeLaw",
     "SizePrediction",
+    # mean-field model of foraging
+    "estimate_rates",
+    "mean_field",
+    "steady_state",
+    "ForagingRates",
+    "MeanField",
+    "SteadyState",
     # statistics
     "normalize",
     "Summary",
@@ -200,6 +208,12 @@ _HOMES = {
     "waveform": "environment",
     "adaptability": "flexibility",
     "reactivity": "flexibility",
+    "ForagingRates": "foraging_model",
+    "MeanField": "foraging_model",
+    "SteadyState": "foraging_model",
+    "estimate_rates": "foraging_model",
+    "mean_field": "foraging_model",
+    "steady_state": "foraging_model",
     "fractional_loss": "interference",
     "performance_lost": "interference",
     "t_lost_fraction": "interference",

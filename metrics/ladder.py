@@ -86,7 +86,7 @@ def fit_ladder(
         CurveError: Too few sizes or runs, sizes that are not rising, or performances that are negative or not finite.
         ValueError: A level outside (0, 1), or no resamples.
 
-    Source: laws as in `laws`; sublinear, linear and superlinear after Hamann 2018.
+    Source: laws as in `laws`; classes of scaling after Hamann et al. 2020, their borders are ours.
     """
     check_level(level)
     check_resamples(n_resamples)
@@ -96,7 +96,7 @@ def fit_ladder(
     rng = np.random.default_rng(seed)
     roots = np.sqrt([total.mean() for total in totals])
     drawn = [np.sqrt([resampled_mean(total, rng) for total in totals]) for _ in range(n_resamples)]
-    laws = {name: _law_fit(name, n, roots, drawn, level, n_runs) for name in ALL_LAWS}
+    laws: dict[LawName, LawFit] = {name: _law_fit(name, n, roots, drawn, level, n_runs) for name in ALL_LAWS}
     exponent = _estimate(_rising_exponent(n, roots), [_rising_exponent(n, each) for each in drawn], level, n_runs)
     return Ladder(
         laws=laws,

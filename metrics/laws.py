@@ -224,16 +224,23 @@ def _fit_exponential(name: LawName, n: FloatArray, roots: FloatArray) -> SizeLaw
     def model(parameters: FloatArray) -> FloatArray:
         return np.exp(0.5 * (terms @ parameters))
 
-    found = least_squares(
-        lambda parameters: model(parameters) - roots,
+    def differences(parameters: FloatArray) -> FloatArray:
+        return model(parameters) - roots
+
+    def slopes(parameters: FloatArray) -> FloatArray:
+        return 0.5 * model(parameters)[:, None] * terms
+
+    found = least_squares(  # pyright: ignore[reportUnknownVariableType] - scipy ships no types
+        differences,
         start,
-        jac=lambda parameters: 0.5 * model(parameters)[:, None] * terms,
+        jac=slopes,  # pyright: ignore[reportArgumentType] - scipy's source names only the methods by text
         bounds=(lowest, highest),
         xtol=_CONVERGED,
         ftol=_CONVERGED,
-        gtol=None,
+        gtol=_CONVERGED,
     )
-    height, exponent, decay = np.pad(found.x, (0, 3 - found.x.size)).tolist()
+    solution = cast("FloatArray", found.x)  # pyright: ignore[reportUnknownMemberType] - scipy ships no types
+    height, exponent, decay = np.pad(solution, (0, 3 - solution.size)).tolist()
     scale = height - exponent * math.log(largest)
     return SizeLaw(name=name, a=math.exp(scale), exponent=exponent, decay=decay / largest)
 

@@ -47,6 +47,10 @@ SIGNATURES = {
     "ratio_for_team": "team",
     "fit_law": "name, sizes, performance",
     "forward_error": "name, sizes, performance",
+    "mean_field": "rates, n_robots, horizon_s, *, n_points=201",
+    "steady_state": "rates, n_robots",
+    "estimate_rates": "n_robots, *, pickups, deliveries, n_carrying, interference, interval_s, n_objects, "
+    "lone_interference=None, avoidance_s=1.0",
     "fit_ladder": "sizes, runs, *, level=0.95, n_resamples=200, seed=None",
     "predict_performance": "sizes, runs, at, *, level=0.95, n_resamples=500, seed=None",
     "predict_policy": "policy, scenario='warehouse_small', *, fit=None, hold=(), seeds=4",
