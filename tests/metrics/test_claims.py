@@ -104,6 +104,7 @@ def test_statements_in_their_three_answers(statement, curves, options, parameter
         ([0, 0, 0, 1, 2, 3], (5.0, 6.0), 0.01, NEITHER),
         ([0, 0, 0, 0, 0, 0.0], (2.5, 4.0), 0.0, NEITHER),  # no change at all
         ([1, 1, 1, 1.3, 1.6, 1.9], (2.5, 4.0), 1.0, ("undecided", "contradicted")),
+        ([1, 1, 1, 1, 1, 1.0], (1.0, 6.0), 0.3, ("undecided", "contradicted")),  # a bend somewhere, if there is one
     ],
 )
 def test_where_a_curve_changes(curve, between, sd, expected):
@@ -128,6 +129,19 @@ def test_which_panel_has_more_differences():
     assert answers(general.differs_more, alike, apart, **AB) == BOTH
     assert answers(general.differs_more, apart, alike, **AB) == NEITHER
     assert answers(general.differs_more, apart, apart, **AB) == OPEN
+    assert answers(general.differs_more, alike, panel({"a": 1.0, "b": 2.0}, n_runs=1), **AB) == OPEN
+
+
+def test_one_run_decides_nothing_by_either_rule():
+    alone = panel({"a": SIX, "b": 2.0 * SIX}, n_runs=1)
+    both = {"policies": ("a", "b")}
+    for statement in (general.is_constant, general.is_narrow, shapes.is_linear):
+        assert answers(statement, alone, **both) == OPEN
+    assert answers(general.is_wider, alone, upper="a", lower="b") == OPEN
+    assert answers(general.ties, alone, **AB) == OPEN
+    assert answers(shapes.changes_before, alone, first="a", others=("b",)) == OPEN
+    assert answers(shapes.changes_within, alone, policies=("a",), between=(1.0, 2.0)) == OPEN
+    assert answers(shapes.same_order, alone, alone, **both) == OPEN
 
 
 def test_orders_in_two_panels():
