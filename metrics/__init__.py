@@ -12,14 +12,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .breakdown import Breakdowns, Survival, breakdown_probability, find_breakdowns, time_to_breakdown
     from .catalog import METRICS, Measure
     from .checks import CurveError, PopulationError
+    from .claims import CLAIMS, Claim, Panel, Verdict, check_claim
     from .distance import aligned_l1, dtw, noise_floor
+    from .distributions import interquartile_mean, probability_of_improvement
     from .earlier_papers import fractional_maintenance, projective_performance, weighted_combination
     from .emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
     from .environment import environment_distance, environment_scaling, waveform
     from .flexibility import adaptability, reactivity
+    from .foraging_model import ForagingRates, MeanField, SteadyState, estimate_rates, mean_field, steady_state
     from .interference import fractional_loss, performance_lost, t_lost_fraction
+    from .ladder import Ladder, LawFit, fit_ladder
+    from .laws import SizeLaw, fit_law
     from .population import (
         availability,
         availability_curves,
@@ -29,8 +35,16 @@ if TYPE_CHECKING:
         ratio_for_team,
         recorded_population_robustness,
     )
-    from .prediction import SizeLaw, SizePrediction, fit_law, forward_error, predict_performance
-    from .queues import PopulationRates, QueueStats, mean_away, queue_statistics
+    from .prediction import SizePrediction, forward_error, predict_performance
+    from .queues import (
+        PopulationComparison,
+        PopulationRates,
+        QueueStats,
+        compare_population,
+        mean_away,
+        queue_statistics,
+        robots_at_work,
+    )
     from .robustness import mean_signed_difference, noise_robustness
     from .scaling import efficiency, raw_performance, scalability, skipped_intervals
     from .scoring import (
@@ -49,7 +63,8 @@ if TYPE_CHECKING:
         score_curves,
         score_policy,
     )
-    from .statistics import Summary, aggregate, bootstrap_measure, normalize
+    from .significance import paired_tests
+    from .statistics import Estimate, Summary, aggregate, bootstrap_measure, normalize
 
 __all__ = [
     # from policies and files of curves to tables of scores
@@ -103,6 +118,9 @@ __all__ = [
     "QueueStats",
     "queue_statistics",
     "mean_away",
+    "robots_at_work",
+    "compare_population",
+    "PopulationComparison",
     "population_robustness",
     "recorded_population_robustness",
     "population_weight",
@@ -110,17 +128,43 @@ __all__ = [
     "availability_curves",
     "ratio_for_availability",
     "ratio_for_team",
-    # prediction of larger swarms
+    # laws of swarm size, and prediction of larger swarms
+    "fit_ladder",
+    "Ladder",
+    "LawFit",
     "predict_performance",
     "fit_law",
     "forward_error",
     "SizeLaw",
     "SizePrediction",
+    # mean-field model of foraging
+    "estimate_rates",
+    "mean_field",
+    "steady_state",
+    "ForagingRates",
+    "MeanField",
+    "SteadyState",
     # statistics
     "normalize",
     "Summary",
     "aggregate",
     "bootstrap_measure",
+    "Estimate",
+    "interquartile_mean",
+    "probability_of_improvement",
+    "paired_tests",
+    # runs that break down
+    "find_breakdowns",
+    "breakdown_probability",
+    "time_to_breakdown",
+    "Breakdowns",
+    "Survival",
+    # claims of the paper
+    "CLAIMS",
+    "check_claim",
+    "Claim",
+    "Panel",
+    "Verdict",
     # measures of earlier papers
     "fractional_maintenance",
     "projective_performance",
@@ -132,13 +176,25 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Breakdowns": "breakdown",
+    "Survival": "breakdown",
+    "breakdown_probability": "breakdown",
+    "find_breakdowns": "breakdown",
+    "time_to_breakdown": "breakdown",
     "METRICS": "catalog",
     "Measure": "catalog",
     "CurveError": "checks",
     "PopulationError": "checks",
+    "CLAIMS": "claims",
+    "Claim": "claims",
+    "Panel": "claims",
+    "Verdict": "claims",
+    "check_claim": "claims",
     "aligned_l1": "distance",
     "dtw": "distance",
     "noise_floor": "distance",
+    "interquartile_mean": "distributions",
+    "probability_of_improvement": "distributions",
     "fractional_maintenance": "earlier_papers",
     "projective_performance": "earlier_papers",
     "weighted_combination": "earlier_papers",
@@ -152,6 +208,12 @@ _HOMES = {
     "waveform": "environment",
     "adaptability": "flexibility",
     "reactivity": "flexibility",
+    "ForagingRates": "foraging_model",
+    "MeanField": "foraging_model",
+    "SteadyState": "foraging_model",
+    "estimate_rates": "foraging_model",
+    "mean_field": "foraging_model",
+    "steady_state": "foraging_model",
     "fractional_loss": "interference",
     "performance_lost": "interference",
     "t_lost_fraction": "interference",
@@ -162,12 +224,18 @@ _HOMES = {
     "ratio_for_availability": "population",
     "ratio_for_team": "population",
     "recorded_population_robustness": "population",
-    "SizeLaw": "prediction",
+    "Ladder": "ladder",
+    "LawFit": "ladder",
+    "fit_ladder": "ladder",
+    "SizeLaw": "laws",
+    "fit_law": "laws",
     "SizePrediction": "prediction",
-    "fit_law": "prediction",
     "forward_error": "prediction",
     "predict_performance": "prediction",
+    "PopulationComparison": "queues",
     "PopulationRates": "queues",
+    "compare_population": "queues",
+    "robots_at_work": "queues",
     "QueueStats": "queues",
     "mean_away": "queues",
     "queue_statistics": "queues",
@@ -191,6 +259,8 @@ _HOMES = {
     "predict_policy": "scoring",
     "score_curves": "scoring",
     "score_policy": "scoring",
+    "paired_tests": "significance",
+    "Estimate": "statistics",
     "Summary": "statistics",
     "aggregate": "statistics",
     "bootstrap_measure": "statistics",

@@ -8,10 +8,12 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import pdtrc  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from .checks import check_horizon, check_rate, check_size
-from .curves import FloatArray
+from .checks import CurveError, PopulationError, check_horizon, check_rate, check_size
+from .curves import FRACTION_TOLERANCE, FloatArray, as_curve
+from .statistics import aggregate
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,27 @@ class QueueStats:
     """Mean number away of a swarm of n robots, L_N; None if n was not given."""
     truncated_distribution: FloatArray | None
     """Probability that 0, 1, ..., n robots are away, shape (n + 1,); None if n was not given."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PopulationComparison:
+    """Robots at work over time, as the queue model expects and as runs had them; divide by N for shares."""
+
+    predicted: FloatArray
+    """Expected robots at work in each interval, (T,)."""
+    observed: FloatArray
+    """Mean over runs, (T,)."""
+    lower: FloatArray
+    """Lower bounds of Student's intervals of these means, (T,); NaN for one run."""
+    upper: FloatArray
+    """Upper bounds, (T,)."""
+    mean_error: float
+    """Observed less predicted robots, mean over intervals."""
+    rms_error: float
+    """Root of the mean squared difference, robots."""
+    inside: float
+    """Share of the intervals whose bounds hold the prediction; NaN for one run. Intervals of a run are not independent:
+    a run that lost robots early lacks them later."""
 
 
 def queue_statistics(rates: PopulationRates, n: int | None = None, *, per_robot: bool = False) -> QueueStats:
@@ -158,26 +181,109 @@ def mean_away(rates: PopulationRates, n: int, horizon: float, *, per_robot: bool
     """
     n = check_size("n", n)
     check_horizon(horizon)
+    return float(_mean_away_until(rates, n, np.array([horizon], dtype=np.float64), per_robot)[0])
+
+
+def robots_at_work(rates: PopulationRates, n: int, interval_ends: ArrayLike, *, per_robot: bool = False) -> FloatArray:
+    """Expected number of robots at work in each interval of a run that starts with no robot away.
+
+        robots_at_work(PopulationRates(lambda_d=0.001), 50, [1000, 2000])  # [49.5, 48.5], one death per 1000 ticks
+
+    With m_T of `mean_away`, the robots away in the interval from s to t are (t m_t - s m_s) / (t - s) on average.
+
+    Args:
+        rates: Rates per tick. The queue need not be stable.
+        n: Swarm size N.
+        interval_ends: Ends of the intervals in ticks, rising, (T,); the first begins at 0.
+        per_robot: As in `queue_statistics`.
+
+    Returns:
+        Robots in [0, n], mean over each interval, (T,).
+
+    Raises:
+        CurveError: n < 1.
+        PopulationError: Ends that do not rise from above 0.
+    """
+    n = check_size("n", n)
+    ends = np.asarray(interval_ends, dtype=np.float64)
+    starts = np.concatenate([[0.0], ends[:-1]]) if ends.ndim == 1 else ends
+    if ends.ndim != 1 or ends.size == 0 or not np.isfinite(ends).all() or not (ends > starts).all():
+        raise PopulationError(f"Expected ends of intervals that rise from above 0 ticks, (T,), got {ends.tolist()}.")
+    away = ends * _mean_away_until(rates, n, ends, per_robot)
+    return n - np.diff(away, prepend=0.0) / (ends - starts)
+
+
+def compare_population(
+    n_active: ArrayLike,
+    rates: PopulationRates,
+    n: int,
+    interval_ends: ArrayLike,
+    *,
+    per_robot: bool = False,
+    level: float = 0.95,
+) -> PopulationComparison:
+    """Hold the robots that runs had at work against what the queue model expects, interval by interval.
+
+    Args:
+        n_active: Robots at work, mean over each interval, (R, T), the same rates in all runs.
+        rates: Rates per tick.
+        n: Swarm size N.
+        interval_ends: As in `robots_at_work`.
+        per_robot: As in `queue_statistics`.
+        level: Confidence level of the intervals.
+
+    Raises:
+        CurveError: Curves that are missing, negative, infinite, of more than n robots or of another length.
+        PopulationError: Ends that do not rise from above 0.
+        ValueError: A level outside (0, 1).
+    """
+    predicted = robots_at_work(rates, n, interval_ends, per_robot=per_robot)
+    runs = np.atleast_2d(as_curve("n_active", n_active))
+    if runs.ndim != 2 or runs.shape[1] != predicted.size or (runs > n * (1.0 + FRACTION_TOLERANCE)).any():
+        raise CurveError(
+            f"Expected n_active of runs, (R, {predicted.size}), with at most {n} robots, got shape {runs.shape} and up "
+            f"to {np.nanmax(runs):g} robots."
+        )
+    each = [aggregate(at_work, level=level) for at_work in runs.T]
+    lower, upper = (np.array([getattr(summary, name) for summary in each]) for name in ("lower", "upper"))
+    observed = np.array([summary.mean for summary in each])
+    error = observed - predicted
+    known = ~np.isnan(lower)
+    inside = (lower <= predicted) & (predicted <= upper)
+    return PopulationComparison(
+        predicted=predicted,
+        observed=observed,
+        lower=lower,
+        upper=upper,
+        mean_error=float(error.mean()),
+        rms_error=float(np.sqrt((error**2).mean())),
+        inside=float(inside[known].mean()) if known.any() else math.nan,
+    )
+
+
+def _mean_away_until(rates: PopulationRates, n: int, ends: FloatArray, per_robot: bool) -> FloatArray:
+    """m_T of `mean_away` for several T, (J,)."""
     if rates.lam == 0.0:
-        return 0.0
+        return np.zeros_like(ends)
     leave, back = _chain(rates, n, per_robot)
     jump_rate = leave[0] + rates.mu  # no state has a larger total rate
-    expected_jumps = jump_rate * horizon
-    n_jumps = int(expected_jumps + 12.0 * math.sqrt(expected_jumps)) + 40  # the tail beyond is below 1e-16
-    more_jumps = pdtrc(np.arange(n_jumps), expected_jumps)
+    expected_jumps = jump_rate * ends
+    most = float(expected_jumps[-1])
+    n_jumps = int(most + 12.0 * math.sqrt(most)) + 40  # the tail beyond is below 1e-16
+    more_jumps = pdtrc(np.arange(n_jumps)[:, None], expected_jumps)
     up, down = leave / jump_rate, back / jump_rate
     stay = 1.0 - up - down
     n_away = np.arange(n + 1.0)
     probability = np.zeros(n + 1)
     probability[0] = 1.0
-    total = 0.0
+    total = np.zeros_like(ends)
     for more in more_jumps:
         total += more * (probability @ n_away)
         after = stay * probability
         after[1:] += up[:-1] * probability[:-1]
         after[:-1] += down[1:] * probability[1:]
         probability = after
-    return float(total / expected_jumps)
+    return total / expected_jumps
 
 
 def _chain(rates: PopulationRates, n: int, per_robot: bool) -> tuple[FloatArray, FloatArray]:

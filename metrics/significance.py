@@ -3,8 +3,10 @@
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
+from .checks import CurveError
 from .curves import FloatArray
 
 ROUNDING = 1e-9
@@ -71,3 +73,30 @@ def holm(p_values: FloatArray) -> FloatArray:
     factors = np.arange(order.size, 0, -1)
     adjusted[order] = np.minimum(1.0, np.maximum.accumulate(factors * p_values[order]))
     return adjusted
+
+
+def paired_tests(first: ArrayLike, second: ArrayLike) -> FloatArray:
+    """Two-sided p values that two policies are equally good at each level, after Holm's correction over the levels.
+
+        paired_tests([[4, 6, 8], [5, 5, 6]], [[1, 2, 3], [5, 6, 5]])  # levels (2,), three runs each: 0.040 and 1
+
+    Args:
+        first: One value per level and run, (L, R), or (R,) for one level. NaN marks a run without a value.
+        second: The same of the other policy; run i of both has the same seed.
+
+    Returns:
+        Adjusted values of `paired_p`, (L,); NaN for a level with fewer than two pairs.
+
+    Raises:
+        CurveError: The arrays differ in shape, or have no axis of runs.
+    """
+    a, b = (np.asarray(values, dtype=np.float64) for values in (first, second))
+    if a.shape != b.shape or a.ndim not in (1, 2):
+        raise CurveError(
+            f"Expected two arrays of the same shape, (levels, runs), got {a.shape} and {b.shape}; runs are paired by "
+            "seed, so mark a missing run with NaN."
+        )
+    with np.errstate(invalid="ignore"):  # infinite values of both, whose test is NaN
+        differences = np.atleast_2d(a - b)
+    missing = np.atleast_2d(np.isnan(a) | np.isnan(b))
+    return holm(np.array([paired_p(level[~gone]) for level, gone in zip(differences, missing, strict=True)]))

@@ -39,6 +39,23 @@ class Summary:
     """Runs left out because their value is NaN."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """A number that is not a mean of runs (a share, a parameter, a critical size), with an interval."""
+
+    value: float
+    lower: float
+    """Lower bound of the interval; NaN where the runs are too few for one."""
+    upper: float
+    """Upper bound of the interval."""
+    n_runs: int
+    """Runs that entered."""
+
+    def holds(self, value: float) -> bool:
+        """Return whether a value lies inside the interval."""
+        return self.lower <= value <= self.upper
+
+
 def normalize(theta: ArrayLike, *, distance: bool = False) -> FloatArray:
     """Squash a measure into (-1, 1): the difference of sigmoids s(x) - s(-x) = tanh(x / 2).
 
@@ -90,7 +107,7 @@ def aggregate(
             picks = np.random.default_rng(seed).integers(used.size, size=(_N_RESAMPLES, used.size))
             with np.errstate(invalid="ignore"):  # infinities of both signs
                 means = used[picks].mean(axis=1)
-            lower, upper = _percentile_bounds(means, level)
+            lower, upper = percentile_bounds(means, level)
         else:
             spread = 2.0 * std
             if method == "t":
@@ -175,7 +192,7 @@ def _bootstrap_runs(
             picks = [rng.integers(size, size=size) for size in sizes]
             resample = measured([tuple(c[pick] for c in part) for part, pick in zip(parts, picks, strict=True)])
             means[k], _ = _mean_and_std(resample[~np.isnan(resample)])
-        lower, upper = _percentile_bounds(means[~np.isnan(means)], level)
+        lower, upper = percentile_bounds(means[~np.isnan(means)], level)
     return Summary(mean=mean, std=std, lower=lower, upper=upper, n_used=used.size, n_nan=values.size - used.size)
 
 
@@ -193,7 +210,7 @@ def _bootstrap_mean_curves(
         # How often each run is drawn, so that all resampled mean curves are one product, shape (n_resamples, T).
         shares = [rng.multinomial(size, np.full(size, 1.0 / size), size=n_resamples) / size for size in sizes]
         resampled = measured([tuple(s @ curve for curve in part) for part, s in zip(parts, shares, strict=True)])
-        lower, upper = _percentile_bounds(resampled, level)
+        lower, upper = percentile_bounds(resampled, level)
     return Summary(mean=value, std=math.nan, lower=lower, upper=upper, n_used=min(sizes), n_nan=0)
 
 
@@ -216,8 +233,9 @@ def _mean_and_std(values: FloatArray) -> tuple[float, float]:
     return mean, std
 
 
-def _percentile_bounds(values: FloatArray, level: float) -> tuple[float, float]:
-    # An infinite value, for example of scalability, can be a bound, but interpolating between two of them gives NaN.
+def percentile_bounds(values: FloatArray, level: float) -> tuple[float, float]:
+    """Bounds of the percentile interval of resampled values, (B,); an infinite value can be a bound."""
+    # Interpolating between two infinite values, for example of scalability, gives NaN.
     method = "nearest" if np.isinf(values).any() else "linear"
     lower, upper = np.quantile(values, [0.5 - 0.5 * level, 0.5 + 0.5 * level], method=method)
     return float(lower), float(upper)

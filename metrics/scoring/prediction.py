@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from metrics.checks import CurveError
-from metrics.prediction import LAWS, MIN_SIZES, SizeLaw, SizePrediction, predict_performance
+from metrics.laws import LAWS, MIN_SIZES, SizeLaw
+from metrics.prediction import SizePrediction, predict_performance
 from metrics.statistics import Summary, aggregate
 
 from .columns import SIZE

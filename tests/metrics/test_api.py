@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import metrics
+import metrics.claims
 import metrics.scoring
 
 FOLDER = Path(metrics.__file__).parent
@@ -35,6 +36,8 @@ SIGNATURES = {
     "PopulationRates": "lambda_d=0.0, lambda_bd=0.0, mu_b=0.0, mu_bd=0.0",
     "queue_statistics": "rates, n=None, *, per_robot=False",
     "mean_away": "rates, n, horizon, *, per_robot=False",
+    "robots_at_work": "rates, n, interval_ends, *, per_robot=False",
+    "compare_population": "n_active, rates, n, interval_ends, *, per_robot=False, level=0.95",
     "population_robustness": "perf, perf_ideal, rates, *, horizon, n=None, ideal_rates=None, weight='transient', "
     "reduce='sum'",
     "recorded_population_robustness": "perf, n_active, perf_ideal, n_active_ideal, *, reduce='sum', relative=False",
@@ -44,11 +47,24 @@ SIGNATURES = {
     "ratio_for_team": "team",
     "fit_law": "name, sizes, performance",
     "forward_error": "name, sizes, performance",
+    "mean_field": "rates, n_robots, horizon_s, *, n_points=201",
+    "steady_state": "rates, n_robots",
+    "estimate_rates": "n_robots, *, pickups, deliveries, n_carrying, interference, interval_s, n_objects, "
+    "lone_interference=None, avoidance_s=1.0",
+    "fit_ladder": "sizes, runs, *, level=0.95, n_resamples=200, seed=None",
     "predict_performance": "sizes, runs, at, *, level=0.95, n_resamples=500, seed=None",
     "predict_policy": "policy, scenario='warehouse_small', *, fit=None, hold=(), seeds=4",
     "choose_policy": "policies, scenario='warehouse_small', *, deliver, keep=1.0, failures=None, deaths=None, "
     "noise=None, seeds=4",
     "normalize": "theta, *, distance=False",
+    "find_breakdowns": "perf, reference, *, window=5, share=0.5, interval_s=1.0",
+    "breakdown_probability": "breakdowns, *, method='wilson', level=0.95",
+    "time_to_breakdown": "breakdowns, *, level=0.95",
+    "interquartile_mean": "values, *, level=0.95, seed=None, n_resamples=2000",
+    "probability_of_improvement": "first, second, *, higher_is_better=True, level=0.95, seed=None",
+    "paired_tests": "first, second",
+    "Panel": "*, levels, scores",
+    "check_claim": "claim, panels",
     "aggregate": "values, *, method='t', level=0.95, seed=None",
 }
 
@@ -74,7 +90,7 @@ def test_type_checkers_and_the_interpreter_see_the_same_names():
     assert set(homes) == set(metrics.__all__)
 
 
-@pytest.mark.parametrize("package", [metrics, metrics.scoring], ids=["metrics", "scoring"])
+@pytest.mark.parametrize("package", [metrics, metrics.claims, metrics.scoring], ids=["metrics", "claims", "scoring"])
 def test_no_public_name_is_that_of_a_module(package):
     modules = {module.name for module in pkgutil.iter_modules(package.__path__)}
     assert not modules & {*package.__all__, *(name for name in vars(package) if callable(vars(package)[name]))}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from metrics import CurveError, paired_tests
 from metrics.significance import holm, paired_p, pooled_p
 
 NAN = math.nan
@@ -42,3 +43,24 @@ def test_the_pooled_test_by_hand():
 @pytest.mark.parametrize("differences", [[[1.0], [2.0]], [[1.0, 1.0], [2.0, 2.0]]], ids=["one pair", "no scatter"])
 def test_without_scatter_there_is_no_pooled_test(differences):
     assert np.isnan(pooled_p(np.array(differences))).all()
+
+
+def test_levels_are_tested_together():
+    first = np.array([[4.0, 6.0, 8.0], [5.0, 5.0, 6.0]])
+    second = np.array([[1.0, 2.0, 3.0], [5.0, 6.0, 5.0]])
+    # Differences 3, 4, 5 and 0, -1, 1: p values of scipy, the smaller one times two.
+    expected = [2 * stats.ttest_rel(first[0], second[0]).pvalue, stats.ttest_rel(first[1], second[1]).pvalue]
+    np.testing.assert_allclose(paired_tests(first, second), expected)
+    np.testing.assert_allclose(paired_tests(first[0], second[0]), expected[0] / 2)
+
+
+def test_a_missing_run_takes_its_partner_along():
+    first, second = [[4.0, 6.0, NAN, 8.0], [1.0, NAN, NAN, NAN]], [[1.0, 2.0, 9.0, 3.0], [0.0, 1.0, 2.0, 3.0]]
+    expected = stats.ttest_rel([4.0, 6.0, 8.0], [1.0, 2.0, 3.0]).pvalue  # the other level has no test
+    np.testing.assert_allclose(paired_tests(first, second), [expected, NAN])
+
+
+@pytest.mark.parametrize(("first", "second"), [([1.0, 2.0], [1.0]), (1.0, 1.0), ([[[1.0]]], [[[1.0]]])])
+def test_runs_that_cannot_be_paired_are_refused(first, second):
+    with pytest.raises(CurveError, match="same shape"):
+        paired_tests(first, second)

@@ -1,0 +1,159 @@
+"""A figure as numbers, and the two rules by which the heights of two curves in it are told apart."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from metrics.checks import CurveError, check_option
+from metrics.curves import FloatArray
+
+Rule: TypeAlias = Literal["intervals", "bands"]
+"""`bands`, the paper's: two curves differ where their bands of the mean plus and minus two standard deviations of
+single runs do not overlap, else they tie. `intervals`, ours, reads the 95 % bootstrap interval of the mean difference
+of runs with the same seed: the curves tie where it lies within `TIE` of zero, differ where it leaves out zero, and else
+it is open which."""
+Levels: TypeAlias = Literal["all", "low", "high"]
+"""All levels of a panel, or its lower or upper half; of an odd number the middle one is in neither half."""
+
+TIE = 0.1
+"""Differences below this share of the largest mean at the same level are a tie (our choice: what looks alike in a
+figure, and with many runs even the smallest difference is significant)."""
+MIN_PAIRS = 4
+"""Fewer pairs of runs decide nothing: three have the same sign by chance in one case of four."""
+CONFIDENCE = 0.95
+N_RESAMPLES = 1000
+_SEED = 1
+"""Fixed, so that the same runs give the same answer."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Panel:
+    """Scores of several policies over the levels of an experiment: what one panel of a figure shows.
+
+        Panel(levels=[1, 2], scores={"crw": [[3.0, 3.1], [4.0, 4.2]], "dpo": [[5.0, 5.1], [7.0, 6.8]]})
+
+    Raises:
+        CurveError: No policy, scores that do not fit to the levels or to each other, or levels that do not rise.
+    """
+
+    levels: FloatArray
+    """What is varied, rising, (L,)."""
+    scores: Mapping[str, FloatArray]
+    """Policy -> one score per level and run, (L, R); run i has the same seed for all policies. NaN and infinite values
+    are runs without a score."""
+
+    def __post_init__(self) -> None:
+        levels = np.asarray(self.levels, dtype=np.float64)
+        if levels.ndim != 1 or levels.size == 0 or not (np.diff(levels) > 0.0).all():
+            raise CurveError(f"Expected levels in rising order, (L,), got {levels.tolist()}.")
+        scores = {name: np.asarray(values, dtype=np.float64) for name, values in self.scores.items()}
+        shapes = {name: values.shape for name, values in scores.items()}
+        if len(set(shapes.values())) != 1 or any(len(s) != 2 or s[0] != levels.size for s in shapes.values()):
+            raise CurveError(
+                f"Expected scores of shape ({levels.size} levels, runs), the same for all policies, got {shapes}; mark "
+                "a missing run with NaN."
+            )
+        finite = {name: np.where(np.isfinite(values), values, np.nan) for name, values in scores.items()}
+        object.__setattr__(self, "levels", levels)
+        object.__setattr__(self, "scores", finite)
+
+    @cached_property
+    def level_scales(self) -> FloatArray:
+        """Largest absolute mean score of any policy at each level, (L,)."""
+        means = np.abs([mean_over_runs(values) for values in self.scores.values()])
+        return np.where(np.isfinite(means), means, 0.0).max(axis=0)
+
+    @property
+    def scale(self) -> float:
+        """The same at any level; 1 if all are 0."""
+        return float(self.level_scales.max()) or 1.0
+
+    def of(self, policies: Iterable[str]) -> FloatArray:
+        """Return the scores of policies, (P, L, R).
+
+        Raises:
+            CurveError: A policy without scores.
+        """
+        names = list(policies)
+        absent = [name for name in names if name not in self.scores]
+        if absent:
+            raise CurveError(f"Expected scores of {', '.join(absent)}, got those of {', '.join(self.scores)}.")
+        return np.stack([self.scores[name] for name in names])
+
+    def part(self, levels: Levels) -> "Panel":
+        """Return the panel with some of its levels."""
+        check_option("levels", levels, Levels)
+        half = max(1, self.levels.size // 2)
+        kept = {"all": slice(None), "low": slice(None, half), "high": slice(self.levels.size - half, None)}[levels]
+        return Panel(levels=self.levels[kept], scores={name: values[kept] for name, values in self.scores.items()})
+
+    def n_runs(self, policies: Iterable[str]) -> int:
+        """Return the smallest number of runs with a score, over levels and policies."""
+        return int(np.isfinite(self.of(policies)).sum(axis=-1).min())
+
+
+def mean_over_runs(values: FloatArray) -> FloatArray:
+    """Mean over the last axis without NaN; NaN where nothing is left."""
+    known = np.isfinite(values)
+    with np.errstate(invalid="ignore"):
+        return np.where(known, values, 0.0).sum(axis=-1) / known.sum(axis=-1)
+
+
+def std_over_runs(values: FloatArray) -> FloatArray:
+    """Standard deviation over the last axis without NaN, divisor R - 1; NaN for fewer than two runs."""
+    known = np.isfinite(values)
+    squares = np.where(known, values - mean_over_runs(values)[..., None], 0.0) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.sqrt(squares.sum(axis=-1) / (known.sum(axis=-1) - 1.0))
+
+
+def drawn_runs(n_runs: int) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
+    """Indices of resampled runs, (N_RESAMPLES, n_runs)."""
+    return np.random.default_rng(_SEED).integers(n_runs, size=(N_RESAMPLES, n_runs))
+
+
+def resampled_runs(values: FloatArray) -> FloatArray | None:
+    """Resample the runs that have a score at every level, (..., L, R) to (N_RESAMPLES, ..., L, R'); None: too few."""
+    complete = values[..., np.isfinite(values).reshape(-1, values.shape[-1]).all(axis=0)]
+    if complete.shape[-1] < MIN_PAIRS:
+        return None
+    return np.moveaxis(complete[..., drawn_runs(complete.shape[-1])], -2, 0)
+
+
+def bounds(resampled: FloatArray) -> tuple[float, float]:
+    """Bounds of the percentile interval at `CONFIDENCE`."""
+    lower, upper = np.quantile(resampled, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE])
+    return float(lower), float(upper)
+
+
+def signs(panel: Panel, first: str, second: str, rule: Rule) -> FloatArray:
+    """Which of two policies is higher at each level: 1 the first, -1 the second, 0 a tie, NaN open; (L,).
+
+    Raises:
+        CurveError: A policy without scores.
+        ValueError: An unknown rule.
+    """
+    check_option("rule", rule, Rule)
+    a, b = panel.of((first, second))
+    if rule == "bands":
+        gap = mean_over_runs(a) - mean_over_runs(b)
+        reach = 2.0 * (std_over_runs(a) + std_over_runs(b))
+        return np.where(np.isnan(gap + reach), np.nan, np.sign(gap) * (np.abs(gap) > reach))
+    ties = TIE * panel.level_scales
+    return np.array([_sign(level[np.isfinite(level)], tie) for level, tie in zip(a - b, ties, strict=True)])
+
+
+def _sign(differences: FloatArray, tie: float) -> float:
+    """Sign of the mean of paired differences, by the rule `intervals`."""
+    n = differences.size
+    if n < MIN_PAIRS:
+        return np.nan
+    mean = float(differences.mean())
+    # The mean of n resampled runs varies by a factor of sqrt((n - 1) / n) too little.
+    lower, upper = bounds(mean + (differences[drawn_runs(n)].mean(axis=1) - mean) * np.sqrt(n / (n - 1.0)))
+    if -tie <= lower and upper <= tie:
+        return 0.0
+    return float(np.sign(mean)) if lower > 0.0 or upper < 0.0 else np.nan

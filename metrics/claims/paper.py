@@ -1,0 +1,470 @@
+"""The claims of the paper about its figures, as data: what is said, where, and which statements that makes.
+
+E are claims about self-organisation, C about scalability, P about raw performance, R about reactivity, A about
+adaptability, N about noise, V about availability, D about population dynamics, X about several figures together. Where
+the paper says nothing of a direction but its text implies one, the text below says "(implied)".
+
+Nothing here was chosen with results in view: the statements are the general ones of `predicates` and `shapes`.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from metrics.population import availability, ratio_for_team
+
+from .checking import Claim, PanelName, Statement
+from .panel import Panel
+from .predicates import (
+    Answer,
+    Outcome,
+    differ,
+    differs_more,
+    every_pair,
+    is_constant,
+    is_higher,
+    is_narrow,
+    is_not_higher,
+    is_wide,
+    is_wider,
+    reaches_higher,
+    ties,
+    varies,
+)
+from .shapes import (
+    ZERO,
+    bend_of,
+    changes_before,
+    changes_within,
+    is_linear,
+    not_same_order,
+    rise_of,
+    same_order,
+    slope_of,
+    with_zero,
+)
+
+EXPERIMENTS: dict[str, str] = {
+    "S1a": "small warehouse, 1 to 128 robots",
+    "S1b": "medium warehouse, 1 to 512 robots",
+    "S1c": "small warehouse, 50 robots, throttled while carrying",
+    "S1d": "medium warehouse, 200 robots, throttled while carrying",
+    "S1e": "small warehouse, 50 robots, noise",
+    "S1f": "medium warehouse, 200 robots, noise",
+    "S1g": "small warehouse, 50 robots, malfunctions and repairs",
+    "S1h": "medium warehouse, 200 robots, malfunctions and repairs",
+    "S2a still": "search and rescue, 12 to 819 robots, objects at rest",
+    "S2a slow": "search and rescue, 12 to 819 robots, objects that move with the smallest probability",
+    "S2a fast": "search and rescue, 12 to 819 robots, objects that move with the largest probability",
+    "S2b 115": "search and rescue, 115 robots, throttled motion",
+    "S2b 320": "search and rescue, 320 robots, throttled motion",
+    "S2c 320": "search and rescue, 320 robots, noise",
+    "S2d 115": "search and rescue, 115 robots, deaths",
+    "S2d 320": "search and rescue, 320 robots, deaths",
+}
+"""Experiments whose scores the claims speak of. In S1a, S1b and S2a the levels are swarm sizes, in S1c, S1d and S2b
+distances from ideal conditions, in the others the disturbance; the undisturbed level is left out."""
+
+POLICIES = ("crw", "dpo", "stochm", "stochx")
+SIMPLE, COMPLEX = ("crw", "dpo"), ("stochm", "stochx")
+STEADY, UNSTEADY = ("crw", "stochx"), ("dpo", "stochm")
+_E_S, _E_T, _C, _P = "spatial_emergence", "task_emergence", "scalability", "raw_performance"
+_R, _A, _N, _D = "reactivity", "adaptability", "noise_robustness", "population_robustness"
+_ALL_PAIRS = every_pair(POLICIES)
+_ONSET = (0.0129, 0.0215)
+"""About 0.017: one level of the sweep below it to one above, three to five sevenths of 0.03."""
+_LARGER = (0.01, 0.05)
+
+
+def _states(
+    predicate: Callable[..., Outcome],
+    *panels: PanelName,
+    views: tuple[Callable[[Panel], Panel], ...] = (),
+    **parameters: Any,
+) -> Statement:
+    return Statement(predicate=predicate, panels=panels, views=views, parameters=parameters)
+
+
+def _best(experiment: str, measure: str, policy: str, levels: str = "all") -> Statement:
+    """Statement that a policy is better than the three others."""
+    return _better(experiment, measure, (policy,), tuple(name for name in POLICIES if name != policy), levels)
+
+
+def _better(
+    experiment: str, measure: str, better: tuple[str, ...], worse: tuple[str, ...], levels: str = "all"
+) -> Statement:
+    """Statement that each of some policies is better than each of others; distances are better where they are lower."""
+    upper, lower = (worse, better) if measure in (_R, _A, _N) else (better, worse)
+    return _states(is_higher, (experiment, measure), upper=upper, lower=lower, levels=levels)
+
+
+def availability_is(*, n: int, n_min: int, team: float, expected: float, within: float) -> Outcome:
+    """Whether the availability of n_min of n robots with a mean team at work has an expected value, up to rounding."""
+    p_v = availability(n, n_min, ratio_for_team(team))
+    answer: Answer = "supported" if abs(p_v - expected) <= within else "contradicted"
+    why = f"availability of {n_min} of {n} robots, mean team {team:g}, is {p_v:.4f}"
+    return Outcome(answer=answer, statistic=p_v, effect=np.nan, n_runs=0, why=why)
+
+
+def needs_larger_team(*, few: tuple[int, int], many: tuple[int, int], team: float) -> Outcome:
+    """Whether a second swarm needs a larger mean team for the availability that a team gives the first.
+
+    Args:
+        few: Swarm size and robots needed of the first.
+        many: The same of the second.
+        team: Mean robots at work in the first.
+    """
+    wanted = availability(*few, ratio_for_team(team))
+    got = availability(*many, ratio_for_team(team))
+    answer: Answer = "supported" if got < wanted else "contradicted"
+    why = (
+        f"a mean team of {team:g} gives {got:.4f} for {many[1]} of {many[0]} and {wanted:.4f} for {few[1]} of {few[0]}"
+    )
+    return Outcome(answer=answer, statistic=got, effect=np.nan, n_runs=0, why=why)
+
+
+def _flexibility(letter: str, measure: str) -> tuple[Claim, ...]:
+    """Return the four claims that the paper makes of reactivity and of adaptability in the same words."""
+    small, medium = ("S1c", measure), ("S1d", measure)
+    where = f"scenario 1, {measure}"
+    others = ("crw", "dpo", "stochm")
+    return (
+        Claim(
+            name=f"{letter}1",
+            text="Under strong disturbance STOCHM and STOCHX are best; STOCHX is best in general.",
+            figure=f"{where}, both warehouses",
+            statements=(
+                _better(*small, COMPLEX, SIMPLE, "high"),
+                _better(*medium, COMPLEX, SIMPLE, "high"),
+                _best(*small, "stochx"),
+                _best(*medium, "stochx"),
+            ),
+        ),
+        Claim(
+            name=f"{letter}2",
+            text="DPO is not better than CRW.",
+            figure=f"{where}, both warehouses",
+            statements=tuple(_states(is_not_higher, panel, first="crw", second="dpo") for panel in (small, medium)),
+        ),
+        Claim(
+            name=f"{letter}3",
+            text="More differences are significant in the medium warehouse than in the small one.",
+            figure=f"{where}, both warehouses",
+            statements=(_states(differs_more, small, medium, pairs=_ALL_PAIRS),),
+        ),
+        Claim(
+            name=f"{letter}4",
+            text="STOCHX rises slowly and evenly with the disturbance; the others rise ever faster.",
+            figure=f"{where}, medium warehouse",
+            statements=(
+                _states(is_higher, medium, views=(slope_of,), upper=others, lower=("stochx",)),
+                _states(ties, medium, views=(bend_of, with_zero), pairs=(("stochx", ZERO),)),
+                _states(is_higher, medium, views=(bend_of, with_zero), upper=others, lower=(ZERO,)),
+            ),
+        ),
+    )
+
+
+_SELF_ORGANISATION = (
+    Claim(
+        name="E1",
+        text="Every algorithm stays roughly constant over the swarm size.",
+        figure="scenario 1, spatial self-organisation, small warehouse",
+        statements=(_states(is_constant, ("S1a", _E_S), policies=POLICIES),),
+    ),
+    Claim(
+        name="E2",
+        text="CRW differs from the other three; it is higher (implied).",
+        figure="scenario 1, spatial self-organisation, small warehouse",
+        statements=(_best("S1a", _E_S, "crw"),),
+    ),
+    Claim(
+        name="E3",
+        text="STOCHM and STOCHX tie.",
+        figure="scenario 1, spatial self-organisation, small warehouse",
+        statements=(_states(ties, ("S1a", _E_S), pairs=(COMPLEX,)),),
+    ),
+    Claim(
+        name="E4",
+        text="CRW, DPO and STOCHM mostly tie.",
+        figure="scenario 1, task self-organisation, medium warehouse",
+        statements=(_states(ties, ("S1b", _E_T), pairs=every_pair(("crw", "dpo", "stochm"))),),
+    ),
+    Claim(
+        name="E5",
+        text="STOCHX is highest.",
+        figure="scenario 1, task self-organisation, medium warehouse",
+        statements=(_best("S1b", _E_T, "stochx"),),
+    ),
+    Claim(
+        name="E6",
+        text="STOCHX grows nearly linearly with the swarm size.",
+        figure="scenario 1, task self-organisation, medium warehouse",
+        statements=(_states(is_linear, ("S1b", _E_T), policies=("stochx",)),),
+    ),
+    Claim(
+        name="E7",
+        text="STOCHX and CRW are steady over the swarm size, DPO and STOCHM vary strongly.",
+        figure="scenario 2, task self-organisation, objects at rest",
+        statements=(
+            _states(is_constant, ("S2a still", _E_T), policies=STEADY),
+            _states(varies, ("S2a still", _E_T), policies=UNSTEADY),
+        ),
+    ),
+    Claim(
+        name="E8",
+        text="In small swarms STOCHX is best, by a little.",
+        figure="scenario 2, task self-organisation, objects at rest",
+        statements=(_best("S2a still", _E_T, "stochx", "low"),),
+    ),
+    Claim(
+        name="E9",
+        text="As E7, for spatial self-organisation with moving objects.",
+        figure="scenario 2, spatial self-organisation, moving objects",
+        statements=(
+            _states(is_constant, ("S2a slow", _E_S), policies=STEADY),
+            _states(varies, ("S2a slow", _E_S), policies=UNSTEADY),
+        ),
+    ),
+)
+
+_SCALING = (
+    Claim(
+        name="C1",
+        text="CRW and DPO have narrow bands.",
+        figure="scenario 1, scalability, medium warehouse",
+        statements=(_states(is_narrow, ("S1b", _C), policies=SIMPLE),),
+    ),
+    Claim(
+        name="C2",
+        text="STOCHM and STOCHX have wide bands.",
+        figure="scenario 1, scalability, medium warehouse",
+        statements=(_states(is_wide, ("S1b", _C), policies=COMPLEX),),
+    ),
+    Claim(
+        name="C3",
+        text="The complex algorithms can reach higher values than the simple ones, but less reliably.",
+        figure="scenario 1, scalability, medium warehouse",
+        statements=(
+            _states(reaches_higher, ("S1b", _C), upper=COMPLEX, lower=SIMPLE),
+            _states(is_wider, ("S1b", _C), upper=COMPLEX, lower=SIMPLE),
+        ),
+    ),
+    Claim(
+        name="C4",
+        text="There are no significant differences at all.",
+        figure="scenario 2, scalability (no figure)",
+        statements=(_states(ties, ("S2a still", _C), pairs=_ALL_PAIRS),),
+    ),
+    Claim(
+        name="P1",
+        text="CRW and DPO deliver more than STOCHM and STOCHX.",
+        figure="scenario 1, raw performance, medium warehouse",
+        statements=(_better("S1b", _P, SIMPLE, COMPLEX),),
+    ),
+    Claim(
+        name="P2",
+        text="The small warehouse shows the same picture.",
+        figure="scenario 1, raw performance (no figure)",
+        statements=(_better("S1a", _P, SIMPLE, COMPLEX),),
+    ),
+    Claim(
+        name="P3",
+        text="Simpler algorithms perform better: CRW and DPO above STOCHM and STOCHX (implied).",
+        figure="scenario 2, raw performance, objects at rest and at their fastest",
+        statements=tuple(_better(experiment, _P, SIMPLE, COMPLEX) for experiment in ("S2a still", "S2a fast")),
+    ),
+)
+
+_FLEXIBILITY_2 = (
+    Claim(
+        name="R5",
+        text="CRW and STOCHX are best, DPO and STOCHM worst; only under strong disturbance, else they tie.",
+        figure="scenario 2, reactivity, 115 robots",
+        statements=(
+            _better("S2b 115", _R, STEADY, UNSTEADY, "high"),
+            _states(ties, ("S2b 115", _R), pairs=_ALL_PAIRS, levels="low"),
+        ),
+    ),
+    Claim(
+        name="A5",
+        text="The algorithms mostly tie.",
+        figure="scenario 2, adaptability, 320 robots",
+        statements=(_states(ties, ("S2b 320", _A), pairs=_ALL_PAIRS),),
+    ),
+    Claim(
+        name="A6",
+        text="Under strong disturbance CRW is better than DPO and STOCHM.",
+        figure="scenario 2, adaptability, 320 robots",
+        statements=(_better("S2b 320", _A, ("crw",), UNSTEADY, "high"),),
+    ),
+)
+
+_NOISE = (
+    Claim(
+        name="N1",
+        text="CRW and STOCHX tie.",
+        figure="scenario 1, noise, small warehouse",
+        statements=(_states(ties, ("S1e", _N), pairs=(STEADY,)),),
+    ),
+    Claim(
+        name="N2",
+        text="DPO and STOCHM tie except under strong noise.",
+        figure="scenario 1, noise, small warehouse",
+        statements=(
+            _states(ties, ("S1e", _N), pairs=(UNSTEADY,), levels="low"),
+            _states(differ, ("S1e", _N), pairs=(UNSTEADY,), levels="high"),
+        ),
+    ),
+    Claim(
+        name="N3",
+        text="From a standard deviation of about 0.017 on, all algorithms change their behaviour.",
+        figure="scenario 1, noise, small warehouse",
+        statements=(_states(changes_within, ("S1e", _N), policies=POLICIES, between=_ONSET),),
+    ),
+    Claim(
+        name="N4",
+        text="The change is strongest for DPO and STOCHM.",
+        figure="scenario 1, noise, small warehouse",
+        statements=(_states(is_higher, ("S1e", _N), views=(rise_of,), upper=UNSTEADY, lower=STEADY),),
+    ),
+    Claim(
+        name="N5",
+        text="The algorithms are further apart than in the small warehouse; N3 and N4 hold again.",
+        figure="scenario 1, noise, medium warehouse",
+        statements=(
+            _states(differs_more, ("S1e", _N), ("S1f", _N), pairs=_ALL_PAIRS),
+            _states(changes_within, ("S1f", _N), policies=POLICIES, between=_ONSET),
+            _states(is_higher, ("S1f", _N), views=(rise_of,), upper=UNSTEADY, lower=STEADY),
+        ),
+    ),
+    Claim(
+        name="N6",
+        text="CRW and STOCHX tie in most cases.",
+        figure="scenario 2, noise, 320 robots",
+        statements=(_states(ties, ("S2c 320", _N), pairs=(STEADY,)),),
+    ),
+    Claim(
+        name="N7",
+        text="DPO, STOCHM and STOCHX get clearly worse with stronger noise, from 0.01 to 0.05 on.",
+        figure="scenario 2, noise, 320 robots",
+        statements=(
+            _states(
+                is_higher,
+                ("S2c 320", _N),
+                views=(rise_of, with_zero),
+                upper=("dpo", "stochm", "stochx"),
+                lower=(ZERO,),
+            ),
+            _states(changes_within, ("S2c 320", _N), policies=("dpo", "stochm", "stochx"), between=_LARGER),
+        ),
+    ),
+    Claim(
+        name="N8",
+        text="STOCHM changes under weaker noise than DPO and STOCHX.",
+        figure="scenario 2, noise, 320 robots",
+        statements=(_states(changes_before, ("S2c 320", _N), first="stochm", others=("dpo", "stochx")),),
+    ),
+)
+
+_POPULATION = (
+    Claim(
+        name="V1",
+        text="With 50 robots, 5 needed and a mean team of 5, availability is about 0.40.",
+        figure="scenario 1, availability (formula)",
+        statements=(_states(availability_is, n=50, n_min=5, team=5.0, expected=0.40, within=0.005),),
+    ),
+    Claim(
+        name="V2",
+        text="With 200 robots and 20 needed, larger teams are needed for the same availability.",
+        figure="scenario 1, availability (formula)",
+        statements=tuple(
+            _states(needs_larger_team, few=(50, 5), many=(200, 20), team=team) for team in (5.0, 10.0, 20.0)
+        ),
+    ),
+    Claim(
+        name="D1",
+        text="Under larger population variance STOCHX is most robust, and STOCHX and CRW are above DPO and STOCHM.",
+        figure="scenario 1, population robustness, small warehouse",
+        statements=(
+            _best("S1g", _D, "stochx", "high"),
+            _better("S1g", _D, STEADY, UNSTEADY, "high"),
+        ),
+    ),
+    Claim(
+        name="D2",
+        text="The order is that of task self-organisation, STOCHX first.",
+        figure="scenario 1, population robustness, medium warehouse",
+        statements=(
+            _best("S1h", _D, "stochx"),
+            _states(same_order, ("S1b", _E_T), ("S1h", _D), policies=POLICIES),
+        ),
+    ),
+    Claim(
+        name="D3",
+        text="CRW and STOCHX are high, DPO and STOCHM much lower.",
+        figure="scenario 2, population robustness, 115 robots",
+        statements=(_better("S2d 115", _D, STEADY, UNSTEADY),),
+    ),
+    Claim(
+        name="D4",
+        text="With 320 robots all tie.",
+        figure="scenario 2, population robustness (no figure)",
+        statements=(_states(ties, ("S2d 320", _D), pairs=_ALL_PAIRS),),
+    ),
+)
+
+_DISTURBED = (("S1c", _R), ("S1d", _R), ("S1c", _A), ("S1d", _A), ("S1e", _N), ("S1f", _N), ("S1g", _D), ("S1h", _D))
+_DISTURBED_2 = (("S2b 115", _R), ("S2b 320", _A), ("S2c 320", _N), ("S2d 115", _D))
+
+_TOGETHER = (
+    Claim(
+        name="X1",
+        text="In flexibility and robustness CRW and STOCHX stand together, better than DPO and STOCHM.",
+        figure="scenarios 1 and 2, flexibility and robustness",
+        statements=tuple(_better(*panel, STEADY, UNSTEADY) for panel in (*_DISTURBED, *_DISTURBED_2)),
+        needs="most",
+    ),
+    Claim(
+        name="X2",
+        text="Higher self-organisation goes with better flexibility and robustness.",
+        figure="scenario 1, task self-organisation beside flexibility and robustness, medium warehouse",
+        statements=tuple(
+            _states(same_order, ("S1b", _E_T), panel, policies=POLICIES, better=(1, 1 if panel[1] == _D else -1))
+            for panel in _DISTURBED
+            if panel[0] in ("S1d", "S1f", "S1h")
+        ),
+        needs="most",
+    ),
+    Claim(
+        name="X3",
+        text="Self-organisation is not tied to scalability or raw performance.",
+        figure="scenario 1, task self-organisation beside scalability and raw performance, medium warehouse",
+        statements=tuple(
+            _states(not_same_order, ("S1b", _E_T), ("S1b", measure), policies=POLICIES) for measure in (_C, _P)
+        ),
+    ),
+    Claim(
+        name="X4",
+        text="For scenario 2 STOCHX is the best choice overall.",
+        figure="scenario 2, all figures",
+        statements=tuple(_best(*panel, "stochx") for panel in (("S2a still", _E_T), ("S2a slow", _E_S), *_DISTURBED_2)),
+        needs="most",
+    ),
+)
+
+CLAIMS: dict[str, Claim] = {
+    claim.name: claim
+    for claim in (
+        *_SELF_ORGANISATION,
+        *_SCALING,
+        *_flexibility("R", _R),
+        *_flexibility("A", _A),
+        *_FLEXIBILITY_2,
+        *_NOISE,
+        *_POPULATION,
+        *_TOGETHER,
+    )
+}
+"""Name -> claim."""
