@@ -40,3 +40,42 @@ def test_two_versions_are_drawn_beside_each_other(tmp_path):
     printed = run(str(ROOT / "scripts/compare_versions.py"), "runs", "runs", "picture.png", cwd=tmp_path)
     assert "| 4 | 0.0 → 0.0 |" in printed
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--only", "vmas"), "expected some of vmas-discovery, "),
+        (("--rounds", "0"), "expected a number above 0, got 0"),
+        ((), "required: --venvs"),
+    ],
+)
+def test_other_packages_are_refused_with_what_was_expected(words, said, tmp_path):
+    command = [sys.executable, str(ROOT / "scripts/bench_peers.py"), *words]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert said in done.stderr
+
+
+def test_a_package_beside_ours_has_a_row(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    import bench_peers
+
+    rates = {bench_peers.CHIPMUNK: 200_000.0, bench_peers.COMPILED: 400_000.0}
+    printed = bench_peers.row("rware", 1, 8, [{"rware": 4000.0, **rates}, {"rware": 100.0, **rates}])
+    cells = printed.split(" | ")
+    assert cells[0] == f"| {bench_peers.PEERS['rware'].label}"
+    assert cells[1:7] == ["50", "1", "8", "2.05", "200", "400"]
+    assert cells[7:] == ["1,025 (50.00 to 2,000)", "2,050 (100 to 4,000) |"]
+
+
+def test_a_package_that_cannot_be_timed_gives_its_reason(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    import bench_peers
+
+    worker = bench_peers.Worker(sys.executable)
+    try:
+        with pytest.raises(bench_peers.PeerError, match="not run: KeyError: 'nobody'"):
+            worker.rate("nobody", 50, 1, 0.1)
+    finally:
+        worker.close()
