@@ -72,7 +72,7 @@ PEERS = {
     "vmas-transport": Peer(
         "VMAS",
         "`transport`",
-        "The same kind of discs, which push a heavy package to a goal. No sensors: each is told its own motion and where "
+        "The same kind of discs; they push a heavy package to a goal. No sensors: each is told how it moves and where "
         "package and goal are, 11 numbers. torch, all worlds in one array.",
         ("vmas==1.5.2", "torch==2.13.0"),
         worlds=((1, 1), (512, 8)),

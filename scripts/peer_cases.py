@@ -6,6 +6,7 @@ per second of processor time: one agent in one step is one agent-step. All actio
 clock starts; compiling, making worlds and starting episodes anew do not count.
 """
 
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -207,7 +208,8 @@ def answer(line: str, made: dict[tuple[str, int, int], Work]) -> str:
 
 def main() -> None:
     """Answer one line after the other; a line that cannot be answered gets "failed" and the reason."""
-    answers, sys.stdout = sys.stdout, sys.stderr  # some packages greet on standard output
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what packages print is no answer
     made: dict[tuple[str, int, int], Work] = {}
     for line in sys.stdin:
         try:
