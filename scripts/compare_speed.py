@@ -12,7 +12,6 @@ possible; the table has the median of the rounds, and their smallest and largest
 """
 
 import argparse
-import os
 import statistics
 import subprocess
 import sys
@@ -20,51 +19,29 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
 
 from rich.console import Console
 from rich.progress import Progress
 from speed_cases import CASES
+from timed_process import TimedProcess, ratio_cell
 
 ROOT = Path(__file__).resolve().parents[1]
 CASES_FILE = Path(__file__).with_name("speed_cases.py")
 OTHER, CHIPMUNK, COMPILED = "other", "chipmunk", "compiled"
 
 
-class Version:
+class Version(TimedProcess):
     """A process that times cases with the package of one folder."""
 
     def __init__(self, folder: Path) -> None:
         """Start the process; raises FileNotFoundError where the folder holds no such package."""
         if not (folder / "swarm_forage_env" / "__init__.py").is_file():
             raise FileNotFoundError(f"Expected a checkout of this project, got {folder}.")
-        one_thread = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-        self._process = subprocess.Popen(
-            [sys.executable, str(CASES_FILE)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=folder,
-            env={**os.environ, **one_thread, "PYTHONPATH": str(folder)},
-        )
+        super().__init__([sys.executable, str(CASES_FILE)], folder, {"PYTHONPATH": str(folder)})
 
     def time(self, case: str, engine: str) -> float:
         """Return microseconds per robot-tick."""
-        print(case, engine, file=_pipe(self._process.stdin), flush=True)
-        answer = _pipe(self._process.stdout).readline()
-        if not answer:
-            raise RuntimeError(f"The process that timed {case} has ended with {self._process.wait()}; see above.")
-        return float(answer)
-
-    def close(self) -> None:
-        """End the process."""
-        self._process.kill()
-        self._process.wait()
-
-
-def _pipe(pipe: IO[str] | None) -> IO[str]:
-    assert pipe is not None, "asked for above"
-    return pipe
+        return float(self.ask(f"{case} {engine}"))
 
 
 @contextmanager
@@ -98,9 +75,7 @@ def rounds_of(case: str, other: Version, this: Version, repeats: int) -> list[di
 def row(case: str, rounds: Sequence[dict[str, float]]) -> str:
     """Return the line of a case."""
     cells = [case, *(f"{statistics.median(times[who] for times in rounds):.3g}" for who in (OTHER, CHIPMUNK, COMPILED))]
-    for engine in (CHIPMUNK, COMPILED):
-        ratios = [times[OTHER] / times[engine] for times in rounds]
-        cells.append(f"{statistics.median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})")
+    cells += [ratio_cell([times[OTHER] / times[engine] for times in rounds]) for engine in (CHIPMUNK, COMPILED)]
     return f"| {' | '.join(cells)} |"
 
 

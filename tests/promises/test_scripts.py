@@ -66,3 +66,42 @@ def test_bad_arguments_end_in_a_message(script, words, fault, tmp_path):
     assert done.returncode == 2, done.stderr
     assert f"{script}.py: error: {fault}" in " ".join(done.stderr.split())
     assert done.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--only", "vmas"), "expected some of vmas-discovery, "),
+        (("--rounds", "0"), "expected a number above 0, got 0"),
+        ((), "required: --venvs"),
+    ],
+)
+def test_other_packages_are_refused_with_what_was_expected(words, said, tmp_path):
+    command = [sys.executable, str(ROOT / "scripts/bench_peers.py"), *words]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert said in done.stderr
+
+
+def test_a_package_beside_ours_has_a_row(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    import bench_peers
+
+    rates = {bench_peers.CHIPMUNK: 200_000.0, bench_peers.COMPILED: 400_000.0}
+    printed = bench_peers.row("rware", 1, 8, [{"rware": 4000.0, **rates}, {"rware": 100.0, **rates}])
+    cells = printed.split(" | ")
+    assert cells[0] == f"| {bench_peers.PEERS['rware'].label}"
+    assert cells[1:7] == ["50", "1", "8", "2.05", "200", "400"]
+    assert cells[7:] == ["1,025 (50.00 to 2,000)", "2,050 (100 to 4,000) |"]
+
+
+def test_a_package_that_cannot_be_timed_gives_its_reason(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    import bench_peers
+
+    worker = bench_peers.Worker(sys.executable)
+    try:
+        with pytest.raises(bench_peers.PeerError, match="not run: KeyError: 'nobody'"):
+            worker.rate("nobody", 50, 1, 0.1)
+    finally:
+        worker.close()
