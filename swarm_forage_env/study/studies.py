@@ -297,7 +297,9 @@ class StudySpec:
             values[name] = tuple(kind(**entry) for entry in entries)
         values["wrappers"] = wrappers_from_list(values["wrappers"])
         values["settings"] = plain_settings(values["settings"])
-        return cls(**values | {name: tuple(values[name]) for name in ("readings", "seeds")})
+        for name in ("readings", "seeds"):
+            values[name] = tuple(values[name])
+        return cls(**values)
 
     def to_json(self) -> str:
         """Return the study as one line of JSON."""
