@@ -1,8 +1,12 @@
 """Study files, and the paper's sets among them."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies import pretrained
 from swarm_forage_env.study.experiments import BUDGETS
 from swarm_forage_env.study.studies import Cell, StudySpec
 from swarm_forage_env.study.study_file import budget_names, load_study, set_names
@@ -126,9 +130,6 @@ def test_the_budget_of_the_paper_is_always_there(written):
 
 
 def test_a_policy_file_lies_beside_the_study(written, tmp_path):
-    from pathlib import Path
-
-    from swarm_forage_env.policies import pretrained
 
     source = next(Path(pretrained.__file__).parent.glob("*.npz"))
     (tmp_path / "own.npz").write_bytes(source.read_bytes())
@@ -176,3 +177,15 @@ def test_unknown_studies_and_budgets_are_refused(written):
         load_study("S1i")
     with pytest.raises(ConfigError, match=r"Did you mean 'tiny'\? Known: tiny, paper"):
         load_study(written(), "tini")
+
+
+def test_the_study_of_the_page_is_one(written, tmp_path):
+    page = (Path(__file__).parents[2] / "docs/studies.md").read_text()
+    (text,) = re.findall(r"^```toml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    policy = next(Path(pretrained.__file__).parent.glob("*.npz"))
+    (tmp_path / "my_policy.npz").write_bytes(policy.read_bytes())
+    file = written(text)
+    assert budget_names(file) == ("first", "full", "paper")
+    first, full = load_study(file, "first"), load_study(file, "full")
+    assert (first.n_experiments, first.n_runs, full.n_runs) == (6, 48, 384)
+    assert first.reference_of(first.cells[0]) == Cell("described", "crw", (10, 0.1))
