@@ -65,30 +65,30 @@ def described(spec: StudySpec) -> str:
 
 def plan_report(spec: StudySpec, folder: StudyFolder, part: tuple[int, int], workers: int) -> str:
     """Return what is left to run and how long it takes, measured here for a moment."""
-    specs = shard(spec.expand(), *part)
-    states = folder.state(run.run_id for run in specs).states
-    todo = [run for run in specs if states[run.run_id] != DONE]
+    planned = {run.run_id: run for run in shard(spec.expand(), *part)}
+    states = folder.state(planned).states
+    todo = {run_id: run for run_id, run in planned.items() if states[run_id] != DONE}
     aside = notes()
-    costs = calibrate(todo, tell=lambda line: aside.print(line, markup=False))
-    seconds = {run.run_id: costs[kind_of(run)].seconds(run) for run in todo}
-    labels = {(policy.policy, json.dumps(dict(policy.parameters))): policy.label for policy in spec.policies}
+    costs = calibrate(todo.values(), tell=lambda line: aside.print(line, markup=False))
+    labels = {run.run_id: cell.policy for cell in spec.cells for run in spec.specs_of(cell)}
     by_policy: dict[str, list[RunSpec]] = {}
-    for run in todo:
-        by_policy.setdefault(labels[run.policy, json.dumps(dict(run.parameters))], []).append(run)
-    by_policy["all"] = todo
+    for run_id, run in todo.items():
+        by_policy.setdefault(labels[run_id], []).append(run)
+    by_policy["all"] = [*todo.values()]
     rows = [("policy", "runs", "robot-ticks", "core-hours")]
     for label, runs in by_policy.items():
-        hours = sum(seconds[run.run_id] for run in runs) / 3600.0
-        rows.append((label, f"{len(runs):,}", f"{sum(run.robot_ticks for run in runs):.3g}", f"{hours:.3g}"))
+        seconds = [costs[kind_of(run)].seconds(run) for run in runs]
+        robot_ticks = sum(run.robot_ticks for run in runs)
+        rows.append((label, f"{len(runs):,}", f"{robot_ticks:.3g}", f"{sum(seconds) / 3600.0:.3g}"))
+    seconds = [costs[kind_of(run)].seconds(run) for run in todo.values()]
     busy = min(workers, max(1, len(todo)))
+    wall = duration(max(sum(seconds) / busy, *seconds, 0.0))
     shares = f", shard {part[0]} of {part[1]}" if part[1] > 1 else ""
-    total_s = sum(seconds.values())
-    longest = max(seconds.values(), default=0.0)
     return "\n".join(
         [
-            f"{spec.name}, budget {spec.budget}{shares}: {len(todo):,} of {len(specs):,} runs to do",
+            f"{spec.name}, budget {spec.budget}{shares}: {len(todo):,} of {len(planned):,} runs to do",
             *aligned(rows),
-            f"about {duration(max(total_s / busy, longest))} on {counted(busy, 'core')} as fast as this one is now",
+            f"about {wall} on {counted(busy, 'core')} as fast as this one is now",
         ]
     )
 

@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,11 +69,7 @@ class RunSpec:
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
         `physics` is left out where it is the default, so that runs in Chipmunk have the same ids with and without it.
         """
-        mapping = self.to_mapping()
-        del mapping["scenario"]["performance"]
-        if mapping["scenario"]["physics"] == "chipmunk":
-            del mapping["scenario"]["physics"]
-        return identity_of(mapping)
+        return identity_of({**self._others(), "scenario": _identifying_fields(self.scenario)})
 
     @property
     def robot_ticks(self) -> int:
@@ -87,8 +84,11 @@ class RunSpec:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the specification as nested plain values."""
+        return {"scenario": to_mapping(self.scenario), **self._others()}
+
+    def _others(self) -> dict[str, Any]:
+        """All but the scenario as nested plain values."""
         return {
-            "scenario": to_mapping(self.scenario),
             "policy": self.policy,
             "parameters": dict(self.parameters),
             "wrappers": wrappers_to_list(self.wrappers),
@@ -131,6 +131,16 @@ class RunSpec:
         if not isinstance(mapping, dict):
             raise ConfigError(f"Expected a run specification as a JSON object, got {type(mapping).__name__}.")
         return cls.from_mapping(mapping)
+
+
+@lru_cache(maxsize=64)
+def _identifying_fields(scenario: ScenarioConfig) -> dict[str, Any]:
+    """What of a scenario is part of a run's identity, see `RunSpec.run_id`; all seeds of a study share it."""
+    mapping = to_mapping(scenario)
+    del mapping["performance"]
+    if mapping["physics"] == "chipmunk":
+        del mapping["physics"]
+    return mapping
 
 
 def chosen_caches(asked: str | None, policy: object, scenario: ScenarioConfig) -> str:
