@@ -39,7 +39,7 @@ SIZE = "population_size"
 READING_NAMES = {"described": "DESCRIBED", "program": "AUTHORS_PROGRAM"}
 """Word of studies -> name of the reading in `scenarios.quirks.READINGS`."""
 SCENARIO_FIELDS = (*field_sections(), "density", "side_m")
-"""What a study may set, and vary, of a scenario: all that `presets.scenario` takes by name."""
+"""What a study may set, and vary, of a scenario: all that `scenarios.presets.scenario` takes by name."""
 OF_THE_STUDY = {
     "horizon_s": "the budget of a study sets it",
     "interval_s": "the budget of a study sets it",
