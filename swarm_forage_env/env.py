@@ -87,12 +87,6 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self._seeds = np.random.default_rng()
         self.seed_value: int | None = None
 
-        columns = self.layout.size
-        self._observation_space = {
-            agent: spaces.Box(-1.0, 1.0, (columns,), np.float32) for agent in self.possible_agents
-        }
-        self._action_space = {agent: spaces.Box(-1.0, 1.0, (3,), np.float32) for agent in self.possible_agents}
-
     # Spaces and constants
 
     @property
@@ -107,11 +101,20 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
     def observation_space(self, agent: str) -> spaces.Box:
         """(D,) float32 in [-1, 1]; one space object per agent."""
-        return self._observation_space[agent]
+        return self._observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Box:
         """(3,) float32 in [-1, 1]: left wheel, right wheel, gripper; one space object per agent."""
-        return self._action_space[agent]
+        return self._action_spaces[agent]
+
+    @cached_property  # made when asked for: runs of a policy never look at them, and there may be thousands
+    def _observation_spaces(self) -> dict[str, spaces.Box]:
+        columns = self.layout.size
+        return {agent: spaces.Box(-1.0, 1.0, (columns,), np.float32) for agent in self.possible_agents}
+
+    @cached_property
+    def _action_spaces(self) -> dict[str, spaces.Box]:
+        return {agent: spaces.Box(-1.0, 1.0, (3,), np.float32) for agent in self.possible_agents}
 
     @cached_property
     def state_space(self) -> spaces.Box:

@@ -22,7 +22,7 @@ from swarm_forage_env.world.caches import (
     n_cache_slots,
     restore_static_caches,
 )
-from swarm_forage_env.world.compiled import CompiledTick, compiled_tick, new_world
+from swarm_forage_env.world.compiled import CompiledTick, new_world
 from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels.tick import BAD_TASKS, DONE, NO_ROOM, TO_PLACE, run
 from swarm_forage_env.world.physics import Physics
@@ -103,15 +103,13 @@ class ForagingArena:
             self._physics.twist,
             self._static_caches,
         )
+        vars(self).pop("_compiled", None)  # that of the run before holds its world
         self._moved = False
         return self.observe()
 
     @cached_property
     def _compiled(self) -> CompiledTick:
-        """Found once: the types of the arrays are the same in all runs of a scenario."""
-        actions = np.zeros((self.config.robots.n_robots, 3), np.float32)
-        bodies = self._physics.state if isinstance(self._physics, Bodies) else None
-        return compiled_tick(self._world, bodies, actions, self._unit_gain, self._nothing[0])
+        return CompiledTick(self._world, self._physics.state if isinstance(self._physics, Bodies) else None)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
@@ -160,7 +158,7 @@ class ForagingArena:
         world, compiled, physics = self._world, self._compiled, self._physics
         pick_chances, walk_chances = self._draws(tick)
         draws = pick_chances[0], walk_chances[0]
-        if isinstance(physics, Bodies) and compiled.whole is not None:
+        if isinstance(physics, Bodies):
             outcome = compiled.whole(world, physics.state, actions, gain, tick, self._moved, *draws)
         else:
             outcome = compiled.set_out(world, actions, gain, tick, self._moved)
