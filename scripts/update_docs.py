@@ -55,6 +55,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         ("crw", "policy"),
     ),
+    "sets": (("swarm-forage study list",), ()),
 }
 """Name -> commands, of which the last prints the table, and what its rows are called in blocks."""
 

@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from swarm_forage_env.study.run import build_stack, run_one, run_policy
     from swarm_forage_env.study.runner import run_all
     from swarm_forage_env.study.spec import RunSpec, plan_run
+    from swarm_forage_env.study.studies import StudySpec
+    from swarm_forage_env.study.study_file import load_study
+    from swarm_forage_env.study.study_run import StudyFolder, run_study
+    from swarm_forage_env.study.study_table import StudyTable, read_study
     from swarm_forage_env.views.pettingzoo import parallel_env
     from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
     from swarm_forage_env.wrappers.handling import HandlingCost, HandlingCostConfig
@@ -65,6 +69,9 @@ __all__ = [
     "SensorNoiseConfig",
     "Snapshot",
     "SnapshotError",
+    "StudyFolder",
+    "StudySpec",
+    "StudyTable",
     "SwarmSpec",
     "Task",
     "Throttle",
@@ -76,14 +83,17 @@ __all__ = [
     "check_policy",
     "from_callable",
     "load_policy",
+    "load_study",
     "parallel_env",
     "parse_wrapper",
     "plan_run",
     "policy_names",
+    "read_study",
     "record_run",
     "run_all",
     "run_one",
     "run_policy",
+    "run_study",
     "scenario",
     "with_overrides",
 ]
@@ -113,6 +123,9 @@ _HOMES = {
     "SensorNoiseConfig": "wrappers.noise",
     "Snapshot": "world.snapshots",
     "SnapshotError": "world.snapshots",
+    "StudyFolder": "study.study_run",
+    "StudySpec": "study.studies",
+    "StudyTable": "study.study_table",
     "SwarmSpec": "contract.policy",
     "Task": "contract.codes",
     "Throttle": "wrappers.throttle",
@@ -124,14 +137,17 @@ _HOMES = {
     "check_policy": "checks",
     "from_callable": "policies.registry",
     "load_policy": "policies.registry",
+    "load_study": "study.study_file",
     "parallel_env": "views.pettingzoo",
     "parse_wrapper": "wrappers.registry",
     "plan_run": "study.spec",
     "policy_names": "policies.registry",
+    "read_study": "study.study_table",
     "record_run": "study.film",
     "run_all": "study.runner",
     "run_one": "study.run",
     "run_policy": "study.run",
+    "run_study": "study.study_run",
     "with_overrides": "scenarios.config",
 }
 """Public name -> submodule that defines it, loaded when the name is first used."""

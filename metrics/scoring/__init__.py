@@ -10,6 +10,7 @@ from .plots import draw_scores
 from .prediction import PredictionTable, predict_curves, predict_policy
 from .prediction_plots import draw_predictions
 from .runs import run_scores
+from .study_tables import StudyLine, study_lines
 from .table import Score, ScoreTable
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "compare_tables",
     "plan_scores",
     "run_scores",
+    "study_lines",
     "draw_scores",
     "predict_policy",
     "predict_curves",
@@ -29,6 +31,7 @@ __all__ = [
     "ScoreForms",
     "Comparison",
     "ScoringPlan",
+    "StudyLine",
     "Performance",
     "PredictionTable",
     "Choice",

@@ -175,7 +175,7 @@ def _population_scores(name: str, study: StudyCurves, variant: Variant, _: Form)
     levels = _levels(study, POPULATION)
     if horizon_s is None:
         raise Uncomputable("there is no column t_end_s, which gives the length of a run")
-    if variant == "sierra":
+    if variant == "sierra" and study.reference_value == 0.0:  # else the reference is that lowest level already
         levels = _against_lowest_rate(levels)
     for reference, level in levels:
         try:

@@ -105,7 +105,7 @@ def _study(plan: ScoringPlan, contestant: Contestant, records: "Sequence[RunReco
     for experiment in plan.experiments:
         key = (experiment.criterion, experiment.value, experiment.scenario.robots.n_robots)
         nothing = RunCurves(criterion=key[0], value=key[1], n_robots=key[2], seeds=(), curves={})
-        experiments.append(replace(found.get(key, nothing), rates=_rates(experiment), n_planned=len(plan.seeds)))
+        experiments.append(replace(found.get(key, nothing), rates=rates_of(experiment), n_planned=len(plan.seeds)))
     n_intervals = round(plan.budget.horizon_s / plan.budget.interval_s)
     return StudyCurves(
         controller=contestant.label,
@@ -132,8 +132,8 @@ def _frame(plan: ScoringPlan, records: "Sequence[RunRecord]") -> "pl.DataFrame":
     return pl.concat(frames, how="diagonal").sort("criterion", "criterion_value", "n_robots", maintain_order=True)
 
 
-def _rates(experiment: "Experiment") -> PopulationRates | None:
-    """Rates of an experiment, per second."""
+def rates_of(experiment: "Experiment") -> PopulationRates | None:
+    """Return the rates of an experiment, per second; None where the population stays as it is."""
     config = experiment.population
     if config is None:
         return None

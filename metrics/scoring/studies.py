@@ -72,6 +72,8 @@ class StudyCurves:
     """Whether performance is a total over its interval, like deliveries; else it is a mean, a ratio, a share."""
     adds_up: bool = True
     """Whether a swarm has what its robots have together, so that twice the swarm could have twice of it."""
+    reference_value: float = 0.0
+    """Value of a criterion at its reference runs; the authors compare population dynamics with the lowest level."""
     where: str = "the table"
     """Name of the table in error messages."""
 
@@ -90,20 +92,21 @@ class StudyCurves:
         Raises:
             CurveError: levels without a reference run of the same swarm size.
         """
-        mine = [e for e in self.experiments if e.criterion == criterion and e.value != 0.0]
+        mine = [e for e in self.experiments if e.criterion == criterion and e.value != self.reference_value]
         return tuple(
             (self._reference(level), level) for level in sorted(mine, key=lambda level: (level.n_robots, level.value))
         )
 
     def _reference(self, level: RunCurves) -> RunCurves:
         same_size = [e for e in self.experiments if e.n_robots == level.n_robots]
-        own = [e for e in same_size if e.criterion == level.criterion and e.value == 0.0]
+        own = [e for e in same_size if e.criterion == level.criterion and e.value == self.reference_value]
         shared = [e for e in same_size if e.criterion == UNDISTURBED]
         for reference in (*own, *shared):
             return reference
         raise CurveError(
             f"Expected a reference run for {level.describe()} of {self.controller} in {self.where}: the same swarm "
-            f"size with criterion {level.criterion} and value 0, or with criterion {UNDISTURBED}; got neither."
+            f"size with criterion {level.criterion} and value {self.reference_value:g}, or with criterion "
+            f"{UNDISTURBED}; got neither."
         )
 
 

@@ -20,6 +20,7 @@ from swarm_forage_env.cli.run import run
 from swarm_forage_env.cli.score import score
 from swarm_forage_env.cli.show import info, list_everything, schema
 from swarm_forage_env.cli.stuck import stuck
+from swarm_forage_env.cli.study import study
 from swarm_forage_env.cli.train import train
 
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
@@ -51,6 +52,7 @@ def _options(
 # `--help` lists them in this order.
 for command in (run, score, compare, predict, choose, train):
     app.command()(command)
+app.add_typer(study, name="study")
 app.command("list")(list_everything)
 for command in (info, schema, rerun, record, stuck, ablate, availability):
     app.command()(command)

@@ -184,7 +184,8 @@ def at_density(
         return in_arena(config, arena_at_density(config, density, n_robots), n_robots=n_robots, n_objects=n_objects)
     fields.whole("robots.n_robots", n_robots, at_least=1)
     side_m = side_for(n_robots, checked_density(density))
-    arena = {name: getattr(search_and_rescue(side_m=side_m).arena, name) for name in ARENA_FIELDS}
+    of_side = search_and_rescue(side_m=side_m).arena
+    arena = {name: getattr(of_side, name) for name in ARENA_FIELDS}
     objects = SEARCH_AND_RESCUE_OBJECTS[int(side_m)] if n_objects is None else n_objects
     return in_arena(config, arena, n_robots=n_robots, n_objects=objects)
 

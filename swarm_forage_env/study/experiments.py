@@ -11,13 +11,13 @@ that each of them varies, and its reference run:
     none                  the undisturbed run itself
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from swarm_forage_env._internal.fields import ConfigError, known_name, whole
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.presets import DENSITY, SEARCH_AND_RESCUE_OBJECTS, search_and_rescue
+from swarm_forage_env.scenarios.presets import DENSITY, SEARCH_AND_RESCUE_OBJECTS, at_density, search_and_rescue
 from swarm_forage_env.scenarios.presets import scenario as preset_scenario
 from swarm_forage_env.scenarios.sizing import arena_at_density, in_arena, robots_at_density
 from swarm_forage_env.study.spec import RunSpec, plan_run
@@ -137,15 +137,9 @@ def plan_experiments(
         ]
     if "noise" in criteria or "population_dynamics" in criteria:
         experiments.append(Experiment(criterion=UNDISTURBED, value=0.0, scenario=scenario))
-    levels = {
-        "throttle": _throttle_levels,
-        "handling_cost": _handling_levels,
-        "noise": _noise_levels,
-        "population_dynamics": _population_levels,
-    }
-    for criterion, of_study in levels.items():
+    for criterion, adversity in _ADVERSITIES.items():
         if criterion in criteria:
-            reference, disturbed = of_study(scenario)
+            reference, disturbed = adversity.levels(scenario)
             chosen = spread(disturbed, budget.n_levels)
             experiments += [
                 Experiment(criterion=criterion, value=value, scenario=scenario, wrappers=wrappers)
@@ -232,9 +226,72 @@ def size_ladder(
         sizes = {1, *(max(2, n_robots >> halvings) for halvings in range(count - 1))}
     if density is not None:
         return _growing_with_swarm(scenario, sorted(sizes), density)
+    return _in_one_arena(scenario, sorted(sizes))
+
+
+def swarms_of_sizes(
+    scenario: ScenarioConfig, sizes: Sequence[int], density: float | None = None
+) -> dict[int, ScenarioConfig]:
+    """Return the scenario with each of some swarm sizes, by size; the rules are those of `size_ladder`.
+
+    Args:
+        scenario: The scenario.
+        sizes: Numbers of robots, each once.
+        density: Robots per m^2 that all sizes but one robot keep; None = the arena of the scenario, in search and
+            rescue the smallest of its arenas that holds the swarm at 5 %.
+
+    Raises:
+        ConfigError: a size for which there is no room, or no arena.
+    """
+    for size in sizes:
+        whole("population_size", size, at_least=1)
+    if density is None and scenario.name != "search_and_rescue":
+        return dict(zip(sizes, _in_one_arena(scenario, sizes), strict=True))
+    # One robot is in the smallest arena of the others, because at the density alone it would have next to none.
+    smallest = min((size for size in sizes if size > 1), default=1)
+    worlds = {size: at_density(scenario, density or DENSITY, n_robots=max(size, smallest)) for size in sizes}
+    return {size: replace(world, robots=replace(world.robots, n_robots=size)) for size, world in worlds.items()}
+
+
+def study_values(scenario: ScenarioConfig, criterion: str) -> tuple[float, ...]:
+    """Return the values that the study gives a criterion in a scenario, the smallest first, without the value 0.
+
+    Raises:
+        ConfigError: an unknown criterion, or a swarm of one robot when sizes are varied.
+    """
+    known_name("criterion", criterion, CRITERIA)
+    if criterion == "population_size":
+        return tuple(sized.robots.n_robots for sized in size_ladder(scenario, None))
+    _, disturbed = _ADVERSITIES[criterion].levels(scenario)
+    return tuple(value for value, _ in disturbed)
+
+
+def wrappers_at(scenario: ScenarioConfig, criterion: str, value: float) -> tuple[WrapperConfig, ...]:
+    """Return the wrappers that make a value of a criterion, also a value that the study does not have.
+
+    Args:
+        scenario: With its horizon, to which waveforms are compressed, and its number of robots.
+        criterion: One of `CRITERIA` but the swarm size.
+        value: 0 is the ideal throttle or handling cost, and for the others no disturbance at all.
+
+    Raises:
+        ConfigError: an unknown criterion, or a value that its wrapper refuses.
+    """
+    known_name("criterion of adversity", criterion, _ADVERSITIES)
+    adversity = _ADVERSITIES[criterion]
+    reference, disturbed = adversity.levels(scenario)
+    known = dict([*reference, *disturbed])
+    if value in known or value == 0.0:
+        return known.get(value, ())
+    level, wrappers = disturbed[0]
+    return tuple(adversity.at(config, level, value) for config in wrappers)
+
+
+def _in_one_arena(scenario: ScenarioConfig, sizes: Sequence[int]) -> tuple[ScenarioConfig, ...]:
+    """The scenario with each size; a warehouse with its usual number of objects gets that of the size sweep."""
     if scenario.objects.n_objects == _preset_objects(scenario.name):
         scenario = replace(scenario, objects=replace(scenario.objects, n_objects=SIZE_SWEEP_OBJECTS[scenario.name]))
-    return tuple(replace(scenario, robots=replace(scenario.robots, n_robots=size)) for size in sorted(sizes))
+    return tuple(replace(scenario, robots=replace(scenario.robots, n_robots=size)) for size in sizes)
 
 
 def _preset_objects(name: str) -> int | None:
@@ -341,3 +398,40 @@ def _malfunctions(n_robots: int) -> tuple[PopulationConfig, ...]:
         PopulationConfig(malfunction_per_tick=factor * MALFUNCTION_PER_TICK, repair_per_tick=factor * repair)
         for factor in range(1, 9)
     )
+
+
+def _waved_at(config: _Waved, level: float, value: float) -> _Waved:
+    wave = config.waveform
+    return replace(config, waveform=replace(wave, amplitude=value, offset=wave.offset - level + value))
+
+
+def _noise_at(config: Any, level: float, value: float) -> Any:
+    return replace(config, sigma=config.sigma - level + value)
+
+
+def _population_at(config: PopulationConfig, level: float, value: float) -> PopulationConfig:
+    factor = value / level
+    return replace(
+        config,
+        death_per_tick=config.death_per_tick * factor,
+        malfunction_per_tick=config.malfunction_per_tick * factor,
+        repair_per_tick=config.repair_per_tick * factor,
+    )
+
+
+class _Adversity(NamedTuple):
+    """One kind of adversity: the levels of the study, and what makes another level of one of them."""
+
+    levels: Callable[[ScenarioConfig], tuple[list[_Level], list[_Level]]]
+    """Scenario -> the reference, if it has wrappers, and the disturbed levels."""
+    at: Callable[[Any, float, float], Any]
+    """Wrapper of a level, value of that level, another value -> the wrapper of the other value."""
+
+
+_ADVERSITIES: dict[str, _Adversity] = {
+    "throttle": _Adversity(_throttle_levels, _waved_at),
+    "handling_cost": _Adversity(_handling_levels, _waved_at),
+    "noise": _Adversity(_noise_levels, _noise_at),
+    "population_dynamics": _Adversity(_population_levels, _population_at),
+}
+"""Criterion -> its adversity."""

@@ -1,11 +1,14 @@
 """How many runs are done and how long the rest will take, on stderr."""
 
 import time
+from collections.abc import Sequence
 from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+DAMAGED_SHOWN = 5
+"""Damaged files that are named; more are only counted."""
 PLAIN_LINE_EVERY_S = 10.0
 """Shortest time between two lines where stderr is no terminal."""
 
@@ -13,9 +16,22 @@ PLAIN_LINE_EVERY_S = 10.0
 class RunProgress:
     """Context manager: a bar on a terminal, an occasional plain line elsewhere."""
 
-    def __init__(self, *, total: int, done: int = 0, foreign: int = 0) -> None:
-        """Count `total` runs. `done` of them are stored already; other versions made `foreign` of these."""
+    def __init__(
+        self, *, total: int, done: int = 0, foreign: int = 0, damaged: Sequence[str] = (), work: float = 0.0
+    ) -> None:
+        """Count runs.
+
+        Args:
+            total: How many there are.
+            done: How many of them are stored already.
+            foreign: How many of these other versions made.
+            damaged: Why files of others cannot be used; they are run again.
+            work: What the rest of the runs takes in any unit, for the estimate; 0 = all runs take as long.
+        """
         self._total = total
+        self._damaged = damaged
+        self._work = work
+        self._work_done = 0.0
         self._stored = done
         self._foreign = foreign
         self._done = done
@@ -36,6 +52,10 @@ class RunProgress:
                 f"{self._foreign} of them {be} made by another version or commit of the packages; "
                 "give another folder to run them afresh."
             )
+        for reason in self._damaged[:DAMAGED_SHOWN]:
+            self._console.print(f"Run again: {reason}", markup=False)
+        if len(self._damaged) > DAMAGED_SHOWN:
+            self._console.print(f"Run again: {len(self._damaged) - DAMAGED_SHOWN} more files like these.")
         if self._done == self._total:
             return self
         if not self._console.is_terminal:
@@ -54,9 +74,10 @@ class RunProgress:
         if self._bar is not None:
             self._bar.stop()
 
-    def advance(self, *, failed: bool) -> None:
-        """Count one more run."""
+    def advance(self, *, failed: bool, work: float = 0.0) -> None:
+        """Count one more run, and the work it was."""
         self._done += 1
+        self._work_done += work
         self._failed += failed
         now = time.monotonic()
         if self._bar is not None:
@@ -72,7 +93,8 @@ class RunProgress:
             return "all done" + failures
         if not ran:
             return "no estimate yet (the first run after an installation compiles for up to a minute)" + failures
-        seconds = (time.monotonic() - self._started) / ran * left
+        share_left = left / ran if not self._work_done else (self._work - self._work_done) / self._work_done
+        seconds = (time.monotonic() - self._started) * share_left
         return f"about {duration(seconds)} left{failures}"
 
 

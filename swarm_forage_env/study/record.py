@@ -131,6 +131,11 @@ class RunRecord:
         """Return all (T,) columns by name, contributed ones last."""
         return {name: getattr(self, name) for name in _COLUMN_DTYPES} | dict(self.contributed)
 
+    @classmethod
+    def column_names(cls) -> tuple[str, ...]:
+        """Return the names of the columns that every record has, keys first, in their order."""
+        return (*_KEY_DTYPES, *_COLUMN_DTYPES)
+
     def rate_per_1000_s(self, column: str) -> float:
         """Return the sum of a column over the run, per 1,000 simulated seconds."""
         return float(self.columns()[column].sum()) * 1000.0 / self.horizon_s

@@ -20,7 +20,7 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import closing, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, TypeAlias
@@ -33,6 +33,8 @@ from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import RunFailure, RunStore
 
 Outcome: TypeAlias = RunRecord | RunFailure
+Task: TypeAlias = tuple[RunSpec, ...]
+"""Runs that an executor gets together."""
 
 THREAD_SETTINGS = (
     "OMP_NUM_THREADS",
@@ -44,6 +46,8 @@ THREAD_SETTINGS = (
 """Environment variables set to 1 for workers: runs are parallel, the libraries inside a run are not."""
 QUEUED_PER_WORKER = 2
 """Runs given to the pool per worker: enough that no worker waits, few enough that a crash loses little."""
+QUEUED_ELSEWHERE = 4096
+"""Tasks given to the executor of the caller at a time: enough for the workers that may join it, few enough to watch."""
 WAKE_UP_EVERY_S = 0.5
 """The driver never sleeps longer, because with the signal handler of a library (polars) Ctrl-C may not end a sleep."""
 
@@ -124,6 +128,7 @@ def run_each(
     store: RunStore | None = None,
     executor: Executor | None = None,
     jobs: int | None = None,
+    batch_robot_ticks: int = 0,
 ) -> Generator[Outcome]:
     """Run specifications and yield each outcome as it finishes, already stored.
 
@@ -135,15 +140,17 @@ def run_each(
         store: Where records and failures go.
         executor: Runs the work; default a pool of local processes.
         jobs: Processes of the default pool, default one per available core; 1 = in this process.
+        batch_robot_ticks: Neighbours among `specs` that differ in the seed alone go to `executor` as one task, until
+            it has so many robot-ticks; 0 = every run is a task of its own.
 
     Raises:
         WorkerError: no worker process could be started.
     """
-    todo = deque(specs)
+    todo = deque((spec,) for spec in specs)
     if jobs is not None:
         jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
     if executor is not None:
-        outcomes = _run_elsewhere(executor, todo)
+        outcomes = _run_elsewhere(executor, _batches(todo, batch_robot_ticks))
     elif jobs == 1 or len(todo) == 1:
         outcomes = _run_on(_InProcess(), todo, limit=1)
     else:
@@ -172,43 +179,80 @@ def _result(planned: dict[str, RunSpec], outcomes: dict[str, Outcome], n_stored:
     )
 
 
-def _run_on(
-    executor: Executor, todo: deque[RunSpec], *, limit: int, lost: deque[RunSpec] | None = None
-) -> Generator[Outcome]:
-    """Run `todo` with at most `limit` runs submitted at a time; if the executor breaks, stop and leave the rest.
+def run_several(specs: Task) -> tuple[Outcome, ...]:
+    """Run specifications one after the other; a run that fails does not end the others."""
+    outcomes: list[Outcome] = []
+    for spec in specs:
+        try:
+            outcomes.append(run_one(spec))
+        except Exception as error:  # noqa: BLE001 - whatever a run raises is its failure
+            outcomes.append(_failure(spec, error))
+    return tuple(outcomes)
 
-    Runs that were submitted when it broke are failures, or go to `lost` if it is given.
+
+def _run_on(
+    executor: Executor, todo: deque[Task], *, limit: int, lost: deque[Task] | None = None
+) -> Generator[Outcome]:
+    """Run `todo` with at most `limit` tasks submitted at a time; if the executor breaks, stop and leave the rest.
+
+    Runs that were submitted when it broke are failures, or go to `lost` if it is given. If a task of several runs
+    fails as a whole, they are tried again one by one, so that only those fail that kill their worker.
     """
-    running: dict[Future[RunRecord], RunSpec] = {}
+    running: dict[Future[Any], Task] = {}
     broken = False
     try:
         while running or (todo and not broken):
             while todo and not broken and len(running) < limit:
                 try:
-                    running[executor.submit(run_one, todo[0])] = todo[0]
+                    running[_submitted(executor, todo[0])] = todo[0]
                     todo.popleft()
                 except BrokenExecutor:
                     broken = True
             finished, _ = wait(running, timeout=WAKE_UP_EVERY_S, return_when=FIRST_COMPLETED)
             for future in finished:
-                spec = running.pop(future)
+                task = running.pop(future)
                 error = CancelledError("by its executor") if future.cancelled() else future.exception()
                 if isinstance(error, BrokenExecutor):
                     broken = True
                     if lost is not None:
-                        lost.append(spec)
+                        lost.append(task)
                         continue
-                yield future.result() if error is None else _failure(spec, error)
+                if error is None:
+                    yield from future.result() if len(task) > 1 else (future.result(),)
+                elif len(task) > 1 and not broken:
+                    todo.extend((spec,) for spec in task)
+                else:
+                    yield from (_failure(spec, error) for spec in task)
     finally:
         for future in running:
             future.cancel()
 
 
-def _run_elsewhere(executor: Executor, todo: deque[RunSpec]) -> Generator[Outcome]:
+def _submitted(executor: Executor, task: Task) -> Future[Any]:
+    return executor.submit(run_one, task[0]) if len(task) == 1 else executor.submit(run_several, task)
+
+
+def _batches(tasks: deque[Task], robot_ticks: int) -> deque[Task]:
+    """Join neighbours that differ in the seed alone, until a task has so many robot-ticks."""
+    joined: deque[Task] = deque()
+    size = 0
+    for task in tasks:
+        last = joined[-1] if joined else ()
+        if last and size < robot_ticks and replace(task[0], seed=last[0].seed) == last[0]:
+            joined[-1] = (*last, *task)
+            size += task[0].robot_ticks
+        else:
+            joined.append(task)
+            size = task[0].robot_ticks
+    return joined
+
+
+def _run_elsewhere(executor: Executor, todo: deque[Task]) -> Generator[Outcome]:
     """Run `todo` on the executor of the caller, which is not replaced if it breaks."""
-    yield from _run_on(executor, todo, limit=len(todo))
+    yield from _run_on(executor, todo, limit=min(QUEUED_ELSEWHERE, max(1, len(todo))))
     if todo:
-        raise WorkerError(f"The executor broke; {len(todo)} runs were not started. Run them again on a new one.")
+        n_left = sum(len(task) for task in todo)
+        raise WorkerError(f"The executor broke; {n_left} runs were not started. Run them again on a new one.")
 
 
 def _failure(spec: RunSpec, error: BaseException) -> RunFailure:
@@ -233,15 +277,15 @@ class _InProcess(Executor):
         return future
 
 
-def _run_in_pool(todo: deque[RunSpec], n_workers: int) -> Generator[Outcome]:
+def _run_in_pool(todo: deque[Task], n_workers: int) -> Generator[Outcome]:
     """Run `todo` in local processes.
 
     A pool breaks as a whole when one worker is killed (for lack of memory, for example). It is replaced for the other
     runs, and the runs that were under way are tried once more, one at a time. So only runs that kill their worker fail.
     """
-    lost: deque[RunSpec] = deque()
+    lost: deque[Task] = deque()
     with _process_pool(n_workers) as pool:
-        _warm_up_workers(pool, todo)
+        _warm_up_workers(pool, [spec for task in todo for spec in task])
         yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers, lost=lost)
     while todo:
         with _process_pool(n_workers) as pool:

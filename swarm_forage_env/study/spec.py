@@ -2,8 +2,9 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,12 +69,12 @@ class RunSpec:
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
         `physics` is left out where it is the default, so that runs in Chipmunk have the same ids with and without it.
         """
-        mapping = self.to_mapping()
-        del mapping["scenario"]["performance"]
-        if mapping["scenario"]["physics"] == "chipmunk":
-            del mapping["scenario"]["physics"]
-        canonical = json.dumps(_canonical(mapping), sort_keys=True, separators=(",", ":"))
-        return hashlib.blake2b(canonical.encode(), digest_size=RUN_ID_DIGITS // 2).hexdigest()
+        return identity_of({**self._others(), "scenario": _identifying_fields(self.scenario)})
+
+    @property
+    def robot_ticks(self) -> int:
+        """Robots times ticks: how much there is to simulate."""
+        return self.scenario.robots.n_robots * self.scenario.horizon_ticks
 
     def describe(self) -> str:
         """Return one line for people."""
@@ -83,11 +84,14 @@ class RunSpec:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the specification as nested plain values."""
+        return {"scenario": to_mapping(self.scenario), **self._others()}
+
+    def _others(self) -> dict[str, Any]:
+        """All but the scenario as nested plain values."""
         return {
-            "scenario": to_mapping(self.scenario),
             "policy": self.policy,
             "parameters": dict(self.parameters),
-            "wrappers": [{"wrapper": config.name, **config.to_mapping()} for config in self.wrappers],
+            "wrappers": wrappers_to_list(self.wrappers),
             "criterion": self.criterion,
             "criterion_value": self.criterion_value,
             "seed": self.seed,
@@ -106,10 +110,7 @@ class RunSpec:
             raise ConfigError(f"Missing key {missing[0]!r} in a run specification.")
         values = dict(mapping)
         values["scenario"] = from_mapping(ScenarioConfig, values["scenario"], where="scenario.")
-        wrappers = values.get("wrappers", ())
-        if not isinstance(wrappers, (list, tuple)):
-            raise ConfigError(f"Expected wrappers as a list of tables, got {wrappers!r}.")
-        values["wrappers"] = tuple(_wrapper_from_mapping(entry) for entry in wrappers)
+        values["wrappers"] = wrappers_from_list(values.get("wrappers", ()))
         return cls(**values)
 
     def to_json(self) -> str:
@@ -130,6 +131,16 @@ class RunSpec:
         if not isinstance(mapping, dict):
             raise ConfigError(f"Expected a run specification as a JSON object, got {type(mapping).__name__}.")
         return cls.from_mapping(mapping)
+
+
+@lru_cache(maxsize=64)
+def _identifying_fields(scenario: ScenarioConfig) -> dict[str, Any]:
+    """What of a scenario is part of a run's identity, see `RunSpec.run_id`; all seeds of a study share it."""
+    mapping = to_mapping(scenario)
+    del mapping["performance"]
+    if mapping["physics"] == "chipmunk":
+        del mapping["physics"]
+    return mapping
 
 
 def chosen_caches(asked: str | None, policy: object, scenario: ScenarioConfig) -> str:
@@ -209,12 +220,34 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
     return file, pinned, load_policy(file, pinned)
 
 
+def wrappers_to_list(wrappers: "Iterable[WrapperConfig]") -> list[dict[str, Any]]:
+    """Return wrapper configurations as plain values; `wrappers_from_list` reads them back."""
+    return [{"wrapper": config.name, **config.to_mapping()} for config in wrappers]
+
+
+def wrappers_from_list(entries: Any) -> "tuple[WrapperConfig, ...]":
+    """Build wrapper configurations back from `wrappers_to_list`.
+
+    Raises:
+        ConfigError: no list of tables, or a table that describes no wrapper.
+    """
+    if not isinstance(entries, (list, tuple)):
+        raise ConfigError(f"Expected wrappers as a list of tables, got {entries!r}.")
+    return tuple(_wrapper_from_mapping(entry) for entry in entries)
+
+
 def _wrapper_from_mapping(entry: Mapping[str, Any]) -> "WrapperConfig":
     values = dict(entry) if isinstance(entry, Mapping) else {}
     name = values.pop("wrapper", None)
     if not isinstance(name, str):
         raise ConfigError(f"Missing key 'wrapper' (its name) in the wrapper {entry!r}.")
     return wrapper_config_class(name).from_mapping(values)
+
+
+def identity_of(mapping: Mapping[str, Any]) -> str:
+    """Return a short hexadecimal hash of nested plain values; 2 and 2.0 count as equal."""
+    canonical = json.dumps(_canonical(mapping), sort_keys=True, separators=(",", ":"))
+    return hashlib.blake2b(canonical.encode(), digest_size=RUN_ID_DIGITS // 2).hexdigest()
 
 
 def _canonical(value: Any) -> Any:

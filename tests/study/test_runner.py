@@ -259,7 +259,7 @@ def test_a_crashed_worker_costs_only_the_run_that_crashed_it(monkeypatch):
         yield Breaking(SPECS[1], n_workers)
 
     monkeypatch.setattr(runner, "_process_pool", breaking_pool)
-    outcomes = list(runner._run_in_pool(deque(SPECS), 2))
+    outcomes = list(runner._run_in_pool(deque((spec,) for spec in SPECS), 2))
     assert {outcome.seed for outcome in outcomes if isinstance(outcome, RunRecord)} == {0, 2, 3}
     (failure,) = (outcome for outcome in outcomes if isinstance(outcome, RunFailure))
     assert failure.spec == SPECS[1]
@@ -274,7 +274,7 @@ def test_workers_that_cannot_start_are_an_error_with_a_hint(monkeypatch):
 
     monkeypatch.setattr(runner, "_process_pool", dead_pool)
     with pytest.raises(WorkerError, match="if __name__ == '__main__'"):
-        list(runner._run_in_pool(deque(SPECS[:1]), 2))
+        list(runner._run_in_pool(deque([SPECS[:1]]), 2))
 
 
 def test_thread_settings_are_put_back(monkeypatch):

@@ -1,0 +1,107 @@
+"""From the table of a study to curves that can be scored: one set of curves per line of its figures.
+
+A study of `swarm_forage_env.study` has cells: a policy in a reading at one value of each axis. The cells that differ on
+the last axis alone are a line of a figure, and one of them is the reference of the others.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .columns import INTERVAL_COLUMNS, SIZE
+from .runs import rates_of
+from .studies import RunCurves, StudyCurves
+
+if TYPE_CHECKING:
+    from swarm_forage_env.study.studies import Cell, Value
+    from swarm_forage_env.study.study_table import StudyTable
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyLine:
+    """The cells of a study that differ on the last axis alone."""
+
+    reading: str
+    """Which rules: "described" or "program"."""
+    policy: str
+    """Label of the policy."""
+    others: "Mapping[str, Value]"
+    """Value on each axis but the last, by its name."""
+    cells: "tuple[Cell, ...]"
+    """In the order of the last axis."""
+    curves: StudyCurves
+    """One experiment per cell, in the same order; `score_study` takes it."""
+
+
+def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[StudyLine, ...]:
+    """Return the lines of a study, in the order of its cells.
+
+    Args:
+        table: From `swarm_forage_env.read_study`. Failed and missing runs count as planned and lost.
+        performance: What P(N, t) is, by a name as in `score_policy`; default that of the scenario.
+
+    Raises:
+        ValueError: no such performance.
+    """
+    from swarm_forage_env.scenarios.performance import quantity
+
+    spec = table.spec
+    names = [axis.name for axis in spec.axes[:-1]]
+    cells_of: dict[tuple[object, ...], list[Cell]] = {}
+    for cell in spec.cells:
+        cells_of.setdefault((cell.reading, cell.policy, cell.values[:-1]), []).append(cell)
+    lines: list[StudyLine] = []
+    for cells in cells_of.values():
+        first = cells[0]
+        read_as = quantity(performance or spec.experiment(first).scenario.performance)
+        experiments = tuple(_runs(table, cell, performance) for cell in cells)
+        n_intervals = round(spec.horizon_s / spec.interval_s)
+        lines.append(
+            StudyLine(
+                reading=first.reading,
+                policy=first.policy,
+                others=dict(zip(names, first.values, strict=False)),
+                cells=tuple(cells),
+                curves=StudyCurves(
+                    controller=first.policy,
+                    experiments=experiments,
+                    t_end_s=spec.interval_s * np.arange(1.0, n_intervals + 1.0),
+                    amount=read_as.amount,
+                    is_total=read_as.is_total,
+                    adds_up=read_as.adds_up,
+                    reference_value=_reference_value(table, cells),
+                    where=f"study {spec.name}",
+                ),
+            )
+        )
+    return tuple(lines)
+
+
+def _runs(table: "StudyTable", cell: "Cell", performance: str | None) -> RunCurves:
+    """The finished runs of a cell."""
+    from swarm_forage_env.scenarios.performance import PERFORMANCE_COLUMNS, performance_curve
+
+    experiment = table.spec.experiment(cell)
+    seeds, columns = table.curves(cell, *{*INTERVAL_COLUMNS, *PERFORMANCE_COLUMNS})
+    curves = {name: curve for name, curve in columns.items() if name in INTERVAL_COLUMNS}
+    if performance is not None and seeds:
+        curves["performance"] = performance_curve(performance, columns)
+    return RunCurves(
+        criterion=experiment.criterion,
+        value=experiment.value,
+        n_robots=experiment.scenario.robots.n_robots,
+        seeds=seeds,
+        curves=curves,
+        rates=rates_of(experiment),
+        n_planned=len(table.spec.seeds),
+    )
+
+
+def _reference_value(table: "StudyTable", cells: "list[Cell]") -> float:
+    """Value of the criterion at the reference of a line; sizes have no other reference than each other."""
+    reference = table.spec.reference_of(cells[0])
+    if reference is None or table.spec.experiment(reference).criterion == SIZE:
+        return 0.0
+    return table.spec.experiment(reference).value

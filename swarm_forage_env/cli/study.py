@@ -1,0 +1,136 @@
+"""The commands `study list`, `show`, `run`, `status` and `pack`."""
+
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, AsJson, DryRun, complain
+
+if TYPE_CHECKING:
+    from swarm_forage_env.study.studies import StudySpec
+
+Name = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A set of the paper (S1a to S2d), or a study file.")]
+Place = Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Folder of a study, or its packed file.")]
+Budget = Annotated[str | None, typer.Option("--budget", help="How much is run; default the first of the file.")]
+Seeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per cell; default those of the budget.")]
+Reading = Annotated[
+    str, typer.Option("--reading", help="described, program (the authors'), both, or file: as it says.")
+]
+
+study = typer.Typer(
+    help="Whole studies: the experiment sets of the paper, or your own.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+
+@study.command("list")
+def list_studies() -> None:
+    """List the experiment sets of the paper, with what they take at its budget."""
+    from swarm_forage_env.cli.study_report import table_of_sets
+    from swarm_forage_env.cli.terminal import output
+
+    output().print(table_of_sets())
+
+
+@study.command()
+def show(name: Name, budget: Budget = None, seeds: Seeds = None, reading: Reading = "file") -> None:
+    """Show what a study varies, and how many runs each of its budgets makes."""
+    from swarm_forage_env.cli.study_report import described
+    from swarm_forage_env.study.study_file import budget_names
+
+    typer.echo(described(_chosen(name, budget, seeds, reading)))
+    others = [other for other in budget_names(name) if other != budget]
+    typer.echo(f"\nBudgets: {', '.join(budget_names(name))}" + ("" if budget or len(others) < 2 else "; see --budget"))
+
+
+@study.command()
+def run(  # long: one parameter per option
+    name: Name,
+    budget: Budget = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/studies/NAME_BUDGET.")] = None,
+    seeds: Seeds = None,
+    reading: Reading = "file",
+    shard: Annotated[str, typer.Option("--shard", metavar="I/N", help="Only the I-th of N equal parts.")] = "1/1",
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Processes, or jobs of slurm; default one per core.")
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option("--cluster", help="Run by Dask: local, slurm, or the address of a scheduler (docs/studies.md)."),
+    ] = None,
+    dry_run: DryRun = False,
+) -> None:
+    """Run what is missing of a study, and pack its runs into one file.
+
+    Finished runs are kept: after Ctrl-C, or with more seeds, the same command does the rest.
+    """
+    from swarm_forage_env.cli.study_report import plan_report, state_report
+    from swarm_forage_env.cli.terminal import notes
+    from swarm_forage_env.study.cluster import cluster_executor
+    from swarm_forage_env.study.runner import available_cores
+    from swarm_forage_env.study.study_run import FAILED, StudyFolder, parse_shard, run_study
+
+    spec = _chosen(name, budget, seeds, reading)
+    part = parse_shard(shard)
+    folder = StudyFolder(out or Path("results", "studies", f"{spec.name}_{spec.budget}"))
+    if dry_run:
+        typer.echo(plan_report(spec, folder, part, workers or available_cores()))
+        return
+    try:
+        with nullcontext() if cluster is None else cluster_executor(cluster, workers) as executor:
+            state = run_study(spec, folder, part=part, jobs=workers, executor=executor, progress=True)
+    except KeyboardInterrupt:
+        words = f"Interrupted. Finished runs are kept in {folder.folder}; the same command does the rest."
+        raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None
+    if part == (1, 1):
+        packed = _pack(folder.folder, None)
+        notes().print(f"packed into {packed}", markup=False)
+    typer.echo(state_report(state, folder))
+    if state.count(FAILED):
+        raise typer.Exit(EXIT_FAILURE)
+
+
+@study.command()
+def status(place: Place, as_json: AsJson = False) -> None:
+    """Show which runs of a study are done, missing or failed, cell by cell; exit code 1 unless all are done."""
+    from swarm_forage_env.cli.study_report import status_json, status_report
+    from swarm_forage_env.study.study_table import read_study
+
+    table = read_study(place)
+    typer.echo(status_json(table) if as_json else status_report(table))
+    if not all(state.is_complete for state in table.cell_states()):
+        raise typer.Exit(EXIT_FAILURE)
+
+
+@study.command()
+def pack(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study.")],
+    out: Annotated[Path | None, typer.Option("--out", help="File; default DIR/NAME.parquet.")] = None,
+) -> None:
+    """Put all runs of a study into one file, which holds everything that is known of them."""
+    typer.echo(f"packed into {_pack(folder, out)}")
+
+
+def _pack(folder: Path, out: Path | None) -> Path:
+    from swarm_forage_env.study.study_run import StudyFolder
+    from swarm_forage_env.study.study_table import gather_study
+
+    table = gather_study(StudyFolder(folder))
+    file = out or folder / f"{table.spec.name}.parquet"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    table.write(file)
+    return file
+
+
+def _chosen(name: str, budget: str | None, seeds: int | None, reading: str) -> "StudySpec":
+    """Return the study that the options describe."""
+    from swarm_forage_env._internal.fields import known_name
+    from swarm_forage_env.study.studies import READING_NAMES
+    from swarm_forage_env.study.study_file import load_study
+
+    known_name("reading", reading, (*READING_NAMES, "both", "file"))
+    readings = {"both": tuple(READING_NAMES), "file": None}.get(reading, (reading,))
+    return load_study(name, budget, seeds=seeds, readings=readings)

@@ -1,0 +1,160 @@
+"""What the commands of studies print."""
+
+import json
+from collections.abc import Sequence
+
+from rich.table import Table
+
+from metrics.scoring.texts import aligned, counted
+from swarm_forage_env.cli.terminal import notes
+from swarm_forage_env.study.calibration import calibrate, kind_of
+from swarm_forage_env.study.progress import duration
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.study.studies import StudySpec
+from swarm_forage_env.study.study_file import PAPER, load_study, set_names
+from swarm_forage_env.study.study_run import DONE, FAILED, MISSING, STATES, CellState, StudyFolder, StudyState, shard
+from swarm_forage_env.study.study_table import StudyTable
+
+FAILURES_SHOWN = 10
+"""Failed runs that are named; the packed file and `--json` have all."""
+
+
+def table_of_sets() -> Table:
+    """Return the sets of the paper with what they take, for one of the two readings."""
+    table = Table(
+        title="experiment sets of the paper",
+        caption="of four controllers at budget paper, for each of the two readings",
+    )
+    for name in ("set", "about", "varies"):
+        table.add_column(name)
+    for name in ("experiments", "runs", "robot-ticks"):
+        table.add_column(name, justify="right")
+    totals = [0, 0, 0]
+    for name in set_names():
+        spec = load_study(name, PAPER, readings=("described",))
+        numbers = [spec.n_experiments, spec.n_runs, spec.robot_ticks]
+        totals = [total + number for total, number in zip(totals, numbers, strict=True)]
+        varied = " x ".join(axis.name for axis in spec.axes)
+        table.add_row(spec.name, spec.title, varied, *_numbers(numbers))
+    table.add_section()
+    table.add_row("all", "", "", *_numbers(totals))
+    return table
+
+
+def described(spec: StudySpec) -> str:
+    """Return a study in words."""
+    axes = [
+        f"{axis.name}: {', '.join(_value(value) for value in axis.values)}"
+        + (f" (reference {_value(spec.reference)})" if axis is spec.axes[-1] and spec.reference is not None else "")
+        for axis in spec.axes
+    ]
+    settings = ", ".join(f"{name} = {value}" for name, value in spec.settings.items())
+    rows = [
+        ("study", f"{spec.name}: {spec.title}" if spec.title else spec.name),
+        ("scenario", spec.scenario + (f", {settings}" if settings else "")),
+        *(("wrapper", config.name) for config in spec.wrappers),
+        ("policies", ", ".join(policy.label for policy in spec.policies)),
+        *(("axis", axis) for axis in axes),
+        ("readings", ", ".join(spec.readings)),
+        ("budget", f"{spec.budget}: {counted(len(spec.seeds), 'seed')}, {spec.horizon_s:,g} s"),
+        ("runs", f"{spec.n_runs:,} in {counted(len(spec.cells), 'cell')}, {spec.robot_ticks:.3g} robot-ticks"),
+        ("identity", spec.study_id),
+    ]
+    return "\n".join(f"{name:<10}{words}" for name, words in rows)
+
+
+def plan_report(spec: StudySpec, folder: StudyFolder, part: tuple[int, int], workers: int) -> str:
+    """Return what is left to run and how long it takes, measured here for a moment."""
+    planned = {run.run_id: run for run in shard(spec.expand(), *part)}
+    states = folder.state(planned).states
+    todo = {run_id: run for run_id, run in planned.items() if states[run_id] != DONE}
+    aside = notes()
+    costs = calibrate(todo.values(), tell=lambda line: aside.print(line, markup=False))
+    labels = {run.run_id: cell.policy for cell in spec.cells for run in spec.specs_of(cell)}
+    by_policy: dict[str, list[RunSpec]] = {}
+    for run_id, run in todo.items():
+        by_policy.setdefault(labels[run_id], []).append(run)
+    by_policy["all"] = [*todo.values()]
+    rows = [("policy", "runs", "robot-ticks", "core-hours")]
+    for label, runs in by_policy.items():
+        seconds = [costs[kind_of(run)].seconds(run) for run in runs]
+        robot_ticks = sum(run.robot_ticks for run in runs)
+        rows.append((label, f"{len(runs):,}", f"{robot_ticks:.3g}", f"{sum(seconds) / 3600.0:.3g}"))
+    seconds = [costs[kind_of(run)].seconds(run) for run in todo.values()]
+    busy = min(workers, max(1, len(todo)))
+    wall = duration(max(sum(seconds) / busy, *seconds, 0.0))
+    shares = f", shard {part[0]} of {part[1]}" if part[1] > 1 else ""
+    return "\n".join(
+        [
+            f"{spec.name}, budget {spec.budget}{shares}: {len(todo):,} of {len(planned):,} runs to do",
+            *aligned(rows),
+            f"about {wall} on {counted(busy, 'core')} as fast as this one is now",
+        ]
+    )
+
+
+def state_report(state: StudyState, folder: StudyFolder) -> str:
+    """Return what came of the runs; failed ones with the command that makes each again."""
+    lines = [f"{_counts([state.count(name) for name in STATES])}, in {folder.folder}"]
+    failed = [run_id for run_id, found in state.states.items() if found == FAILED]
+    files = [folder.store.failure_path(run_id) for run_id in failed[:FAILURES_SHOWN]]
+    return "\n".join([*lines, *(f"  again, alone: swarm-forage rerun {file}" for file in files), *_more(failed)])
+
+
+def status_report(table: StudyTable) -> str:
+    """Return how far a study is: all cells that are not complete, and failed runs."""
+    states = table.cell_states()
+    open_cells = [state for state in states if not state.is_complete]
+    spec = table.spec
+    lines = [
+        f"{spec.name}, budget {spec.budget}: {_counts([sum(s.n_runs[name] for s in states) for name in STATES])}",
+        f"{len(states) - len(open_cells):,} of {counted(len(states), 'cell')} complete",
+    ]
+    if len(table.versions) > 1:
+        lines.append(f"The runs were made by {len(table.versions)} versions or commits of the packages.")
+    if open_cells:
+        header = ("reading", "policy", *(axis.name for axis in spec.axes), *STATES)
+        lines += ["", *aligned([header, *(_cells(state) for state in open_cells)])]
+    failures = table.frame.filter(table.frame["state"] == FAILED)
+    for row in failures.head(FAILURES_SHOWN).iter_rows(named=True):
+        lines += ["", f"failed: {row['policy']}, seed {row['seed']}: {row['error']}", f"  again: {row['rerun']}"]
+    return "\n".join([*lines, *_more(failures["run_id"].to_list())])
+
+
+def status_json(table: StudyTable) -> str:
+    """Return the states of all cells, and all failed runs, as a JSON document."""
+    lost = table.frame.filter(table.frame["state"] == FAILED)
+    failures = lost.select("run_id", "reading", "policy", "seed", "error", "traceback", "rerun").to_dicts()
+    document = {
+        "study": table.spec.to_mapping(),
+        "versions": list(table.versions),
+        "cells": table.cells().to_dicts(),
+        "failures": failures,
+    }
+    return json.dumps(document, indent=1)
+
+
+def _more(run_ids: Sequence[str]) -> list[str]:
+    n_more = len(run_ids) - FAILURES_SHOWN
+    return [f"  and {n_more} more"] if n_more > 0 else []
+
+
+def _counts(numbers: Sequence[int]) -> str:
+    done, failed, missing = numbers
+    words = [f"{done:,} of {counted(sum(numbers), 'run')} {DONE}"]
+    words += [f"{number:,} {state}" for state, number in ((FAILED, failed), (MISSING, missing)) if number]
+    return ", ".join(words)
+
+
+def _cells(state: CellState) -> tuple[str, ...]:
+    place = (state.cell.reading, state.cell.policy, *(_value(value) for value in state.cell.values))
+    return (*place, *(str(state.n_runs[name]) for name in STATES))
+
+
+def _value(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _numbers(numbers: Sequence[int]) -> tuple[str, str, str]:
+    experiments, runs, robot_ticks = numbers
+    return f"{experiments:,}", f"{runs:,}", f"{robot_ticks:.2e}"

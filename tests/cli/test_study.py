@@ -1,0 +1,143 @@
+"""The commands of studies: what is there, run, interrupt, status, pack."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env.cli import study_report
+from swarm_forage_env.study import calibration, study_run
+from swarm_forage_env.study.study_table import read_study
+
+FILE = """
+name = "mine"
+title = "Two sizes"
+scenario = "warehouse_small"
+policies = ["random"]
+
+[set]
+n_objects = 20
+
+[[axis]]
+criterion = "population_size"
+values = [2, 3]
+
+[budget.tiny]
+seeds = 2
+horizon_s = 4.0
+interval_s = 2.0
+"""
+RUN = ("study", "run", "mine.toml", "--workers", "1")
+FOLDER = Path("results/studies/mine_tiny")
+
+
+@pytest.fixture
+def written(command):
+    """The command in a folder with a study file."""
+    Path("mine.toml").write_text(FILE)
+    return command
+
+
+def test_the_sets_are_listed_with_their_runs(command):
+    code, out, _ = command("study", "list")
+    assert code == 0
+    assert len(re.findall(r"^│ S[12][a-h] │", out, re.MULTILINE)) == 12
+    assert re.search(r"│ all +│ +│ +│ +168 │ 129,024 │", out)
+
+
+def test_a_study_is_shown(written):
+    code, out, _ = written("study", "show", "S1g", "--budget", "smoke", "--reading", "program")
+    assert code == 0
+    assert "axis      population_dynamics: 1, 4, 8 (reference 1)" in out
+    assert "readings  program" in out
+    assert "runs      24 in 12 cells, 6e+06 robot-ticks" in out
+    assert "Budgets: tiny, paper" in written("study", "show", "mine.toml")[1]
+
+
+def test_a_study_runs_and_is_packed(written):
+    code, out, err = written(*RUN)
+    assert code == 0
+    assert out.strip() == f"8 of 8 runs done, in {FOLDER}"
+    assert f"packed into {FOLDER}/mine.parquet" in err
+    for place in (FOLDER, FOLDER / "mine.parquet"):
+        code, out, _ = written("study", "status", str(place))
+        assert code == 0
+        assert out.splitlines() == ["mine, budget tiny: 8 of 8 runs done", "4 of 4 cells complete"]
+    code, out, err = written(*RUN, "--seeds", "3")
+    assert "8 of 12 runs are stored already" in err
+    assert code == 0
+
+
+def test_shards_are_not_packed_until_asked(written):
+    code, out, err = written(*RUN, "--shard", "1/2", "--reading", "described", "--out", "here")
+    assert code == 0
+    assert "packed" not in err
+    code, out, _ = written("study", "status", "here")
+    assert code == 1
+    assert out.splitlines()[0] == "mine, budget tiny: 2 of 4 runs done, 2 missing"
+    assert out.splitlines()[1] == "0 of 2 cells complete"
+    assert re.search(r"^described +random +2 +1 +0 +1$", out, re.MULTILINE)
+    code, out, _ = written("study", "pack", "here", "--out", "there/packed.parquet")
+    assert code == 0
+    assert read_study("there/packed.parquet").spec.name == "mine"
+    code, out, _ = written("study", "status", "there/packed.parquet", "--json")
+    assert code == 1
+    assert [cell["n_missing"] for cell in json.loads(out)["cells"]] == [1, 1]
+
+
+def test_failures_are_told_with_the_command_that_makes_them_again(written, monkeypatch):
+    Path("mine.toml").write_text(FILE.replace('"random"', '{ policy = "random", parameters = { speed = 3 } }'))
+    code, out, _ = written(*RUN, "--seeds", "3")
+    assert code == 1
+    assert "0 of 12 runs done, 12 failed" in out
+    assert out.count(f"again, alone: swarm-forage rerun {FOLDER}/runs/failures/") == study_report.FAILURES_SHOWN
+    assert "and 2 more" in out
+    code, out, _ = written("study", "status", str(FOLDER / "mine.parquet"))
+    assert code == 1
+    assert "failed: random, seed 0: " in out
+    monkeypatch.chdir(FOLDER)
+    rerun = re.search(r"again: swarm-forage (.*)", out)[1].split()
+    with pytest.raises(TypeError, match="takes no arguments"):
+        written(*rerun)
+
+
+def test_a_dry_run_measures_and_runs_nothing(written, monkeypatch):
+    monkeypatch.setattr(calibration, "MEASURE_S", 0.001)
+    code, out, err = written(*RUN, "--dry-run")
+    assert code == 0
+    assert "mine, budget tiny: 8 of 8 runs to do" in out
+    assert re.search(r"^random +8 +400 +\S+$", out, re.MULTILINE)
+    assert re.search(r"^all +8 +400 +\S+$", out, re.MULTILINE)
+    assert re.search(r"about \d+ s on 1 core", out)
+    assert "measuring random, N = 2" in err
+    assert not FOLDER.exists()
+    written(*RUN)
+    assert "0 of 8 runs to do" in written(*RUN, "--dry-run")[1]
+
+
+def test_an_interrupt_keeps_what_is_done(written, monkeypatch):
+    def interrupted(*args, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study_run, "run_each", interrupted)
+    code, _, err = written(*RUN)
+    assert code == 130
+    assert f"kept in {FOLDER}; the same command does the rest" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("run", "mine.tom"), "Expected a study file or one of S1a"),
+        (("run", "mine.toml", "--budget", "tini"), "Did you mean 'tiny'?"),
+        (("run", "mine.toml", "--reading", "progam"), "Did you mean 'program'?"),
+        (("run", "mine.toml", "--shard", "3/2"), "the shard to be a whole number from 1 to 2"),
+        (("status", "nowhere"), "No such file"),
+        (("pack", "."), "without study.json"),
+    ],
+)
+def test_what_is_refused(written, words, message):
+    code, _, err = written("study", *words)
+    assert code == 2
+    assert message in err

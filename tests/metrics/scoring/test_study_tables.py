@@ -1,0 +1,74 @@
+"""Curves of a study's table: lines of figures, references found by the axes, scores."""
+
+import numpy as np
+import pytest
+
+from metrics import ScoreForms
+from metrics.scoring.study_scores import score_study
+from metrics.scoring.study_tables import study_lines
+from swarm_forage_env import StudyFolder, read_study, run_study
+from swarm_forage_env.study.studies import Axis
+from tests.support.tiny_study import RANDOM, tiny_study
+
+
+@pytest.fixture
+def made(tmp_path):
+    """Run a study in this process and return its table."""
+
+    def make(*axes, **changes):
+        folder = StudyFolder(tmp_path)
+        run_study(tiny_study(axes=axes, policies=(RANDOM,), **changes), folder, jobs=1)
+        return read_study(tmp_path)
+
+    return make
+
+
+def test_a_line_is_what_differs_on_the_last_axis(made):
+    table = made(Axis(name="walk_probability", values=(0.0, 0.5)), Axis(name="noise", values=(0.0, 0.02, 0.03)))
+    lines = study_lines(table)
+    assert [(line.reading, line.policy, line.others) for line in lines] == [
+        ("described", "random", {"walk_probability": 0.0}),
+        ("described", "random", {"walk_probability": 0.5}),
+    ]
+    for line in lines:
+        assert [cell.values[-1] for cell in line.cells] == [0.0, 0.02, 0.03]
+        pairs = line.curves.levels("noise")
+        assert [(reference.criterion, level.value) for reference, level in pairs] == [("none", 0.02), ("none", 0.03)]
+        scores, missing = score_study(line.curves, ["noise_robustness"])
+        assert [score.x for score in scores] == [0.02, 0.03]
+        assert [sorted(score.per_seed) for score in scores] == [[0, 1], [0, 1]]
+        assert missing == {}
+
+
+def test_sizes_are_scored_from_the_smallest(made):
+    (line,) = study_lines(made(Axis(name="population_size", values=(1, 2)), reference=1))
+    scores, missing = score_study(line.curves, ["scalability", "time_emergence", "raw_performance"])
+    assert {score.measure for score in scores} == {"scalability", "time_emergence", "raw_performance"}
+    assert missing == {}
+    assert line.curves.horizon_s == 4.0
+
+
+def test_the_lowest_rates_may_be_the_reference(made):
+    """The authors compare with their lowest level; both forms of the measure then use the same runs."""
+    (line,) = study_lines(made(Axis(name="population_dynamics", values=(1.0, 2.0, 4.0)), reference=1.0,
+                               settings={"n_robots": 4, "n_objects": 20}))  # fmt: skip
+    pairs = line.curves.levels("population_dynamics")
+    assert [(reference.value, level.value) for reference, level in pairs] == [(1.0, 2.0), (1.0, 4.0)]
+    assert all(reference.rates.lambda_bd == pytest.approx(0.005) for reference, _ in pairs), "0.001 per tick of 0.2 s"
+    scores, _ = score_study(
+        line.curves, ["population_robustness"], ScoreForms(variants=("corrected", "sierra"), forms=("marginal",))
+    )
+    assert [(score.variant, score.x) for score in scores] == [
+        ("corrected", 2.0), ("corrected", 4.0), ("sierra", 2.0), ("sierra", 4.0)]  # fmt: skip
+
+
+def test_lost_runs_are_counted_and_another_performance_is_read(made, tmp_path):
+    table = made(Axis(name="noise", values=(0.0, 0.02)))
+    noisy = table.spec.cells[-1]
+    StudyFolder(tmp_path).store.path(table.spec.specs_of(noisy)[1].run_id).unlink()
+    (line,) = study_lines(read_study(tmp_path), "n_active")
+    reference, level = line.curves.experiments
+    assert (reference.n_lost, level.n_lost, level.seeds) == (0, 1, (0,))
+    np.testing.assert_array_equal(level.performance, level.curves["n_active"])
+    assert line.curves.amount == "robots"
+    assert not line.curves.is_total
