@@ -44,6 +44,9 @@ class ForagingArena:
         obs: (N, D) the observation, rewritten in every tick.
     """
 
+    _bound: tuple[CompiledPolicy | None, Callable[..., tuple[int, int]] | None] = (None, None)
+    """The policy that `run` was called with last, and the function compiled for it: to find it takes milliseconds."""
+
     def __init__(
         self, config: ScenarioConfig, *, reads: Collection[str] | None = None, snapshots: bool = False
     ) -> None:
@@ -115,7 +118,7 @@ class ForagingArena:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
-        return {name: value for name, value in vars(self).items() if name != "_compiled"}
+        return {name: value for name, value in vars(self).items() if name not in ("_compiled", "_bound")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -216,7 +219,9 @@ class ForagingArena:
         if not isinstance(physics, Bodies):
             raise RuntimeError('Expected physics "compiled" for a run without Python between ticks, got "chipmunk".')
         tasks = policy.task if policy.task is not None else self._no_tasks
-        run_compiled: Callable[..., tuple[int, int]] | None = None
+        bound_to, run_compiled = self._bound
+        if bound_to is not policy:
+            run_compiled = None
         while n_left:
             first = self.tick + 1
             now, policy_draws = policy.next_ticks()
@@ -240,6 +245,7 @@ class ForagingArena:
             )
             if run_compiled is None:
                 run_compiled = direct(run, *arguments)
+                self._bound = policy, run_compiled
             n_done, outcome = run_compiled(*arguments)
             policy.count_ticks(n_done)
             if outcome == BAD_TASKS:
