@@ -15,6 +15,7 @@ from swarm_forage_env.cli.compare import compare
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE, complain
 from swarm_forage_env.cli.predict import predict
 from swarm_forage_env.cli.record import record
+from swarm_forage_env.cli.replay import replay
 from swarm_forage_env.cli.rerun import rerun
 from swarm_forage_env.cli.run import run
 from swarm_forage_env.cli.score import score
@@ -52,7 +53,7 @@ def _options(
 for command in (run, score, compare, predict, choose, train):
     app.command()(command)
 app.command("list")(list_everything)
-for command in (info, schema, rerun, record, stuck, ablate, availability):
+for command in (info, schema, rerun, record, replay, stuck, ablate, availability):
     app.command()(command)
 
 

@@ -165,7 +165,7 @@ class Chart {
 /** Lines, one per run. */
 class LineChart extends Chart {
   constructor(parent, title, player, runs, series, unit = "") {
-    super(parent, title, 104, player);
+    super(parent, title, 92, player);
     this.runs = runs;
     this.unit = unit;
     this.use(series);

@@ -78,7 +78,7 @@ class Painter {
     const { run } = this;
     const steps = Math.min(TRAIL_STEPS, Math.ceil(shown.trails / run.frameS));
     const stride = Math.max(1, Math.round(shown.trails / run.frameS / steps));
-    pen.lineCap = "round";
+    pen.lineCap = "butt"; // round ends would overlap and look like beads
     pen.lineWidth = width;
     for (const [loaded, colour] of [[0, theme.colours.empty], [CARRYING, theme.colours.carrying]]) {
       pen.strokeStyle = colour;
@@ -301,7 +301,9 @@ class Painter {
     const { view } = this;
     const fitting = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].filter((m) => m * view.scale <= view.width / 5);
     const metres = fitting.at(-1) ?? 0.1;
-    const [right, y] = [view.width - 14, view.height - 13];
+    const [, bottom, east] = this.run.header.world.interior_m;
+    const right = Math.min(view.width - 14, view.px(east) - 10);
+    const y = Math.min(view.height - 13, view.py(bottom) - 10);
     const left = right - metres * view.scale;
     pen.font = "11px system-ui, sans-serif";
     pen.textAlign = "right";

@@ -99,7 +99,8 @@ class Inspector {
     if (focus.chosen < 0) {
       const hint = document.createElement("p");
       hint.className = "hint";
-      hint.textContent = "Click a robot to see what it is doing, and to follow it.";
+      const way = matchMedia("(pointer: coarse)").matches ? "Tap" : "Click";
+      hint.textContent = `${way} a robot to see what it is doing, and to follow it.`;
       this.robot.replaceChildren(hint);
       return;
     }

@@ -51,7 +51,7 @@ def write_replays(path: str | Path, replays: Replay | Sequence[Replay], *, title
     Args:
         path: File to create or replace, by custom with the suffix .html; a missing folder is made.
         replays: At least one. Side by side makes sense for runs of one arena and seed.
-        title: Headline; default the names of the policies.
+        title: Headline; default the names of policies and scenarios.
 
     Returns:
         The path written.
@@ -65,8 +65,7 @@ def write_replays(path: str | Path, replays: Replay | Sequence[Replay], *, title
     path = Path(path)
     packed = [_packed(replay) for replay in replays]
     header = {"format": FORMAT, "version": FORMAT_VERSION, "runs": [about for about, _ in packed]}
-    shown = title or " beside ".join(dict.fromkeys(replay.label for replay in replays))
-    page = build_page(shown, header, [block for _, block in packed])
+    page = build_page(title or _headline(replays), header, [block for _, block in packed])
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as draft:
         draft.write_text(page, encoding="utf-8")
@@ -89,6 +88,14 @@ def read_replays(path: str | Path) -> tuple[Replay, ...]:
     except (ConfigError, ReplayError, KeyError, TypeError, ValueError) as error:
         reason = f"no {error}" if isinstance(error, KeyError) else str(error).rstrip(".")
         raise ReplayError(f"Cannot read {path}: its content is damaged ({reason}).") from error
+
+
+def _headline(replays: Sequence[Replay]) -> str:
+    labels, scenarios = (
+        dict.fromkeys(names)
+        for names in ([replay.label for replay in replays], [replay.scenario.name for replay in replays])
+    )
+    return f"{' beside '.join(labels)}, {' and '.join(scenarios)}".replace("_", " ")
 
 
 def _runs_of(header: dict[str, Any]) -> list[dict[str, Any]]:
