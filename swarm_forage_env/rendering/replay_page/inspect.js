@@ -104,16 +104,29 @@ class Inspector {
       this.robot.replaceChildren(hint);
       return;
     }
-    const facts = this.runs.map((run) => new Map(robotFacts(run, focus.chosen)));
-    const names = [...new Set(facts.flatMap((map) => [...map.keys()]))];
-    const rows = names.map((name) => [name, ...facts.map((map) => map.get(name) ?? "–")]);
     const title = heading(`robot ${focus.chosen}`);
     const follow = document.createElement("button");
     follow.textContent = focus.follows ? "following" : "follow";
     follow.setAttribute("aria-pressed", String(focus.follows));
     follow.onclick = () => this.page.follow(!focus.follows);
     title.append(follow);
-    this.robot.replaceChildren(title, tableOf(this.runs, rows));
+    this.robot.replaceChildren(title, ...this.robotWords());
+  }
+
+  /** The state of the chosen robot: a table for one run, a paragraph each for several. */
+  robotWords() {
+    if (this.runs.length === 1) return [tableOf(this.runs, robotFacts(this.runs[0], focus.chosen))];
+    return this.runs.map((run) => {
+      const told = document.createElement("p");
+      told.className = "told";
+      const name = document.createElement("b");
+      name.textContent = run.header.label;
+      const words = robotFacts(run, focus.chosen).map(([key, text]) =>
+        ["task", "state", "activity"].includes(key) ? text : `${key} ${text}`,
+      );
+      told.append(swatch(theme.ofRun(run.index)), name, words.join(" · "));
+      return told;
+    });
   }
 
   showTip(panel, event) {

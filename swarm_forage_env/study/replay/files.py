@@ -91,11 +91,9 @@ def read_replays(path: str | Path) -> tuple[Replay, ...]:
 
 
 def _headline(replays: Sequence[Replay]) -> str:
-    labels, scenarios = (
-        dict.fromkeys(names)
-        for names in ([replay.label for replay in replays], [replay.scenario.name for replay in replays])
-    )
-    return f"{' beside '.join(labels)}, {' and '.join(scenarios)}".replace("_", " ")
+    if len(replays) == 1:
+        return f"{replays[0].label}, {replays[0].scenario.name.replace('_', ' ')}"
+    return ", ".join(replay.label for replay in replays)
 
 
 def _runs_of(header: dict[str, Any]) -> list[dict[str, Any]]:
