@@ -59,7 +59,8 @@ def replay(  # long: one parameter per option
     robots: Robots = None,
     seconds: Annotated[float | None, typer.Option(help="Simulated seconds to keep; default the whole run.")] = None,
     frame: Annotated[
-        float | None, typer.Option(help="Simulated seconds between frames; default 1, more in long runs of many robots.")
+        float | None,
+        typer.Option(help="Simulated seconds between frames; default 1, or more for large swarms."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
     objects: Objects = None,
@@ -103,9 +104,7 @@ def _write(path: Path, replays: "Sequence[Replay]") -> None:
     typer.echo(f"wrote {written} ({written.stat().st_size / 1e6:.1f} MB)")
 
 
-def _planned(
-    words: Sequence[str], options: "ScenarioOptions", seed: int
-) -> "list[tuple[RunSpec, RunRecord | None]]":
+def _planned(words: Sequence[str], options: "ScenarioOptions", seed: int) -> "list[tuple[RunSpec, RunRecord | None]]":
     """Return a specification for each run or policy, and the record of stored ones; the first decides the world."""
     from swarm_forage_env.cli.scenario_options import plan_runs
     from swarm_forage_env.study.spec import RunSpec, plan_run

@@ -66,8 +66,8 @@ def take_page_apart(text: str) -> tuple[dict[str, Any], list[bytes]]:
         PageError: there is no header, or header or blocks cannot be read.
     """
     found = _HEADER.search(text)
-    if found is None:
-        raise PageError("it is no replay page")
+    if found is None or not text.rstrip().endswith("</html>"):
+        raise PageError("it is no replay page or cut short")
     try:
         header = json.loads(found[1])
         blocks = [base64.b64decode(block, validate=True) for block in _DATA.findall(text)]

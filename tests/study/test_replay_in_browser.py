@@ -65,9 +65,8 @@ def keep_picture(browser: Browser, name: str) -> None:
 
 
 def seek(browser: Browser, time_s: float) -> None:
-    browser.ask(
-        f"(() => {{ const s = document.getElementById('scrub'); s.value = {time_s}; s.dispatchEvent(new Event('input')); }})()"
-    )
+    browser.ask(f"document.getElementById('scrub').value = {time_s}")
+    browser.ask("document.getElementById('scrub').dispatchEvent(new Event('input'))")
     browser.ask("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
@@ -115,10 +114,7 @@ def test_a_click_chooses_a_robot_and_tells_its_state(pair, replays, tmp_path):
         seek(browser, 150.0)
         frame = 150  # one per second
         robot = next(r for r in range(12) if not replay.status[frame, r] & (8 | 4))
-        left, top, width, height = browser.ask(
-            "(() => { const {left, top, width, height} = document.querySelector('.arena canvas').getBoundingClientRect();"
-            " return [left, top, width, height]; })()"
-        )
+        left, top, width, height = browser.box(".arena canvas")
         scale = (min(width, height) - 16) / 8.0
         x_m, y_m = replay.position_m[frame, robot]
         browser.click_at(left + width / 2 + scale * (x_m - 4.0), top + height / 2 - scale * (y_m - 4.0))
@@ -188,5 +184,5 @@ def test_a_damaged_page_says_so(page, tmp_path):
     broken = tmp_path / "broken.html"
     broken.write_text(text[:start] + "AAAA" * 20 + text[start + 80 :])
     with Browser(tmp_path, **DESKTOP) as browser:
-        browser.open(broken, "document.getElementById('loading')?.textContent.startsWith('This replay cannot be shown')")
+        browser.open(broken, "document.getElementById('loading')?.textContent.includes('cannot be shown')")
         assert browser.complaints  # the error itself is on the console

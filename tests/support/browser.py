@@ -128,13 +128,19 @@ class Browser:
         """Return the text of an element."""
         return self.ask(f"document.querySelector({json.dumps(selector)}).textContent").strip()
 
+    def box(self, selector: str) -> tuple[float, float, float, float]:
+        """Return left, top, width and height of an element in the window; it is scrolled into sight."""
+        element = f"document.querySelector({json.dumps(selector)})"
+        self.ask(f"{element}.scrollIntoView({{block: 'nearest'}})")
+        left, top, width, height = self.ask(
+            f"(({{left, top, width, height}}) => [left, top, width, height])({element}.getBoundingClientRect())"
+        )
+        return left, top, width, height
+
     def middle(self, selector: str) -> tuple[float, float]:
         """Return where the middle of an element is in the window."""
-        box = self.ask(
-            f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.scrollIntoView({{block: 'nearest'}});"
-            " const {left, top, width, height} = e.getBoundingClientRect(); return [left, top, width, height]; })()"
-        )
-        return box[0] + box[2] / 2, box[1] + box[3] / 2
+        left, top, width, height = self.box(selector)
+        return left + width / 2, top + height / 2
 
     def click(self, selector: str) -> None:
         """Click in the middle of an element."""
@@ -152,9 +158,8 @@ class Browser:
 
     def touch(self, kind: str, *points: tuple[float, float]) -> None:
         """Send a touch event, "touchStart" for example."""
-        self.call(
-            "Input.dispatchTouchEvent", type=kind, touchPoints=[{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
-        )
+        touches = [{"x": x, "y": y, "id": finger} for finger, (x, y) in enumerate(points)]
+        self.call("Input.dispatchTouchEvent", type=kind, touchPoints=touches)
 
     def picture(self, file: Path) -> Path:
         """Write what the page looks like as PNG."""

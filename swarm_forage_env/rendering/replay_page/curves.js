@@ -1,6 +1,7 @@
 // Charts under the arenas: curves of all runs over time, with a cursor; a click jumps there.
 
 const CURVE_BINS = 50; // as many intervals as the study records in a run of the paper
+const SHORTEST_BIN_S = 40; // less, and single deliveries are all that is to be seen
 const SHARE_BINS = 160;
 const LEFT_PX = 40;
 const RIGHT_PX = 8;
@@ -26,7 +27,8 @@ function binEdges(run, bins) {
 
 /** A value for each part of a run, at the time of its middle. */
 function binned(run, valueOf) {
-  const edges = binEdges(run, CURVE_BINS);
+  const bins = Math.min(CURVE_BINS, Math.max(10, Math.round(run.endS / SHORTEST_BIN_S)));
+  const edges = binEdges(run, bins);
   return edges.slice(1).map((end, k) => ({
     time: (run.timeOf(edges[k]) + run.timeOf(end)) / 2,
     value: valueOf(edges[k], end),

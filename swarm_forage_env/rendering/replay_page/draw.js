@@ -218,24 +218,25 @@ class Painter {
   bodies(pen, rows, colour) {
     const { run, view, radius } = this;
     const detailed = radius >= DETAILED_PX;
-    pen.fillStyle = pen.strokeStyle = colour;
+    pen.fillStyle = colour;
     pen.beginPath();
     for (const robot of rows) disc(pen, view.px(run.x[robot]), view.py(run.y[robot]), radius);
     pen.fill();
     if (!detailed) return;
-    pen.lineWidth = Math.max(1, 0.4 * radius);
-    pen.beginPath();
-    for (const robot of rows) {
-      const [x, y] = [view.px(run.x[robot]), view.py(run.y[robot])];
-      const [ahead, aside] = [Math.cos(run.turn[robot]), -Math.sin(run.turn[robot])];
-      pen.moveTo(x + 0.9 * radius * ahead, y + 0.9 * radius * aside);
-      pen.lineTo(x + 2.0 * radius * ahead, y + 2.0 * radius * aside);
-    }
-    pen.stroke();
     pen.lineWidth = Math.max(0.6, 0.12 * radius);
     pen.strokeStyle = theme.colours.floor; // a rim separates robots that touch
     pen.beginPath();
     for (const robot of rows) disc(pen, view.px(run.x[robot]), view.py(run.y[robot]), radius);
+    pen.stroke();
+    pen.lineWidth = Math.max(1, 0.4 * radius);
+    pen.strokeStyle = colour;
+    pen.beginPath();
+    for (const robot of rows) {
+      const [x, y] = [view.px(run.x[robot]), view.py(run.y[robot])];
+      const [ahead, aside] = [Math.cos(run.turn[robot]), -Math.sin(run.turn[robot])];
+      pen.moveTo(x + 0.7 * radius * ahead, y + 0.7 * radius * aside);
+      pen.lineTo(x + 2.0 * radius * ahead, y + 2.0 * radius * aside);
+    }
     pen.stroke();
   }
 

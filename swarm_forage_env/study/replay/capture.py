@@ -113,7 +113,7 @@ def _ticks_between_frames(scenario: ScenarioConfig, end: int, frame_s: float | N
     n_robots = scenario.robots.n_robots
     for seconds in FRAME_STEPS_S:
         step = max(1, round(seconds / scenario.dt_s))
-        if n_robots * (1 + end // step) <= MOST_POSES:
+        if n_robots * (1 + math.ceil(end / step)) <= MOST_POSES:
             return step
     return math.ceil(n_robots * end / MOST_POSES)
 

@@ -63,13 +63,18 @@ def write_replays(path: str | Path, replays: Replay | Sequence[Replay], *, title
     if not replays:
         raise ReplayError("Expected at least one replay to write, got none.")
     path = Path(path)
-    packed = [_packed(replay) for replay in replays]
-    header = {"format": FORMAT, "version": FORMAT_VERSION, "runs": [about for about, _ in packed]}
-    page = build_page(title or _headline(replays), header, [block for _, block in packed])
+    page = page_of(replays, title=title)
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as draft:
         draft.write_text(page, encoding="utf-8")
     return path
+
+
+def page_of(replays: Sequence[Replay], *, title: str | None = None) -> str:
+    """Return the page that `write_replays` writes, as text."""
+    packed = [_packed(replay) for replay in replays]
+    header = {"format": FORMAT, "version": FORMAT_VERSION, "runs": [about for about, _ in packed]}
+    return build_page(title or _headline(replays), header, [block for _, block in packed])
 
 
 def read_replays(path: str | Path) -> tuple[Replay, ...]:

@@ -103,7 +103,7 @@ class Replay:
     @property
     def times_s(self) -> FloatArray:
         """(F,) simulated seconds since the start."""
-        return self.ticks * self.scenario.dt_s
+        return np.multiply(self.ticks, self.scenario.dt_s, dtype=np.float64)
 
     @property
     def position_step_m(self) -> float:
@@ -113,17 +113,17 @@ class Replay:
     @property
     def position_m(self) -> FloatArray:
         """(F, N, 2) m."""
-        return self.position * self.position_step_m
+        return np.multiply(self.position, self.position_step_m, dtype=np.float64)
 
     @property
     def heading_rad(self) -> FloatArray:
         """(F, N) rad in [0, 2 pi)."""
-        return self.heading * (2.0 * np.pi / HEADING_STEPS)
+        return np.multiply(self.heading, 2.0 * np.pi / HEADING_STEPS, dtype=np.float64)
 
     @property
     def task(self) -> Small:
         """(F, N) `Task` codes."""
-        return (self.status >> TASK_SHIFT) & 7
+        return (self.status >> np.uint8(TASK_SHIFT)) & np.uint8(7)
 
     def has(self, flag: Status) -> NDArray[np.bool_]:
         """Return where a flag of the status is set, (F, N)."""
