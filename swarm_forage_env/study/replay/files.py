@@ -206,6 +206,7 @@ def _replay_of(about: dict[str, Any], block: bytes) -> Replay:
         )
         for place in about["arrays"]
     }
+    own: dict[str, Any] = {name: arrays.get(name) for name in _ARRAYS}
     signals = {name.removeprefix("signal_"): array for name, array in arrays.items() if name not in _ARRAYS}
     return Replay(
         spec=RunSpec.from_mapping(about["spec"]),
@@ -217,7 +218,7 @@ def _replay_of(about: dict[str, Any], block: bytes) -> Replay:
         versions=about["versions"],
         has_tasks=about["has_tasks"],
         signals=signals,
-        **{name: arrays.get(name) for name in _ARRAYS},
+        **own,
     )
 
 
