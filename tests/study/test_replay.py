@@ -239,6 +239,12 @@ def test_replays_come_back_from_their_file(replay, tmp_path):
         assert all(np.array_equal(one.signals[name], kept.signals[name]) for name in kept.signals)
 
 
+@pytest.mark.compiled
+def test_runs_of_one_policy_are_told_apart(replay, tmp_path):
+    again = read_replays(write_replays(tmp_path / "three.html", [replay] * 3))
+    assert [one.label for one in again] == ["stochm", "stochm (2)", "stochm (3)"]
+
+
 def edited(text: str, change) -> str:
     """The page with another header."""
     start = text.index('id="header">') + len('id="header">')

@@ -7,6 +7,7 @@ and which array lies where in the run's block of bytes (`coding` says how). `doc
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +73,7 @@ def write_replays(path: str | Path, replays: Replay | Sequence[Replay], *, title
 
 def page_of(replays: Sequence[Replay], *, title: str | None = None) -> str:
     """Return the page that `write_replays` writes, as text."""
+    replays = _told_apart(replays)
     packed = [_packed(replay) for replay in replays]
     header = {"format": FORMAT, "version": FORMAT_VERSION, "runs": [about for about, _ in packed]}
     return build_page(title or _headline(replays), header, [block for _, block in packed])
@@ -93,6 +95,16 @@ def read_replays(path: str | Path) -> tuple[Replay, ...]:
     except (ConfigError, ReplayError, KeyError, TypeError, ValueError) as error:
         reason = f"no {error}" if isinstance(error, KeyError) else str(error).rstrip(".")
         raise ReplayError(f"Cannot read {path}: its content is damaged ({reason}).") from error
+
+
+def _told_apart(replays: Sequence[Replay]) -> list[Replay]:
+    """Return the replays with a number behind labels that were there before."""
+    labels = [replay.label for replay in replays]
+    seen = [labels[: index + 1].count(label) for index, label in enumerate(labels)]
+    return [
+        replay if nth == 1 else replace(replay, label=f"{replay.label} ({nth})")
+        for replay, nth in zip(replays, seen, strict=True)
+    ]
 
 
 def _headline(replays: Sequence[Replay]) -> str:
