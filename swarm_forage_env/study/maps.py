@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -54,8 +55,9 @@ class FloorMaps:
 
     def write(self, path: str | Path) -> None:
         """Write the arrays to an .npz file, whole or not at all."""
+        content: dict[str, Any] = {**self.arrays, "side_m": self.side_m, "size_m": self.size_m}
         with replacing(Path(path)) as draft, draft.open("wb") as file:
-            np.savez_compressed(file, **self.arrays, side_m=self.side_m, size_m=self.size_m)
+            np.savez_compressed(file, **content)
 
 
 def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:

@@ -3,7 +3,7 @@
 const CURVE_BINS = 50; // as many intervals as the study records in a run of the paper
 const SHORTEST_BIN_S = 40; // less, and single deliveries are all that is to be seen
 const SHARE_BINS = 160;
-const LEFT_PX = 40;
+const LEFT_PX = 47;
 const RIGHT_PX = 8;
 const DASHES = [[], [7, 3], [2, 3], [9, 3, 2, 3], [4, 4], [1, 2]];
 

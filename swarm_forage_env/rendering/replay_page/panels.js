@@ -134,15 +134,17 @@ class Panel {
   }
 }
 
-/** Sizes of panels that fill a room best: columns, and width and height of a canvas. */
+const WORTH_A_ROW = 1.25; // panels must become this much wider for another row, which pushes the curves down
+
+/** Columns of panels that use a room well, and width and height of a canvas. */
 function bestGrid(count, aspect, width, height, gap, captionPx) {
-  let best = { area: 0 };
-  for (let columns = 1; columns <= count; columns++) {
+  let best = { width: 0 };
+  for (let columns = count; columns >= 1; columns--) {
     const rows = Math.ceil(count / columns);
     const most = (width - gap * (columns - 1)) / columns - 2;
     const tallest = (height - gap * (rows - 1)) / rows - captionPx;
-    const wide = Math.min(most, Math.max(60, tallest) * aspect);
-    if (wide > (best.width ?? 0)) best = { columns, width: Math.floor(wide), height: Math.floor(wide / aspect) };
+    const wide = Math.floor(Math.min(most, Math.max(60, tallest) * aspect));
+    if (wide > WORTH_A_ROW * best.width) best = { columns, width: wide, height: Math.floor(wide / aspect) };
   }
   return best;
 }

@@ -98,13 +98,19 @@ def read_replays(path: str | Path) -> tuple[Replay, ...]:
 
 
 def _told_apart(replays: Sequence[Replay]) -> list[Replay]:
-    """Return the replays with a number behind labels that were there before."""
+    """Return the replays with labels that differ: those of one policy get what disturbs the run, then a number."""
     labels = [replay.label for replay in replays]
+    labels = [_with_disturbance(replay) if labels.count(replay.label) > 1 else replay.label for replay in replays]
     seen = [labels[: index + 1].count(label) for index, label in enumerate(labels)]
     return [
-        replay if nth == 1 else replace(replay, label=f"{replay.label} ({nth})")
-        for replay, nth in zip(replays, seen, strict=True)
+        replace(replay, label=label if nth == 1 else f"{label} ({nth})")
+        for replay, label, nth in zip(replays, labels, seen, strict=True)
     ]
+
+
+def _with_disturbance(replay: Replay) -> str:
+    names = ", ".join(config.name.replace("_", " ") for config in replay.spec.wrappers)
+    return f"{replay.label} with {names}" if names else replay.label
 
 
 def _headline(replays: Sequence[Replay]) -> str:
