@@ -24,7 +24,7 @@ def maps(
     from swarm_forage_env.rendering.plots import draw_maps
     from swarm_forage_env.study.maps import MEANINGS, floor_maps
     from swarm_forage_env.study.replay.files import read_replays
-    from swarm_forage_env.study.replay.model import ReplayError
+    from swarm_forage_env.study.replay.frames import ReplayError
 
     try:
         found = [floor_maps(replay, side_m=side) for replay in read_replays(page)]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.cli.scenario_options import ScenarioOptions
     from swarm_forage_env.study.record import RunRecord
     from swarm_forage_env.study.replay.capture import Progress
-    from swarm_forage_env.study.replay.model import Replay
+    from swarm_forage_env.study.replay.frames import Replay
     from swarm_forage_env.study.spec import RunSpec
 
 RESULTS = Path("results")
@@ -183,7 +183,7 @@ def _complaints() -> Iterator[None]:
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.rendering.view import RenderError
-    from swarm_forage_env.study.replay.model import ReplayError
+    from swarm_forage_env.study.replay.frames import ReplayError
 
     try:
         yield

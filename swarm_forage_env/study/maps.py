@@ -11,7 +11,7 @@ from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.units import CELL_M
-from swarm_forage_env.study.replay.model import Replay, Status
+from swarm_forage_env.study.replay.frames import Replay, Status
 
 MEANINGS: Mapping[str, str] = {
     "density": "active robots per m², mean over time",

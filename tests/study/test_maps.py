@@ -9,7 +9,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.maps import MEANINGS, floor_maps
-from swarm_forage_env.study.replay.model import Replay, Status
+from swarm_forage_env.study.replay.frames import Replay, Status
 from swarm_forage_env.study.spec import RunSpec
 
 WORLD = scenario("warehouse_small", n_robots=2, n_objects=1, horizon_s=200.0)

@@ -19,7 +19,7 @@ from swarm_forage_env.study.replay import files as files_module
 from swarm_forage_env.study.replay.capture import record_replay
 from swarm_forage_env.study.replay.coding import pack, unpack
 from swarm_forage_env.study.replay.files import read_replays, write_replays
-from swarm_forage_env.study.replay.model import HEADING_STEPS, Replay, ReplayError, Status
+from swarm_forage_env.study.replay.frames import HEADING_STEPS, Replay, ReplayError, Status
 from swarm_forage_env.study.run import LiveRun, build_env, run_one
 from swarm_forage_env.study.spec import plan_run
 from swarm_forage_env.wrappers.recorder import TOTALS

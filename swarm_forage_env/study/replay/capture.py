@@ -15,7 +15,7 @@ from swarm_forage_env.policies.registry import is_policy_file, load_policy
 from swarm_forage_env.rendering.view import refusing
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.study.record import RunRecord, software_versions
-from swarm_forage_env.study.replay.model import (
+from swarm_forage_env.study.replay.frames import (
     HEADING_STEPS,
     TASK_SHIFT,
     Replay,

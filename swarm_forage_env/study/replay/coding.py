@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.study.replay.model import ReplayError
+from swarm_forage_env.study.replay.frames import ReplayError
 
 DTYPES = ("u1", "u2", "i4", "f4")
 """Types of arrays in a replay, little-endian; the page knows the same."""

@@ -22,7 +22,7 @@ from swarm_forage_env.scenarios.performance import quantity
 from swarm_forage_env.scenarios.regions import source_boxes
 from swarm_forage_env.scenarios.units import CELL_M, WALL_M
 from swarm_forage_env.study.replay.coding import pack, unpack
-from swarm_forage_env.study.replay.model import Replay, ReplayError
+from swarm_forage_env.study.replay.frames import Replay, ReplayError
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.wrappers.recorder import TOTALS
 
