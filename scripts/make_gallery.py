@@ -104,7 +104,7 @@ EXHIBITS = (
         "warehouse_small",
         ("dpo", "dpo"),
         "Failures: robots of the second run break, are repaired, and sometimes die where they are.",
-        wrapper="population:malfunction_per_tick=0.03,repair_per_tick=0.02,death_per_tick=0.0015",
+        wrapper="population:malfunction_per_tick=0.02,repair_per_tick=0.025,death_per_tick=0.0015",
     ),
 )
 FILMS = {"dpo": "dpo", "ppo": "ppo_warehouse_small"}

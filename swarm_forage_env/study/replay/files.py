@@ -26,7 +26,7 @@ from swarm_forage_env.study.replay.frames import Replay, ReplayError
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.wrappers.recorder import TOTALS
 
-FORMAT = "swarm_forage_env.replay"
+FORMAT = "swarm_forage_env replay"
 FORMAT_VERSION = 1
 """Raised whenever an array or a field changes its name, type or meaning."""
 _ARRAYS = {
