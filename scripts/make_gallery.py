@@ -123,7 +123,7 @@ def draw(exhibit: Exhibit) -> None:
     state = (env.swarm, env.objects, env.caches, env.events)
     title = f"{spec.scenario.name}, {spec.policy}".replace("_", " ")
     picture = render_frame(spec.scenario, *state, tick=env.tick, size_px=PICTURE_PX, trails=trails, title=title)
-    Image.fromarray(picture).quantize(128).save(FOLDER / f"{exhibit.name}.png", optimize=True)
+    Image.fromarray(picture).save(FOLDER / f"{exhibit.name}.png", optimize=True)
 
 
 def show(exhibit: Exhibit) -> None:
