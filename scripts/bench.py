@@ -24,7 +24,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -113,8 +112,7 @@ def tick_shares(scenario: ScenarioConfig, policy_name: str, ticks: int) -> dict[
     recorder = build_stack(spec.scenario, reads=getattr(policy, "reads", None))
     run = LiveRun(recorder, policy, seed=0)
     arena = recorder.unwrapped.arena
-    compiled = SimpleNamespace(**arena._compiled._asdict())  # unlike those of a named tuple its fields can be replaced
-    vars(arena)["_compiled"] = compiled
+    compiled = arena._compiled
     spent: dict[str, list[float]] = {phase: [0.0] for phase in PHASES}
     with (
         stopwatch(Physics, "advance", spent["physics"]),

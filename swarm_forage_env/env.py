@@ -87,12 +87,6 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self._seeds = np.random.default_rng()
         self.seed_value: int | None = None
 
-        columns = self.layout.size
-        self._observation_space = {
-            agent: spaces.Box(-1.0, 1.0, (columns,), np.float32) for agent in self.possible_agents
-        }
-        self._action_space = {agent: spaces.Box(-1.0, 1.0, (3,), np.float32) for agent in self.possible_agents}
-
     # Spaces and constants
 
     @property
@@ -107,11 +101,20 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
     def observation_space(self, agent: str) -> spaces.Box:
         """(D,) float32 in [-1, 1]; one space object per agent."""
-        return self._observation_space[agent]
+        return self._observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Box:
         """(3,) float32 in [-1, 1]: left wheel, right wheel, gripper; one space object per agent."""
-        return self._action_space[agent]
+        return self._action_spaces[agent]
+
+    @cached_property  # made when asked for: runs of a policy never look at them, and there may be thousands
+    def _observation_spaces(self) -> dict[str, spaces.Box]:
+        columns = self.layout.size
+        return {agent: spaces.Box(-1.0, 1.0, (columns,), np.float32) for agent in self.possible_agents}
+
+    @cached_property
+    def _action_spaces(self) -> dict[str, spaces.Box]:
+        return {agent: spaces.Box(-1.0, 1.0, (3,), np.float32) for agent in self.possible_agents}
 
     @cached_property
     def state_space(self) -> spaces.Box:
@@ -129,10 +132,14 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     def _world(self) -> ForagingArena:
         """The arena; raises RuntimeError before the first reset."""
         if self.seed_value is None:
-            raise RuntimeError(
-                "There is no world before the first reset. Call reset before step, state, render or snapshot."
-            )
+            raise self._not_begun()
         return self.arena
+
+    @staticmethod
+    def _not_begun() -> RuntimeError:
+        return RuntimeError(
+            "There is no world before the first reset. Call reset before step, state, render or snapshot."
+        )
 
     @property
     def swarm(self) -> SwarmState:
@@ -247,15 +254,32 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
                 finite.
             RuntimeError: before the first reset.
         """
-        arena = self._world
+        actions, wheel_gain = self.begin_step(actions, wheel_gain)
+        self.arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
+        return self.end_step(tasks)
+
+    def begin_step(
+        self, actions: ActionArray, wheel_gain: FloatArray | None = None
+    ) -> tuple[ActionArray, FloatArray | None]:
+        """Do what comes before the arena's step, and return what the arena is to be stepped with.
+
+        `begin_step`, the arena's step and `end_step` are `step_batch`; this is for arenas that are stepped together
+        (`world.rack`).
+        """
+        if self.seed_value is None:
+            raise self._not_begun()
         actions = self.checked_actions(actions)
         if wheel_gain is not None and wheel_gain.shape != (len(actions), 2):
             raise ActionError(
                 f"Expected wheel_gain with shape (n_robots, 2) = {(len(actions), 2)}, got {wheel_gain.shape}."
             )
         self._rewards.remember()
-        obs = self._last_obs = arena.step(actions, wheel_gain=wheel_gain, tasks=tasks)
-        return obs, self._rewards.reward(), self._terminated, arena.tick >= self.max_cycles
+        return actions, wheel_gain
+
+    def end_step(self, tasks: CodeArray | None = None) -> BatchStep:
+        """Return the result of a step, after the arena's; see `step_batch`. `tasks` is for wrappers."""
+        self._last_obs = self.arena.obs
+        return self._last_obs, self._rewards.reward(), self._terminated, self.arena.tick >= self.max_cycles
 
     def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
         """Let a compiled policy drive the swarm for some ticks; see `ForagingArena.run`. Rewards are not computed."""

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+import numpy as np
 from numba import njit, typeof, types
 from numba.core.caching import FunctionCache
 
@@ -57,6 +58,11 @@ def kernel(function: F) -> F:
     return cast(F, compiled)
 
 
+def is_compiled(function: Callable[..., Any]) -> bool:
+    """Whether calls of a kernel run compiled code; not so where the compiler is switched off."""
+    return hasattr(function, "compile")
+
+
 def direct(function: F, *example: Any) -> F:
     """Return a call of a kernel for arguments of the types of `example`, compiled here if it is not yet.
 
@@ -67,7 +73,27 @@ def direct(function: F, *example: Any) -> F:
     compiled = getattr(function, "compile", None)
     if compiled is None:  # the compiler is switched off
         return function
-    return cast(F, compiled(tuple(_type_of(argument) for argument in example)))
+    key = function, tuple(_kind_of(argument) for argument in example)
+    if key not in _entry_points:
+        _entry_points[key] = compiled(tuple(_type_of(argument) for argument in example))
+    return cast(F, _entry_points[key])
+
+
+_entry_points: dict[Any, Callable[..., Any]] = {}
+"""Kernel and kinds of its arguments -> what `direct` returns. To find the types of a whole world takes numba
+milliseconds, and every run of a study asks."""
+
+
+def _kind_of(argument: Any) -> Any:
+    """Return something that is equal for arguments of the same type."""
+    if isinstance(argument, np.ndarray):
+        flags = argument.flags
+        return argument.dtype, argument.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned, flags.writeable
+    if isinstance(argument, tuple):
+        return type(argument), *map(_kind_of, argument)
+    if type(argument) in (bool, int, float):
+        return type(argument)
+    return _type_of(argument)
 
 
 def _type_of(argument: Any) -> Any:
@@ -81,7 +107,7 @@ class Callback:
         """Compile `function`, which returns nothing, for arguments of the types of `example`."""
         self.function = function
         self.type: Any = None
-        if not hasattr(function, "compile"):  # the compiler is switched off
+        if not is_compiled(function):
             return
         arguments = tuple(typeof(argument) for argument in example)
         self.type = types.FunctionType(types.none(*arguments))

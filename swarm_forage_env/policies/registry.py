@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
-from functools import partial
-from importlib.metadata import entry_points
+from functools import cache, partial
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import PurePath
 from typing import Any, ClassVar
 
@@ -71,16 +71,23 @@ def from_callable(function: Callable[[ObsArray], ActionArray], *, name: str | No
 
 def policy_names() -> tuple[str, ...]:
     """Return the names of all installed policies, sorted."""
-    return tuple(sorted({point.name for point in entry_points(group=POLICY_ENTRY_POINTS)}))
+    return tuple(sorted({point.name for point in _installed(POLICY_ENTRY_POINTS)}))
 
 
 def is_policy_file(name: str) -> bool:
     """Return whether `name` has the suffix of files that an installed package opens as policies."""
-    return bool(entry_points(group=POLICY_FILE_ENTRY_POINTS, name=_suffix(name)))
+    return bool(_openers(name))
 
 
-def _suffix(name: str) -> str:
-    return PurePath(name).suffix.removeprefix(".").lower()
+@cache  # every run asks, and the answer is in the files of all packages that are installed
+def _installed(group: str) -> tuple[EntryPoint, ...]:
+    return tuple(entry_points(group=group))
+
+
+def _openers(name: str) -> list[EntryPoint]:
+    """Return what opens the policy file of that name: one entry point or none."""
+    suffix = PurePath(name).suffix.removeprefix(".").lower()
+    return [point for point in _installed(POLICY_FILE_ENTRY_POINTS) if point.name == suffix]
 
 
 def policy_class(name: str) -> Callable[..., Policy]:
@@ -92,9 +99,9 @@ def policy_class(name: str) -> Callable[..., Policy]:
     if name in _LOCAL_POLICIES:
         return _LOCAL_POLICIES[name]
     if is_policy_file(name):
-        (opener,) = entry_points(group=POLICY_FILE_ENTRY_POINTS, name=_suffix(name))
+        (opener,) = _openers(name)
         return partial(opener.load(), name)
-    for point in entry_points(group=POLICY_ENTRY_POINTS):
+    for point in _installed(POLICY_ENTRY_POINTS):
         if point.name == name:
             return point.load()
     known = policy_names()

@@ -11,7 +11,8 @@ Row `a * N + i` is always robot i of arena a. The life of a row:
   `ArenaStep.is_episode` is false for them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
@@ -19,9 +20,11 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env.contract.codes import Counter
-from swarm_forage_env.contract.types import BoolArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
+from swarm_forage_env.world.arena import ForagingArena
+from swarm_forage_env.world.rack import Rack, can_share_a_rack
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
 
@@ -154,6 +157,8 @@ class ArenaBatch:
         self._returns = np.zeros((n_arenas, self.n_robots), np.float64)
         self._lengths = np.zeros((n_arenas, self.n_robots), np.int32)
         self._n_columns = self.interface.layout.size
+        self._commands = np.zeros((n_arenas, self.n_robots, 3), np.float32)
+        self._racked: tuple[tuple[ForagingArena, ...], Rack | None] | None = None
         self._no_endings = _Endings().joined(self._n_columns)
 
     def reset(
@@ -209,17 +214,12 @@ class ArenaBatch:
         rewards = np.zeros(shape, np.float32)
         terminated, truncated = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
         endings = _Endings()
-        for number in range(self.n_arenas):
-            rows = slice(number * self.n_robots, (number + 1) * self.n_robots)
-            out = obs[number], rewards[number], terminated[number], truncated[number]
-            try:
-                self._step_arena(number, actions[rows], out, endings)
-            except ValueError as error:
-                error.add_note(
-                    f"This was in arena {self._first_arena + number}, which was not stepped. Other arenas may have "
-                    "been stepped already; where there are others, reset before going on."
-                )
-                raise
+        ended = self._advance(actions.reshape(*shape, *actions.shape[1:]), rewards)
+        self._lengths += self._present  # as before the step: a robot that died in it had begun it
+        self._returns += rewards
+        for number, (dead, all_dead, at_horizon) in enumerate(ended):
+            out = obs[number], terminated[number], truncated[number]
+            self._conclude(number, dead, all_dead or at_horizon, out, endings)
         return ArenaStep(
             obs=obs.reshape(self.n_rows, columns),
             rewards=rewards.ravel(),
@@ -229,23 +229,74 @@ class ArenaBatch:
             **(endings.joined(columns) if endings.rows else self._no_endings),
         )
 
-    def _step_arena(
+    def _advance(self, actions: np.ndarray, rewards: np.ndarray) -> list[tuple[BoolArray, bool, bool]]:
+        """Carry out a decision in every arena, together where they can be; see `LearnerArena.step`.
+
+        Args:
+            actions: (A, N) or (A, N, k).
+            rewards: (A, N), to be added to.
+        """
+        rack = self._rack()
+        if rack is None:
+            return [self._alone(number, actions[number], rewards[number]) for number in range(self.n_arenas)]
+        ticks: list[tuple[BoolArray, bool, bool]] = [(np.zeros(0, np.bool_), False, False)] * self.n_arenas
+        going = list(range(self.n_arenas))
+        for _ in range(self.interface.config.decision_ticks):
+            gains: dict[int, FloatArray | None] = {}
+            for number in going:
+                with self._noted(number):
+                    arena = self.arenas[number]
+                    self._commands[number], gains[number] = arena.env.begin_step(arena.command(actions[number]))
+            for number, error in rack.step(gains, self._commands).items():
+                with self._noted(number):
+                    raise error
+            for number in going:
+                arena = self.arenas[number]
+                ticks[number] = arena.take(arena.env.end_step(), rewards[number])
+            going = [number for number in going if not any(ticks[number][1:])]
+            if not going:
+                break
+        return ticks
+
+    def _alone(self, number: int, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
+        with self._noted(number):
+            return self.arenas[number].step(actions, rewards)
+
+    @contextmanager
+    def _noted(self, number: int) -> Iterator[None]:
+        """Tell in every refusal of actions in which arena it was."""
+        try:
+            yield
+        except ValueError as error:
+            error.add_note(
+                f"This was in arena {self._first_arena + number}, which was not stepped. Other arenas may have "
+                "been stepped already; where there are others, reset before going on."
+            )
+            raise
+
+    def _rack(self) -> Rack | None:
+        """Return what steps all arenas together, None where they have to be stepped one by one."""
+        worlds = tuple(arena.forage_env.arena for arena in self.arenas)
+        if self._racked is None or any(one is not other for one, other in zip(worlds, self._racked[0], strict=True)):
+            together = len(worlds) > 1 and can_share_a_rack(worlds) and all(map(_steps_in_parts, self.arenas))
+            self._racked = worlds, Rack(worlds) if together else None
+        return self._racked[1]
+
+    def _conclude(
         self,
         number: int,
-        actions: np.ndarray,
-        out: tuple[ObsArray, np.ndarray, BoolArray, BoolArray],
+        dead: BoolArray,
+        over: bool,
+        out: tuple[ObsArray, BoolArray, BoolArray],
         endings: _Endings,
     ) -> None:
-        """Step one arena; writes its rows of obs, rewards, terminated, truncated and appends to `endings`."""
-        obs, rewards, terminated, truncated = out
+        """Book a decision of one arena; writes its rows of obs, terminated, truncated and appends to `endings`."""
+        obs, terminated, truncated = out
         arena, absent = self.arenas[number], self._absent[number]
-        dead, all_dead, at_horizon = arena.step(actions, rewards)
-        self._lengths[number] += self._present[number]  # presence before the step: a robot that died in it had begun it
         self._present[number] = arena.forage_env.swarm.present
-        self._returns[number] += rewards
         arena.observe(obs)
         np.greater(dead, absent, out=terminated)
-        if all_dead or at_horizon:
+        if over:
             terminated |= absent
             np.logical_not(terminated, out=truncated)
             self._note_endings(number, np.arange(self.n_robots), obs, endings)
@@ -315,6 +366,16 @@ class ArenaBatch:
         self._is_closed = True
         for arena in self.arenas:
             arena.env.close()
+
+
+def _steps_in_parts(arena: LearnerArena) -> bool:
+    """Whether a step of the stack is `begin_step`, the arena's step and `end_step`, and nobody has replaced it."""
+    layer = arena.env
+    while isinstance(layer, SwarmWrapper):
+        if type(layer).step_batch is not SwarmWrapper.step_batch or "step_batch" in vars(layer):
+            return False
+        layer = cast("ForageEnv | SwarmWrapper", layer.env)
+    return type(layer).step_batch is ForageEnv.step_batch and "step_batch" not in vars(layer)
 
 
 def _joined(parts: list[np.ndarray], nothing: np.ndarray) -> np.ndarray:

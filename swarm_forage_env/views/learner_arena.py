@@ -9,8 +9,8 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.spelling import suggestion
-from swarm_forage_env.contract.types import BoolArray, ObsArray
-from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, LearnerInterface, chosen_interface
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig, field_sections, scenario_of_same_size
 from swarm_forage_env.scenarios.presets import chosen_scenario
@@ -163,15 +163,22 @@ class LearnerArena:
             RuntimeError: before the first reset.
             ActionError: actions that the interface or the drive refuses.
         """
-        obs, dead, all_dead, truncated = self._last_obs, np.zeros(0, np.bool_), False, False
+        tick = np.zeros(0, np.bool_), False, False
         for _ in range(self._plan.interface.decision_ticks):
-            obs, reward, dead, truncated = self.env.step_batch(self.interface.command(actions, obs))
-            self._obs = obs
-            rewards += reward
-            all_dead = bool(dead[0] and dead.all())
-            if truncated or all_dead:
+            tick = self.take(self.env.step_batch(self.command(actions)), rewards)
+            if any(tick[1:]):
                 break
-        return dead, all_dead, truncated
+        return tick
+
+    def command(self, actions: np.ndarray) -> ActionArray:
+        """Return the commands of the next tick, (N, 3) in a reused buffer; see `LearnerInterface.command`."""
+        return self.interface.command(actions, self._last_obs)
+
+    def take(self, tick: BatchStep, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
+        """Take over what a tick of `env` has brought; arguments and result as those of `step`."""
+        self._obs, reward, dead, truncated = tick
+        rewards += reward
+        return dead, bool(dead[0] and dead.all()), truncated
 
     def snapshot(self, *, agents: Sequence[str] = ()) -> LearnerSnapshot:
         """Return the state of the run and of the sequence of seeds; see `ForageEnv.snapshot`."""

@@ -22,9 +22,11 @@ from swarm_forage_env.world.caches import (
     n_cache_slots,
     restore_static_caches,
 )
-from swarm_forage_env.world.compiled import CompiledTick, compiled_tick, new_world
+from swarm_forage_env.world.compiled import CompiledTick, new_world
 from swarm_forage_env.world.interactions import Interactions
+from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.tick import BAD_TASKS, DONE, NO_ROOM, TO_PLACE, run
+from swarm_forage_env.world.kernels.world import World
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.placement import draw_source, place_all, place_objects, static_cache_centres
 from swarm_forage_env.world.sensors import new_sensors, read_slices
@@ -42,6 +44,7 @@ class ForagingArena:
         tick: Ticks done since reset.
         swarm, objects, caches, events: The state; read freely, write through the methods.
         obs: (N, D) the observation, rewritten in every tick.
+        has_changed: Whether robots came or went since they last looked around.
     """
 
     _bound: tuple[CompiledPolicy | None, Callable[..., tuple[int, int]] | None] = (None, None)
@@ -106,15 +109,13 @@ class ForagingArena:
             self._physics.twist,
             self._static_caches,
         )
-        self._moved = False
+        vars(self).pop("_compiled", None)  # that of the run before holds its world
+        self.has_changed = False
         return self.observe()
 
     @cached_property
     def _compiled(self) -> CompiledTick:
-        """Found once: the types of the arrays are the same in all runs of a scenario."""
-        actions = np.zeros((self.config.robots.n_robots, 3), np.float32)
-        bodies = self._physics.state if isinstance(self._physics, Bodies) else None
-        return compiled_tick(self._world, bodies, actions, self._unit_gain, self._nothing[0])
+        return CompiledTick(self._world, self._physics.state if isinstance(self._physics, Bodies) else None)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
@@ -161,19 +162,19 @@ class ForagingArena:
         tick = self.tick + 1
         gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
         world, compiled, physics = self._world, self._compiled, self._physics
-        pick_chances, walk_chances = self._draws(tick)
-        draws = pick_chances[0], walk_chances[0]
-        if isinstance(physics, Bodies) and compiled.whole is not None:
-            outcome = compiled.whole(world, physics.state, actions, gain, tick, self._moved, *draws)
+        picks, walks = self.draws(tick)
+        draws = picks[0], walks[0]
+        if isinstance(physics, Bodies):
+            outcome = compiled.whole(world, physics.state, actions, gain, tick, self.has_changed, *draws)
         else:
-            outcome = compiled.set_out(world, actions, gain, tick, self._moved)
+            outcome = compiled.set_out(world, actions, gain, tick, self.has_changed)
             if outcome == DONE:
                 physics.advance(self.swarm)
                 outcome = compiled.meet_and_close(world, actions, tick, *draws)
-        self._conclude(outcome, tick, actions, gain, tasks, draws)
+        self.conclude(outcome, actions, gain, tasks)
         return self.obs
 
-    def _draws(self, tick: int) -> tuple[FloatArray, FloatArray]:
+    def draws(self, tick: int) -> tuple[FloatArray, FloatArray]:
         """Return random numbers of a tick and some after it: for pick-ups (ticks, N), for walking objects (ticks, M).
 
         Where they are not needed there is one row of zeros for all.
@@ -185,39 +186,42 @@ class ForagingArena:
             self._walk_chance.rows(tick) if config.objects.walk_probability > 0.0 else nothing,
         )
 
-    def _conclude(
-        self,
-        outcome: int,
-        tick: int,
-        actions: ActionArray,
-        gain: FloatArray,
-        tasks: CodeArray | None,
-        draws: tuple[FloatArray, FloatArray],
-    ) -> None:
-        """Do what is left of a tick after its compiled part, and count it."""
+    def conclude(self, outcome: int, actions: ActionArray, gain: FloatArray, tasks: CodeArray | None = None) -> None:
+        """Do what is left of the next tick after its compiled part, and count it.
+
+        Args:
+            outcome: What the compiled part returned, see `kernels.tick`.
+            actions: (N, 3) what it was called with.
+            gain: (N, 2) likewise.
+            tasks: (N,) or None, see `step`.
+
+        Raises:
+            ActionError: see `step`.
+        """
         if outcome >= 0:
             raise ActionError(
                 f"Expected finite actions and wheel gains, got {actions[outcome].tolist()} and "
                 f"{gain[outcome].tolist()} for robot_{outcome}; the world was not stepped."
             )
+        self.tick, self.has_changed = self.tick + 1, False
+        if outcome == DONE:
+            return
+        picks, walks = self.draws(self.tick)
         if outcome == NO_ROOM:
             self._physics.advance(self.swarm)
-            outcome = self._compiled.meet_and_close(self._world, actions, tick, *draws)
-        self.tick, self._moved = tick, False
+            outcome = self._compiled.meet_and_close(self._world, actions, self.tick, picks[0], walks[0])
         if outcome == TO_PLACE:
             self._create_dynamic_caches()
             self._replace_displaced()
             self._restore_caches(tasks)
-            self._compiled.close(self._world, draws[1])
+            self._compiled.close(self._world, walks[0])
 
     def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
         """Let a compiled policy drive the world for some ticks; what happens is what `step` and `act` do by turns.
 
         Bodies must be compiled, too. `task_shares` (codes,) gets the share of active robots in each task, tick by tick.
         """
-        physics, n_left = self._physics, n_ticks
-        if not isinstance(physics, Bodies):
-            raise RuntimeError('Expected physics "compiled" for a run without Python between ticks, got "chipmunk".')
+        bodies, n_left = self.bodies, n_ticks
         tasks = policy.task if policy.task is not None else self._no_tasks
         bound_to, run_compiled = self._bound
         if bound_to is not policy:
@@ -225,15 +229,15 @@ class ForagingArena:
         while n_left:
             first = self.tick + 1
             now, policy_draws = policy.next_ticks()
-            picks, walks = self._draws(first)
+            picks, walks = self.draws(first)
             n_drawn = min(len(rows) for rows in (policy_draws, picks, walks) if rows is not self._nothing)
             arguments = (
                 self._world,
-                physics.state,
+                bodies.state,
                 self._unit_gain,
                 first,
                 min(n_left, n_drawn),
-                self._moved,
+                self.has_changed,
                 policy.callback,
                 policy.state,
                 now,
@@ -250,13 +254,23 @@ class ForagingArena:
             policy.count_ticks(n_done)
             if outcome == BAD_TASKS:
                 raise ValueError(f"Expected tasks with shape {self.swarm.active.shape} and codes of Task, got {tasks}.")
-            if outcome >= 0:  # the last of these ticks has not happened
-                self.tick, self._moved = self.tick + n_done - 1, self._moved and n_done == 1
-                n_done = 1
-            last = n_done - 1
-            draws = picks[last % len(picks)], walks[last % len(walks)]
-            self._conclude(outcome, self.tick + n_done, policy.state[-1], self._unit_gain, policy.task, draws)
+            self.tick, self.has_changed = self.tick + n_done - 1, self.has_changed and n_done == 1
+            self.conclude(outcome, policy.state[-1], self._unit_gain, policy.task)
             n_left -= n_done
+
+    # For `world.rack`
+
+    @property
+    def bodies(self) -> Bodies:
+        """The compiled bodies of the run; raises RuntimeError where Chipmunk has them."""
+        if not isinstance(self._physics, Bodies):
+            raise RuntimeError('Expected physics "compiled", got "chipmunk".')
+        return self._physics
+
+    @property
+    def parts(self) -> tuple[World, BodyState]:
+        """What the compiled tick works on; other objects after a reset, and where bodies need more room."""
+        return self._world, self.bodies.state
 
     def _create_dynamic_caches(self) -> None:
         creators = self._interactions.creators()
@@ -336,5 +350,5 @@ class ForagingArena:
             angle = float(swarm.heading[robot])
             swarm.facing[robot] = np.cos(angle), np.sin(angle)
             self._physics.place(robot, x, y, angle)
-        self._moved |= not np.array_equal(swarm.present, present)
+        self.has_changed |= not np.array_equal(swarm.present, present)
         swarm.active[:], swarm.present[:] = active, present

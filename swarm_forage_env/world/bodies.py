@@ -77,6 +77,11 @@ class Bodies:
         """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
         return {name: value for name, value in vars(self).items() if name not in ("_move", "_tell")}
 
+    @property
+    def n_pairs(self) -> int:
+        """Pairs that there is room for."""
+        return len(self.state.pairs)
+
     def make_room(self) -> None:
         """Make room for twice as many pairs; what is remembered of the last tick is kept."""
         before = self.state.memory

@@ -1,7 +1,7 @@
 """The compiled tick of one run: `kernels.tick`, bound to the arrays of the run."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 
@@ -17,15 +17,51 @@ from swarm_forage_env.world.kernels.world import Sensors, Wandering, World
 from swarm_forage_env.world.state import StepEvents, SwarmState
 
 
-class CompiledTick(NamedTuple):
-    """The functions of `kernels.tick`, to be called with arguments of exactly these types, contiguous."""
+class CompiledTick:
+    """The functions of `kernels.tick`, each compiled when it is first asked for.
 
-    observe: Callable[[World], None]
-    set_out: Callable[[World, ActionArray, FloatArray, int, bool], int]
-    meet_and_close: Callable[[World, ActionArray, int, FloatArray, FloatArray], int]
-    close: Callable[[World, FloatArray], None]
-    whole: Callable[[World, BodyState, ActionArray, FloatArray, int, bool, FloatArray, FloatArray], int] | None
-    """Only with compiled bodies."""
+    They are called without a look at the arguments, which must be contiguous arrays of exactly these types.
+    """
+
+    def __init__(self, world: World, bodies: BodyState | None) -> None:
+        """Take the types of the arguments from a run; the types are the same in all runs of a scenario.
+
+        Args:
+            world: State and constants of the run.
+            bodies: Compiled bodies, None where Chipmunk has them.
+        """
+        n_robots = len(world.present)
+        self._world, self._bodies = world, bodies
+        self._actions: ActionArray = np.zeros((n_robots, 3), np.float32)
+        self._gain: FloatArray = np.zeros((n_robots, 2))
+        self._draws: FloatArray = np.zeros(n_robots)
+
+    @cached_property
+    def observe(self) -> Callable[[World], None]:
+        """See `kernels.tick.observe`."""
+        return direct(tick.observe, self._world)
+
+    @cached_property
+    def set_out(self) -> Callable[[World, ActionArray, FloatArray, int, bool], int]:
+        """See `kernels.tick.set_out`."""
+        return direct(tick.set_out, self._world, self._actions, self._gain, 0, False)
+
+    @cached_property
+    def meet_and_close(self) -> Callable[[World, ActionArray, int, FloatArray, FloatArray], int]:
+        """See `kernels.tick.meet_and_close`."""
+        return direct(tick.meet_and_close, self._world, self._actions, 0, self._draws, self._draws)
+
+    @cached_property
+    def close(self) -> Callable[[World, FloatArray], None]:
+        """See `kernels.tick.close`."""
+        return direct(tick.close, self._world, self._draws)
+
+    @cached_property
+    def whole(self) -> Callable[[World, BodyState, ActionArray, FloatArray, int, bool, FloatArray, FloatArray], int]:
+        """See `kernels.tick.whole`; for compiled bodies only."""
+        assert self._bodies is not None, "Chipmunk moves its bodies itself"
+        draws = self._draws, self._draws
+        return direct(tick.whole, self._world, self._bodies, self._actions, self._gain, 0, False, *draws)
 
 
 def new_world(
@@ -62,19 +98,4 @@ def new_world(
         ),
         n_static_caches=n_static_caches,
         has_caches=config.caches != "none",
-    )
-
-
-def compiled_tick(
-    world: World, bodies: BodyState | None, actions: ActionArray, wheel_gain: FloatArray, draws: FloatArray
-) -> CompiledTick:
-    """Return the functions of a tick for arguments of these types; `draws` is one row of random numbers."""
-    return CompiledTick(
-        observe=direct(tick.observe, world),
-        set_out=direct(tick.set_out, world, actions, wheel_gain, 0, False),
-        meet_and_close=direct(tick.meet_and_close, world, actions, 0, draws, draws),
-        close=direct(tick.close, world, draws),
-        whole=None
-        if bodies is None
-        else direct(tick.whole, world, bodies, actions, wheel_gain, 0, False, draws, draws),
     )

@@ -145,11 +145,26 @@ class SwarmWrapper(BaseParallelWrapper):
         Raises:
             ActionError: as `ForageEnv.step_batch`; for a wrong shape before any wrapper has done anything.
         """
+        actions, gain = self._before(actions, wheel_gain)
+        return self._after(self._inner.step_batch(actions, wheel_gain=gain, tasks=tasks), tasks)
+
+    def begin_step(
+        self, actions: ActionArray, wheel_gain: FloatArray | None = None
+    ) -> tuple[ActionArray, FloatArray | None]:
+        """Do what comes before the arena's step, from here inwards; see `ForageEnv.begin_step`."""
+        return self._inner.begin_step(*self._before(actions, wheel_gain))
+
+    def end_step(self, tasks: CodeArray | None = None) -> BatchStep:
+        """Return the result of a step as seen from here, after the arena's; see `ForageEnv.end_step`."""
+        return self._after(self._inner.end_step(tasks), tasks)
+
+    def _before(self, actions: ActionArray, wheel_gain: FloatArray | None) -> tuple[ActionArray, FloatArray | None]:
         actions = self.unwrapped.checked_actions(actions)
         self.before_step()
-        obs, reward, terminated, truncated = self._inner.step_batch(
-            actions, wheel_gain=self.gain(actions, wheel_gain), tasks=tasks
-        )
+        return actions, self.gain(actions, wheel_gain)
+
+    def _after(self, step: BatchStep, tasks: CodeArray | None) -> BatchStep:
+        obs, reward, terminated, truncated = step
         obs = self._last_obs = self.observe(obs)
         self.after_step(tasks, terminated, truncated)
         return obs, reward, terminated, truncated

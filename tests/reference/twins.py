@@ -121,6 +121,8 @@ WITHOUT = {
     "swarm_forage_env.world.kernels.bodies.tell_poses": "compared with `unpack_poses` in tests/world/test_bodies.py",
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "
     "tests/world/test_interactions_timing.py",
+    "swarm_forage_env.world.kernels.many.whole_each": "each world by `tick.whole`; compared with arenas that are stepped "
+    "alone in tests/world/test_rack.py",
     "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",
     "swarm_forage_env.world.kernels.tick.close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.meet_and_close": IN_ORDER,

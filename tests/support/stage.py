@@ -66,7 +66,7 @@ def put(env: ForageEnv, robot: int, x: float, y: float, heading: float = 0.0) ->
     swarm.position[robot], swarm.heading[robot] = (x, y), heading
     swarm.facing[robot] = np.cos(heading), np.sin(heading)
     env.arena._physics.place(robot, x, y, heading)
-    env.arena._moved = True
+    env.arena.has_changed = True
 
 
 def stand(env: ForageEnv, robot: int, cell: tuple[int, int]) -> None:

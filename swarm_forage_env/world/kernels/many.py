@@ -1,0 +1,193 @@
+"""Several worlds of one scenario, stepped by one call. Each stays where it is; a table tells where its arrays are.
+
+B is the number of worlds. Worlds know nothing of each other: each is stepped by the function that steps a single one.
+"""
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.types import ActionArray, FloatArray
+from swarm_forage_env.world.kernels.bodies import BodyState
+from swarm_forage_env.world.kernels.interact import InteractionState
+from swarm_forage_env.world.kernels.tick import whole
+from swarm_forage_env.world.kernels.world import Sensors, World
+
+
+def _array_at(typingctx: Any, like: Any, address: Any) -> Any:  # noqa: ARG001 - numba hands over the types
+    """Say how compiled code makes an array of the type and shape of `like` with its data at an address."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        array = context.make_array(signature.return_type)(context, builder, value=args[0])
+        array.data = builder.inttoptr(args[1], array.data.type)
+        # The memory belongs to whoever made the array; nobody here may free it.
+        array.meminfo = ir.Constant(array.meminfo.type, None)
+        array.parent = cgutils.get_null_value(array.parent.type)
+        return array._getvalue()
+
+    return like(like, types.intp), generate
+
+
+array_at: Any = intrinsic(_array_at)
+"""(array, address) -> an array like it whose data is there; for compiled code only."""
+
+
+@kernel
+def state_at(s: InteractionState, at: np.ndarray) -> InteractionState:
+    """State like `s` whose arrays are `at` (28,) these addresses."""
+    return InteractionState(
+        array_at(s.position, at[0]),
+        array_at(s.carried_object, at[1]),
+        array_at(s.cargo_from_cache, at[2]),
+        array_at(s.pending_kind, at[3]),
+        array_at(s.pending_band, at[4]),
+        array_at(s.pending_target, at[5]),
+        array_at(s.pending_until, at[6]),
+        array_at(s.active, at[7]),
+        array_at(s.floor, at[8]),
+        array_at(s.status, at[9]),
+        array_at(s.object_cell, at[10]),
+        array_at(s.cache_slot, at[11]),
+        array_at(s.carriers, at[12]),
+        array_at(s.cache_alive, at[13]),
+        array_at(s.cache_cell, at[14]),
+        array_at(s.cache_serial, at[15]),
+        array_at(s.cache_count, at[16]),
+        array_at(s.code, at[17]),
+        array_at(s.event_object, at[18]),
+        array_at(s.event_cache, at[19]),
+        array_at(s.first_picked, at[20]),
+        array_at(s.counters, at[21]),
+        array_at(s.happened, at[22]),
+        array_at(s.displaced, at[23]),
+        array_at(s.creators, at[24]),
+        array_at(s.queue, at[25]),
+        array_at(s.handler_used, at[26]),
+        array_at(s.handling_ticks, at[27]),
+    )
+
+
+@kernel
+def sensors_at(s: Sensors, at: np.ndarray) -> Sensors:
+    """Sensors like `s` whose arrays are `at` (7,) these addresses."""
+    return Sensors(
+        array_at(s.obs, at[0]),
+        array_at(s.near, at[1]),
+        (s.bins[0], array_at(s.bins[1], at[2]), array_at(s.bins[2], at[3])),
+        s.columns,
+        array_at(s.interior, at[4]),
+        array_at(s.lights, at[5]),
+        s.intensity,
+        s.radius_m,
+        s.reach_m,
+        array_at(s.scales, at[6]),
+        s.sizes,
+        s.cache_half_side,
+        s.reads_light,
+        s.light_of_carriers_only,
+        s.reads_ground,
+        s.reads_line_of_sight,
+        s.behind_counts,
+    )
+
+
+@kernel
+def world_at(w: World, at: np.ndarray) -> World:
+    """World like `w` whose arrays are `at` (50,) these addresses, in the order of `rack.arrays_of`."""
+    before, now = w.pressing
+    return World(
+        state_at(w.state, at[:28]),
+        w.rules,
+        array_at(w.heading, at[28]),
+        array_at(w.facing, at[29]),
+        array_at(w.wheel_speed, at[30]),
+        array_at(w.present, at[31]),
+        array_at(w.twist, at[32]),
+        array_at(w.command, at[33]),
+        array_at(w.drive_limits, at[34]),
+        w.dt_s,
+        w.touch_m,
+        (
+            (array_at(before[0], at[35]), array_at(before[1], at[36]), array_at(before[2], at[37])),
+            (array_at(now[0], at[38]), array_at(now[1], at[39]), array_at(now[2], at[40])),
+        ),
+        sensors_at(w.sensors, at[41:48]),
+        array_at(w.interfering, at[48]),
+        array_at(w.interference_sum, at[49]),
+        w.wandering,
+        w.n_static_caches,
+        w.has_caches,
+    )
+
+
+@kernel
+def bodies_at(b: BodyState, at: np.ndarray) -> BodyState:
+    """Bodies like `b` whose arrays are `at` (13,) these addresses."""
+    work, memory = b.work, b.memory
+    return BodyState(
+        array_at(b.poses, at[0]),
+        array_at(b.near, at[1]),
+        (b.bins[0], array_at(b.bins[1], at[2]), array_at(b.bins[2], at[3])),
+        array_at(b.room, at[4]),
+        b.radius_m,
+        b.n_substeps,
+        array_at(b.pairs, at[5]),
+        (
+            array_at(work[0], at[6]),
+            array_at(work[1], at[7]),
+            array_at(work[2], at[8]),
+            array_at(work[3], at[9]),
+            array_at(work[4], at[10]),
+        ),
+        (array_at(memory[0], at[11]), array_at(memory[1], at[12])),
+    )
+
+
+@kernel
+def whole_each(
+    w: World,
+    bodies: BodyState,
+    worlds_at: np.ndarray,
+    bodies_are_at: np.ndarray,
+    seats: np.ndarray,
+    actions: ActionArray,
+    wheel_gain: FloatArray,
+    ticks: Any,
+    look_first: Any,
+    chance: FloatArray,
+    walk_chance: FloatArray,
+    outcomes: np.ndarray,
+) -> None:
+    """Step worlds, each by `tick.whole`.
+
+    Args:
+        w: Any of the worlds: gives types, shapes and constants.
+        bodies: Its bodies.
+        worlds_at: (B, 50) addresses of the arrays of each world.
+        bodies_are_at: (B, 13) addresses of the arrays of its bodies.
+        seats: Which of the B worlds are stepped.
+        actions: (B, N, 3), and all others as in `tick.whole` with one more dimension in front.
+        wheel_gain: (B, N, 2).
+        ticks: (B,) int64.
+        look_first: (B,) bool.
+        chance: (B, N).
+        walk_chance: (B, M), or (B, N) where it is not read.
+        outcomes: (B,) is written for the worlds that are stepped.
+    """
+    for seat in range(seats.shape[0]):
+        b = seats[seat]
+        outcomes[b] = whole(
+            world_at(w, worlds_at[b]),
+            bodies_at(bodies, bodies_are_at[b]),
+            actions[b],
+            wheel_gain[b],
+            ticks[b],
+            look_first[b],
+            chance[b],
+            walk_chance[b],
+        )

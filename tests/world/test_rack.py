@@ -1,0 +1,192 @@
+"""Arenas that are stepped together are what they are alone, whatever happens to one of them."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+from swarm_forage_env import scenario
+from swarm_forage_env.contract.policy import ActionError
+from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
+from swarm_forage_env.views.learner_arena import ArenaPlan, plan_arena
+from swarm_forage_env.world.arena import ForagingArena
+from swarm_forage_env.world.rack import Rack, can_share_a_rack
+from swarm_forage_env.wrappers.throttle import Throttle
+
+pytestmark = pytest.mark.compiled
+N_ROBOTS = 12
+ADVERSITY = (
+    "sensor_noise:sigma=0.03",
+    "population:malfunction_per_tick=0.02,repair_per_tick=0.03,death_per_tick=0.003",
+    "throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=20",
+)
+COLUMNS = ("obs", "rewards", "terminated", "truncated", "active", "ended", "final_obs", "returns", "lengths")
+
+
+def plan(*wrappers: str, **fields) -> ArenaPlan:
+    """A small world, 60 ticks long, so that arenas end and begin anew."""
+    world = scenario("warehouse_small", **{"n_robots": N_ROBOTS, "n_objects": 60} | fields)
+    return plan_arena(world, {"physics": "compiled"}, wrappers=wrappers, max_cycles=60)
+
+
+def drawn(ticks: int, n_arenas: int) -> np.ndarray:
+    """Actions (ticks, A N, 3) with which robots drive on, meet and grasp."""
+    actions = np.random.default_rng(0).uniform(-1, 1, (ticks, n_arenas * N_ROBOTS, 3)).astype(np.float32)
+    actions[..., :2] = np.abs(actions[..., :2])
+    return actions
+
+
+def joined(steps: list[ArenaStep]) -> dict[str, np.ndarray]:
+    """Columns of arenas that were stepped alone, as those of one batch."""
+    columns = {name: np.concatenate([getattr(step, name) for step in steps]) for name in COLUMNS}
+    columns["ended"] = np.concatenate([step.ended + number * N_ROBOTS for number, step in enumerate(steps)])
+    return columns
+
+
+@pytest.mark.parametrize(
+    ("wrappers", "fields"),
+    [((), {}), (ADVERSITY, {}), ((), {"caches": "dynamic"}), ((), {"walk_probability": 0.02, "caches": "static"})],
+    ids=["bare", "wrapped", "dynamic caches", "static caches and walking objects"],
+)
+def test_arenas_together_are_those_alone(wrappers, fields):
+    chosen = plan(*wrappers, **fields)
+    together, alone = ArenaBatch(chosen, 3), [ArenaBatch(chosen, 1) for _ in range(3)]
+    obs, _ = together.reset([4, 5, 6], [None] * 3)
+    np.testing.assert_array_equal(obs, np.concatenate([one.reset([4 + k], [None])[0] for k, one in enumerate(alone)]))
+    n_ended = 0
+    for actions in drawn(150, 3):
+        step = together.step(actions)
+        expected = joined([one.step(rows) for one, rows in zip(alone, np.split(actions, 3), strict=True)])
+        for name in COLUMNS:
+            np.testing.assert_array_equal(getattr(step, name), expected[name], err_msg=name)
+        n_ended += len(step.outcomes)
+    assert together._rack() is not None
+    assert all(one._rack() is None for one in alone)
+    assert n_ended >= 6
+
+
+def arenas(n: int) -> list[ForagingArena]:
+    """Arenas that have begun, each with a seed of its own."""
+    config = plan().scenario
+    made = [ForagingArena(config) for _ in range(n)]
+    for seed, arena in enumerate(made):
+        arena.reset(seed)
+    return made
+
+
+def assert_same(one: ForagingArena, other: ForagingArena) -> None:
+    """Two arenas are in the same state."""
+    assert one.tick == other.tick
+    np.testing.assert_array_equal(one.obs, other.obs)
+    np.testing.assert_array_equal(one.bodies.poses(), other.bodies.poses())
+    np.testing.assert_array_equal(one.objects.floor, other.objects.floor)
+
+
+def test_a_seat_may_stay_be_stepped_alone_begin_anew_and_go_back():
+    ours, theirs = arenas(3), arenas(3)
+    rack, unit = Rack(ours), np.ones((N_ROBOTS, 2))
+    actions = drawn(40, 3).reshape(40, 3, N_ROBOTS, 3)
+    kept = None
+    for tick, now in enumerate(actions):
+        seats = [seat for seat in range(3) if (tick + seat) % 3 or tick < 20]
+        assert not rack.step(dict.fromkeys(seats, 0.5 * unit if tick == 7 else None), now)
+        for seat in seats:
+            theirs[seat].step(now[seat], wheel_gain=0.5 * unit if tick == 7 else None)
+        if tick == 10:
+            for arena in (ours[1], theirs[1]):
+                arena.reset(99)
+        if tick == 15:
+            kept = [pickle.dumps(arena.__getstate__()) for arena in (ours[0], theirs[0])]
+        if tick == 25:
+            assert kept is not None
+            for arena, state in zip((ours[0], theirs[0]), kept, strict=True):
+                arena.__setstate__(pickle.loads(state))  # noqa: S301 - written above
+        if tick == 30:
+            for arena in (ours[2], theirs[2]):
+                arena.step(now[2])
+        for one, other in zip(ours, theirs, strict=True):
+            assert_same(one, other)
+
+
+def test_more_room_in_one_seat_is_room_in_all(monkeypatch):
+    monkeypatch.setattr("swarm_forage_env.world.bodies.PAIRS_PER_ROBOT", 1)
+    ours, theirs = arenas(2), arenas(2)
+    rack = Rack(ours)
+    for arena in (ours[1], theirs[1]):  # everybody on one spot: more pairs than there is room for
+        arena.swarm.position[:] = 4.0 + 1e-3 * np.arange(N_ROBOTS)[:, None]
+        for robot, (x, y) in enumerate(arena.swarm.position.tolist()):
+            arena.bodies.place(robot, x, y, 0.0)
+        arena.has_changed = True
+    for now in drawn(5, 2).reshape(5, 2, N_ROBOTS, 3):
+        rack.step({0: None, 1: None}, now)
+        for arena, rows in zip(theirs, now, strict=True):
+            arena.step(rows)
+        for one, other in zip(ours, theirs, strict=True):
+            assert_same(one, other)
+    assert ours[0].bodies.n_pairs == ours[1].bodies.n_pairs > N_ROBOTS
+
+
+def test_a_refused_action_stops_its_own_arena_only():
+    ours, theirs = arenas(3), arenas(3)
+    now = drawn(1, 3).reshape(3, N_ROBOTS, 3)
+    now[1, 5, 0] = np.nan
+    refused = Rack(ours).step(dict.fromkeys(range(3)), now)
+    assert list(refused) == [1]
+    assert "robot_5" in str(refused[1])
+    assert [arena.tick for arena in ours] == [1, 0, 1]
+    with pytest.raises(ActionError, match="robot_5"):
+        theirs[1].step(now[1])
+    for seat in (0, 2):
+        theirs[seat].step(now[seat])
+    for one, other in zip(ours, theirs, strict=True):
+        assert_same(one, other)
+    batch = ArenaBatch(plan(), 3)
+    batch.reset([0, 1, 2], [None] * 3)
+    with pytest.raises(ActionError, match="robot_5") as raised:
+        batch.step(now.reshape(-1, 3))
+    assert "arena 1, which was not stepped" in "".join(raised.value.__notes__)
+
+
+def test_a_copy_of_a_batch_goes_on_by_itself():
+    batch = ArenaBatch(plan(), 2)
+    batch.reset([0, 1], [None] * 2)
+    actions = drawn(20, 2)
+    for now in actions[:10]:
+        batch.step(now)
+    other = copy.deepcopy(batch)
+    ours = [batch.step(now).obs for now in actions[10:]]
+    np.testing.assert_array_equal(ours, [other.step(now).obs for now in actions[10:]])
+
+
+def test_who_may_share_a_rack():
+    config = plan().scenario
+    assert can_share_a_rack([ForagingArena(config), ForagingArena(config)])
+    unlike = (
+        ForagingArena(config, reads=("proximity",)),
+        ForagingArena(scenario("warehouse_small", n_robots=N_ROBOTS, physics="compiled")),
+    )
+    for other in unlike:
+        assert not can_share_a_rack([ForagingArena(config), other])
+        with pytest.raises(ValueError, match="Expected arenas of one scenario"):
+            Rack([ForagingArena(config), other])
+    assert not can_share_a_rack([ForagingArena(scenario("warehouse_small"))] * 2)
+
+
+def test_a_stack_whose_step_was_replaced_is_stepped_by_it(monkeypatch):
+    batch = ArenaBatch(plan("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=20"), 2)
+    batch.reset([0, 1], [None] * 2)
+    assert batch._rack() is not None
+    calls = []
+    original = Throttle.step_batch
+
+    def counted(self, actions, **options):
+        calls.append(self)
+        return original(self, actions, **options)
+
+    monkeypatch.setattr(Throttle, "step_batch", counted)
+    other = ArenaBatch(plan("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=20"), 2)
+    other.reset([0, 1], [None] * 2)
+    now = drawn(1, 2)[0]
+    np.testing.assert_array_equal(other.step(now).obs, batch.step(now).obs)
+    assert len(calls) == 2
