@@ -47,9 +47,6 @@ class ForagingArena:
         has_changed: Whether robots came or went since they last looked around.
     """
 
-    _bound: tuple[CompiledPolicy | None, Callable[..., tuple[int, int]] | None] = (None, None)
-    """The policy that `run` was called with last, and the function compiled for it: to find it takes milliseconds."""
-
     def __init__(
         self, config: ScenarioConfig, *, reads: Collection[str] | None = None, snapshots: bool = False
     ) -> None:
@@ -119,7 +116,7 @@ class ForagingArena:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
-        return {name: value for name, value in vars(self).items() if name not in ("_compiled", "_bound")}
+        return {name: value for name, value in vars(self).items() if name != "_compiled"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -223,9 +220,7 @@ class ForagingArena:
         """
         bodies, n_left = self.bodies, n_ticks
         tasks = policy.task if policy.task is not None else self._no_tasks
-        bound_to, run_compiled = self._bound
-        if bound_to is not policy:
-            run_compiled = None
+        run_compiled: Callable[..., tuple[int, int]] | None = None
         while n_left:
             first = self.tick + 1
             now, policy_draws = policy.next_ticks()
@@ -249,7 +244,6 @@ class ForagingArena:
             )
             if run_compiled is None:
                 run_compiled = direct(run, *arguments)
-                self._bound = policy, run_compiled
             n_done, outcome = run_compiled(*arguments)
             policy.count_ticks(n_done)
             if outcome == BAD_TASKS:
