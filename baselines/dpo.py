@@ -119,6 +119,11 @@ class DPOPolicy(ScriptedPolicy):
         """(N,) number of objects that each robot remembers, a copy."""
         return self._robots["n_known"].copy()
 
+    @property
+    def n_remembered(self) -> IntArray:
+        """(N,) the same: a robot remembers objects only."""
+        return self.n_known
+
     def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
         """Return what one robot remembers: object row -> (cell x, cell y, pheromone density)."""
         return remembered_objects(self._memory, self._robots, robot_index, self._constants[0].log_keep)

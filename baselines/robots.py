@@ -14,7 +14,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import is_obstacle_vector, ring_is_empty, ring_sum, sees_nest
 from swarm_forage_env.contract.layout import EVENT_SCALE, GROUND_SENSORS, RING_SENSORS
-from swarm_forage_env.contract.types import Row
+from swarm_forage_env.contract.types import CodeArray, Row
 
 
 class Activity(IntEnum):
@@ -38,6 +38,26 @@ class Activity(IntEnum):
     """Just dropped: the task is done."""
     LET_GO = 8
     """Giving up while carrying: standing, releasing the object here."""
+
+
+EXPLORING = 9
+"""Code behind those of `Activity`: ACQUIRE without a point to go to."""
+EXPLORING_LOADED = 10
+"""The same of TRANSPORT."""
+ACTIVITY_WORDS = (
+    "going to a goal",
+    "picking up",
+    "going home",
+    "in the nest, looking for a place",
+    "dropping",
+    "leaving the nest",
+    "carrying to a goal",
+    "task done",
+    "letting go",
+    "exploring",
+    "exploring with cargo",
+)
+"""What the codes of `Activity`, and the two behind them, mean to people."""
 
 
 class VectorState(IntEnum):
@@ -124,6 +144,15 @@ def describe_robot(robot: np.record) -> str:
     if robot.explore_ticks != NOT_EXPLORING:
         told += f", exploring for {robot.explore_ticks} ticks"
     return told
+
+
+def activity_codes(robots: np.ndarray) -> CodeArray:
+    """Return what every robot is up to, (N,) indices into `ACTIVITY_WORDS`."""
+    codes = robots["activity"].copy()
+    without_goal = robots["vector_state"] == VectorState.IDLE
+    codes[without_goal & (robots["activity"] == Activity.ACQUIRE)] = EXPLORING
+    codes[without_goal & (robots["activity"] == Activity.TRANSPORT)] = EXPLORING_LOADED
+    return codes
 
 
 class Senses(NamedTuple):

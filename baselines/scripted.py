@@ -7,11 +7,11 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import Callback, direct
 from swarm_forage_env._internal.rng import TickDraws
-from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env.contract.policy import RobotStates, SwarmSpec
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 from .parameters import require_inputs
-from .robots import describe_robot
+from .robots import ACTIVITY_WORDS, activity_codes, describe_robot
 
 
 class CompiledScript:
@@ -56,6 +56,7 @@ class ScriptedPolicy:
     class: a pickle would take a copy of it along, which another process had to compile anew."""
     _spec: SwarmSpec | None = None
     _shapes: tuple[tuple[int, ...], tuple[int, ...]] | None = None
+    _script: CompiledScript | None = None
 
     def _start(
         self,
@@ -84,6 +85,7 @@ class ScriptedPolicy:
         self._actions: ActionArray = np.zeros((spec.n_robots, 3), np.float32)
         self._state = (constants, robots, *memory, self._actions)
         self.n_ticks = 0
+        self._script = None
         self._bind()
 
     def _bind(self) -> None:
@@ -104,14 +106,17 @@ class ScriptedPolicy:
     def compiled(self) -> "CompiledScript | None":
         """The policy for runs without Python between ticks; None where somebody has put another `act` in its place."""
         is_own = type(self).act is ScriptedPolicy.act and "act" not in vars(self)
-        return CompiledScript(self._kernel, self._state, self, self._chance) if is_own else None
+        if is_own and self._script is None:  # kept, because its types take milliseconds to find out
+            self._script = CompiledScript(self._kernel, self._state, self, self._chance)
+        return self._script if is_own else None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies are made of: everything but the compiled version, which cannot be stored."""
-        return {name: value for name, value in self.__dict__.items() if name != "_step"}
+        return {name: value for name, value in self.__dict__.items() if name not in ("_step", "_script")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
+        self._script = None
         if self._spec is not None:
             self._bind()
 
@@ -123,3 +128,12 @@ class ScriptedPolicy:
     def describe_robot(self, row: int) -> str:
         """Return what one robot is up to, in one line for people."""
         return describe_robot(self._robots[row])
+
+    @property
+    def n_remembered(self) -> IntArray | None:
+        """(N,) number of things that each robot remembers; None for a policy without memory."""
+        return None
+
+    def describe_robots(self) -> RobotStates:
+        """Return what all robots are up to, as arrays."""
+        return RobotStates(activity_codes(self._robots), ACTIVITY_WORDS, self.n_remembered)

@@ -132,6 +132,11 @@ class TaskPolicy(ScriptedPolicy):
         """(N,) number of caches that each robot remembers, a copy."""
         return self._robots["n_caches"].copy()
 
+    @property
+    def n_remembered(self) -> IntArray:
+        """(N,) number of objects and caches that each robot remembers."""
+        return self._robots["n_known"] + self._robots["n_caches"]
+
     def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
         """Return the objects that one robot remembers: object row -> (cell x, cell y, pheromone density)."""
         return remembered_objects(self._memory.objects, self._robots, robot_index, self._constants[0].log_keep)

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
     from swarm_forage_env.study.film import record_run
     from swarm_forage_env.study.record import RunRecord
+    from swarm_forage_env.study.replay.capture import record_replay
+    from swarm_forage_env.study.replay.files import read_replays, write_replays
     from swarm_forage_env.study.run import build_stack, run_one, run_policy
     from swarm_forage_env.study.runner import run_all
     from swarm_forage_env.study.spec import RunSpec, plan_run
@@ -88,6 +90,8 @@ __all__ = [
     "parse_wrapper",
     "plan_run",
     "policy_names",
+    "read_replays",
+    "record_replay",
     "read_study",
     "record_run",
     "run_all",
@@ -96,6 +100,7 @@ __all__ = [
     "run_study",
     "scenario",
     "with_overrides",
+    "write_replays",
 ]
 
 _HOMES = {
@@ -142,6 +147,8 @@ _HOMES = {
     "parse_wrapper": "wrappers.registry",
     "plan_run": "study.spec",
     "policy_names": "policies.registry",
+    "read_replays": "study.replay.files",
+    "record_replay": "study.replay.capture",
     "read_study": "study.study_table",
     "record_run": "study.film",
     "run_all": "study.runner",
@@ -149,6 +156,7 @@ _HOMES = {
     "run_policy": "study.run",
     "run_study": "study.study_run",
     "with_overrides": "scenarios.config",
+    "write_replays": "study.replay.files",
 }
 """Public name -> submodule that defines it, loaded when the name is first used."""
 

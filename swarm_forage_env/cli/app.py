@@ -12,9 +12,11 @@ from swarm_forage_env.cli.ablate import ablate
 from swarm_forage_env.cli.availability import availability
 from swarm_forage_env.cli.choose import choose
 from swarm_forage_env.cli.compare import compare
+from swarm_forage_env.cli.maps import maps
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE, complain
 from swarm_forage_env.cli.predict import predict
 from swarm_forage_env.cli.record import record
+from swarm_forage_env.cli.replay import replay
 from swarm_forage_env.cli.rerun import rerun
 from swarm_forage_env.cli.run import run
 from swarm_forage_env.cli.score import score
@@ -54,7 +56,7 @@ for command in (run, score, compare, predict, choose, train):
     app.command()(command)
 app.add_typer(study, name="study")
 app.command("list")(list_everything)
-for command in (info, schema, rerun, record, stuck, ablate, availability):
+for command in (info, schema, rerun, record, replay, maps, stuck, ablate, availability):
     app.command()(command)
 
 

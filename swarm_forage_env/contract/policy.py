@@ -5,13 +5,13 @@ A policy, scripted or trained, sees observations and never the state of the worl
 """
 
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.layout import ObservationLayout, observation_layout
-from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, WHEEL_SCALE_MPS
@@ -108,6 +108,17 @@ class SwarmSpec:
         )
 
 
+class RobotStates(NamedTuple):
+    """What every robot of a policy is up to now, for people; see `Policy`."""
+
+    activity: CodeArray
+    """(N,) indices into `words`."""
+    words: tuple[str, ...]
+    """What an activity is called; the same all through a run."""
+    n_remembered: IntArray | None
+    """(N,) number of things that a robot remembers, None for robots without memory."""
+
+
 class CompiledPolicy(Protocol):
     """A policy whose ticks can be run without Python in between. Policies offer it by a method `compiled`."""
 
@@ -143,7 +154,8 @@ class Policy(Protocol):
     """Controls every robot at once. An instance drives one run; its memory is created by `reset`.
 
     Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
-    doing, for people (`study.stuck` shows it); `compiled() -> CompiledPolicy | None`, for runs without Python
+    doing, for people (`study.stuck` shows it); `describe_robots() -> RobotStates`, the same of all robots as arrays
+    (`study.replay` keeps it); `compiled() -> CompiledPolicy | None`, for runs without Python
     between ticks; the class attributes `caches` ("none", "static", "dynamic": those that
     the policy is made for) and `reads` (names of the slices it looks at; default all;
     "light if carrying" = light only of robots that carry).

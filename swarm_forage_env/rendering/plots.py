@@ -128,3 +128,41 @@ def draw_availability(path: str | Path, curves: Mapping[int, FloatArray], teams:
     panels[0].set(ylabel="availability", ylim=(0, 1))
     panels[-1].legend(frameon=False)
     figure.savefig(path, dpi=150)
+
+
+def draw_maps(
+    path: str | Path,
+    rows: Sequence[tuple[str, Mapping[str, FloatArray], bool]],
+    titles: Mapping[str, str],
+    size_m: tuple[float, float],
+) -> None:
+    """Draw maps of a floor: a row of panels per run or difference, a column per quantity.
+
+    Args:
+        path: File to write; its suffix chooses the format (.png, .svg, .pdf).
+        rows: Label; arrays (ny, nx) by name, row = y from below; and whether they are differences.
+        titles: Headline of each column, by name of the array; their order is that of the columns.
+        size_m: Extent of the floor along x and y.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    from matplotlib.figure import Figure
+
+    width, height = 4.2, 4.2 * size_m[1] / size_m[0] + 0.7
+    figure = Figure(figsize=(width * len(titles), height * len(rows)), layout="constrained")
+    panels = figure.subplots(len(rows), len(titles), squeeze=False)
+    bar = min(1.0, 1.2 * size_m[1] / size_m[0])  # as long as a panel is high
+    for (label, arrays, is_difference), line in zip(rows, panels, strict=True):
+        for (name, title), axes in zip(titles.items(), line, strict=True):
+            values = arrays[name]
+            # Few squares hold most; the last percent would leave all others in one colour.
+            top = float(np.quantile(np.abs(values[values != 0]), 0.99)) if values.any() else 1.0
+            low, colours = (-top, "RdBu_r") if is_difference else (0.0, "cividis")
+            image = axes.imshow(
+                values, origin="lower", extent=(0, size_m[0], 0, size_m[1]), vmin=low, vmax=top, cmap=colours
+            )
+            axes.set_title(f"{label}\n{title}", fontsize=9)
+            axes.tick_params(labelsize=7)
+            figure.colorbar(image, ax=axes, shrink=bar).ax.tick_params(labelsize=7)
+    figure.savefig(path, dpi=110)

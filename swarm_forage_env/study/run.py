@@ -126,6 +126,17 @@ def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:
     recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
     LiveRun(recorder, policy, spec.seed).advance()
     recorder.close()
+    return finished_record(recorder, spec, started)
+
+
+def finished_record(recorder: RunRecorder, spec: RunSpec, started: float) -> RunRecord:
+    """Return the record of a run that has ended.
+
+    Args:
+        recorder: Outermost wrapper of the run.
+        spec: The run.
+        started: When it began, by `time.perf_counter`.
+    """
     columns: dict[str, Any] = recorder.columns()
     origin = {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),

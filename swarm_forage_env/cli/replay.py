@@ -1,0 +1,195 @@
+"""The command `replay`."""
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from swarm_forage_env.cli.options import (
+    Caches,
+    ConfigFile,
+    Density,
+    Objects,
+    Robots,
+    Scenario,
+    Settings,
+    Side,
+    Wrappers,
+)
+from swarm_forage_env.cli.terminal import notes
+
+if TYPE_CHECKING:
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions
+    from swarm_forage_env.study.record import RunRecord
+    from swarm_forage_env.study.replay.capture import Progress
+    from swarm_forage_env.study.replay.frames import Replay
+    from swarm_forage_env.study.spec import RunSpec
+
+RESULTS = Path("results")
+"""Where the runs of a run id are looked for: the folder that `swarm-forage run` stores them in."""
+_RUN_ID = re.compile(r"[0-9a-f]{16}")
+_OPTIONS_OF_STORED_RUNS = ("run", "out", "beside", "seconds", "frame")
+
+
+def replay(  # long: one parameter per option
+    context: typer.Context,
+    run: Annotated[
+        str,
+        typer.Argument(
+            metavar="RUN|POLICY",
+            help="A stored run (file.parquet, or the id of one in results/), or a policy: name, or file of a trained "
+            "one.",
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File to write; default results/SCENARIO_POLICY.html.")
+    ] = None,
+    beside: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="RUN|POLICY",
+            help="Another run to be seen beside it, a policy in the same world with the same seed; may be repeated.",
+        ),
+    ] = None,
+    scenario: Scenario = "warehouse_small",
+    robots: Robots = None,
+    seconds: Annotated[float | None, typer.Option(help="Simulated seconds to keep; default the whole run.")] = None,
+    frame: Annotated[
+        float | None,
+        typer.Option(help="Simulated seconds between frames; default 1, or more for large swarms."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
+    objects: Objects = None,
+    side: Side = None,
+    density: Density = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    wrappers: Wrappers = None,
+    config: ConfigFile = None,
+) -> None:
+    """Look into a run: write it as one HTML file, with play, zoom, every robot's state, and curves.
+
+    The file needs no network and works on phones, too. A stored run is made again for it.
+    """
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions
+
+    options = ScenarioOptions(
+        scenario=scenario,
+        robots=robots,
+        objects=objects,
+        side=side,
+        density=density,
+        caches=caches,
+        settings=tuple(settings or ()),
+        wrappers=tuple(wrappers or ()),
+        config_file=config,
+    )
+    stored = _stored_run(run)
+    if stored is not None:
+        _refuse_scenario_options(context)
+    with _complaints():
+        runs = _planned([run, *(beside or ())], options, seed)
+        replays = [_recorded(spec, record, seconds, frame) for spec, record in runs]
+        _write(out or _default_file(runs[0][0]), replays)
+
+
+def _write(path: Path, replays: "Sequence[Replay]") -> None:
+    from swarm_forage_env.study.replay.files import write_replays
+
+    written = write_replays(path, replays)
+    typer.echo(f"wrote {written} ({written.stat().st_size / 1e6:.1f} MB)")
+
+
+def _planned(words: Sequence[str], options: "ScenarioOptions", seed: int) -> "list[tuple[RunSpec, RunRecord | None]]":
+    """Return a specification for each run or policy, and the record of stored ones; the first decides the world."""
+    from swarm_forage_env.cli.scenario_options import plan_runs
+    from swarm_forage_env.study.spec import RunSpec, plan_run
+
+    runs: list[tuple[RunSpec, RunRecord | None]] = []
+    for word in words:
+        record = _stored_run(word)
+        if record is not None:
+            runs.append((RunSpec.from_json(record.spec), record))
+        elif runs and runs[0][1] is not None:
+            first = runs[0][0]
+            runs.append((plan_run(first.scenario, word, wrappers=first.wrappers, seed=first.seed), None))
+        else:
+            runs.append((plan_runs(options, (word,), n_seeds=1, first_seed=seed)[0], None))
+    return runs
+
+
+def _stored_run(word: str) -> "RunRecord | None":
+    """Return the record that a word names, or None if it names a policy."""
+    from swarm_forage_env.study.record import RecordError, RunRecord
+
+    if Path(word).suffix == ".parquet":
+        return RunRecord.read(word)
+    if not _RUN_ID.fullmatch(word):
+        return None
+    found = sorted(RESULTS.glob(f"**/{word}.parquet"))
+    if not found:
+        raise RecordError(f"Expected the run {word} below {RESULTS}/, found none; give the path of its file.")
+    return RunRecord.read(found[0])
+
+
+def _refuse_scenario_options(context: typer.Context) -> None:
+    given = [
+        option.opts[0]
+        for option in context.command.params
+        if option.name not in _OPTIONS_OF_STORED_RUNS
+        and (source := context.get_parameter_source(str(option.name))) is not None
+        and source.name == "COMMANDLINE"
+    ]
+    if given:
+        raise typer.BadParameter(
+            f"Expected a stored run without options that describe another one, got {', '.join(given)}; "
+            "leave them out, or give a policy."
+        )
+
+
+def _recorded(spec: "RunSpec", stored: "RunRecord | None", seconds: float | None, frame_s: float | None) -> "Replay":
+    from swarm_forage_env.study.replay.capture import record_replay
+
+    with _bar(f"{spec.policy}, seed {spec.seed}") as progress:
+        made, record = record_replay(spec, seconds=seconds, frame_s=frame_s, progress=progress)
+    if stored is not None and record is not None and not record.same_columns(stored):
+        notes().print(
+            f"The run {spec.run_id} comes out different from its record, which other versions made; "
+            "the replay shows the run as it is now.",
+            markup=False,
+        )
+    return made
+
+
+@contextmanager
+def _bar(text: str) -> "Iterator[Progress]":
+    """Show how much of a run is done, and an estimate of how long the rest will take."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    screen = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task(text)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextmanager
+def _complaints() -> Iterator[None]:
+    """Turn what is wrong with the words into a complaint about them."""
+    from swarm_forage_env.policies.model_files import ModelError
+    from swarm_forage_env.policies.network import NetworkError
+    from swarm_forage_env.rendering.view import RenderError
+    from swarm_forage_env.study.replay.frames import ReplayError
+
+    try:
+        yield
+    except (ReplayError, RenderError, ModelError, NetworkError) as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def _default_file(spec: "RunSpec") -> Path:
+    return RESULTS / f"{spec.scenario.name}_{Path(spec.policy).stem}.html"

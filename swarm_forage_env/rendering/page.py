@@ -1,0 +1,83 @@
+"""The replay page: one HTML file out of a style sheet, scripts and data, and the data out of such a file.
+
+Its parts lie in `replay_page`. Data are a header in JSON and one block of bytes per run, in base64. Nothing is loaded
+from elsewhere; the page itself forbids that.
+"""
+
+import base64
+import html
+import json
+import re
+from functools import cache
+from importlib import resources
+from string import Template
+from typing import Any
+
+SCRIPTS = (
+    "theme.js",
+    "decode.js",
+    "events.js",
+    "run.js",
+    "player.js",
+    "view.js",
+    "draw.js",
+    "panels.js",
+    "curves.js",
+    "inspect.js",
+    "legend.js",
+    "controls.js",
+    "main.js",
+)
+"""Parts of the script in the order in which they are put together; later ones use earlier ones."""
+_HEADER = re.compile(r'<script type="application/json" id="header">(.*?)</script>', re.DOTALL)
+_DATA = re.compile(r'<script type="text/plain" class="run">(.*?)</script>', re.DOTALL)
+
+
+class PageError(ValueError):
+    """A text that is no replay page, or a damaged one."""
+
+
+def build_page(title: str, header: dict[str, Any], blocks: list[bytes]) -> str:
+    """Return the page as text.
+
+    Args:
+        title: Title and headline.
+        header: Plain values for JSON.
+        blocks: One block of bytes per run.
+    """
+    data = "\n".join(
+        f'<script type="text/plain" class="run">{base64.b64encode(block).decode("ascii")}</script>' for block in blocks
+    )
+    # "<" within JSON would end the script element early if "/script>" followed.
+    written = json.dumps(header, allow_nan=False).replace("<", "\\u003c")
+    return Template(_part("index.html")).substitute(
+        title=html.escape(title),
+        style=_part("replay.css"),
+        script="\n".join(_part(name) for name in SCRIPTS),
+        header=written,
+        data=data,
+    )
+
+
+def take_page_apart(text: str) -> tuple[dict[str, Any], list[bytes]]:
+    """Return header and blocks of a page, as they were given to `build_page`.
+
+    Raises:
+        PageError: there is no header, or header or blocks cannot be read.
+    """
+    found = _HEADER.search(text)
+    if found is None or not text.rstrip().endswith("</html>"):
+        raise PageError("it is no replay page or cut short")
+    try:
+        header = json.loads(found[1])
+        blocks = [base64.b64decode(block, validate=True) for block in _DATA.findall(text)]
+    except ValueError as error:
+        raise PageError(f"its content is damaged ({error})") from error
+    if not isinstance(header, dict):
+        raise PageError("its header is no JSON object")
+    return header, blocks
+
+
+@cache
+def _part(name: str) -> str:
+    return resources.files("swarm_forage_env.rendering").joinpath("replay_page", name).read_text(encoding="utf-8")

@@ -1,0 +1,143 @@
+// What the signs mean, and what is shown.
+
+/** Paint one sign of the legend in the middle of a small canvas. */
+const signs = {
+  empty: (pen) => robotSign(pen, theme.colours.empty),
+  carrying: (pen) => {
+    robotSign(pen, theme.colours.carrying);
+    pen.fillStyle = theme.colours.floor;
+    pen.fillRect(8.8, 8.8, 4.4, 4.4);
+  },
+  "in interference": (pen) => {
+    robotSign(pen, theme.colours.empty);
+    ringSign(pen, theme.colours.interference, 8.5, 2);
+  },
+  "in repair": (pen) => ringSign(pen, theme.colours.repair, 4.5, 2.6),
+  dead: (pen) => {
+    pen.strokeStyle = theme.colours.repair;
+    pen.lineWidth = 2;
+    pen.beginPath();
+    for (const way of [-1, 1]) {
+      pen.moveTo(11 - 4, 11 - 4 * way);
+      pen.lineTo(11 + 4, 11 + 4 * way);
+    }
+    pen.stroke();
+  },
+  delivered: (pen) => ringSign(pen, theme.colours.nest, 7, 2),
+  object: (pen) => {
+    pen.fillStyle = theme.colours.object;
+    pen.fillRect(8, 8, 6, 6);
+  },
+  nest: (pen) => areaSign(pen, theme.colours.nest, 0.3),
+  source: (pen) => areaSign(pen, theme.colours.source, 0.25, false),
+  cache: (pen) => areaSign(pen, theme.colours.cache, 0.3),
+};
+
+function robotSign(pen, colour) {
+  pen.fillStyle = pen.strokeStyle = colour;
+  pen.beginPath();
+  disc(pen, 11, 11, 5);
+  pen.fill();
+  pen.lineWidth = 2;
+  pen.beginPath();
+  pen.moveTo(11, 11);
+  pen.lineTo(19, 6);
+  pen.stroke();
+}
+
+function ringSign(pen, colour, radius, width) {
+  pen.strokeStyle = colour;
+  pen.lineWidth = width;
+  pen.beginPath();
+  disc(pen, 11, 11, radius);
+  pen.stroke();
+}
+
+function areaSign(pen, colour, opacity, framed = true) {
+  pen.fillStyle = pen.strokeStyle = colour;
+  pen.globalAlpha = opacity;
+  pen.fillRect(3, 3, 16, 16);
+  pen.globalAlpha = 1;
+  pen.lineWidth = 1.5;
+  if (framed) pen.strokeRect(3, 3, 16, 16);
+}
+
+function taskSign(task) {
+  return (pen) => robotSign(pen, theme.colours[`task-${task}`]);
+}
+
+class Legend {
+  constructor(runs, page) {
+    this.runs = runs;
+    this.page = page;
+    this.card = document.getElementById("legend");
+    this.list = document.createElement("ul");
+    this.card.append(this.list, this.choices());
+  }
+
+  /** A list of [name, painter] of the signs that occur in these runs. */
+  entries() {
+    const anyRun = (test) => this.runs.some(test);
+    const ofStatus = (bit) => anyRun((run) => run.arrays.status.some((state) => state & bit));
+    this.hasRepair ??= ofStatus(REPAIR);
+    this.hasAbsent ??= ofStatus(ABSENT);
+    const byTask = shown.colour === "task";
+    const names = byTask ? [] : ["empty", "carrying"];
+    names.push("in interference");
+    if (this.hasRepair) names.push("in repair");
+    if (this.hasAbsent) names.push("dead");
+    names.push("delivered", "object", "nest");
+    if (anyRun((run) => run.header.world.sources_m.length > 0)) names.push("source");
+    if (anyRun((run) => run.header.world.caches !== "none")) names.push("cache");
+    const tasks = byTask ? this.tasksInUse().map((task) => [this.runs[0].header.tasks[task], taskSign(task)]) : [];
+    return [...tasks, ...names.map((name) => [name, signs[name]])];
+  }
+
+  tasksInUse() {
+    const used = new Set();
+    for (const run of this.runs) {
+      if (!run.header.has_tasks) used.add(0);
+      else for (const state of run.arrays.status) used.add((state >> TASK_SHIFT) & 7);
+    }
+    return [...used].sort((a, b) => a - b);
+  }
+
+  paint() {
+    this.list.replaceChildren(
+      ...this.entries().map(([name, sign]) => {
+        const item = document.createElement("li");
+        const canvas = document.createElement("canvas");
+        sign(sizeCanvas(canvas, 22, 22));
+        item.append(canvas, name);
+        return item;
+      }),
+    );
+  }
+
+  choices() {
+    const row = document.createElement("div");
+    row.className = "choices";
+    row.append(this.choice("trails", [[0, "none"], [30, "30 s"], [120, "2 min"], [600, "10 min"]], shown.trails, (value) => {
+      shown.trails = Number(value);
+    }));
+    if (this.runs.some((run) => run.header.has_tasks)) {
+      row.append(this.choice("colour by", [["cargo", "cargo"], ["task", "task"]], shown.colour, (value) => {
+        shown.colour = value;
+        this.paint();
+      }));
+    }
+    return row;
+  }
+
+  choice(name, options, current, use) {
+    const label = document.createElement("label");
+    const select = document.createElement("select");
+    for (const [value, text] of options) select.add(new Option(text, value, value === current, value === current));
+    select.onchange = () => {
+      use(select.value);
+      this.page.repaint();
+    };
+    label.append(name, select);
+    return label;
+  }
+}

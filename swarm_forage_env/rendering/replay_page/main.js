@@ -1,0 +1,140 @@
+// The page: unpack the runs, build the parts, and paint whenever something has changed.
+
+class Page {
+  constructor(runs) {
+    this.runs = runs;
+    this.frameS = Math.min(...runs.map((run) => run.frameS));
+    this.player = new Player(Math.max(...runs.map((run) => run.endS)));
+    this.camera = new Camera();
+    const arenas = document.getElementById("arenas");
+    this.panels = runs.map((run) => new Panel(arenas, run, this.camera, this));
+    const curves = document.getElementById("curves");
+    this.life = new LifeChart(curves, this.player, runs);
+    this.charts = makeCharts(curves, this.player, runs);
+    this.inspector = new Inspector(runs, this);
+    this.legend = new Legend(runs, this);
+    connectControls(this.player, this);
+    this.describe();
+    this.restyle();
+    document.addEventListener("themed", () => this.restyle());
+    addEventListener("resize", () => this.resize());
+    requestAnimationFrame((now) => this.turn(now));
+  }
+
+  describe() {
+    const { header } = this.runs[0];
+    const { world } = header;
+    const facts = [header.scenario.replaceAll("_", " "), `${header.n_robots} robots`, `${header.n_objects} objects`,
+      `${world.width_m} × ${world.height_m} m`, `seed ${header.seed}`];
+    for (const text of header.disturbances) facts.push(text);
+    document.getElementById("subtitle").textContent = facts.join("  ·  ");
+  }
+
+  repaint() {
+    this.player.dirty = true;
+  }
+
+  restyle() {
+    for (const panel of this.panels) panel.theme();
+    this.legend.paint();
+    this.resize();
+  }
+
+  resize() {
+    const arenas = document.getElementById("arenas");
+    const { width_m, height_m } = this.runs[0].header.world;
+    const isNarrow = innerWidth <= 860;
+    const height = isNarrow ? innerHeight * 0.62 * Math.max(1, this.runs.length / 2) : Math.max(300, innerHeight * 0.64);
+    const caption = this.panels[0].box.querySelector("figcaption").offsetHeight + 2;
+    const grid = bestGrid(this.runs.length, width_m / height_m, arenas.clientWidth, height, 12, caption);
+    arenas.style.gridTemplateColumns = `repeat(${grid.columns}, ${grid.width + 2}px)`;
+    for (const panel of this.panels) panel.resize(grid.width, grid.height);
+    for (const chart of [this.life, ...this.charts]) if (!chart.card.hidden) chart.resize();
+    this.inspector.told = "";
+    for (const chart of this.charts) chart.told = null;
+    this.repaint();
+  }
+
+  turn(now) {
+    this.player.tick(now);
+    if (this.player.dirty) {
+      this.player.dirty = false;
+      this.paint();
+    }
+    requestAnimationFrame((next) => this.turn(next));
+  }
+
+  paint() {
+    const { time, speed } = this.player;
+    for (const run of this.runs) run.seek(time);
+    if (focus.follows && focus.chosen >= 0) this.keepInSight();
+    for (const panel of this.panels) panel.paint(speed);
+    for (const chart of [this.life, ...this.charts]) if (!chart.card.hidden) chart.paint(time);
+    showTime(this.player);
+    this.inspector.update();
+  }
+
+  keepInSight() {
+    const { run, view } = focus.panel ?? this.panels[0];
+    view.lookAt(run.x[focus.chosen], run.y[focus.chosen]);
+  }
+
+  /** Look at a robot, or at none (-1). */
+  choose(robot, panel) {
+    focus.chosen = robot;
+    focus.panel = panel;
+    if (robot < 0) focus.follows = false;
+    this.life.choose(robot);
+    this.repaint();
+  }
+
+  follow(wanted) {
+    if (focus.chosen < 0) return;
+    focus.follows = wanted;
+    if (wanted && this.camera.zoom < 2) this.camera.zoom = 3;
+    this.repaint();
+  }
+
+  zoom(factor) {
+    const { view } = this.panels[0];
+    view.zoomAt(view.width / 2, view.height / 2, factor);
+    this.repaint();
+  }
+
+  showWhole() {
+    focus.follows = false;
+    this.camera.reset();
+    this.repaint();
+  }
+
+  showTip(panel, event) {
+    this.inspector.showTip(panel, event);
+    this.repaint();
+  }
+
+  hideTip() {
+    this.inspector.tip.hidden = true;
+    this.repaint();
+  }
+}
+
+async function start() {
+  const loading = document.getElementById("loading");
+  try {
+    theme.start();
+    const header = JSON.parse(document.getElementById("header").textContent);
+    const texts = [...document.querySelectorAll("script.run")];
+    const runs = [];
+    for (const [index, about] of header.runs.entries()) {
+      runs.push(new Run(about, await unpackRun(about, texts[index].textContent), index));
+      texts[index].remove(); // the text is not needed any more, and it is large
+    }
+    new Page(runs);
+    loading.hidden = true;
+  } catch (error) {
+    loading.textContent = `This replay cannot be shown: ${error.message}. The file may be damaged, or the browser too old.`;
+    throw error;
+  }
+}
+
+start();

@@ -1,0 +1,150 @@
+// One run: what was where at a time. Rows are robots; the values of one robot over time lie together.
+
+const CARRYING = 1;
+const INTERFERING = 2;
+const REPAIR = 4;
+const ABSENT = 8;
+const HANDLING = 128;
+const TASK_SHIFT = 4;
+const CARRIED = 1; // status of an object
+const FREE = 0;
+
+/** Slope of a curve at a sample, so that the curve neither overshoots nor rings: zero where it turns. */
+function slope(before, after) {
+  return before * after <= 0 ? 0 : (2 * before * after) / (before + after);
+}
+
+/** Cubic from y1 to y2 with the neighbours y0 and y3, at a share in [0, 1]. */
+function between(y0, y1, y2, y3, share) {
+  const step = y2 - y1;
+  if (step === 0) return y1;
+  const start = slope(y1 - y0, step);
+  const end = slope(step, y3 - y2);
+  const rest = 1 - share;
+  return (
+    y1 + share * share * (3 - 2 * share) * step + share * rest * rest * start - share * share * rest * end
+  );
+}
+
+class Run {
+  constructor(header, arrays, index) {
+    this.header = header;
+    this.index = index;
+    this.arrays = arrays;
+    this.nRobots = header.n_robots;
+    this.nFrames = header.n_frames;
+    this.frameS = header.frame_ticks * header.dt_s;
+    this.endS = header.end_tick * header.dt_s;
+    this.objects = new EventTable(arrays.object_events, header.n_objects);
+    this.caches = new EventTable(arrays.cache_events, header.n_cache_slots);
+    this.x = new Float32Array(this.nRobots);
+    this.y = new Float32Array(this.nRobots);
+    this.turn = new Float32Array(this.nRobots);
+    this.status = new Uint8Array(this.nRobots);
+    this.deliveries = this.findDeliveries();
+    this.firstSeen = Int32Array.from({ length: this.nRobots }, (_, robot) => this.firstFrameOf(robot));
+  }
+
+  /** The first frame in which a robot is in the world. */
+  firstFrameOf(robot) {
+    const row = robot * this.nFrames;
+    let frame = 0;
+    while (frame < this.nFrames && this.arrays.status[row + frame] & ABSENT) frame++;
+    return frame;
+  }
+
+  timeOf(frame) {
+    return Math.min(frame * this.frameS, this.endS);
+  }
+
+  /** The frame at or before a time, and the share of the way to the next one. */
+  frameAt(time) {
+    const frame = Math.max(0, Math.min(this.nFrames - 1, Math.floor(time / this.frameS + 1e-9)));
+    if (time >= this.endS) return { frame: this.nFrames - 1, share: 0 };
+    const span = this.timeOf(frame + 1) - this.timeOf(frame);
+    return { frame, share: span > 0 ? Math.min(1, Math.max(0, (time - this.timeOf(frame)) / span)) : 0 };
+  }
+
+  /** Let x, y, turn and status be those of a time. */
+  seek(time) {
+    const { frame, share } = this.frameAt(time);
+    const last = this.nFrames - 1;
+    const [f0, f2, f3] = [Math.max(0, frame - 1), Math.min(last, frame + 1), Math.min(last, frame + 2)];
+    const { position, heading, status } = this.arrays;
+    const step = this.header.position_step_m;
+    for (let robot = 0; robot < this.nRobots; robot++) {
+      const row = robot * this.nFrames;
+      const ofX = 2 * robot * this.nFrames;
+      const ofY = ofX + this.nFrames;
+      const state = status[row + frame];
+      this.status[robot] = state;
+      // One that is born, or was away, does not glide to where it appears.
+      const still = share === 0 || ((state ^ status[row + f2]) & ABSENT) !== 0;
+      const way = still ? 0 : share;
+      this.x[robot] =
+        step * between(position[ofX + f0], position[ofX + frame], position[ofX + f2], position[ofX + f3], way);
+      this.y[robot] =
+        step * between(position[ofY + f0], position[ofY + frame], position[ofY + f2], position[ofY + f3], way);
+      const turned = ((heading[row + f2] - heading[row + frame] + 384) % 256) - 128; // the shorter way round
+      this.turn[robot] = ((heading[row + frame] + way * turned) * Math.PI) / 128;
+    }
+    this.frame = frame;
+    this.time = time;
+  }
+
+  task(robot) {
+    return (this.status[robot] >> TASK_SHIFT) & 7;
+  }
+
+  activity(robot) {
+    const codes = this.arrays.activity;
+    return codes ? this.header.activities[codes[robot * this.nFrames + this.frame]] : null;
+  }
+
+  /** Number of things that a robot remembers, or null. */
+  remembered(robot) {
+    const { remembered } = this.arrays;
+    if (!remembered) return null;
+    const samples = remembered.length / this.nRobots;
+    const sample = Math.min(samples - 1, Math.floor(this.frame / this.header.remembered_frames));
+    return remembered[robot * samples + sample];
+  }
+
+  /** Row of the object that a robot carries, or -1. */
+  cargo(robot) {
+    const values = this.objects.at(this.frame);
+    for (let row = 0; row < this.header.n_objects; row++) {
+      if (values[3 * row] === CARRIED && values[3 * row + 1] === robot) return row;
+    }
+    return -1;
+  }
+
+  /** What had been counted up to a frame, by name. */
+  counted(name, frame = this.frame) {
+    return this.arrays.counters[this.header.counters.indexOf(name) * this.nFrames + frame];
+  }
+
+  /** Drops of objects in the nest: frames, in order, and robots. */
+  findDeliveries() {
+    const table = this.objects;
+    const [left, bottom, right, top] = this.header.world.nest_box_m;
+    const step = this.header.position_step_m;
+    const carriers = new Int32Array(this.header.n_objects).fill(-1);
+    const frames = [];
+    const robots = [];
+    for (let i = 0; i < table.count; i++) {
+      const object = table.rows[i];
+      const robot = carriers[object];
+      const now = table.a[i] === CARRIED ? table.b[i] : -1;
+      carriers[object] = now;
+      if (robot < 0 || robot === now) continue;
+      const at = 2 * robot * this.nFrames + table.frames[i];
+      const x = step * this.arrays.position[at];
+      const y = step * this.arrays.position[at + this.nFrames];
+      if (x < left - 0.3 || x > right + 0.3 || y < bottom - 0.3 || y > top + 0.3) continue;
+      frames.push(table.frames[i]);
+      robots.push(robot);
+    }
+    return { frames: Int32Array.from(frames), robots: Int32Array.from(robots) };
+  }
+}

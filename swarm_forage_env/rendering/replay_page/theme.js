@@ -1,0 +1,43 @@
+// Light or dark, and the colours of the style sheet for those who draw.
+
+const theme = {
+  colours: {},
+
+  /** Take the reader's choice, else the system's. */
+  start() {
+    const system = matchMedia("(prefers-color-scheme: dark)");
+    this.set(system.matches ? "dark" : "light");
+    system.addEventListener("change", () => this.set(system.matches ? "dark" : "light"));
+  },
+
+  set(name) {
+    document.documentElement.dataset.theme = name;
+    const style = getComputedStyle(document.documentElement);
+    const names = ["page", "panel", "line", "text", "faint", "accent", "wall", "floor", "nest", "light", "source",
+      "cache", "object", "empty", "carrying", "interference", "repair", "grid"];
+    for (let k = 0; k < 8; k++) names.push(`task-${k}`);
+    for (let k = 0; k < 6; k++) names.push(`run-${k}`);
+    this.colours = Object.fromEntries(names.map((key) => [key, style.getPropertyValue(`--${key}`).trim()]));
+    document.dispatchEvent(new Event("themed"));
+  },
+
+  toggle() {
+    this.set(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
+  },
+
+  ofRun(index) {
+    return this.colours[`run-${index % 6}`];
+  },
+};
+
+/** A canvas of this many CSS pixels, sharp on dense screens; returns its context. */
+function sizeCanvas(canvas, width, height) {
+  const density = Math.min(devicePixelRatio || 1, 2);
+  canvas.width = Math.round(width * density);
+  canvas.height = Math.round(height * density);
+  canvas.style.width = `${width}px`;
+  canvas.style.height = `${height}px`;
+  const pen = canvas.getContext("2d");
+  pen.setTransform(density, 0, 0, density, 0, 0);
+  return pen;
+}

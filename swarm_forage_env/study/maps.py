@@ -1,0 +1,96 @@
+"""Maps of the floor: where robots were, where they took and left objects, where they got in each other's way."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import ConfigError, number
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.study.replay.frames import Replay, Status
+
+MEANINGS: Mapping[str, str] = {
+    "density": "active robots per m², mean over time",
+    "interference": "robots in interference per m², mean over time",
+    "pickups": "objects picked up per m² and 1,000 s",
+    "drops": "objects dropped per m² and 1,000 s",
+}
+"""Map -> what its numbers are."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FloorMaps:
+    """Arrays over the squares of a floor, or differences of two such arrays."""
+
+    label: str
+    """What they are of, for people."""
+    side_m: float
+    """Side of a square."""
+    size_m: tuple[float, float]
+    """Extent of the arena along x and y."""
+    arrays: Mapping[str, FloatArray]
+    """Name, as in `MEANINGS` -> (ny, nx), row = y from below."""
+    is_difference: bool = False
+
+    def minus(self, other: "FloorMaps") -> "FloorMaps":
+        """Return what is more here than in `other`.
+
+        Raises:
+            ConfigError: maps of another arena, or of squares of another size.
+        """
+        mine, theirs = (self.size_m, self.side_m), (other.size_m, other.side_m)
+        if mine != theirs:
+            raise ConfigError(f"Expected maps of one arena and one size of squares, got {mine} and {theirs}.")
+        return FloorMaps(
+            label=f"{self.label} minus {other.label}",
+            side_m=self.side_m,
+            size_m=self.size_m,
+            arrays={name: array - other.arrays[name] for name, array in self.arrays.items()},
+            is_difference=True,
+        )
+
+    def write(self, path: str | Path) -> None:
+        """Write the arrays to an .npz file, whole or not at all."""
+        content: dict[str, Any] = {**self.arrays, "side_m": self.side_m, "size_m": self.size_m}
+        with replacing(Path(path)) as draft, draft.open("wb") as file:
+            np.savez_compressed(file, **content)
+
+
+def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
+    """Count robots, pick-ups and drops of a replay in squares of the floor.
+
+    Args:
+        replay: The run. Robots count at its frames; pick-ups that are undone before the next frame are missing.
+        side_m: Side of a square, default two cells.
+
+    Raises:
+        ConfigError: `side_m` is smaller than a cell, or larger than the arena.
+    """
+    arena = replay.scenario.arena
+    number("side_m", side_m, at_least=CELL_M, at_most=max(arena.width_m, arena.height_m))
+    edges = [np.arange(0.0, extent + side_m - 1e-9, side_m) for extent in (arena.height_m, arena.width_m)]
+
+    def count(places_m: FloatArray) -> FloatArray:
+        inside = np.clip(places_m, 0.0, [arena.width_m, arena.height_m])
+        return np.histogram2d(inside[:, 1], inside[:, 0], bins=edges)[0]
+
+    active = ~(replay.has(Status.ABSENT) | replay.has(Status.REPAIR))
+    position_m = replay.position_m
+    _, signs, places_m = replay.handovers
+    of_frames = 1.0 / (side_m**2 * replay.n_frames)
+    of_events = 1000.0 / (side_m**2 * float(replay.times_s[-1]))
+    return FloorMaps(
+        label=replay.label,
+        side_m=side_m,
+        size_m=(arena.width_m, arena.height_m),
+        arrays={
+            "density": count(position_m[active]) * of_frames,
+            "interference": count(position_m[active & replay.has(Status.INTERFERING)]) * of_frames,
+            "pickups": count(places_m[signs > 0]) * of_events,
+            "drops": count(places_m[signs < 0]) * of_events,
+        },
+    )

@@ -1,0 +1,238 @@
+"""From a run to its replay. Looking reads the state and never writes it, so it does not change the run."""
+
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import number
+from swarm_forage_env.contract.policy import Policy, RobotStates
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.registry import is_policy_file, load_policy
+from swarm_forage_env.rendering.view import refusing
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.study.record import RunRecord, software_versions
+from swarm_forage_env.study.replay.frames import (
+    HEADING_STEPS,
+    TASK_SHIFT,
+    Replay,
+    ReplayError,
+    Status,
+    position_step_m,
+)
+from swarm_forage_env.study.run import LiveRun, build_stack, finished_record
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.wrappers.handling import HandlingCostConfig
+from swarm_forage_env.wrappers.throttle import ThrottleConfig
+
+MOST_POSES = 5_000_000
+"""Frames times robots that a replay has by default at most: about 12 MB in the page, and 40 MB where it is opened."""
+FRAME_STEPS_S = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
+"""Times between frames to choose from (our choice: a robot drives half its diameter in the first)."""
+REMEMBERED_FRAMES = 5
+"""The size of memories is looked at in every frame of this number."""
+
+Progress = Callable[[int, int], None]
+"""Called with (ticks done, ticks in all)."""
+
+
+def record_replay(
+    spec: RunSpec,
+    *,
+    policy: Policy | None = None,
+    seconds: float | None = None,
+    frame_s: float | None = None,
+    progress: Progress | None = None,
+) -> tuple[Replay, RunRecord | None]:
+    """Run a specification and keep what happened.
+
+    Args:
+        spec: The run.
+        policy: A fresh policy object; default the policy that `spec` names.
+        seconds: Simulated time to keep; default the whole run.
+        frame_s: Simulated time between frames; default the shortest of `FRAME_STEPS_S` with at most `MOST_POSES`.
+        progress: Called after every frame.
+
+    Returns:
+        The replay; and the record of the run, the same as without a replay, or None if only a part was run.
+
+    Raises:
+        ReplayError: `seconds` is longer than the run.
+        RenderError: `seconds` or `frame_s` is no positive number.
+        ValueError: no installed policy has the name, or it refuses its parameters.
+    """
+    started = time.perf_counter()
+    scenario = spec.scenario
+    end = _last_tick(scenario, seconds)
+    step = _ticks_between_frames(scenario, end, frame_s)
+    policy = load_policy(spec.policy, spec.parameters) if policy is None else policy
+    recorder = build_stack(scenario, spec.wrappers, reads=getattr(policy, "reads", None))
+    run = LiveRun(recorder, policy, spec.seed)
+    env = run.forage_env
+    album = _Album(env, policy, 1 + math.ceil(end / step))
+    album.look()
+    while env.tick < end and not run.over:
+        run.advance(to_tick=min(env.tick + step, end))
+        album.look()
+        if progress is not None:
+            progress(env.tick, end)
+    recorder.close()
+    replay = Replay(
+        spec=spec,
+        label=Path(spec.policy).stem if is_policy_file(spec.policy) else spec.policy,
+        frame_ticks=step,
+        end_tick=env.tick,
+        signals=_signals(spec, album.ticks),
+        versions=software_versions(),
+        **album.arrays(),
+    )
+    return replay, finished_record(recorder, spec, started) if recorder.complete else None
+
+
+def _last_tick(scenario: ScenarioConfig, seconds: float | None) -> int:
+    if seconds is None:
+        return scenario.horizon_ticks
+    with refusing():
+        number("seconds", seconds, above=0.0)
+    if seconds > scenario.horizon_s:
+        raise ReplayError(
+            f"Expected seconds <= {scenario.horizon_s:g}, the scenario's horizon_s, got {seconds:g}; "
+            "keep less or give the scenario a longer horizon."
+        )
+    return max(1, round(seconds / scenario.dt_s))
+
+
+def _ticks_between_frames(scenario: ScenarioConfig, end: int, frame_s: float | None) -> int:
+    if frame_s is not None:
+        with refusing():
+            number("frame_s", frame_s, at_least=scenario.dt_s)
+        return round(frame_s / scenario.dt_s)
+    n_robots = scenario.robots.n_robots
+    for seconds in FRAME_STEPS_S:
+        step = max(1, round(seconds / scenario.dt_s))
+        if n_robots * (1 + math.ceil(end / step)) <= MOST_POSES:
+            return step
+    return math.ceil(n_robots * end / MOST_POSES)
+
+
+def _signals(spec: RunSpec, ticks: list[int]) -> dict[str, np.ndarray]:
+    """Return the waveforms of time that disturb the swarm, at the frames."""
+    return {
+        config.name: np.array([signal(tick) for tick in ticks], np.float32)
+        for config in spec.wrappers
+        if isinstance(config, ThrottleConfig | HandlingCostConfig)
+        for signal in [config.waveform.signal(spec.scenario.dt_s)]
+    }
+
+
+class _Album:
+    """Collects frames of a run."""
+
+    def __init__(self, env: ForageEnv, policy: Policy, most_frames: int) -> None:
+        self._env = env
+        self._policy = policy
+        self._tell = cast("Callable[[], RobotStates] | None", getattr(policy, "describe_robots", None))
+        self._step_m = position_step_m(env.scenario)
+        self._activities: tuple[str, ...] = ()
+        n_robots = env.scenario.robots.n_robots
+        self._position = np.zeros((most_frames, n_robots, 2), np.uint16)
+        self._heading = np.zeros((most_frames, n_robots), np.uint8)
+        self._status = np.zeros((most_frames, n_robots), np.uint8)
+        self._activity = None if self._tell is None else np.zeros((most_frames, n_robots), np.uint8)
+        self._remembered: list[np.ndarray] = []
+        self._counters = np.zeros((most_frames, len(env.events.counters)), np.int32)
+        self._first_counters = env.events.counters.copy()
+        self._objects = _Changes(env.scenario.objects.n_objects)
+        self._caches = _Changes(len(env.caches.alive))
+        self.ticks: list[int] = []
+
+    def look(self) -> None:
+        """Keep the state as it is now."""
+        env, frame = self._env, len(self.ticks)
+        self.ticks.append(env.tick)
+        self._keep_poses(frame)
+        self._keep_states(frame)
+        self._counters[frame] = env.events.counters - self._first_counters
+        self._objects.look(frame, _objects_now(env))
+        caches = env.caches
+        self._caches.look(frame, np.column_stack((caches.count, np.where(caches.alive[:, None], caches.cell, -1))))
+
+    def _keep_poses(self, frame: int) -> None:
+        swarm = self._env.swarm
+        limit = np.iinfo(np.uint16).max
+        steps = np.clip(np.rint(swarm.position / self._step_m), 0, limit).astype(np.uint16)
+        turns = np.rint(swarm.heading * (HEADING_STEPS / (2.0 * np.pi))).astype(np.int64).astype(np.uint8)
+        absent = ~swarm.present
+        if frame and absent.any():  # parked bodies are nowhere
+            steps = np.where(absent[:, None], self._position[frame - 1], steps)
+            turns = np.where(absent, self._heading[frame - 1], turns)
+        self._position[frame], self._heading[frame] = steps, turns
+
+    def _keep_states(self, frame: int) -> None:
+        swarm, interfering = self._env.swarm, self._env.events.interfering
+        flags = (
+            (Status.CARRYING, swarm.carried_object >= 0),
+            (Status.INTERFERING, interfering & swarm.active),
+            (Status.REPAIR, swarm.present & ~swarm.active),
+            (Status.ABSENT, ~swarm.present),
+            (Status.HANDLING, swarm.pending_kind != 0),
+        )
+        for flag, rows in flags:
+            self._status[frame] |= np.where(rows, np.uint8(flag), np.uint8(0))
+        tasks = getattr(self._policy, "task", None)
+        if tasks is not None:
+            self._status[frame] |= np.asarray(tasks, np.uint8) << TASK_SHIFT
+        if self._tell is None or self._activity is None:
+            return
+        states = self._tell()
+        self._activities = states.words
+        self._activity[frame] = states.activity
+        if states.n_remembered is not None and frame % REMEMBERED_FRAMES == 0:
+            self._remembered.append(np.minimum(states.n_remembered, np.iinfo(np.uint16).max).astype(np.uint16))
+
+    def arrays(self) -> dict[str, Any]:
+        """Return what was kept, as fields of `Replay`."""
+        end = len(self.ticks)
+        return {
+            "position": self._position[:end],
+            "heading": self._heading[:end],
+            "status": self._status[:end],
+            "activity": None if self._activity is None else self._activity[:end],
+            "activities": self._activities,
+            "remembered": np.array(self._remembered) if self._remembered else None,
+            "remembered_frames": REMEMBERED_FRAMES,
+            "counters": self._counters[:end],
+            "object_events": self._objects.events(),
+            "cache_events": self._caches.events(),
+            "has_tasks": getattr(self._policy, "task", None) is not None,
+        }
+
+
+def _objects_now(env: ForageEnv) -> np.ndarray:
+    """Return (M, 3): status, and the cell; of a carried object the robot that carries it and -1."""
+    objects, carried = env.objects, env.swarm.carried_object
+    now = np.column_stack((objects.status, objects.cell)).astype(np.int32)
+    robots = np.flatnonzero(carried >= 0)
+    now[carried[robots], 1] = robots
+    return now
+
+
+class _Changes:
+    """Keeps rows of a table when they change."""
+
+    def __init__(self, n_rows: int) -> None:
+        # No row of a table looks like this, so that the first look finds all rows changed.
+        self._last = np.full((n_rows, 3), np.iinfo(np.int32).min, np.int32)
+        self._found: list[np.ndarray] = []
+
+    def look(self, frame: int, now: np.ndarray) -> None:
+        rows = np.flatnonzero((now != self._last).any(axis=1))
+        if len(rows):
+            self._found.append(np.column_stack((np.full(len(rows), frame), rows, now[rows])).astype(np.int32))
+            self._last[rows] = now[rows]
+
+    def events(self) -> np.ndarray:
+        return np.concatenate(self._found) if self._found else np.zeros((0, 5), np.int32)

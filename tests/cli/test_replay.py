@@ -1,0 +1,100 @@
+"""The command `replay`: pages of policies and of stored runs."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env.policies import pretrained
+from swarm_forage_env.study.replay.files import read_replays
+from swarm_forage_env.study.store import RunStore
+
+pytestmark = pytest.mark.compiled
+SHORT = ("--robots", "3", "--seconds", "4")
+
+
+def test_replay_writes_a_page(command):
+    code, out, err = command("replay", "random", *SHORT, "-o", "new/run.html")
+    assert (code, err) == (0, "")
+    assert out.startswith("wrote new/run.html (0.1 MB)")
+    (replay,) = read_replays("new/run.html")
+    assert (replay.label, replay.n_frames, replay.scenario.robots.n_robots) == ("random", 5, 3)
+    assert command("replay", "random", *SHORT)[1].startswith("wrote results/warehouse_small_random.html")
+
+
+def test_replay_shows_runs_of_one_world_and_seed_side_by_side(command):
+    shutil.copy(Path(pretrained.__file__).with_name("ppo_warehouse_small.npz"), "mine.npz")
+    words = ("--seed", "7", "--wrapper", "throttle:waveform=constant,amplitude=0.2")
+    code, _, err = command(
+        "replay", "stochm", "--beside", "crw", "--beside", "mine.npz", *SHORT, *words, "-o", "a.html"
+    )
+    assert (code, err) == (0, "")
+    replays = read_replays("a.html")
+    assert [replay.label for replay in replays] == ["stochm", "crw", "mine"]
+    assert [replay.scenario.caches for replay in replays] == ["static", "none", "none"]
+    assert {replay.spec.seed for replay in replays} == {7}
+    assert [list(replay.signals) for replay in replays] == [["throttle"]] * 3
+    starts = {replay.position[0].tobytes() for replay in replays}
+    assert len(starts) == 1
+
+
+@pytest.fixture
+def stored(command):
+    """A stored run and the words that make it."""
+    words = ("--policy", "dpo", "--robots", "3", "--horizon", "200", "--first-seed", "4", "--jobs", "1")
+    assert command("run", *words)[0] == 0
+    (record,) = RunStore("results/warehouse_small").records()
+    return record
+
+
+def test_replay_makes_a_stored_run_again(command, stored):
+    for word in (stored.run_id, f"results/warehouse_small/{stored.run_id}.parquet"):
+        code, _, err = command("replay", word, "--beside", "crw", "-o", "run.html")
+        assert (code, err) == (0, "")
+        mine, beside = read_replays("run.html")
+        assert mine.spec.run_id == stored.run_id
+        assert (beside.spec.seed, beside.scenario) == (4, mine.scenario)
+        assert mine.counters[-1, 0] == stored.collected.sum()
+
+
+def test_replay_says_when_a_stored_run_comes_out_different(command, stored):
+    import dataclasses
+
+    other = dataclasses.replace(stored, n_carrying=stored.n_carrying + 1.0)
+    other.write("results/other.parquet")
+    code, _, err = command("replay", "results/other.parquet", "-o", "run.html")
+    assert code == 0
+    assert "comes out different from its record" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("0123456789abcdef",), "Expected the run 0123456789abcdef below results/, found none"),
+        (("gone.parquet",), "Cannot read gone.parquet"),
+        (("crv",), "Unknown policy 'crv'"),
+        (("crw", "--beside", "crv"), "Unknown policy 'crv'"),
+        (("crw", "--seconds", "1e9"), "Expected seconds <= 10000"),
+        (("crw", "--seconds", "2", "--frame", "0.01"), "frame_s"),
+    ],
+)
+def test_wrong_words_are_one_line(command, words, expected):
+    code, out, err = command("replay", *words)
+    assert (code, out) == (2, "")
+    assert expected in err
+    assert err.count("\n") == 1
+
+
+def test_a_stored_run_takes_no_options_of_another_one(command, stored):
+    code, _, err = command("replay", stored.run_id, "--robots", "5", "--seed", "1")
+    assert code == 2
+    assert "got --robots, --seed" in err
+
+
+def test_an_interrupt_leaves_no_file(command, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("swarm_forage_env.study.run.LiveRun.advance", interrupted)
+    assert command("replay", "random", *SHORT, "-o", "run.html")[0] == 130
+    assert not list(Path().iterdir())
