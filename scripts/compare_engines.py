@@ -1,4 +1,4 @@
-"""Run both engines of physics and print what differs, as a Markdown table.
+"""Run both engines of physics and print the measures that differ, as a Markdown table.
 
     python scripts/compare_engines.py --scenario warehouse_small,warehouse_medium --policy crw,dpo --robots 16,64
 
@@ -10,7 +10,7 @@ equivalent. A difference is compiled minus Chipmunk, the mean over seeds with a 
 import argparse
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from arguments import whole
@@ -97,7 +97,18 @@ def case(name: str, policy: str, n_robots: int, horizon_s: float) -> list[RunSpe
     return [plan_run(replace(world, physics=physics), policy) for physics in PHYSICS_ENGINES]
 
 
-def rows_of_case(specs: Sequence[RunSpec], seeds: int) -> Iterator[str]:
+@dataclass(frozen=True)
+class Row:
+    """One measure of one case in both engines."""
+
+    text: str
+    alike: bool
+    """Whether all runs had the same number in both engines, as far as it is printed."""
+    apart: bool
+    """Whether the interval of the difference leaves out zero."""
+
+
+def rows_of_case(specs: Sequence[RunSpec], seeds: int) -> Iterator[Row]:
     """Run one case in both engines; one line of the table per measure."""
     name, policy, n_robots = specs[0].scenario.name, specs[0].policy, specs[0].scenario.robots.n_robots
     runs = [[measured(spec.scenario, policy, seed) for seed in range(seeds)] for spec in specs]
@@ -108,7 +119,11 @@ def rows_of_case(specs: Sequence[RunSpec], seeds: int) -> Iterator[str]:
         difference = aggregate(compiled - chipmunk)
         cells = (chipmunk.mean(), compiled.mean(), difference.mean, difference.lower, difference.upper)
         before, after, mean, low, high = (written(value, decimals) for value in cells)
-        yield f"| {name} | {policy} | {n_robots} | {measure} | {before} | {after} | {mean} ({low} to {high}) |"
+        yield Row(
+            text=f"| {name} | {policy} | {n_robots} | {measure} | {before} | {after} | {mean} ({low} to {high}) |",
+            alike=bool(np.abs(compiled - chipmunk).max() < 0.5 * 10.0**-decimals),
+            apart=difference.lower > 0.0 or difference.upper < 0.0,
+        )
 
 
 def written(value: float, decimals: int) -> str:
@@ -135,6 +150,7 @@ def main() -> None:
     parser.add_argument(
         "--seeds", type=whole(at_least=2), default=4, help="runs of a case, for an interval two or more"
     )
+    parser.add_argument("--all", action="store_true", help="print rows with the same numbers in both engines, too")
     parser.add_argument("--horizon", type=float, default=2_000.0, help="length of a run in s")
     chosen = parser.parse_args()
     try:
@@ -143,9 +159,19 @@ def main() -> None:
         parser.error(str(error))
     print("| scenario | policy | robots | measure | Chipmunk | compiled | difference |")
     print("|---|---|--:|---|--:|--:|--:|")
+    n_alike, n_rows, n_apart = 0, 0, 0
     for specs in cases:
-        for row in rows_of_case(specs, chosen.seeds):
-            print(row, flush=True)
+        rows = list(rows_of_case(specs, chosen.seeds))
+        n_alike += all(row.alike for row in rows)
+        n_rows += len(rows)
+        n_apart += sum(row.apart for row in rows)
+        for row in rows:
+            if chosen.all or not row.alike:
+                print(row.text, flush=True)
+    print(
+        f"{n_alike} of {len(cases)} cases have the same numbers in both engines. In {n_apart} of all {n_rows} rows the"
+    )
+    print("interval of the difference leaves out zero.")
 
 
 if __name__ == "__main__":
