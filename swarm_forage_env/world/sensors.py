@@ -53,6 +53,7 @@ def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collec
         reach_m=PROXIMITY_RANGE_M,
         scales=np.array([WHEEL_SCALE_MPS, config.arena.width_m, config.arena.height_m]),
         sizes=(*config.arena.n_cells, config.objects.n_objects),
+        shares=(np.arange(config.objects.n_objects + 1) / config.objects.n_objects).astype(np.float32),
         cache_half_side=config.cache_half_side_cells,
         reads_light="light" in read,
         light_of_carriers_only=reads is not None and "light" not in reads,

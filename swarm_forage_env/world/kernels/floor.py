@@ -55,21 +55,13 @@ def ground(
             continue
         cos = facing[i, 0]
         sin = facing[i, 1]
-        grey = _GREY_EMPTY
-        last_x = -2
-        last_y = -2
         for k in range(GROUND_SENSORS):
             x = position[i, 0] + cos * _GROUND_X[k] - sin * _GROUND_Y[k]
             y = position[i, 1] + sin * _GROUND_X[k] + cos * _GROUND_Y[k]
             cell_x = int(math.floor(x * CELLS_PER_M))
             cell_y = int(math.floor(y * CELLS_PER_M))
-            # Usually all four sensors are over one cell, which is then read once: a large floor does not fit the cache.
-            if cell_x != last_x or cell_y != last_y:
-                inside = 0 <= cell_x < nx and 0 <= cell_y < ny
-                grey = grey_of(floor[cell_y, cell_x]) if inside else _GREY_EMPTY
-                last_x = cell_x
-                last_y = cell_y
-            obs[i, start + k] = grey
+            inside = 0 <= cell_x < nx and 0 <= cell_y < ny
+            obs[i, start + k] = grey_of(floor[cell_y, cell_x]) if inside else _GREY_EMPTY
 
 
 @kernel
@@ -109,7 +101,7 @@ def light(
             # Only the sensors within a quarter turn of the light: 12 or 13 in a row, counted round the ring.
             first = math.ceil((bearing - 0.5 * math.pi - _FIRST_SENSOR_RAD) / _SENSOR_STEP_RAD)
             away = _FIRST_SENSOR_RAD + first * _SENSOR_STEP_RAD - bearing
-            k = int(first) % RING_SENSORS
+            k = int(first) if first >= 0.0 else int(first) + RING_SENSORS  # less than a turn: no division is needed
             while away < 0.5 * math.pi:
                 obs[i, start + k] = min(1.0, obs[i, start + k] + base * (1.0 - abs(away) / (0.5 * math.pi)))
                 away += _SENSOR_STEP_RAD
@@ -121,7 +113,7 @@ def line_of_sight(
     position: FloatArray,
     present: BoolArray,
     floor: IntArray,
-    n_objects: int,
+    shares: ObsArray,
     caches: tuple[BoolArray, IntArray, IntArray, IntArray],
     half_side: int,
     obs: ObsArray,
@@ -129,30 +121,49 @@ def line_of_sight(
 ) -> None:
     """Write the robot's cell, the objects of its 5 x 5 window and the caches that meet it.
 
+    `shares` (M + 1,) = what is written for no object, and for each object (row + 1) / M;
     `caches` = alive, centre cell, serial, count per slot; `half_side` = (cache side in cells - 1) / 2;
     `starts` = first columns of los_cell, los_object, los_cache.
     """
     ny, nx = floor.shape
     cell_start, object_start, cache_start = starts
+    n_objects = shares.shape[0] - 1
     for i in range(position.shape[0]):
-        obs[i, cell_start] = 0.0
-        obs[i, cell_start + 1] = 0.0
-        for k in range(object_start, cache_start + CACHE_FIELDS * VISIBLE_CACHES):
-            obs[i, k] = 0.0
         if not present[i]:
+            for k in range(cell_start, cache_start + CACHE_FIELDS * VISIBLE_CACHES):
+                obs[i, k] = 0.0
             continue
         cell_x = min(nx - 1, max(0, int(position[i, 0] * CELLS_PER_M)))
         cell_y = min(ny - 1, max(0, int(position[i, 1] * CELLS_PER_M)))
         obs[i, cell_start] = (2 * cell_x + 1) / nx - 1.0
         obs[i, cell_start + 1] = (2 * cell_y + 1) / ny - 1.0
-        x_low, y_low = max(0, cell_x - _HALF_WINDOW), max(0, cell_y - _HALF_WINDOW)
-        for y in range(y_low, min(ny, cell_y + _HALF_WINDOW + 1)):
-            first = object_start + (y - cell_y + _HALF_WINDOW) * WINDOW_CELLS + _HALF_WINDOW - cell_x
-            for x in range(x_low, min(nx, cell_x + _HALF_WINDOW + 1)):
-                if floor[y, x] >= 0:
-                    obs[i, first + x] = (floor[y, x] + 1) / n_objects
+        window = obs[i, object_start:cache_start]
+        if _HALF_WINDOW <= cell_x < nx - _HALF_WINDOW and _HALF_WINDOW <= cell_y < ny - _HALF_WINDOW:
+            _whole_window(floor, cell_x - _HALF_WINDOW, cell_y - _HALF_WINDOW, shares, window)
+        else:
+            _cut_window(floor, cell_x - _HALF_WINDOW, cell_y - _HALF_WINDOW, shares, window)
+        for k in range(cache_start, cache_start + CACHE_FIELDS * VISIBLE_CACHES):
+            obs[i, k] = 0.0
         if caches[0].shape[0] > 0:
             _visible_caches(cell_x, cell_y, position, caches, half_side, i, obs, cache_start, (nx, ny, n_objects))
+
+
+@kernel
+def _whole_window(floor: IntArray, x_low: int, y_low: int, shares: ObsArray, window: ObsArray) -> None:
+    """Write the objects of a window inside of the floor. Without a branch: where objects lie cannot be foreseen."""
+    for y in range(WINDOW_CELLS):
+        for x in range(WINDOW_CELLS):
+            window[y * WINDOW_CELLS + x] = shares[max(floor[y_low + y, x_low + x], -1) + 1]
+
+
+@kernel
+def _cut_window(floor: IntArray, x_low: int, y_low: int, shares: ObsArray, window: ObsArray) -> None:
+    """Write the objects of a window at the border; cells outside of the floor hold none."""
+    ny, nx = floor.shape
+    for y in range(WINDOW_CELLS):
+        for x in range(WINDOW_CELLS):
+            inside = 0 <= x_low + x < nx and 0 <= y_low + y < ny
+            window[y * WINDOW_CELLS + x] = shares[max(floor[y_low + y, x_low + x], -1) + 1] if inside else 0.0
 
 
 @kernel

@@ -74,7 +74,7 @@ def state_at(s: InteractionState, at: np.ndarray) -> InteractionState:
 
 @kernel
 def sensors_at(s: Sensors, at: np.ndarray) -> Sensors:
-    """Sensors like `s` whose arrays are `at` (7,) these addresses."""
+    """Sensors like `s` whose arrays are `at` (8,) these addresses."""
     return Sensors(
         array_at(s.obs, at[0]),
         array_at(s.near, at[1]),
@@ -87,6 +87,7 @@ def sensors_at(s: Sensors, at: np.ndarray) -> Sensors:
         s.reach_m,
         array_at(s.scales, at[6]),
         s.sizes,
+        array_at(s.shares, at[7]),
         s.cache_half_side,
         s.reads_light,
         s.light_of_carriers_only,
@@ -98,7 +99,7 @@ def sensors_at(s: Sensors, at: np.ndarray) -> Sensors:
 
 @kernel
 def world_at(w: World, at: np.ndarray) -> World:
-    """World like `w` whose arrays are `at` (50,) these addresses, in the order of `world.rack.addresses`."""
+    """World like `w` whose arrays are `at` (51,) these addresses, in the order of `world.rack.addresses`."""
     before, now = w.pressing
     return World(
         state_at(w.state, at[:28]),
@@ -116,9 +117,9 @@ def world_at(w: World, at: np.ndarray) -> World:
             (array_at(before[0], at[35]), array_at(before[1], at[36]), array_at(before[2], at[37])),
             (array_at(now[0], at[38]), array_at(now[1], at[39]), array_at(now[2], at[40])),
         ),
-        sensors_at(w.sensors, at[41:48]),
-        array_at(w.interfering, at[48]),
-        array_at(w.interference_sum, at[49]),
+        sensors_at(w.sensors, at[41:49]),
+        array_at(w.interfering, at[49]),
+        array_at(w.interference_sum, at[50]),
         w.wandering,
         w.n_static_caches,
         w.has_caches,
@@ -168,7 +169,7 @@ def whole_each(
     Args:
         w: Any of the worlds: gives types, shapes and constants.
         bodies: Its bodies.
-        worlds_at: (B, 50) addresses of the arrays of each world.
+        worlds_at: (B, 51) addresses of the arrays of each world.
         bodies_are_at: (B, 13) addresses of the arrays of its bodies.
         seats: Which of the B worlds are stepped.
         actions: (B, N, 3), and all others as in `tick.whole` with one more dimension in front.

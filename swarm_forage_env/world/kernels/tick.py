@@ -86,7 +86,7 @@ def sense(w: World) -> None:
             a.position,
             w.present,
             a.floor,
-            s.sizes[2],
+            s.shares,
             (a.cache_alive, a.cache_cell, a.cache_serial, a.cache_count),
             s.cache_half_side,
             s.obs,

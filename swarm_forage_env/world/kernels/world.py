@@ -47,6 +47,8 @@ class Sensors(NamedTuple):
     """Wheel scale in m/s, arena width and height in m."""
     sizes: tuple[int, int, int]
     """Cells along x, along y, objects."""
+    shares: ObsArray
+    """(M + 1,) what the window shows: 0 for no object, (row + 1) / M for each."""
     cache_half_side: int
     reads_light: bool
     light_of_carriers_only: bool
