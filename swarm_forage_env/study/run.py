@@ -170,12 +170,14 @@ def warm_up(spec: RunSpec) -> None:
     """Step a run a few ticks, so that its kernels are compiled and cached before many processes need them.
 
     So early in a run a policy may not use the gripper. In one more tick every robot therefore grasps, because the
-    kernel of interactions takes longest to compile.
+    kernel of interactions takes longest to compile. Where the whole run is one kernel, it is compiled already.
     """
     policy = load_policy(spec.policy, spec.parameters)
     recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
-    LiveRun(recorder, policy, spec.seed).advance(to_tick=WARM_UP_TICKS)
-    grasping = np.zeros((spec.scenario.robots.n_robots, 3), np.float32)
-    grasping[:, 2] = Grip.GRASP
-    recorder.step_batch(grasping)
+    run = LiveRun(recorder, policy, spec.seed)
+    run.advance(to_tick=WARM_UP_TICKS)
+    if run.compiled_policy is None:
+        grasping = np.zeros((spec.scenario.robots.n_robots, 3), np.float32)
+        grasping[:, 2] = Grip.GRASP
+        recorder.step_batch(grasping)
     recorder.close()
