@@ -23,10 +23,14 @@ def test_conflicts_over_one_object_are_counted(tmp_path):
 
 @pytest.mark.compiled
 def test_two_engines_are_compared(tmp_path):
-    words = ("--policy", "dpo", "--robots", "30", "--seeds", "2", "--horizon", "20")
+    words = ("--policy", "dpo", "--robots", "30", "--seeds", "2", "--horizon", "20", "--all")
     lines = run(str(ROOT / "scripts/compare_engines.py"), *words, cwd=tmp_path).splitlines()
-    assert len(lines) == 2 + 9
-    assert all(line.startswith("| warehouse_small | dpo | 30 |") for line in lines[2:])
+    assert len(lines) == 2 + 9 + 2
+    assert all(line.startswith("| warehouse_small | dpo | 30 |") for line in lines[2:11])
+    assert lines[11:] == [
+        "1 of 1 cases have the same numbers in both engines.",
+        "In 0 of all 9 rows the interval of the difference leaves out zero.",
+    ]
 
 
 @pytest.mark.compiled

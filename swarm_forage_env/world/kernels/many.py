@@ -6,7 +6,6 @@ B is the number of worlds. Worlds know nothing of each other: each is stepped by
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
@@ -26,7 +25,7 @@ def _array_at(typingctx: Any, like: Any, address: Any) -> Any:  # noqa: ARG001 -
         array = context.make_array(signature.return_type)(context, builder, value=args[0])
         array.data = builder.inttoptr(args[1], array.data.type)
         # The memory belongs to whoever made the array; nobody here may free it.
-        array.meminfo = ir.Constant(array.meminfo.type, None)
+        array.meminfo = cgutils.get_null_value(array.meminfo.type)
         array.parent = cgutils.get_null_value(array.parent.type)
         return array._getvalue()
 
