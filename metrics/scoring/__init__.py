@@ -10,8 +10,10 @@ from .plots import draw_scores
 from .prediction import PredictionTable, predict_curves, predict_policy
 from .prediction_plots import draw_predictions
 from .runs import run_scores
+from .study_panels import StudyPanel, StudyPanels, study_panels
 from .study_tables import StudyLine, study_lines
 from .table import Score, ScoreTable
+from .verdicts import Judged, Waiting, judge_claims
 
 __all__ = [
     "score_policy",
@@ -21,6 +23,8 @@ __all__ = [
     "plan_scores",
     "run_scores",
     "study_lines",
+    "study_panels",
+    "judge_claims",
     "draw_scores",
     "predict_policy",
     "predict_curves",
@@ -32,6 +36,10 @@ __all__ = [
     "Comparison",
     "ScoringPlan",
     "StudyLine",
+    "StudyPanel",
+    "StudyPanels",
+    "Judged",
+    "Waiting",
     "Performance",
     "PredictionTable",
     "Choice",
