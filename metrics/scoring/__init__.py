@@ -11,6 +11,7 @@ from .prediction import PredictionTable, predict_curves, predict_policy
 from .prediction_plots import draw_predictions
 from .runs import run_scores
 from .study_panels import StudyPanel, StudyPanels, study_panels
+from .study_plots import StudyFigure, draw_figure, draw_map, study_figures
 from .study_tables import StudyLine, study_lines
 from .table import Score, ScoreTable
 from .verdicts import Judged, Waiting, judge_claims
@@ -24,6 +25,9 @@ __all__ = [
     "run_scores",
     "study_lines",
     "study_panels",
+    "study_figures",
+    "draw_figure",
+    "draw_map",
     "judge_claims",
     "draw_scores",
     "predict_policy",
@@ -38,6 +42,7 @@ __all__ = [
     "StudyLine",
     "StudyPanel",
     "StudyPanels",
+    "StudyFigure",
     "Judged",
     "Waiting",
     "Performance",

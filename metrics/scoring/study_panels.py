@@ -110,6 +110,8 @@ def study_panels(
 ) -> StudyPanels:
     """Score a study and return its panels, by reading, other axes, variant and measure.
 
+    A study whose last axis is no criterion of these measures has panels of its performance, where the axis has numbers.
+
     Args:
         table: From `swarm_forage_env.read_study`.
         variants: Variants of the measures; a measure has a panel in each that it has.
@@ -124,7 +126,8 @@ def study_panels(
         lines.setdefault((line.reading, *line.others.values()), []).append(line)
     panels: list[StudyPanel] = []
     missing: dict[tuple[str, str], str] = {}
-    for together in lines.values():
+    is_scored = bool(table.spec.axes) and table.spec.axes[-1].is_criterion
+    for together in lines.values() if is_scored else ():
         for variant in variants:
             for measure in _measures_in(measures, variant, together[0].curves):
                 found: dict[str, tuple[Score, ...]] = {}
@@ -135,6 +138,8 @@ def study_panels(
                         missing[measure, variant] = why
                 if any(found.values()):
                     panels.append(_panel(table, together[0], variant, found))
+    if not panels and "raw_performance" in measures:
+        panels = _performance_panels(table, list(lines.values()))
     return StudyPanels(panels=tuple(panels), missing=missing)
 
 
@@ -182,6 +187,42 @@ def _panel(table: "StudyTable", line: StudyLine, variant: Variant, found: Mappin
         seeds=seeds,
         scores=matrices,
     )
+
+
+def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine]]) -> list[StudyPanel]:
+    """Return the performance of each run over the last axis, whatever that is, where it has numbers."""
+    values = table.spec.axes[-1].values if table.spec.axes else ()
+    if not values or any(isinstance(value, str | bool) for value in values):
+        return []
+    order: list[int] = np.argsort(np.array(values, dtype=np.float64)).tolist()
+    x = np.array(values, dtype=np.float64)[order]
+    seeds = tuple(sorted(table.spec.seeds))
+    panels: list[StudyPanel] = []
+    for lines in groups:
+        first = lines[0]
+        matrices = {line.policy: np.full((len(x), len(seeds)), np.nan) for line in lines}
+        for line in lines:
+            for row, place in enumerate(order):
+                runs = line.curves.experiments[place]
+                if runs.seeds:
+                    matrices[line.policy][row, np.isin(seeds, runs.seeds)] = runs.performance.sum(axis=-1)
+        over = f"in {table.spec.horizon_s:,.0f} s" if first.curves.is_total else "summed over intervals"
+        panels.append(
+            StudyPanel(
+                study=table.spec.name,
+                reading=first.reading,
+                others=first.others,
+                measure="raw_performance",
+                variant="corrected",
+                criterion=table.spec.axes[-1].name,
+                x=x,
+                levels=x,
+                unit=f"{first.curves.amount} {over}",
+                seeds=seeds,
+                scores=matrices,
+            )
+        )
+    return panels
 
 
 def _places(x: Sequence[float], scores: Sequence[Score]) -> FloatArray:

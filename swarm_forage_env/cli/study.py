@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, AsJson, DryRun, complain
+from swarm_forage_env.cli.study_plot import plot
 from swarm_forage_env.cli.study_verdict import verdict
 
 if TYPE_CHECKING:
@@ -115,7 +116,8 @@ def pack(
     typer.echo(f"packed into {_pack(folder, out)}")
 
 
-study.command()(verdict)
+for command in (verdict, plot):
+    study.command()(command)
 
 
 def _pack(folder: Path, out: Path | None) -> Path:

@@ -1,4 +1,4 @@
-"""The commands on results of studies: verdict."""
+"""The commands on results of studies: verdict, plot."""
 
 import json
 from pathlib import Path
@@ -60,3 +60,25 @@ def test_a_study_of_ones_own_has_no_claims(ran):
     code, _, err = ran("study", "verdict", "mine")
     assert code == 2
     assert "Expected studies of the paper's sets" in err
+
+
+def test_figures_are_drawn_with_their_numbers(ran):
+    code, out, _ = ran("study", "plot", "done", "--out", "figures", "--band", "sd", "--variant", "corrected,sierra")
+    assert code == 0
+    assert sorted(out.split()) == sorted(str(path) for path in Path("figures").iterdir())
+    names = {path.name for path in Path("figures").iterdir()}
+    assert {f"S1a_raw_performance_described{suffix}" for suffix in (".svg", ".png", ".csv")} <= names
+    assert "S1a_raw_performance_described_sierra.svg" in names
+    assert Path("figures/S1a_raw_performance_described.csv").read_text().startswith("reading,policy,population_size,")
+
+
+def test_what_cannot_be_drawn_is_told(ran):
+    code, _, err = ran("study", "plot", "done", "--band", "cd")
+    assert code == 2
+    assert "band 'cd'" in err
+    words = FILE.replace("values = [1, 2]", 'values = ["none", "static"]').replace("criterion", "field")
+    Path("words.toml").write_text(words.replace("population_size", "caches"))
+    assert ran("study", "run", "words.toml", "--workers", "1", "--out", "words")[0] == 0
+    code, _, err = ran("study", "plot", "words")
+    assert code == 2
+    assert "Expected a study with finished runs and numbers on its last axis, got S1a" in err
