@@ -1,6 +1,7 @@
-"""The commands on results of studies: verdict, plot."""
+"""The commands on results of studies: verdict, plot, report."""
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -82,3 +83,43 @@ def test_what_cannot_be_drawn_is_told(ran):
     code, _, err = ran("study", "plot", "words")
     assert code == 2
     assert "Expected a study with finished runs and numbers on its last axis, got S1a" in err
+
+
+def test_a_report_is_written(ran):
+    code, _, err = ran("study", "report", "done", "--out", "pages/report.html")
+    assert code == 0
+    assert "written pages/report.html" in err
+    page = Path("pages/report.html").read_text()
+    assert 'id="verdicts"' in page
+    assert "S1a, budget tiny: 16 of 16 runs done" in page
+    assert "swarm-forage study run FILE --budget tiny --seeds 2 --reading described  # the file of study S1a" in page
+    assert ran("study", "report", "done/S1a.parquet", "--out", "again.html")[0] == 0
+    assert Path("again.html").read_text() == page
+
+
+def test_a_report_on_a_study_of_ones_own_has_no_claims(ran):
+    Path("mine.toml").write_text(FILE.replace('"S1a"', '"mine"'))
+    assert ran("study", "run", "mine.toml", "--workers", "1", "--out", "mine")[0] == 0
+    assert ran("study", "report", "mine", "--out", "mine.html")[0] == 0
+    page = Path("mine.html").read_text()
+    assert 'id="verdicts"' not in page
+    assert "mine: raw performance" in page
+
+
+def test_what_a_report_refuses(ran, monkeypatch):
+    for words, message in (
+        (("done", "--out", "report.htm"), "ending in .html, got 'report.htm'"),
+        (("done", "done"), "Expected each study once, got S1a, S1a"),
+        (("done", "--band", "cd"), "band 'cd'"),
+    ):
+        code, _, err = ran("study", "report", *words)
+        assert code == 2
+        assert message in err
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    code, _, err = ran("study", "report", "done")
+    assert code == 1
+    assert "No report without matplotlib and Jinja2" in err
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    code, _, err = ran("study", "plot", "done")
+    assert code == 1
+    assert "No picture without matplotlib" in err

@@ -44,7 +44,7 @@ def made_table(spec, performance, *, lost=(), adversity=lambda cell: 0.0):
     rows = []
     for number, cell in enumerate(spec.cells):
         for seed in spec.seeds:
-            place = {"cell": number, "seed": seed}
+            place = {"cell": number, "seed": seed, "run_id": f"{number}_{seed}"}
             if (cell, seed) in lost:
                 rows.append({**place, "state": "missing"})
                 continue
