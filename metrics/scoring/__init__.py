@@ -2,6 +2,7 @@
 
 from .choosing import Choice, choose_policy
 from .comparison import Comparison, compare_tables
+from .figure_panels import StudyPanel, StudyPanels, study_panels
 from .front_door import compare_policies, score_curves, score_policy
 from .measures import ScoreForms
 from .performance import Performance
@@ -10,7 +11,6 @@ from .plots import draw_scores
 from .prediction import PredictionTable, predict_curves, predict_policy
 from .prediction_plots import draw_predictions
 from .runs import run_scores
-from .study_panels import StudyPanel, StudyPanels, study_panels
 from .study_plots import StudyFigure, draw_figure, draw_map, study_figures
 from .study_tables import StudyLine, study_lines
 from .table import Score, ScoreTable

@@ -13,8 +13,8 @@ from metrics.curves import FloatArray
 from metrics.statistics import Summary, aggregate
 
 from .columns import SIZE
+from .figure_panels import StudyPanel, StudyPanels
 from .plots import COLOURS, PANELS_PER_ROW, X_LABELS, Panel
-from .study_panels import StudyPanel, StudyPanels
 from .texts import number
 
 if TYPE_CHECKING:

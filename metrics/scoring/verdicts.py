@@ -10,8 +10,8 @@ from metrics.claims import CLAIMS, Claim, PanelName, Verdict, check_claim
 from metrics.claims.paper import POLICIES
 from metrics.curves import Variant
 
+from .figure_panels import StudyPanel, StudyPanels
 from .measures import MEASURE_VARIANTS
-from .study_panels import StudyPanel, StudyPanels
 from .texts import plain
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env.cli.study_verdict import Places, scored_studies, waiting_lines
 
 if TYPE_CHECKING:
-    from metrics.scoring.study_panels import StudyPanels
+    from metrics.scoring.figure_panels import StudyPanels
     from metrics.scoring.study_plots import StudyFigure
     from metrics.scoring.verdicts import Judged, Waiting
     from swarm_forage_env.study.study_table import StudyTable

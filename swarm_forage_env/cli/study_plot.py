@@ -8,7 +8,7 @@ import typer
 from swarm_forage_env.cli.options import NO_PICTURE, Variants
 
 if TYPE_CHECKING:
-    from metrics.scoring.study_panels import StudyPanels
+    from metrics.scoring.figure_panels import StudyPanels
     from metrics.scoring.study_plots import StudyFigure
 
 FORMATS = (".svg", ".png")
@@ -23,7 +23,7 @@ def plot(
     variants: Variants = "corrected",
 ) -> None:
     """Draw the figures of a study: each measure over what is varied, as SVG, PNG and a table in CSV."""
-    from metrics.scoring.study_panels import study_panels
+    from metrics.scoring.figure_panels import study_panels
     from swarm_forage_env._internal.fields import known_name
     from swarm_forage_env.cli.score_options import score_forms
     from swarm_forage_env.study.study_table import read_study

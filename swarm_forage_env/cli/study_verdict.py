@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from metrics.curves import Variant
-    from metrics.scoring.study_panels import StudyPanels
+    from metrics.scoring.figure_panels import StudyPanels
     from metrics.scoring.verdicts import Judged, Waiting
     from swarm_forage_env.study.study_table import StudyTable
 
@@ -45,7 +45,7 @@ def verdict(
 
 def scored_studies(tables: "Sequence[StudyTable]", variants: "Sequence[Variant]") -> "list[StudyPanels]":
     """Score studies, and tell which one is under way: with many runs it takes minutes."""
-    from metrics.scoring.study_panels import study_panels
+    from metrics.scoring.figure_panels import study_panels
     from swarm_forage_env.cli.terminal import notes
 
     scored: list[StudyPanels] = []

@@ -7,7 +7,7 @@ import pytest
 from metrics import CurveError
 from metrics.claims import EXPERIMENTS
 from metrics.scoring import judge_claims, study_panels
-from metrics.scoring.study_panels import experiment_of
+from metrics.scoring.figure_panels import experiment_of
 from metrics.scoring.verdicts import VARIANTS
 from swarm_forage_env.study.studies import Axis, StudyPolicy
 from swarm_forage_env.study.study_file import load_study, set_names
