@@ -2,6 +2,7 @@
 
 from .choosing import Choice, choose_policy
 from .comparison import Comparison, compare_tables
+from .figure_panels import StudyPanel, StudyPanels, study_panels
 from .front_door import compare_policies, score_curves, score_policy
 from .measures import ScoreForms
 from .performance import Performance
@@ -10,8 +11,10 @@ from .plots import draw_scores
 from .prediction import PredictionTable, predict_curves, predict_policy
 from .prediction_plots import draw_predictions
 from .runs import run_scores
+from .study_plots import StudyFigure, draw_figure, draw_map, study_figures
 from .study_tables import StudyLine, study_lines
 from .table import Score, ScoreTable
+from .verdicts import Judged, Waiting, judge_claims
 
 __all__ = [
     "score_policy",
@@ -21,6 +24,11 @@ __all__ = [
     "plan_scores",
     "run_scores",
     "study_lines",
+    "study_panels",
+    "study_figures",
+    "draw_figure",
+    "draw_map",
+    "judge_claims",
     "draw_scores",
     "predict_policy",
     "predict_curves",
@@ -32,6 +40,11 @@ __all__ = [
     "Comparison",
     "ScoringPlan",
     "StudyLine",
+    "StudyPanel",
+    "StudyPanels",
+    "StudyFigure",
+    "Judged",
+    "Waiting",
     "Performance",
     "PredictionTable",
     "Choice",

@@ -21,7 +21,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F
 PANELS_PER_ROW = 4
 LONG_TITLE = 48
 """Letters that fit above a panel; longer titles are smaller, so that they do not run into their neighbours."""
-_X_LABELS = {
+X_LABELS = {
     SIZE: "robots (the larger swarm)",
     THROTTLE: "distance from ideal conditions (amplitude)",
     NOISE: "standard deviation of noise",
@@ -117,7 +117,7 @@ def _draw_panel(panel: Panel, content: _Content, tables: Sequence[ScoreTable], *
     title = f"{content.label}{', relative' if content.is_relative else ''} ({arrow} is better)"
     panel.set_title(title, fontsize=9 if len(title) <= LONG_TITLE else 7)
     panel.set_ylabel("share of performance" if content.is_relative else first.unit, fontsize=8)
-    panel.set_xlabel(_X_LABELS[MEASURE_CRITERIA[first.measure]], fontsize=8)
+    panel.set_xlabel(X_LABELS[MEASURE_CRITERIA[first.measure]], fontsize=8)
     panel.set_xticks(range(len(places)), [_place(place, shown) for place in places])
     panel.tick_params(labelsize=8)
     panel.margins(x=0.15)

@@ -1,4 +1,4 @@
-"""The commands `study list`, `show`, `run`, `status` and `pack`."""
+"""The commands `study list`, `show`, `run`, `status`, `pack` and those of their results."""
 
 from contextlib import nullcontext
 from pathlib import Path
@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, AsJson, DryRun, complain
+from swarm_forage_env.cli.study_page import report
+from swarm_forage_env.cli.study_plot import plot
+from swarm_forage_env.cli.study_verdict import verdict
 
 if TYPE_CHECKING:
     from swarm_forage_env.study.studies import StudySpec
@@ -112,6 +115,10 @@ def pack(
 ) -> None:
     """Put all runs of a study into one file, which holds everything that is known of them."""
     typer.echo(f"packed into {_pack(folder, out)}")
+
+
+for command in (verdict, plot, report):
+    study.command()(command)
 
 
 def _pack(folder: Path, out: Path | None) -> Path:

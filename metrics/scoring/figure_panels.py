@@ -1,0 +1,236 @@
+"""From the table of a study to the panels of its figures: one measure of all policies over the last axis.
+
+A panel has the scores of every run. It is drawn as it is, and the claims of the paper are held against it.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from metrics.catalog import METRICS
+from metrics.checks import CurveError
+from metrics.claims import Panel
+from metrics.curves import FloatArray, Variant
+
+from .columns import THROTTLE
+from .measures import DISTURBANCES, MEASURE_CRITERIA, MEASURE_VARIANTS, ScoreForms
+from .studies import StudyCurves
+from .study_scores import score_study
+from .study_tables import StudyLine, study_lines
+from .table import Score
+
+if TYPE_CHECKING:
+    from swarm_forage_env.study.studies import Value
+    from swarm_forage_env.study.study_table import StudyTable
+
+FIGURE_MEASURES = (
+    "raw_performance",
+    "spatial_emergence",
+    "task_emergence",
+    "scalability",
+    "reactivity",
+    "adaptability",
+    "noise_robustness",
+    "population_robustness",
+)
+"""Measures that the paper's figures show."""
+
+_EXPERIMENTS: dict[tuple[Any, ...], str] = {
+    **{(name,): name for name in ("S1a", "S1b", "S1c", "S1d", "S1e", "S1f", "S1g", "S1h")},
+    ("S2a", 0.0): "S2a still",
+    ("S2a", 0.001): "S2a slow",
+    ("S2a", 0.051): "S2a fast",
+    ("S2b", 115): "S2b 115",
+    ("S2b", 320): "S2b 320",
+    ("S2c", 320): "S2c 320",
+    ("S2d", 115): "S2d 115",
+    ("S2d", 320): "S2d 320",
+}
+"""Name of a set, and value on its first axis where it has two -> experiment that claims speak of."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyPanel:
+    """One measure in one variant, of all policies of a study, under one reading and at one value of each other axis."""
+
+    study: str
+    """Name of the study."""
+    reading: str
+    """Which rules: "described" or "program"."""
+    others: "Mapping[str, Value]"
+    """Value on each axis but the last, by its name."""
+    measure: str
+    """Name in `METRICS`."""
+    variant: Variant
+    criterion: str
+    """What is varied along x."""
+    x: FloatArray
+    """Its values, rising, (L,): swarm sizes, amplitudes, ...; the level that others are compared with is left out."""
+    levels: FloatArray
+    """Where they are in the paper's figures, rising, (L,): of throttles the distance of conditions from the ideal."""
+    unit: str
+    seeds: tuple[int, ...]
+    """Seed of each run, (R,)."""
+    scores: Mapping[str, FloatArray]
+    """Policy -> one score per level and run, (L, R); NaN is a run without a score."""
+
+    @property
+    def experiment(self) -> str | None:
+        """Name of the experiment in `metrics.claims.EXPERIMENTS`; None if the paper's claims are not about it."""
+        return experiment_of(self.study, tuple(self.others.values()))
+
+    @property
+    def higher_is_better(self) -> bool:
+        """Direction of the measure."""
+        return METRICS[self.measure].higher_is_better
+
+    def for_claims(self) -> Panel:
+        """Return the scores as claims want them."""
+        return Panel(levels=self.levels, scores=self.scores)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyPanels:
+    """All panels of a study."""
+
+    panels: tuple[StudyPanel, ...]
+    missing: Mapping[tuple[str, str], str]
+    """Measure and variant -> why it could not be computed, for what the study varies."""
+
+
+def experiment_of(study: str, others: "Sequence[Value]") -> str | None:
+    """Return the experiment in `metrics.claims.EXPERIMENTS` that a study has at these values on its first axes."""
+    return _EXPERIMENTS.get((study, *others))
+
+
+def study_panels(
+    table: "StudyTable", variants: Sequence[Variant] = ("corrected",), measures: Sequence[str] = FIGURE_MEASURES
+) -> StudyPanels:
+    """Score a study and return its panels, by reading, other axes, variant and measure.
+
+    A study whose last axis is no criterion of these measures has panels of its performance, where the axis has numbers.
+
+    Args:
+        table: From `swarm_forage_env.read_study`.
+        variants: Variants of the measures; a measure has a panel in each that it has.
+        measures: Names in `METRICS`; those of another criterion than the study's are left out.
+
+    Raises:
+        CurveError: an unknown measure or variant.
+    """
+    ScoreForms(variants=tuple(variants))  # refuses unknown ones
+    lines: dict[tuple[Any, ...], list[StudyLine]] = {}
+    for line in study_lines(table):
+        lines.setdefault((line.reading, *line.others.values()), []).append(line)
+    panels: list[StudyPanel] = []
+    missing: dict[tuple[str, str], str] = {}
+    is_scored = bool(table.spec.axes) and table.spec.axes[-1].is_criterion
+    for together in lines.values() if is_scored else ():
+        for variant in variants:
+            for measure in _measures_in(measures, variant, together[0].curves):
+                found: dict[str, tuple[Score, ...]] = {}
+                for line in together:
+                    scores, why = _scores(line.curves, measure, variant)
+                    found[line.policy] = scores
+                    if why:
+                        missing[measure, variant] = why
+                if any(found.values()):
+                    panels.append(_panel(table, together[0], variant, found))
+    if not panels and "raw_performance" in measures:
+        panels = _performance_panels(table, list(lines.values()))
+    return StudyPanels(panels=tuple(panels), missing=missing)
+
+
+def _measures_in(measures: Sequence[str], variant: Variant, curves: StudyCurves) -> list[str]:
+    """Return the measures that have a variant, and whose criterion is varied."""
+    varied = {experiment.criterion for experiment in curves.experiments}
+    if varied & set(DISTURBANCES):
+        varied.add(THROTTLE)
+    return [
+        measure
+        for measure in measures
+        if MEASURE_CRITERIA[measure] in varied and variant in MEASURE_VARIANTS.get(measure, ("corrected",))
+    ]
+
+
+def _scores(curves: StudyCurves, measure: str, variant: Variant) -> tuple[tuple[Score, ...], str]:
+    """Return the scores of one line, or why there are none."""
+    try:
+        scores, missing = score_study(curves, (measure,), ScoreForms(variants=(variant,)))
+    except CurveError as error:
+        return (), str(error)
+    return scores, "; ".join(missing.values())
+
+
+def _panel(table: "StudyTable", line: StudyLine, variant: Variant, found: Mapping[str, Sequence[Score]]) -> StudyPanel:
+    """Put the scores of several policies beside each other."""
+    scores = [score for of_policy in found.values() for score in of_policy]
+    x = sorted({score.x for score in scores})
+    seeds = tuple(sorted(table.spec.seeds))
+    matrices = {policy: np.full((len(x), len(seeds)), np.nan) for policy in found}
+    for policy, of_policy in found.items():
+        for score in of_policy:
+            for seed, value in score.per_seed.items():
+                matrices[policy][x.index(score.x), seeds.index(seed)] = value
+    return StudyPanel(
+        study=table.spec.name,
+        reading=line.reading,
+        others=line.others,
+        measure=scores[0].measure,
+        variant=variant,
+        criterion=scores[0].criterion,
+        x=np.array(x),
+        levels=_places(x, scores),
+        unit=scores[0].unit,
+        seeds=seeds,
+        scores=matrices,
+    )
+
+
+def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine]]) -> list[StudyPanel]:
+    """Return the performance of each run over the last axis, whatever that is, where it has numbers."""
+    values = table.spec.axes[-1].values if table.spec.axes else ()
+    if not values or any(isinstance(value, str | bool) for value in values):
+        return []
+    order: list[int] = np.argsort(np.array(values, dtype=np.float64)).tolist()
+    x = np.array(values, dtype=np.float64)[order]
+    seeds = tuple(sorted(table.spec.seeds))
+    panels: list[StudyPanel] = []
+    for lines in groups:
+        first = lines[0]
+        matrices = {line.policy: np.full((len(x), len(seeds)), np.nan) for line in lines}
+        for line in lines:
+            for row, place in enumerate(order):
+                runs = line.curves.experiments[place]
+                if runs.seeds:
+                    matrices[line.policy][row, np.isin(seeds, runs.seeds)] = runs.performance.sum(axis=-1)
+        over = f"in {table.spec.horizon_s:,.0f} s" if first.curves.is_total else "summed over intervals"
+        panels.append(
+            StudyPanel(
+                study=table.spec.name,
+                reading=first.reading,
+                others=first.others,
+                measure="raw_performance",
+                variant="corrected",
+                criterion=table.spec.axes[-1].name,
+                x=x,
+                levels=x,
+                unit=f"{first.curves.amount} {over}",
+                seeds=seeds,
+                scores=matrices,
+            )
+        )
+    return panels
+
+
+def _places(x: Sequence[float], scores: Sequence[Score]) -> FloatArray:
+    """Distances of the conditions from the ideal ones, where the scores have them and they rise; else x itself."""
+    distances = {score.x: score.beside["environment_distance"] for score in scores if _has_distance(score)}
+    places = np.array([distances.get(value, np.nan) for value in x])
+    return places if np.isfinite(places).all() and (np.diff(places) > 0.0).all() else np.array(x)
+
+
+def _has_distance(score: Score) -> bool:
+    return "environment_distance" in score.beside

@@ -1,0 +1,221 @@
+"""Figures of a study: a measure over what is varied, every run a dot. Needs matplotlib (the optional extra "plots")."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import numpy as np
+
+from metrics.catalog import METRICS
+from metrics.curves import FloatArray
+from metrics.statistics import Summary, aggregate
+
+from .columns import SIZE
+from .figure_panels import StudyPanel, StudyPanels
+from .plots import COLOURS, PANELS_PER_ROW, X_LABELS, Panel
+from .texts import number
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Band: TypeAlias = Literal["ci", "sd"]
+"""What is shaded: the 95 % confidence interval of the mean, or the mean plus and minus two standard deviations."""
+
+_BANDS: dict[Band, str] = {"ci": "95 % interval of the mean", "sd": "mean ± 2 standard deviations of runs"}
+_NOTHING = Summary(mean=math.nan, std=math.nan, lower=math.nan, upper=math.nan, n_used=0, n_nan=0)
+_APART = 0.012
+"""Distance between the dots of different policies at one level, as a share of the axis."""
+MANY_DOTS = 500
+"""More dots in a panel are put into vector pictures as an image: as single marks they take a megabyte and more."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyFigure:
+    """Panels of one measure in one variant and reading: one per value of the axes before the last."""
+
+    panels: tuple[StudyPanel, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of its files: study, measure, reading, and the variant if it is not the corrected one."""
+        first = self.panels[0]
+        words = (first.study, first.measure, first.reading, "" if first.variant == "corrected" else first.variant)
+        return "_".join(word for word in words if word)
+
+    @property
+    def title(self) -> str:
+        """Headline."""
+        first = self.panels[0]
+        arrow = "higher" if first.higher_is_better else "lower"
+        words = f"{first.measure.replace('_', ' ')} ({arrow} is better), reading {first.reading}"
+        return f"{first.study}: {words}" + ("" if first.variant == "corrected" else f", measure {first.variant}")
+
+    @property
+    def has_map(self) -> bool:
+        """Whether it varies two numbers, so that a heat map shows it whole."""
+        others = [tuple(panel.others.values()) for panel in self.panels]
+        numbers = all(len(place) == 1 and not isinstance(place[0], str | bool) for place in others)
+        return (
+            numbers and len(others) > 1 and all(panel.x.tolist() == self.panels[0].x.tolist() for panel in self.panels)
+        )
+
+    def to_frame(self) -> "pl.DataFrame":
+        """Return the numbers behind the picture: one row per panel, policy and level, and a column per run."""
+        import polars as pl
+
+        rows: list[dict[str, Any]] = []
+        for panel in self.panels:
+            for policy, scores in panel.scores.items():
+                for x, level, runs, summary in zip(panel.x, panel.levels, scores, _summaries(scores), strict=True):
+                    place = {"reading": panel.reading, **panel.others, "policy": policy}
+                    means = {"mean": summary.mean, "lower": summary.lower, "upper": summary.upper, "sd": summary.std}
+                    of_runs = {f"seed_{seed}": value for seed, value in zip(panel.seeds, runs.tolist(), strict=True)}
+                    where = {panel.criterion: float(x), "level": float(level)}
+                    rows.append({**place, **where, **means, "n_runs": summary.n_used, **of_runs})
+        return pl.DataFrame(rows, infer_schema_length=None).fill_nan(None)
+
+
+def study_figures(scored: StudyPanels) -> tuple[StudyFigure, ...]:
+    """Return the figures of a study, those without a single score left out."""
+    groups: dict[tuple[str, str, str], list[StudyPanel]] = {}
+    for panel in scored.panels:
+        if any(np.isfinite(scores).any() for scores in panel.scores.values()):
+            groups.setdefault((panel.reading, panel.variant, panel.measure), []).append(panel)
+    return tuple(StudyFigure(panels=tuple(panels)) for panels in groups.values())
+
+
+def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci") -> None:
+    """Draw a figure into picture files: lines are means, the band is around them, dots are runs.
+
+    Args:
+        figure: From `study_figures`.
+        paths: Files to write; their suffixes choose the formats (.svg, .png, .pdf).
+        band: What is shaded.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    from matplotlib.figure import Figure  # not pyplot: no global state, no window system
+
+    n_columns = min(PANELS_PER_ROW, len(figure.panels))
+    n_rows = math.ceil(len(figure.panels) / n_columns)
+    picture: Any = Figure(figsize=(max(5.2, 3.6 * n_columns + 0.6), 3.2 * n_rows + 0.9), layout="constrained")
+    axes: list[Panel] = picture.subplots(n_rows, n_columns, squeeze=False, sharey=True).ravel().tolist()
+    for panel, place in zip(figure.panels, axes, strict=False):
+        _draw_panel(place, panel, band)
+    for place in axes[len(figure.panels) :]:
+        place.set_axis_off()
+    handles, labels = axes[0].get_legend_handles_labels()
+    picture.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 8), frameon=False, fontsize=9)
+    picture.suptitle(f"{figure.title}\nshaded: {_BANDS[band]}; dots: runs", fontsize=10)
+    _save(picture, figure.name, paths)
+
+
+def draw_map(figure: StudyFigure, paths: Sequence[Path]) -> None:
+    """Draw the means of a figure as heat maps, one per policy, into picture files.
+
+    Args:
+        figure: One that `has_map`.
+        paths: As in `draw_figure`.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    from matplotlib.figure import Figure
+
+    first = figure.panels[0]
+    policies = list(first.scores)
+    means = {
+        policy: np.array([[s.mean for s in _summaries(panel.scores[policy])] for panel in figure.panels])
+        for policy in policies
+    }
+    known = np.concatenate([values[np.isfinite(values)] for values in means.values()])
+    low, high = float(known.min()), float(known.max())
+    size = (1.0 + len(policies) * (0.9 + 0.55 * len(first.x)), 1.9 + 0.5 * len(figure.panels))
+    picture: Any = Figure(figsize=size, layout="constrained")
+    axes: list[Panel] = picture.subplots(1, len(policies), squeeze=False, sharey=True)[0].tolist()
+    image: Any = None
+    for policy, place in zip(policies, axes, strict=True):
+        image = place.imshow(means[policy], origin="lower", aspect="auto", cmap="cividis", vmin=low, vmax=high)
+        for (row, column), value in np.ndenumerate(means[policy]):
+            colour = "black" if value > (low + high) / 2.0 else "white"
+            place.text(column, row, number(value), ha="center", va="center", fontsize=6, color=colour)
+        place.set_title(policy, fontsize=9)
+        place.set_xticks(range(len(first.x)), [f"{value:.3g}" for value in first.levels], rotation=45)
+        place.set_xlabel(_x_label(first), fontsize=8)
+        place.tick_params(labelsize=7)
+    ((axis, _),) = first.others.items()
+    axes[0].set_yticks(range(len(figure.panels)), [_words(panel.others[axis]) for panel in figure.panels])
+    axes[0].set_ylabel(axis.replace("_", " "), fontsize=8)
+    picture.colorbar(image, ax=axes, label=first.unit).ax.tick_params(labelsize=7)
+    picture.suptitle(f"{figure.title}\nmeans of runs", fontsize=10)
+    _save(picture, f"{figure.name}_map", paths)
+
+
+def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
+    is_log = panel.criterion == SIZE
+    levels = np.log2(panel.levels) if is_log else panel.levels
+    step = _APART * (float(np.ptp(levels)) or 1.0)
+    are_many = sum(scores.size for scores in panel.scores.values()) > MANY_DOTS
+    for index, (policy, scores) in enumerate(panel.scores.items()):
+        colour = COLOURS[index % len(COLOURS)]
+        summaries = _summaries(scores)
+        mean = np.array([summary.mean for summary in summaries])
+        lower, upper = np.array([_edges(summary, band) for summary in summaries]).T
+        beside = levels + step * (index - 0.5 * (len(panel.scores) - 1))
+        dots = np.repeat(2.0**beside if is_log else beside, scores.shape[1])
+        (marks,) = place.plot(dots, scores.ravel(), ".", markersize=4, color=colour, alpha=0.35, zorder=2.5)
+        marks.set_rasterized(are_many)
+        place.plot(panel.levels, mean, color=colour, marker="o", markersize=4, linewidth=1.6, label=policy, zorder=3)
+        place.fill_between(panel.levels, lower, upper, color=colour, alpha=0.2, linewidth=0.0, zorder=2)
+        if len(panel.levels) == 1:  # a band has no width there
+            place.vlines(panel.levels, lower, upper, color=colour, linewidth=3.0, alpha=0.4, zorder=2)
+    neutral = METRICS[panel.measure].neutral
+    if neutral is not None and panel.variant == "corrected":
+        place.axhline(neutral, color="0.5", linewidth=0.8, zorder=0)
+    if is_log:
+        place.set_xscale("log", base=2)
+        place.set_xticks(panel.levels, [f"{size:g}" for size in panel.levels])
+        place.minorticks_off()
+    if panel.others:
+        words = ", ".join(f"{name.replace('_', ' ')} {_words(value)}" for name, value in panel.others.items())
+        place.set_title(words, fontsize=9)
+    place.set_xlabel(_x_label(panel), fontsize=8)
+    place.set_ylabel(panel.unit, fontsize=8)
+    place.tick_params(labelsize=8)
+    place.grid(alpha=0.25)
+
+
+def _x_label(panel: StudyPanel) -> str:
+    if panel.criterion == SIZE:
+        return "robots"
+    if panel.x.tolist() != panel.levels.tolist():
+        return "distance from ideal conditions"
+    return X_LABELS.get(panel.criterion, panel.criterion.replace("_", " "))
+
+
+def _edges(summary: Summary, band: Band) -> tuple[float, float]:
+    if band == "ci":
+        return summary.lower, summary.upper
+    return summary.mean - 2.0 * summary.std, summary.mean + 2.0 * summary.std
+
+
+def _summaries(scores: FloatArray) -> list[Summary]:
+    """Return the mean of the runs at each level, with its interval; runs without a finite score are left out."""
+    return [aggregate(known) if known.size else _NOTHING for known in (runs[np.isfinite(runs)] for runs in scores)]
+
+
+def _words(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _save(picture: Any, name: str, paths: Sequence[Path]) -> None:
+    """Write a picture; the same numbers give the same bytes."""
+    from matplotlib import rc_context  # pyright: ignore[reportUnknownVariableType]  (its own types leave it open)
+
+    with rc_context({"svg.hashsalt": name}):
+        for path in paths:
+            dated = {"metadata": {"Date": None}} if path.suffix == ".svg" else {}
+            picture.savefig(path, dpi=150, **dated)

@@ -1,0 +1,167 @@
+"""The claims of the paper held against studies, in every reading and variant that the studies can answer."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+from metrics.checks import CurveError
+from metrics.claims import CLAIMS, Claim, PanelName, Verdict, check_claim
+from metrics.claims.paper import POLICIES
+from metrics.curves import Variant
+
+from .figure_panels import StudyPanel, StudyPanels
+from .measures import MEASURE_VARIANTS
+from .texts import plain
+
+if TYPE_CHECKING:
+    from swarm_forage_env.study.study_table import StudyTable
+
+VARIANTS: tuple[Variant, ...] = ("corrected", "paper", "sierra")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """What studies say of one claim in one reading and one variant."""
+
+    claim: Claim
+    reading: str
+    """Empty for a claim about formulas, which needs no runs."""
+    variant: Variant
+    verdict: Verdict
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return it as plain values; numbers that JSON does not have are None."""
+        verdict = self.verdict
+        return {
+            "claim": self.claim.name,
+            "text": self.claim.text,
+            "figure": self.claim.figure,
+            "reading": self.reading,
+            "variant": self.variant,
+            "answer": verdict.answer,
+            "by_bands": verdict.by_bands,
+            "statistic": plain(verdict.statistic),
+            "effect": plain(verdict.effect),
+            "n_runs": verdict.n_runs,
+            "why": verdict.why,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Waiting:
+    """A claim that cannot be answered yet, in one reading and one variant."""
+
+    claim: Claim
+    reading: str
+    variant: Variant
+    lacks: tuple[PanelName, ...]
+    """Experiments and measures without scores."""
+    reasons: tuple[str, ...]
+    """Why they have none, where their study is there."""
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        return {
+            "claim": self.claim.name,
+            "text": self.claim.text,
+            "reading": self.reading,
+            "variant": self.variant,
+            "lacks": [list(name) for name in self.lacks],
+            "reasons": list(self.reasons),
+        }
+
+
+def why_no_claims(table: "StudyTable") -> str:
+    """Return why the claims cannot be held against a study; empty if they can."""
+    sets = {name.split()[0] for claim in CLAIMS.values() for name, _ in claim.panels}
+    name = table.spec.name
+    if name not in sets:
+        return (
+            f"Expected studies of the paper's sets, {', '.join(sorted(sets))}, which its claims are about; got study "
+            f"{name!r}."
+        )
+    absent = [label for label in POLICIES if label not in {policy.label for policy in table.spec.policies}]
+    if absent:
+        return (
+            f"Expected the policies {', '.join(POLICIES)} in study {name}, which the claims of the paper are about; "
+            f"it has no {', '.join(absent)}."
+        )
+    return ""
+
+
+def judge_claims(
+    tables: "Sequence[StudyTable]", scored: Sequence[StudyPanels], variants: Sequence[Variant] = VARIANTS
+) -> tuple[tuple[Judged, ...], tuple[Waiting, ...]]:
+    """Hold all claims against studies; a claim is left out in a variant that none of its measures has.
+
+    Args:
+        tables: Studies, each once.
+        scored: The panels of each in the same order, in these variants and the corrected one.
+        variants: Which.
+
+    Returns:
+        The answered claims, by reading, variant and claim, formulas first; and those that wait for runs.
+
+    Raises:
+        CurveError: a study twice, one without the policies of the paper, or none of its sets.
+    """
+    names = [table.spec.name for table in tables]
+    if len(set(names)) < len(names):
+        raise CurveError(f"Expected each study once, got {', '.join(names)}.")
+    for reason in filter(None, map(why_no_claims, tables)):
+        raise CurveError(reason)
+    found = _Found(
+        panels={
+            (panel.reading, panel.variant, panel.experiment or "", panel.measure): panel
+            for one in scored
+            for panel in one.panels
+        },
+        reasons={
+            (name, *key): why for name, one in zip(names, scored, strict=True) for key, why in one.missing.items()
+        },
+    )
+    judged = [
+        Judged(claim=claim, reading="", variant="corrected", verdict=check_claim(claim, {}))
+        for claim in CLAIMS.values()
+        if not claim.panels
+    ]
+    waiting: list[Waiting] = []
+    readings = dict.fromkeys(reading for table in tables for reading in table.spec.readings)
+    for reading, variant, claim in product(readings, variants, CLAIMS.values()):
+        if claim.panels and any(_variant_of(measure, variant) == variant for _, measure in claim.panels):
+            outcome = _judge(claim, reading, variant, found)
+            if isinstance(outcome, Judged):
+                judged.append(outcome)
+            else:
+                waiting.append(outcome)
+    return tuple(judged), tuple(waiting)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Found:
+    """What studies have."""
+
+    panels: Mapping[tuple[str, str, str, str], StudyPanel]
+    """By reading, variant, experiment and measure."""
+    reasons: Mapping[tuple[str, str, str], str]
+    """Study, measure and variant -> why there are no scores."""
+
+
+def _variant_of(measure: str, variant: Variant) -> Variant:
+    """Return the variant of a measure that is used: this one if it has it, else the corrected one."""
+    return variant if variant in MEASURE_VARIANTS.get(measure, ()) else "corrected"
+
+
+def _judge(claim: Claim, reading: str, variant: Variant, found: _Found) -> Judged | Waiting:
+    places = {
+        (experiment, measure): (reading, _variant_of(measure, variant), experiment, measure)
+        for experiment, measure in claim.panels
+    }
+    lacks = tuple(name for name, place in places.items() if place not in found.panels)
+    if not lacks:
+        panels = {name: found.panels[place].for_claims() for name, place in places.items()}
+        return Judged(claim=claim, reading=reading, variant=variant, verdict=check_claim(claim, panels))
+    keys = [(experiment.split()[0], measure, _variant_of(measure, variant)) for experiment, measure in lacks]
+    reasons = tuple(dict.fromkeys(found.reasons[key] for key in keys if key in found.reasons))
+    return Waiting(claim=claim, reading=reading, variant=variant, lacks=lacks, reasons=reasons)

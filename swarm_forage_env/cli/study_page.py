@@ -1,0 +1,220 @@
+"""The command `study report`: studies, their figures and the claims about them as one page."""
+
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, get_args
+
+import typer
+
+from swarm_forage_env._internal.extras import install_command
+from swarm_forage_env.cli.study_verdict import Places, scored_studies, waiting_lines
+
+if TYPE_CHECKING:
+    from metrics.scoring.figure_panels import StudyPanels
+    from metrics.scoring.study_plots import StudyFigure
+    from metrics.scoring.verdicts import Judged, Waiting
+    from swarm_forage_env.study.study_table import StudyTable
+
+NO_REPORT = f"No report without matplotlib and Jinja2: {install_command('plots')}."
+
+
+def report(
+    places: Places,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.html", help="Page to write.")] = Path("report.html"),
+    band: Annotated[
+        str, typer.Option("--band", help="ci: 95 % interval of the mean; sd: mean ± 2 standard deviations of runs.")
+    ] = "ci",
+) -> None:
+    """Write one page about studies: what they say of the paper's claims, figures, numbers, settings, versions."""
+    from metrics.scoring.verdicts import VARIANTS, judge_claims, why_no_claims
+    from swarm_forage_env._internal.fields import ConfigError, known_name
+    from swarm_forage_env.cli.terminal import notes
+    from swarm_forage_env.study.study_table import read_study
+
+    known_name("band", band, ("ci", "sd"))
+    if out.suffix != ".html":
+        raise ConfigError(f"Expected --out as a file ending in .html, got {str(out)!r}.")
+    tables = [read_study(place) for place in places]
+    scored = scored_studies(tables, VARIANTS)
+    about = [pair for pair in zip(tables, scored, strict=True) if not why_no_claims(pair[0])]
+    try:
+        judged, waiting = judge_claims([table for table, _ in about], [panels for _, panels in about])
+    except ValueError as error:  # a study twice
+        raise ConfigError(str(error)) from error
+    try:
+        text = page_of(tables, scored, judged if about else (), waiting if about else (), band)
+    except ImportError as error:
+        raise ImportError(NO_REPORT) from error
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text(text, encoding="utf-8")
+    notes().print(f"written {out}", markup=False)
+
+
+def page_of(
+    tables: "Sequence[StudyTable]",
+    scored: "Sequence[StudyPanels]",
+    judged: "Sequence[Judged]",
+    waiting: "Sequence[Waiting]",
+    band: str,
+) -> str:
+    """Return the page as text; without verdicts it has no part about claims.
+
+    Raises:
+        ImportError: matplotlib or Jinja2 is not installed.
+    """
+    from metrics.claims.predicates import Answer
+    from swarm_forage_env.rendering.report import build_report
+
+    columns = list(dict.fromkeys((one.reading, one.variant) for one in (*judged, *waiting) if one.reading))
+    names = sorted({name for table in tables for made in table.versions for name in made})
+    answers = get_args(Answer)
+    counts = Counter((one.reading, one.variant, one.verdict.answer) for one in judged)
+    return build_report(
+        {
+            "title": f"Swarm foraging: {', '.join(table.spec.name for table in tables)}",
+            "answers": answers,
+            "columns": [{"reading": reading, "variant": variant} for reading, variant in columns],
+            "counts": [
+                {"reading": reading, "variant": variant, "counts": [counts[reading, variant, word] for word in answers]}
+                for reading, variant in columns
+            ],
+            "claims": _claim_rows(columns, judged, waiting),
+            "waiting": [line.strip() for line in waiting_lines(waiting)[1:]],
+            "studies": [
+                _study(table, panels, judged, waiting, band) for table, panels in zip(tables, scored, strict=True)
+            ],
+            "cost": [_cost(table) for table in tables],
+            "version_names": names,
+            "versions": [
+                [table.spec.name, *(made.get(name, "") for name in names)]
+                for table in tables
+                for made in table.versions
+            ],
+            "commands": "\n".join(_again(table) for table in tables),
+        }
+    )
+
+
+def _claim_rows(
+    columns: Sequence[tuple[str, str]], judged: "Sequence[Judged]", waiting: "Sequence[Waiting]"
+) -> list[dict[str, Any]]:
+    """Return one row per claim that is answered somewhere, with a cell per column."""
+    from metrics.claims import CLAIMS
+
+    found = {(one.claim.name, one.reading, one.variant): one.verdict for one in judged}
+    waits = {(one.claim.name, one.reading, one.variant) for one in waiting}
+    rows: list[dict[str, Any]] = []
+    for name in (name for name in CLAIMS if name in {one.claim.name for one in judged}):
+        formula = found.get((name, "", "corrected"))
+        cells: list[dict[str, Any]] = []
+        for column in columns if formula is None else [("", "corrected")]:
+            verdict = found.get((name, *column))
+            span = 1 if formula is None else len(columns)
+            if verdict is None:
+                why = "waits" if (name, *column) in waits else "no such form"
+                cells.append({"answer": "", "by_bands": "", "why": why, "span": span})
+            else:
+                cells.append({"answer": verdict.answer, "by_bands": verdict.by_bands, "why": "", "span": span})
+        rows.append({"name": name, "text": CLAIMS[name].text, "cells": cells})
+    return rows
+
+
+def _study(
+    table: "StudyTable", panels: "StudyPanels", judged: "Sequence[Judged]", waiting: "Sequence[Waiting]", band: str
+) -> dict[str, Any]:
+    from metrics.scoring.study_plots import study_figures
+    from swarm_forage_env.cli.study_report import described, status_report
+
+    figures = [figure for figure in study_figures(panels) if figure.panels[0].variant == "corrected"]
+    return {
+        "name": table.spec.name,
+        "anchor": f"study-{table.spec.study_id}",
+        "title": table.spec.title,
+        "state": status_report(table).splitlines()[0],
+        "figures": [_figure(figure, judged, waiting, band) for figure in figures],
+        "missing": [
+            f"{measure}: {why}" for (measure, variant), why in panels.missing.items() if variant == "corrected"
+        ],
+        "settings": described(table.spec),
+    }
+
+
+def _figure(
+    figure: "StudyFigure", judged: "Sequence[Judged]", waiting: "Sequence[Waiting]", band: str
+) -> dict[str, Any]:
+    frame = figure.to_frame()
+    shown = frame.select([name for name in frame.columns if not name.startswith("seed_") and name != "reading"])
+    return {
+        "title": figure.title,
+        "pictures": _pictures(figure, band),
+        "claims": _claims_about(figure, judged, waiting),
+        "header": [name.replace("_", " ") for name in shown.columns],
+        "rows": shown.rows(),
+    }
+
+
+def _pictures(figure: "StudyFigure", band: str) -> list[dict[str, str]]:
+    from swarm_forage_env.cli.study_plot import written
+    from swarm_forage_env.rendering.report import picture_address
+
+    with tempfile.TemporaryDirectory() as folder:
+        files = [file for file in written(figure, Path(folder), band) if file.suffix == ".svg"]
+        kinds = ("curves", "heat maps")
+        return [
+            {"address": picture_address(file.read_bytes()), "words": f"{figure.title}, {kind}"}
+            for file, kind in zip(files, kinds, strict=False)
+        ]
+
+
+def _claims_about(
+    figure: "StudyFigure", judged: "Sequence[Judged]", waiting: "Sequence[Waiting]"
+) -> list[dict[str, Any]]:
+    """Return the claims that use a panel of the figure, with what was found under its reading."""
+    from metrics.scoring.texts import counted, percent
+
+    here = {(panel.experiment, panel.measure) for panel in figure.panels}
+    reading = figure.panels[0].reading
+    found: dict[str, dict[str, Any]] = {}
+    for one in (*judged, *waiting):
+        if one.reading != reading or here.isdisjoint(one.claim.panels):
+            continue
+        entry = found.setdefault(one.claim.name, {"name": one.claim.name, "text": one.claim.text, "found": []})
+        verdict = getattr(one, "verdict", None)
+        if verdict is None:
+            lacks = ", ".join(" ".join(name).replace("_", " ") for name in getattr(one, "lacks", ()))
+            entry["found"].append({"answer": "", "words": f"{one.variant}: waits for {lacks}"})
+            continue
+        words = f"{one.variant}; by bands {verdict.by_bands}; effect {percent(verdict.effect)}; "
+        words += f"{counted(verdict.n_runs, 'run')}; {verdict.why}"
+        entry["found"].append({"answer": verdict.answer, "words": words})
+    return list(found.values())
+
+
+def _cost(table: "StudyTable") -> list[str | int | float]:
+    """Return a row about what a study took."""
+    from swarm_forage_env.study.study_run import DONE
+
+    spec = table.spec
+    n_done = sum(state.n_runs[DONE] for state in table.cell_states())
+    hours = spec.n_runs * spec.horizon_s / 3600.0
+    return [spec.name, spec.budget, n_done, spec.n_runs, float(spec.robot_ticks), hours]
+
+
+def _again(table: "StudyTable") -> str:
+    """Return the command that makes the runs of a study."""
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.study.study_file import load_study
+
+    spec = table.spec
+    reading, *others = spec.readings
+    budget = f" --budget {spec.budget}" if spec.budget else ""
+    command = f"swarm-forage study run {{}}{budget} --seeds {len(spec.seeds)} --reading {'both' if others else reading}"
+    try:
+        same = load_study(spec.name, spec.budget, seeds=len(spec.seeds), readings=spec.readings)
+    except ConfigError:  # no set of the paper, or no budget of it
+        same = None
+    if same is not None and same.study_id == spec.study_id:
+        return command.format(spec.name)
+    return f"{command.format('FILE')}  # the file of study {spec.name}, identity {spec.study_id}"

@@ -1,0 +1,116 @@
+"""The command `study verdict`: the paper's claims held against studies."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from metrics.curves import Variant
+    from metrics.scoring.figure_panels import StudyPanels
+    from metrics.scoring.verdicts import Judged, Waiting
+    from swarm_forage_env.study.study_table import StudyTable
+
+Places = Annotated[list[Path], typer.Argument(metavar="DIR|FILE...", help="Folders of studies, or their packed files.")]
+
+
+def verdict(
+    places: Places,
+    json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write all of it as JSON.")] = None,
+) -> None:
+    """Hold the claims of the paper against runs of its sets: what they support, contradict or leave open."""
+    from metrics.scoring.verdicts import VARIANTS, judge_claims
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.cli.terminal import notes, output
+    from swarm_forage_env.study.study_table import read_study
+
+    tables = [read_study(place) for place in places]
+    try:
+        judged, waiting = judge_claims(tables, scored_studies(tables, VARIANTS))
+    except ValueError as error:  # a study that no claim is about
+        raise ConfigError(str(error)) from error
+    console = output()
+    for key in dict.fromkeys((one.reading, one.variant) for one in judged):
+        console.print(_table([one for one in judged if (one.reading, one.variant) == key]))
+    typer.echo("\n".join(waiting_lines(waiting)))
+    if json_file is not None:
+        json_file.parent.mkdir(parents=True, exist_ok=True)
+        json_file.write_text(verdict_json(tables, judged, waiting) + "\n", encoding="utf-8")
+        notes().print(f"written {json_file}", markup=False)
+
+
+def scored_studies(tables: "Sequence[StudyTable]", variants: "Sequence[Variant]") -> "list[StudyPanels]":
+    """Score studies, and tell which one is under way: with many runs it takes minutes."""
+    from metrics.scoring.figure_panels import study_panels
+    from swarm_forage_env.cli.terminal import notes
+
+    scored: list[StudyPanels] = []
+    for table in tables:
+        notes().print(f"scoring {table.spec.name}", markup=False)
+        scored.append(study_panels(table, variants))
+    return scored
+
+
+def verdict_json(tables: "Sequence[StudyTable]", judged: "Sequence[Judged]", waiting: "Sequence[Waiting]") -> str:
+    """Return everything as a JSON document; numbers that do not exist are null."""
+    studies = [
+        {
+            "name": table.spec.name,
+            "study_id": table.spec.study_id,
+            "budget": table.spec.budget,
+            "n_seeds": len(table.spec.seeds),
+            "versions": [dict(versions) for versions in table.versions],
+        }
+        for table in tables
+    ]
+    document = {
+        "studies": studies,
+        "verdicts": [one.to_mapping() for one in judged],
+        "waiting": [one.to_mapping() for one in waiting],
+    }
+    return json.dumps(document, indent=1)
+
+
+def waiting_lines(waiting: "Sequence[Waiting]") -> list[str]:
+    """Return which claims wait for what, those that wait for the same in one line."""
+    claims: dict[str, dict[str, None]] = {}
+    for one in waiting:
+        words = f"for {', '.join(dict.fromkeys(experiment for experiment, _ in one.lacks))}"
+        if one.reasons:
+            words += f" ({one.reading}, {one.variant}: {'; '.join(one.reasons)})"
+        claims.setdefault(words, {})[one.claim.name] = None
+    if not claims:
+        return ["No claim waits for runs."]
+    return ["These claims wait:", *(f"  {', '.join(names)}: {words}" for words, names in claims.items())]
+
+
+def _table(judged: "Sequence[Judged]") -> "Table":
+    from rich.table import Table
+
+    from metrics.scoring.texts import number, percent
+
+    first = judged[0]
+    title = f"reading {first.reading}, measures {first.variant}" if first.reading else "from formulas alone"
+    table = Table(title=title, title_justify="left")
+    for name in ("claim", "text", "by intervals", "by bands"):
+        table.add_column(name)
+    for name in ("statistic", "effect", "runs"):
+        table.add_column(name, justify="right")
+    table.add_column("why")
+    for one in judged:
+        verdict = one.verdict
+        table.add_row(
+            one.claim.name,
+            one.claim.text,
+            verdict.answer,
+            verdict.by_bands,
+            number(verdict.statistic),
+            percent(verdict.effect),
+            str(verdict.n_runs),
+            verdict.why,
+        )
+    return table

@@ -1,0 +1,90 @@
+"""The report on studies in a real browser: it fits, sorts, and asks for nothing."""
+
+import pytest
+
+from metrics.scoring import judge_claims, study_panels
+from metrics.scoring.verdicts import VARIANTS
+from swarm_forage_env.cli.study_page import page_of
+from swarm_forage_env.study.studies import Axis
+from swarm_forage_env.study.study_file import load_study
+from tests.support.browser import Browser, chromium
+from tests.support.made_tables import FOUR, made_study, made_table
+
+LOADED = "document.readyState === 'complete'"
+
+
+def by_policy(cell):
+    return (10.0 - FOUR.index(cell.policy)) * cell.values[-1]
+
+
+def page(*specs):
+    tables = [made_table(spec, by_policy) for spec in specs]
+    scored = [study_panels(table, VARIANTS) for table in tables]
+    return page_of(tables, scored, *judge_claims(tables, scored), "ci")
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A page about two sets, one with two axes."""
+    chromium()  # skips before the page is made
+    walking = Axis(name="walk_probability", values=(0.0, 0.001))
+    folder = tmp_path_factory.mktemp("report")
+    text = page(made_study(), made_study("S2a", walking, Axis(name="population_size", values=(2, 4))))
+    (folder / "report.html").write_text(text)
+    return folder / "report.html"
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_it_fits_and_asks_for_nothing(written, tmp_path, width):
+    with Browser(tmp_path, width=width, height=900) as browser:
+        browser.open(written, LOADED)
+        assert browser.ask("document.documentElement.scrollWidth") <= width
+        assert [address for address in browser.requests if not address.startswith("data:")] == []
+        assert browser.complaints == []
+        assert browser.ask("[...document.images].every((image) => image.naturalWidth > 100)")
+        assert browser.ask("document.images.length") == 10, "four and three figures, three of them with a map"
+
+
+def test_tables_are_sorted_by_a_click(written, tmp_path):
+    names = "[...document.querySelectorAll('#verdicts .name')].map((cell) => cell.textContent)"
+    with Browser(tmp_path, width=1280, height=900) as browser:
+        browser.open(written, LOADED)
+        before = browser.ask(names)
+        browser.click("#verdicts th button")
+        assert browser.ask(names) == sorted(before)
+        browser.click("#verdicts th button")
+        assert browser.ask(names) == sorted(before, reverse=True)
+        assert browser.ask("document.querySelector('#verdicts th').getAttribute('aria-sort')") == "descending"
+
+
+def test_printing_unfolds_what_is_folded(written, tmp_path):
+    n_open = "document.querySelectorAll('details[open]').length"
+    with Browser(tmp_path, width=1280, height=900) as browser:
+        browser.open(written, LOADED)
+        assert browser.ask(n_open) == 0
+        browser.ask("dispatchEvent(new Event('beforeprint'))")
+        assert browser.ask(n_open) == browser.ask("document.querySelectorAll('details').length") > 0
+        browser.ask("dispatchEvent(new Event('afterprint'))")
+        assert browser.ask(n_open) == 0
+
+
+def test_a_set_is_run_again_by_its_name():
+    spec = load_study("S1a", "smoke", seeds=1, readings=("described",))
+    text = page(spec)
+    assert "<pre>swarm-forage study run S1a --budget smoke --seeds 1 --reading described</pre>" in text
+    assert spec.study_id in text
+
+
+def test_a_figure_has_its_claims_beside_it():
+    text = page(made_study())
+    article = next(part for part in text.split("<article") if "<h3>S1a: raw performance" in part)
+    assert "<strong>P2</strong> The small warehouse shows the same picture." in article
+    assert "<strong>E1</strong>" not in article
+    assert "supported" in article.split("P2</strong>")[1]
+    scalability = next(part for part in text.split("<article") if "<h3>S1a: scalability" in part)
+    assert 'class="claims"' not in scalability, "the paper claims nothing of it"
+
+
+def test_a_claim_that_needs_another_set_says_which():
+    article = next(part for part in page(made_study("S1b")).split("<article") if "<h3>S1b: task emergence" in part)
+    assert "corrected: waits for S1d reactivity" in article

@@ -1,0 +1,125 @@
+"""The commands on results of studies: verdict, plot, report."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+FILE = """
+name = "S1a"
+scenario = "warehouse_small"
+policies = [
+    { policy = "random", label = "crw" },
+    { policy = "random", label = "dpo" },
+    { policy = "random", label = "stochm" },
+    { policy = "random", label = "stochx" },
+]
+readings = ["described"]
+
+[set]
+n_objects = 20
+
+[[axis]]
+criterion = "population_size"
+values = [1, 2]
+
+[budget.tiny]
+seeds = 2
+horizon_s = 4.0
+interval_s = 2.0
+"""
+
+
+@pytest.fixture
+def ran(command):
+    """The command in a folder with a study that has been run, in `done`."""
+    Path("S1a.toml").write_text(FILE)
+    assert command("study", "run", "S1a.toml", "--workers", "1", "--out", "done")[0] == 0
+    return command
+
+
+def test_claims_are_held_against_a_study(ran):
+    code, out, err = ran("study", "verdict", "done", "--json", "there/verdict.json")
+    assert code == 0
+    assert "from formulas alone" in out
+    assert "reading described, measures sierra" in out
+    assert "E4, E5, E6, C1, C2, C3, P1, X3: for S1b" in out
+    assert "scoring S1a" in err
+    document = json.loads(Path("there/verdict.json").read_text())
+    assert [study["name"] for study in document["studies"]] == ["S1a"]
+    answers = {(one["claim"], one["variant"]): one["answer"] for one in document["verdicts"]}
+    assert answers["P2", "corrected"] == "undecided", "two runs decide nothing"
+    assert answers["V1", "corrected"] == "supported"
+    assert {one["claim"] for one in document["waiting"]} >= {"E4", "X1"}
+    assert ran("study", "verdict", "done/S1a.parquet")[1] == out
+
+
+def test_a_study_of_ones_own_has_no_claims(ran):
+    Path("mine.toml").write_text(FILE.replace('"S1a"', '"mine"'))
+    assert ran("study", "run", "mine.toml", "--workers", "1", "--out", "mine")[0] == 0
+    code, _, err = ran("study", "verdict", "mine")
+    assert code == 2
+    assert "Expected studies of the paper's sets" in err
+
+
+def test_figures_are_drawn_with_their_numbers(ran):
+    code, out, _ = ran("study", "plot", "done", "--out", "figures", "--band", "sd", "--variant", "corrected,sierra")
+    assert code == 0
+    assert sorted(out.split()) == sorted(str(path) for path in Path("figures").iterdir())
+    names = {path.name for path in Path("figures").iterdir()}
+    assert {f"S1a_raw_performance_described{suffix}" for suffix in (".svg", ".png", ".csv")} <= names
+    assert "S1a_raw_performance_described_sierra.svg" in names
+    assert Path("figures/S1a_raw_performance_described.csv").read_text().startswith("reading,policy,population_size,")
+
+
+def test_what_cannot_be_drawn_is_told(ran):
+    code, _, err = ran("study", "plot", "done", "--band", "cd")
+    assert code == 2
+    assert "band 'cd'" in err
+    words = FILE.replace("values = [1, 2]", 'values = ["none", "static"]').replace("criterion", "field")
+    Path("words.toml").write_text(words.replace("population_size", "caches"))
+    assert ran("study", "run", "words.toml", "--workers", "1", "--out", "words")[0] == 0
+    code, _, err = ran("study", "plot", "words")
+    assert code == 2
+    assert "Expected a study with finished runs and numbers on its last axis, got S1a" in err
+
+
+def test_a_report_is_written(ran):
+    code, _, err = ran("study", "report", "done", "--out", "pages/report.html")
+    assert code == 0
+    assert "written pages/report.html" in err
+    page = Path("pages/report.html").read_text()
+    assert 'id="verdicts"' in page
+    assert "S1a, budget tiny: 16 of 16 runs done" in page
+    assert "swarm-forage study run FILE --budget tiny --seeds 2 --reading described  # the file of study S1a" in page
+    assert ran("study", "report", "done/S1a.parquet", "--out", "again.html")[0] == 0
+    assert Path("again.html").read_text() == page
+
+
+def test_a_report_on_a_study_of_ones_own_has_no_claims(ran):
+    Path("mine.toml").write_text(FILE.replace('"S1a"', '"mine"'))
+    assert ran("study", "run", "mine.toml", "--workers", "1", "--out", "mine")[0] == 0
+    assert ran("study", "report", "mine", "--out", "mine.html")[0] == 0
+    page = Path("mine.html").read_text()
+    assert 'id="verdicts"' not in page
+    assert "mine: raw performance" in page
+
+
+def test_what_a_report_refuses(ran, monkeypatch):
+    for words, message in (
+        (("done", "--out", "report.htm"), "ending in .html, got 'report.htm'"),
+        (("done", "done"), "Expected each study once, got S1a, S1a"),
+        (("done", "--band", "cd"), "band 'cd'"),
+    ):
+        code, _, err = ran("study", "report", *words)
+        assert code == 2
+        assert message in err
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    code, _, err = ran("study", "report", "done")
+    assert code == 1
+    assert "No report without matplotlib and Jinja2" in err
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    code, _, err = ran("study", "plot", "done")
+    assert code == 1
+    assert "No picture without matplotlib" in err

@@ -1,0 +1,164 @@
+"""From tables of studies to panels, and from panels to verdicts on the paper's claims."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+from metrics import CurveError
+from metrics.claims import EXPERIMENTS
+from metrics.scoring import judge_claims, study_panels
+from metrics.scoring.figure_panels import experiment_of
+from metrics.scoring.verdicts import VARIANTS
+from swarm_forage_env.study.studies import Axis, StudyPolicy
+from swarm_forage_env.study.study_file import load_study, set_names
+from swarm_forage_env.study.study_table import StudyTable
+from tests.support.made_tables import FOUR, made_study, made_table
+
+SIMPLE_FIRST = {"crw": 10.0, "dpo": 11.0, "stochm": 5.0, "stochx": 4.0}
+
+
+def by_policy(cell):
+    return SIMPLE_FIRST[cell.policy] * cell.values[-1]
+
+
+@pytest.fixture
+def of_sizes():
+    return made_table(made_study(), by_policy)
+
+
+def only(panels, measure, **where):
+    (found,) = [
+        panel
+        for panel in panels
+        if panel.measure == measure and all(getattr(panel, name) == value for name, value in where.items())
+    ]
+    return found
+
+
+def test_a_panel_has_a_row_per_level_and_a_column_per_seed(of_sizes):
+    panel = only(study_panels(of_sizes).panels, "raw_performance")
+    assert (panel.study, panel.reading, panel.others, panel.experiment) == ("S1a", "described", {}, "S1a")
+    assert panel.x.tolist() == panel.levels.tolist() == [1.0, 2.0, 4.0]
+    assert tuple(panel.scores) == FOUR
+    assert panel.scores["dpo"].shape == (3, 6)
+    seeds, curves = of_sizes.curves(of_sizes.spec.cells[1], "performance")
+    assert seeds == panel.seeds
+    np.testing.assert_allclose(panel.scores["crw"][1], curves["performance"].sum(axis=1))
+    assert panel.for_claims().scores["crw"].shape == (3, 6)
+
+
+def test_measures_that_compare_sizes_leave_the_smallest_out(of_sizes):
+    assert only(study_panels(of_sizes).panels, "scalability").x.tolist() == [2.0, 4.0]
+
+
+def test_a_missing_run_is_no_score():
+    spec = made_study()
+    cell = spec.cells[2]  # four robots
+    panels = study_panels(made_table(spec, by_policy, lost={(cell, 3)})).panels
+    assert np.argwhere(np.isnan(only(panels, "raw_performance").scores["crw"])).tolist() == [[2, 3]]
+    assert np.isfinite(only(panels, "raw_performance").scores["dpo"]).all()
+
+
+def test_a_panel_per_value_of_the_first_axis():
+    walking = Axis(name="walk_probability", values=(0.0, 0.001, 0.3))
+    spec = made_study("S2a", walking, Axis(name="population_size", values=(2, 4)))
+    scored = study_panels(made_table(spec, by_policy))
+    found = [(panel.others, panel.experiment) for panel in scored.panels if panel.measure == "raw_performance"]
+    assert found == [
+        ({"walk_probability": 0.0}, "S2a still"),
+        ({"walk_probability": 0.001}, "S2a slow"),
+        ({"walk_probability": 0.3}, None),
+    ]
+    assert "no reference run of one robot" in scored.missing["spatial_emergence", "corrected"]
+
+
+def test_throttles_are_placed_by_the_distance_of_conditions():
+    axis = Axis(name="throttle", values=(0.0, 0.2, 0.4))
+    spec = made_study("S1c", axis, reference=0.0, settings={"n_objects": 20, "n_robots": 4})
+    table = made_table(spec, lambda cell: 5.0 - cell.values[-1], adversity=lambda cell: 0.1 + cell.values[-1])
+    panel = only(study_panels(table).panels, "reactivity")
+    assert panel.x.tolist() == [0.2, 0.4]
+    assert panel.levels.tolist() == pytest.approx([0.4, 0.8]), "two intervals, 0.2 and 0.4 from the ideal"
+    assert not panel.higher_is_better
+
+
+def test_a_measure_has_a_panel_in_each_variant_that_it_has(of_sizes):
+    panels = study_panels(of_sizes, VARIANTS, ("raw_performance", "scalability", "reactivity")).panels
+    assert [(panel.variant, panel.measure) for panel in panels] == [
+        ("corrected", "raw_performance"),
+        ("corrected", "scalability"),
+        ("paper", "scalability"),
+        ("sierra", "raw_performance"),
+        ("sierra", "scalability"),
+    ]
+    with pytest.raises(CurveError, match="Unknown variant 'siera'"):
+        study_panels(of_sizes, ("siera",))
+
+
+def test_every_experiment_of_the_claims_is_in_a_set():
+    """By name, and by the value on the first axis where a set has two."""
+    specs = [load_study(name, "reduced", readings=("described",)) for name in set_names()]
+    found = {experiment_of(spec.name, cell.values[:-1]) for spec in specs for cell in spec.cells}
+    # Claims about deaths speak of 320 robots, too, which the budget leaves out because no figure shows them.
+    assert found - {None} | {"S2d 320"} == set(EXPERIMENTS)
+    assert experiment_of("S2d", (320,)) == "S2d 320"
+
+
+def test_claims_are_answered_in_each_reading_and_variant():
+    spec = made_study(readings=("described", "program"))
+    table = made_table(spec, by_policy)
+    judged, waiting = judge_claims([table], [study_panels(table, VARIANTS)])
+    answers = {(one.claim.name, one.reading, one.variant): one.verdict.answer for one in judged}
+    assert {key[0] for key in answers} == {"V1", "V2", "P2", "E1", "E2", "E3"}
+    assert answers["V1", "", "corrected"] == "supported"
+    for reading in spec.readings:
+        assert [key[2] for key in answers if key[:2] == ("P2", reading)] == ["corrected", "sierra"]
+        assert answers["P2", reading, "corrected"] == answers["P2", reading, "sierra"] == "supported"
+        assert [key[2] for key in answers if key[:2] == ("E3", reading)] == [*VARIANTS]
+    lacking = {one.claim.name: one.lacks for one in waiting if (one.reading, one.variant) == ("program", "corrected")}
+    assert lacking["D2"] == (("S1h", "population_robustness"), ("S1b", "task_emergence"))
+    assert not {"V1", "V2", "P2"} & {one.claim.name for one in waiting}
+
+
+def test_the_opposite_order_contradicts():
+    heights = dict(zip(SIMPLE_FIRST, reversed(SIMPLE_FIRST.values()), strict=True))
+    table = made_table(made_study(), lambda cell: heights[cell.policy])
+    judged, _ = judge_claims([table], [study_panels(table)], ("corrected",))
+    assert {one.claim.name: one.verdict.answer for one in judged}["P2"] == "contradicted"
+
+
+def test_a_claim_may_need_two_studies():
+    tables = [made_table(made_study(name), by_policy) for name in ("S1a", "S1b")]
+    judged, _ = judge_claims(tables, [study_panels(table) for table in tables], ("corrected",))
+    assert {"P1", "P2", "X3"} <= {one.claim.name for one in judged}
+    assert {one.to_mapping()["claim"] for one in judged} == {one.claim.name for one in judged}
+
+
+def test_what_cannot_be_computed_is_told_with_the_claim():
+    axes = (Axis(name="walk_probability", values=(0.001,)), Axis(name="population_size", values=(2, 4)))
+    table = made_table(made_study("S2a", *axes), by_policy)
+    _, waiting = judge_claims([table], [study_panels(table)], ("corrected",))
+    (one,) = [one for one in waiting if one.claim.name == "E9"]
+    assert "no reference run of one robot" in one.to_mapping()["reasons"][0]
+
+
+@pytest.mark.parametrize(
+    ("specs", "message"),
+    [
+        ([made_study(), made_study()], "Expected each study once, got S1a, S1a"),
+        ([made_study("mine")], "Expected studies of the paper's sets, S1a, .*; got study 'mine'"),
+        ([made_study(policies=(StudyPolicy(label="crw", policy="random"),))], "it has no dpo, stochm, stochx"),
+    ],
+)
+def test_what_no_claim_is_about_is_refused(specs, message):
+    tables = [made_table(spec, by_policy) for spec in specs]
+    with pytest.raises(CurveError, match=message):
+        judge_claims(tables, [study_panels(table) for table in tables])
+
+
+def test_a_study_without_a_finished_run_decides_nothing():
+    spec = made_study()
+    table = made_table(spec, by_policy)
+    nothing = StudyTable(spec=spec, frame=table.frame.with_columns(state=pl.lit("missing")), versions=())
+    judged, _ = judge_claims([nothing], [study_panels(nothing)], ("corrected",))
+    assert {one.claim.name: one.verdict.answer for one in judged}["P2"] == "undecided"

@@ -1,0 +1,65 @@
+"""Tables of studies whose curves are made by hand: nothing is run."""
+
+import numpy as np
+import polars as pl
+
+from swarm_forage_env.study.studies import Axis, StudyPolicy, StudySpec
+from swarm_forage_env.study.study_table import StudyTable
+
+FOUR = ("crw", "dpo", "stochm", "stochx")
+N_INTERVALS = 4
+
+
+def four_policies():
+    """The policies of the paper by label; whatever stands behind them, it is not run."""
+    return tuple(StudyPolicy(label=label, policy="random") for label in FOUR)
+
+
+def made_study(name="S1a", *axes, **changes):
+    """A study of the four policies; by default over three swarm sizes."""
+    given = {
+        "name": name,
+        "scenario": "warehouse_small",
+        "settings": {"n_objects": 20},
+        "policies": four_policies(),
+        "axes": axes or (Axis(name="population_size", values=(1, 2, 4)),),
+        "reference": None,
+        "readings": ("described",),
+        "seeds": tuple(range(6)),
+        "horizon_s": 10.0 * N_INTERVALS,
+        "interval_s": 10.0,
+    }
+    return StudySpec(**given | changes)
+
+
+def made_table(spec, performance, *, lost=(), adversity=lambda cell: 0.0):
+    """A study's table.
+
+    Args:
+        spec: The study.
+        performance: Cell -> level of its performance; runs differ a little from it, equally in all cells.
+        lost: (cell, seed) of missing runs.
+        adversity: Cell -> conditions in the second half of a run.
+    """
+    rows = []
+    for number, cell in enumerate(spec.cells):
+        for seed in spec.seeds:
+            place = {"cell": number, "seed": seed, "run_id": f"{number}_{seed}"}
+            if (cell, seed) in lost:
+                rows.append({**place, "state": "missing"})
+                continue
+            noise = 0.02 * np.random.default_rng(seed).normal(size=N_INTERVALS)
+            rows += [
+                {
+                    **place,
+                    "state": "done",
+                    "interval": interval,
+                    "t_end_s": spec.interval_s * (interval + 1),
+                    "performance": performance(cell) * (1.0 + noise[interval]),
+                    "interference_fraction": 0.1,
+                    "adversity": adversity(cell) if 2 * interval >= N_INTERVALS else 0.1,
+                    "n_active": 4.0,
+                }
+                for interval in range(N_INTERVALS)
+            ]
+    return StudyTable(spec=spec, frame=pl.DataFrame(rows, infer_schema_length=None), versions=({"numpy": "2.0"},))
