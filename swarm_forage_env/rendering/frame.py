@@ -278,7 +278,11 @@ def _write_text(
     """Add headline, clock, figures and cache counts; returns the finished picture."""
     from PIL import Image, ImageDraw
 
-    picture = Image.fromarray(canvas.round().astype(np.uint8))
+    done_picture = np.rint(canvas, out=canvas).astype(np.uint8)
+    top = view.bottom - (scenario.arena.height_m + WALL_M) * view.scale
+    # Pillow works on copies, so it gets no more than the rows that have text in them.
+    written = done_picture if caches.alive.any() else done_picture[: int(top)]
+    picture = Image.fromarray(written)
     pen = ImageDraw.Draw(picture)
     margin = text_height(view.unit)
     arena, count = scenario.arena, events.counters
@@ -289,7 +293,6 @@ def _write_text(
     n_interfering = int(np.count_nonzero(events.interfering & swarm.active))
     done = f"{count[Counter.COLLECTED]:,} delivered    {count[Counter.FIRST_PICKED]:,} first pick-ups"
     now = f"{n_active:,} robots    {n_carrying:,} carrying    {n_interfering:,} in interference"
-    top = view.bottom - (arena.height_m + WALL_M) * view.scale
     room = view.width - 2 * margin
     _write_line(pen, 0.33 * top, headline, f"{seconds:,.0f} s", 1.35 * margin, margin, room, PALETTE.text)
     _write_line(pen, 0.72 * top, done, now, margin, margin, room, PALETTE.faint_text)
@@ -304,7 +307,8 @@ def _write_text(
             stroke_width=2,
             stroke_fill=PALETTE.floor,
         )
-    return np.array(picture)
+    written[:] = np.asarray(picture)
+    return done_picture
 
 
 def _write_line(

@@ -20,6 +20,10 @@ Colour: TypeAlias = tuple[int, int, int]
 _STAMP_BUDGET = 2_000_000
 """Pixels computed at once: this limits the memory of a call for any number of shapes."""
 
+_MOST_SPARE = 4
+_spare_zeros: dict[int, NDArray[np.float32]] = {}
+"""Size -> zeros that nobody uses now: making megabytes of them for each call took longer than the painting itself."""
+
 _Coverage: TypeAlias = Callable[[NDArray[np.float32], NDArray[np.float32], slice], NDArray[np.floating]]
 
 
@@ -127,9 +131,14 @@ def _paint(
     assert canvas.flags.c_contiguous, "painting goes through a flat view"
     height, width = canvas.shape[:2]
     middle = np.asarray(centre, np.float64).reshape(-1, 2)
+    if len(middle) == 0:
+        return
     strength = np.broadcast_to(np.asarray(opacity, np.float32), (len(middle),))
-    share = np.zeros(height * width, np.float32)
-    offset = np.arange(-int(np.ceil(reach)), int(np.ceil(reach)) + 1)
+    share = _borrow_zeros(height * width)
+    reached = int(np.ceil(reach))
+    offset = np.arange(-reached, reached + 1)
+    around = width * offset[:, None] + offset
+    touched = []
     for rows in _chunks(len(middle), offset.size**2):
         corner = np.floor(middle[rows]).astype(np.int64)
         column = corner[:, 0, None, None] + offset[None, None, :]
@@ -137,11 +146,28 @@ def _paint(
         dx = (column + 0.5 - middle[rows, 0, None, None]).astype(np.float32)
         dy = (row + 0.5 - middle[rows, 1, None, None]).astype(np.float32)
         covered = coverage(dx, dy, rows) * strength[rows, None, None]
-        seen = (covered > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        np.maximum.at(share, (row * width + column)[seen], covered[seen])
-    touched = np.flatnonzero(share > 0)  # several times faster than on floats
+        seen = covered > 0
+        if corner.min() < reached or (corner >= (width - reached, height - reached)).any():
+            seen &= (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        place = np.flatnonzero(seen)
+        pixel = ((width * corner[:, 1] + corner[:, 0])[:, None, None] + around).reshape(-1)[place]
+        np.maximum.at(share, pixel, covered.reshape(-1)[place])
+        touched.append(pixel)
+    # A pixel that several shapes touch stands here several times; it gets the same value each time.
+    pixel = np.concatenate(touched)
     pixels = canvas.reshape(-1, 3)
-    pixels[touched] += (np.asarray(colour, np.float32) - pixels[touched]) * share[touched, None]
+    ground = pixels[pixel]
+    pixels[pixel] = ground + (np.asarray(colour, np.float32) - ground) * share[pixel, None]
+    share[pixel] = 0.0
+    _spare_zeros[share.size] = share
+
+
+def _borrow_zeros(size: int) -> NDArray[np.float32]:
+    """Return an array of zeros; one that is put back into `_spare_zeros`, all zero again, need not be made anew."""
+    if len(_spare_zeros) > _MOST_SPARE:
+        _spare_zeros.clear()
+    spare = _spare_zeros.pop(size, None)
+    return np.zeros(size, np.float32) if spare is None else spare
 
 
 def _chunks(n_shapes: int, stamp_pixels: int) -> Iterator[slice]:
