@@ -3,6 +3,7 @@
 A process has one window at a time. Nothing here knows a run; `study.watch` decides what is shown and what a key does.
 """
 
+import io
 import os
 from dataclasses import dataclass
 from types import ModuleType
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_forage_env._internal.extras import install_command
-from swarm_forage_env.rendering.view import PALETTE, RenderError
+from swarm_forage_env.rendering.view import PALETTE, RenderError, text_font
 
 PANEL_PX = 320
 """Width of the panel on the right, with its margins."""
@@ -20,7 +21,7 @@ CLOSE_UP_PX = 300
 """Side of the close-up in the panel."""
 _MARGIN_PX = 10
 _LINE_PX = 18
-_TEXT_PX = 18
+_TEXT_PX = 14
 _LOWEST_PX = 600
 """Height that the panel's text needs."""
 
@@ -77,6 +78,7 @@ class Window:
         """Prepare; raises ImportError if pygame is not installed."""
         self._pygame = _load_pygame()
         self._surface: Any = None
+        self._font: Any = None
         self.was_closed = False
         """Whether the user has closed it. Then `show` does nothing."""
 
@@ -135,7 +137,8 @@ class Window:
             elif event.type == pygame.KEYDOWN:
                 found.append(Pressed(pygame.key.name(event.key), shift))
             elif event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
-                found.append(Clicked(*event.pos, shift))
+                x, y = event.pos
+                found.append(Clicked(x, y, shift))
         return found
 
     def wait(self, per_second: float) -> float:
@@ -168,9 +171,10 @@ class Window:
         self._clock = pygame.time.Clock()
 
     def _open_font(self) -> None:
-        if not self._pygame.font.get_init():
+        if self._font is None:
             self._pygame.font.init()
-        self._font = self._pygame.font.Font(None, _TEXT_PX)
+            # The letters of the pictures; pygame's own are hard to read at this size.
+            self._font = self._pygame.font.Font(io.BytesIO(text_font(_TEXT_PX).font_bytes), _TEXT_PX)
 
     def _draw_panel(self, scene: Scene) -> None:
         left, top = scene.frame.shape[1] + _MARGIN_PX, _MARGIN_PX

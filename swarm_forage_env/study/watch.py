@@ -24,7 +24,7 @@ from swarm_forage_env.study.run import LiveRun, build_env
 from swarm_forage_env.wrappers.base import WrapperConfig
 
 HELP = (
-    "space: pause   . one tick   up, down: speed   click, tab: choose a robot   esc: none   +, -: close-up   "
+    "space: pause   .: one tick   up, down: speed   click, tab: choose a robot   esc: none   +, -: close-up   "
     "t, s, w, h: raise throttle, sensor noise, wheel noise, handling   with shift: lower   shift and click: kill   "
     "q: quit"
 )
