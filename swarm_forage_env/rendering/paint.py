@@ -20,6 +20,7 @@ Colour: TypeAlias = tuple[int, int, int]
 _STAMP_BUDGET = 2_000_000
 """Pixels computed at once: this limits the memory of a call for any number of shapes."""
 
+_WHOLE_PIXEL = np.dtype((np.void, 12))
 _MOST_SPARE = 4
 _spare_zeros: dict[int, NDArray[np.float32]] = {}
 """Size -> zeros that nobody uses now: making megabytes of them for each call took longer than the painting itself."""
@@ -59,7 +60,7 @@ def paint_discs(
     """Fill discs at `centre` (n, 2); `opacity` is one number or (n,)."""
 
     def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], _: slice) -> NDArray[np.floating]:
-        return np.clip(radius + 0.5 - np.hypot(dx, dy), 0.0, 1.0)
+        return np.clip(radius + 0.5 - _length(dx, dy), 0.0, 1.0)
 
     _paint(canvas, centre, radius + 1.0, coverage, colour, opacity)
 
@@ -68,7 +69,7 @@ def paint_rings(canvas: Canvas, centre: ArrayLike, radius: float, line: float, c
     """Draw circles of mean radius `radius` and line width `line` around `centre` (n, 2)."""
 
     def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], _: slice) -> NDArray[np.floating]:
-        return np.clip((line + 1.0) / 2.0 - np.abs(np.hypot(dx, dy) - radius), 0.0, 1.0)
+        return np.clip((line + 1.0) / 2.0 - np.abs(_length(dx, dy) - radius), 0.0, 1.0)
 
     _paint(canvas, centre, radius + line / 2.0 + 1.0, coverage, colour, 1.0)
 
@@ -95,7 +96,7 @@ def paint_needles(
     def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], rows: slice) -> NDArray[np.floating]:
         ux, uy = along[rows, 0, None, None], along[rows, 1, None, None]
         forward = np.clip(dx * ux + dy * uy, -length / 2.0, length / 2.0)
-        return np.clip((line + 1.0) / 2.0 - np.hypot(dx - forward * ux, dy - forward * uy), 0.0, 1.0)
+        return np.clip((line + 1.0) / 2.0 - _length(dx - forward * ux, dy - forward * uy), 0.0, 1.0)
 
     _paint(canvas, middle, (length + line) / 2.0 + 1.0, coverage, colour, 1.0)
 
@@ -107,6 +108,13 @@ def paint_glows(canvas: Canvas, centre: ArrayLike, radius: float, colour: Colour
         return np.clip(1.0 - (dx * dx + dy * dy) / (radius * radius), 0.0, 1.0) ** 3
 
     _paint(canvas, centre, radius, coverage, colour, opacity)
+
+
+def _length(dx: NDArray[np.float32], dy: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Length of vectors, broadcast: what `np.hypot` returns, in a third of its time."""
+    x, y = dx.astype(np.float64), dy.astype(np.float64)  # squares of these cannot overflow or lose digits
+    total = x * x + y * y
+    return np.sqrt(total, out=total).astype(np.float32)
 
 
 def _paint(
@@ -156,8 +164,12 @@ def _paint(
     # A pixel that several shapes touch stands here several times; it gets the same value each time.
     pixel = np.concatenate(touched)
     pixels = canvas.reshape(-1, 3)
-    ground = pixels[pixel]
-    pixels[pixel] = ground + (np.asarray(colour, np.float32) - ground) * share[pixel, None]
+    ground = pixels.take(pixel, axis=0)
+    mixed = np.asarray(colour, np.float32) - ground
+    mixed *= share.take(pixel)[:, None]
+    mixed += ground
+    # As one item of twelve bytes a pixel is stored three times faster than as a row of three numbers.
+    pixels.view(_WHOLE_PIXEL)[:, 0][pixel] = mixed.view(_WHOLE_PIXEL)[:, 0]
     share[pixel] = 0.0
     _spare_zeros[share.size] = share
 
