@@ -62,7 +62,7 @@ def paint_discs(
     def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], _: slice) -> NDArray[np.floating]:
         return np.clip(radius + 0.5 - _length(dx, dy), 0.0, 1.0)
 
-    _paint(canvas, centre, radius + 1.0, coverage, colour, opacity)
+    _paint(canvas, centre, radius + 0.5, coverage, colour, opacity)
 
 
 def paint_rings(canvas: Canvas, centre: ArrayLike, radius: float, line: float, colour: Colour) -> None:
@@ -71,7 +71,7 @@ def paint_rings(canvas: Canvas, centre: ArrayLike, radius: float, line: float, c
     def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], _: slice) -> NDArray[np.floating]:
         return np.clip((line + 1.0) / 2.0 - np.abs(_length(dx, dy) - radius), 0.0, 1.0)
 
-    _paint(canvas, centre, radius + line / 2.0 + 1.0, coverage, colour, 1.0)
+    _paint(canvas, centre, radius + (line + 1.0) / 2.0, coverage, colour, 1.0)
 
 
 def paint_squares(canvas: Canvas, centre: ArrayLike, side: float, colour: Colour, opacity: float = 1.0) -> None:
@@ -83,7 +83,7 @@ def paint_squares(canvas: Canvas, centre: ArrayLike, side: float, colour: Colour
         down = np.minimum(dy + 0.5, half) - np.maximum(dy - 0.5, -half)
         return np.clip(across, 0.0, 1.0) * np.clip(down, 0.0, 1.0)
 
-    _paint(canvas, centre, half + 1.0, coverage, colour, opacity)
+    _paint(canvas, centre, half + 0.5, coverage, colour, opacity)
 
 
 def paint_needles(
@@ -98,7 +98,7 @@ def paint_needles(
         forward = np.clip(dx * ux + dy * uy, -length / 2.0, length / 2.0)
         return np.clip((line + 1.0) / 2.0 - _length(dx - forward * ux, dy - forward * uy), 0.0, 1.0)
 
-    _paint(canvas, middle, (length + line) / 2.0 + 1.0, coverage, colour, 1.0)
+    _paint(canvas, middle, (length + line + 1.0) / 2.0, coverage, colour, 1.0)
 
 
 def paint_glows(canvas: Canvas, centre: ArrayLike, radius: float, colour: Colour, opacity: float) -> None:
@@ -130,7 +130,7 @@ def _paint(
     Args:
         canvas: Painted in place.
         centre: (n, 2) pixel coordinates of the shapes' middles.
-        reach: Distance from the middle beyond which coverage is zero, pixels.
+        reach: Distance from the middle, along an axis, from which on coverage is zero, pixels.
         coverage: A function of the offsets from the middles to pixel centres, (k, 1, P) and (k, P, 1), and of the
             slice of the k shapes; returns shares in [0, 1], (k, P, P).
         colour: Colour of all shapes.
@@ -143,7 +143,7 @@ def _paint(
         return
     strength = np.broadcast_to(np.asarray(opacity, np.float32), (len(middle),))
     share = _borrow_zeros(height * width)
-    reached = int(np.ceil(reach))
+    reached = int(np.ceil(reach + 0.5)) - 1  # the centre of a pixel farther away is beyond reach
     offset = np.arange(-reached, reached + 1)
     around = width * offset[:, None] + offset
     touched = []
