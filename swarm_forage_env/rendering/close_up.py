@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import WINDOW_CELLS, ObservationLayout
-from swarm_forage_env.contract.types import FloatArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.rendering.paint import (
     Canvas,
     paint_box,
@@ -40,6 +40,11 @@ class _Lens:
     def pixels(self, position_m: NDArray[np.floating]) -> FloatArray:
         middle = self.size_px / 2.0
         return (np.asarray(position_m, np.float64) - self.centre) * (self.scale, -self.scale) + middle
+
+    def shows(self, pixel: FloatArray, reach_px: float) -> BoolArray:
+        """Return which of the things at `pixel` (n, 2) reach into the picture."""
+        half = self.size_px / 2.0
+        return (np.abs(pixel - half) < half + reach_px).all(axis=1)
 
     def box(self, box_m: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
         (left, bottom), (right, top) = self.pixels(np.array([box_m[:2], box_m[2:]]))
@@ -80,7 +85,6 @@ def render_close_up(
     """
     lens = _Lens(swarm.position[robot].copy(), size_px / side_m, size_px)
     canvas = np.empty((size_px, size_px, 3), np.float32)
-    canvas[:] = PALETTE.page
     _draw_ground(canvas, lens, scenario, caches)
     _draw_objects(canvas, lens, objects, obs[layout["los_object"]])
     _draw_window(canvas, lens, swarm.position[robot])
@@ -91,8 +95,13 @@ def render_close_up(
 
 def _draw_ground(canvas: Canvas, lens: _Lens, scenario: ScenarioConfig, caches: CacheState) -> None:
     arena = scenario.arena
-    paint_box(canvas, lens.box((-WALL_M, -WALL_M, arena.width_m + WALL_M, arena.height_m + WALL_M)), PALETTE.wall)
-    paint_box(canvas, lens.box(arena.interior_m), PALETTE.floor)
+    left, top, right, bottom = lens.box(arena.interior_m)
+    if max(left, top) <= 0.0 and min(right, bottom) >= lens.size_px:
+        canvas[:] = PALETTE.floor
+    else:
+        canvas[:] = PALETTE.page
+        paint_box(canvas, lens.box((-WALL_M, -WALL_M, arena.width_m + WALL_M, arena.height_m + WALL_M)), PALETTE.wall)
+        paint_box(canvas, (left, top, right, bottom), PALETTE.floor)
     paint_box(canvas, lens.box(arena.nest_box_m), PALETTE.nest, NEST_OPACITY)
     half = scenario.cache_side_cells * CELL_M / 2
     for x, y in (caches.cell[caches.alive] + 0.5) * CELL_M:
@@ -102,10 +111,10 @@ def _draw_ground(canvas: Canvas, lens: _Lens, scenario: ScenarioConfig, caches: 
 
 
 def _draw_objects(canvas: Canvas, lens: _Lens, objects: ObjectState, los_object: ObsArray) -> None:
-    lying = objects.status == ObjectStatus.FREE
     seen = np.rint(los_object[los_object > 0] * len(objects.status)).astype(np.int64) - 1
     side = 0.8 * CELL_M * lens.scale
     place = lens.pixels((objects.cell + 0.5) * CELL_M)
+    lying = (objects.status == ObjectStatus.FREE) & lens.shows(place, side)
     paint_squares(canvas, place[lying], side, PALETTE.object, _FAINT)
     paint_squares(canvas, place[seen], side, PALETTE.object)
 
@@ -138,7 +147,7 @@ def _draw_beams(
 def _draw_robots(canvas: Canvas, lens: _Lens, scenario: ScenarioConfig, swarm: SwarmState, robot: int) -> None:
     radius = scenario.robots.radius_m * lens.scale
     centre = lens.pixels(swarm.position)
-    shown = swarm.present & (np.abs(centre - lens.size_px / 2.0) < lens.size_px / 2.0 + 2.0 * radius).all(axis=1)
+    shown = swarm.present & lens.shows(centre, 2.0 * radius)
     carrying = swarm.carried_object >= 0
     direction = np.column_stack([np.cos(swarm.heading), -np.sin(swarm.heading)])
     paint_rings(canvas, centre[shown & ~swarm.active], 0.8 * radius, 0.4 * radius, PALETTE.repair)
