@@ -44,7 +44,7 @@ class _Lens:
     def shows(self, pixel: FloatArray, reach_px: float) -> BoolArray:
         """Return which of the things at `pixel` (n, 2) reach into the picture."""
         half = self.size_px / 2.0
-        return (np.abs(pixel - half) < half + reach_px).all(axis=1)
+        return np.abs(pixel - half).max(axis=1) < half + reach_px
 
     def box(self, box_m: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
         (left, bottom), (right, top) = self.pixels(np.array([box_m[:2], box_m[2:]]))

@@ -110,7 +110,7 @@ def paint_glows(canvas: Canvas, centre: ArrayLike, radius: float, colour: Colour
     _paint(canvas, centre, radius, coverage, colour, opacity)
 
 
-def _length(dx: NDArray[np.float32], dy: NDArray[np.float32]) -> NDArray[np.float32]:
+def _length(dx: NDArray[np.floating], dy: NDArray[np.floating]) -> NDArray[np.float32]:
     """Length of vectors, broadcast: what `np.hypot` returns, in a third of its time."""
     x, y = dx.astype(np.float64), dy.astype(np.float64)  # squares of these cannot overflow or lose digits
     total = x * x + y * y
