@@ -111,9 +111,9 @@ class Window:
             column, row, radius = scene.ring
             pygame.draw.circle(surface, PALETTE.text, (column, row), radius, width=2)
         if has_panel:
-            self._draw_panel(scene)
+            self._fill_panel(scene)
         for number, line in enumerate(help_lines):
-            self._write(line, (_MARGIN_PX, height + _LINE_PX * number), PALETTE.faint_text)
+            self._put_text(line, (_MARGIN_PX, height + _LINE_PX * number), PALETTE.faint_text)
         pygame.display.flip()
 
     def show_picture(self, picture: NDArray[np.uint8], title: str) -> None:
@@ -164,10 +164,10 @@ class Window:
             pygame.display.init()
             self._surface = pygame.display.set_mode(size)
         except pygame.error as error:
-            raise RenderError(
-                f"Expected a display to open a window on, got {error}; without one, film the run (`swarm-forage "
-                "record`) or use render_mode='rgb_array'."
-            ) from error
+            raise _no_display(str(error)) from error
+        if pygame.display.get_driver() == "offscreen" and "SDL_VIDEODRIVER" not in os.environ:
+            self.close()
+            raise _no_display("one that nobody can see")
         self._clock = pygame.time.Clock()
 
     def _open_font(self) -> None:
@@ -176,17 +176,17 @@ class Window:
             # The letters of the pictures; pygame's own are hard to read at this size.
             self._font = self._pygame.font.Font(io.BytesIO(text_font(_TEXT_PX).font_bytes), _TEXT_PX)
 
-    def _draw_panel(self, scene: Scene) -> None:
+    def _fill_panel(self, scene: Scene) -> None:
         left, top = scene.frame.shape[1] + _MARGIN_PX, _MARGIN_PX
         if scene.close_up is not None:
             _put(self._pygame, self._surface, scene.close_up, (left, top))
             top += scene.close_up.shape[0] + _MARGIN_PX
         for text in scene.lines:
             for line in self._wrapped(text, PANEL_PX - 2 * _MARGIN_PX, between=" ") or [""]:
-                self._write(line, (left, top), PALETTE.text)
+                self._put_text(line, (left, top), PALETTE.text)
                 top += _LINE_PX
 
-    def _write(self, text: str, place: tuple[int, int], colour: tuple[int, int, int]) -> None:
+    def _put_text(self, text: str, place: tuple[int, int], colour: tuple[int, int, int]) -> None:
         self._surface.blit(self._font.render(text, True, colour), place)
 
     def _wrapped(self, text: str, width: int, between: str = "   ") -> list[str]:
@@ -204,6 +204,13 @@ class Window:
 def _put(pygame: Any, surface: Any, picture: NDArray[np.uint8], place: tuple[int, int]) -> None:
     height, width = picture.shape[:2]
     surface.blit(pygame.image.frombuffer(np.ascontiguousarray(picture), (width, height), "RGB"), place)
+
+
+def _no_display(what_came: str) -> RenderError:
+    return RenderError(
+        f"Expected a display to open a window on, got {what_came}; without one, film the run (`swarm-forage record`) "
+        "or use render_mode='rgb_array'."
+    )
 
 
 def _load_pygame() -> ModuleType:

@@ -31,7 +31,7 @@ HELP = (
 SPEEDS = (0.2, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0)
 """Simulated seconds per second; our choice."""
 FRAMES_PER_S = 30.0
-_LONGEST_S = 0.1
+LONGEST_S = 0.1
 """Ticks of one frame take at most this long, so that the window answers even if the run is slower than its speed."""
 _NEAREST_PX = 30.0
 """A click farther from every robot chooses none."""
@@ -91,7 +91,7 @@ class Watch:
         if self.paused:
             return
         self._owed_ticks += seconds * self.speed / self.scenario.dt_s
-        until = time.perf_counter() + _LONGEST_S
+        until = time.perf_counter() + LONGEST_S
         while self._owed_ticks >= 1.0 and not self.run.over:
             self._owed_ticks -= 1.0
             self.step()

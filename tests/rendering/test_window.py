@@ -111,6 +111,25 @@ def test_without_a_display_the_message_says_what_else_there_is(monkeypatch):
         Window().show(Scene(frame=FRAME, title=""))
 
 
+def test_a_display_that_nobody_can_see_is_none_unless_it_was_asked_for(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    window = Window()
+    monkeypatch.setattr(pygame.display, "get_driver", lambda: "offscreen")
+    window.show(Scene(frame=FRAME, title=""))
+    window.close()
+    set_mode = pygame.display.set_mode
+
+    def without_the_variable(size):
+        surface = set_mode(size)
+        monkeypatch.delenv("SDL_VIDEODRIVER")
+        return surface
+
+    monkeypatch.setattr(pygame.display, "set_mode", without_the_variable)
+    with pytest.raises(RenderError, match="nobody can see"):
+        window.show(Scene(frame=FRAME, title=""))
+    assert not pygame.display.get_init()
+
+
 def test_without_pygame_the_message_tells_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
     with pytest.raises(ImportError, match=r'pygame-ce.*pip install ".\[render\]"'):

@@ -7,6 +7,7 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.rendering.view import RenderError
 from swarm_forage_env.rendering.window import Clicked, Closed, Pressed, Window
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study import watch as watching
 from swarm_forage_env.study.levels import LEVELS, Levels, with_idle
 from swarm_forage_env.study.run import LiveRun, build_env
 from swarm_forage_env.study.watch import HELP, SPEEDS, Watch, watch_run
@@ -65,7 +66,8 @@ def test_looking_changes_nothing(policy, wrappers):
     assert watch.levels.changes == []
 
 
-def test_pause_one_tick_and_speed(watch):
+def test_pause_one_tick_and_speed(watch, monkeypatch):
+    monkeypatch.setattr(watching, "LONGEST_S", 1000.0)  # ticks take long while they are compiled
     watch.advance(0.2)
     assert watch.world.tick == 10
     press(watch, "space")
@@ -81,6 +83,14 @@ def test_pause_one_tick_and_speed(watch):
     assert watch.speed == SPEEDS[-1]
     press(watch, *["down"] * 20)
     assert watch.speed == SPEEDS[0]
+
+
+def test_a_slow_run_does_not_keep_the_window_waiting(watch, monkeypatch):
+    monkeypatch.setattr(watching, "LONGEST_S", -1.0)
+    watch.advance(0.2)
+    assert watch.world.tick == 1
+    watch.advance(0.02)
+    assert watch.world.tick == 2, "what could not be done is not owed"
 
 
 def test_a_run_that_is_over_stays_as_it_is():
