@@ -329,6 +329,42 @@ def start_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a c
         yield Row("import to first ticks, later", seconds, "s", "< 2", seconds < 2)
 
 
+def frame_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a case like the others; ticks are few
+    """Pictures of a large swarm, and the window of a smaller one with a robot chosen, on a display that is none."""
+    from swarm_forage_env.rendering.window import Pressed, Window
+    from swarm_forage_env.study.watch import Watch
+
+    env = parallel_env("search_and_rescue", n_robots=819, physics="compiled", render_mode="rgb_array")
+    env.reset(seed=0)
+    rate = pictures_per_second(env.render, 10 * repeats)
+    yield Row("rgb_array, N = 819, 900 pixels", rate, "pictures/s", ">= 60", rate >= 60)
+
+    os.environ["SDL_VIDEODRIVER"] = "dummy"
+    window, watch = Window(), Watch(warehouse_medium(physics="compiled"), "dpo", speed=6.0)
+    watch.handle(Pressed("tab"))
+
+    def show() -> None:
+        watch.advance(1.0 / 30.0)
+        window.show(watch.scene())
+        window.events()
+
+    rate = pictures_per_second(show, 10 * repeats)
+    window.close()
+    yield Row("window, N = 200, DPO, one tick a picture", rate, "pictures/s", ">= 30", rate >= 30)
+
+
+def pictures_per_second(draw: Callable[[], object], n_pictures: int) -> float:
+    """Median rate of a function that draws one picture, without its first calls."""
+    for _ in range(3):
+        draw()
+    seconds = []
+    for _ in range(n_pictures):
+        started = time.process_time()
+        draw()
+        seconds.append(time.process_time() - started)
+    return 1.0 / statistics.median(seconds)
+
+
 Case = Callable[[int, int], Iterable[Row]]
 """Measures a case; arguments: ticks, repeats."""
 
@@ -350,6 +386,7 @@ def cases() -> dict[str, Case]:
         "four wrappers, N = 200": wrapper_rows,
         "PettingZoo dict API, N = 200": dict_rows,
         "learning: VecEnv and PPO": learning_rows,
+        "pictures: rgb_array and window": frame_rows,
         "start: import and first ticks": start_rows,
     }
 

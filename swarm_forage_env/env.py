@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
@@ -19,6 +19,9 @@ from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.rewards import RewardModel
 from swarm_forage_env.world.snapshots import Origin, Snapshot, package_version, read, take
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
+
+if TYPE_CHECKING:
+    from swarm_forage_env.rendering.window import Window
 
 BatchStep: TypeAlias = tuple[ObsArray, np.ndarray, BoolArray, bool]
 """Observations (N, D), rewards (N,) float32, terminated (N,), truncated."""
@@ -37,7 +40,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - PettingZoo types it as an attribute of instances
         "name": "swarm_forage_v1",
-        "render_modes": ["rgb_array"],
+        "render_modes": ["rgb_array", "human"],
         "render_fps": 5,
         "is_parallelizable": True,
     }
@@ -56,7 +59,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         Args:
             scenario: The configuration.
             max_cycles: Steps until truncation; default the scenario's horizon.
-            render_mode: None or "rgb_array".
+            render_mode: None, "rgb_array", or "human": every reset and step is shown in a window, without waiting.
             reads: Observation slices that will be used; others may stay zero, which is faster. Default: all.
             snapshots: Keep what `snapshot`, `copy.deepcopy` and `pickle` need. With physics="compiled" that is nothing,
                 and they always work. With physics="chipmunk" it is a history of the run, 24 bytes per robot and tick,
@@ -66,14 +69,16 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         Raises:
             ConfigError: `scenario` is no ScenarioConfig, an unknown slice in `reads`, or `snapshots` is no bool.
             ValueError: max_cycles is no whole number >= 1, or an unknown render mode.
+            ImportError: render_mode is "human" and pygame is not installed.
         """
         instance("scenario", scenario, ScenarioConfig, hint="; `parallel_env` takes names of presets, too")
         if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ValueError(f"Expected render_mode None or 'rgb_array', got {render_mode!r}.")
+            raise ValueError(f"Expected render_mode None, 'rgb_array' or 'human', got {render_mode!r}.")
         if max_cycles is not None:
             max_cycles = as_whole("max_cycles", max_cycles, at_least=1, or_none=True)
         self.scenario = scenario
         self.render_mode = render_mode
+        self._window = _new_window() if render_mode == "human" else None
         self.max_cycles = scenario.horizon_ticks if max_cycles is None else max_cycles
         switch("snapshots", snapshots)
         self.arena = ForagingArena(scenario, reads=reads, snapshots=snapshots)
@@ -211,6 +216,8 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self._terminated[:] = False
         self.agents = list(self.possible_agents)
         self._last_obs = obs
+        if self._window is not None:
+            self.render()
         return obs
 
     def checked_actions(self, actions: ActionArray) -> ActionArray:
@@ -279,6 +286,8 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     def end_step(self, tasks: CodeArray | None = None) -> BatchStep:
         """Return the result of a step, after the arena's; see `step_batch`. `tasks` is for wrappers."""
         self._last_obs = self.arena.obs
+        if self._window is not None:
+            self.render()
         return self._last_obs, self._rewards.reward(), self._terminated, self.arena.tick >= self.max_cycles
 
     def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
@@ -456,12 +465,27 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         return np.clip(flat, -1.0, 1.0).astype(np.float32)
 
     def render(self) -> np.ndarray | None:
-        """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
+        """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None.
+
+        With "human" the picture is shown in a window. When the user closes it, the run goes on unseen.
+        """
         if self.render_mode is None:
             return None
         from swarm_forage_env.rendering.frame import render_frame  # an optional extra, imported only for a picture
 
-        return render_frame(self.scenario, self.swarm, self.objects, self.caches, self.events, tick=self.tick)
+        picture = render_frame(self.scenario, self.swarm, self.objects, self.caches, self.events, tick=self.tick)
+        if self._window is None:
+            return picture
+        self._window.show_picture(picture, title=self.scenario.name.replace("_", " "))
+        return None
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+
+
+def _new_window() -> "Window":
+    from swarm_forage_env.rendering.window import Window  # an optional extra, imported only for a window
+
+    return Window()

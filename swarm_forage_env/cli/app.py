@@ -24,6 +24,7 @@ from swarm_forage_env.cli.show import info, list_everything, schema
 from swarm_forage_env.cli.stuck import stuck
 from swarm_forage_env.cli.study import study
 from swarm_forage_env.cli.train import train
+from swarm_forage_env.cli.watch import watch
 
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
 """Base of typer's complaints about arguments; typer gives it no public name."""
@@ -56,7 +57,7 @@ for command in (run, score, compare, predict, choose, train):
     app.command()(command)
 app.add_typer(study, name="study")
 app.command("list")(list_everything)
-for command in (info, schema, rerun, record, replay, maps, stuck, ablate, availability):
+for command in (info, schema, rerun, watch, record, replay, maps, stuck, ablate, availability):
     app.command()(command)
 
 

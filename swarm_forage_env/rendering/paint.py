@@ -20,6 +20,11 @@ Colour: TypeAlias = tuple[int, int, int]
 _STAMP_BUDGET = 2_000_000
 """Pixels computed at once: this limits the memory of a call for any number of shapes."""
 
+_WHOLE_PIXEL = np.dtype((np.void, 12))
+_MOST_SPARE = 4
+_spare_zeros: dict[int, NDArray[np.float32]] = {}
+"""Size -> zeros that nobody uses now: making megabytes of them for each call took longer than the painting itself."""
+
 _Coverage: TypeAlias = Callable[[NDArray[np.float32], NDArray[np.float32], slice], NDArray[np.floating]]
 
 
@@ -55,18 +60,18 @@ def paint_discs(
     """Fill discs at `centre` (n, 2); `opacity` is one number or (n,)."""
 
     def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], _: slice) -> NDArray[np.floating]:
-        return np.clip(radius + 0.5 - np.hypot(dx, dy), 0.0, 1.0)
+        return np.clip(radius + 0.5 - _length(dx, dy), 0.0, 1.0)
 
-    _paint(canvas, centre, radius + 1.0, coverage, colour, opacity)
+    _paint(canvas, centre, radius + 0.5, coverage, colour, opacity)
 
 
 def paint_rings(canvas: Canvas, centre: ArrayLike, radius: float, line: float, colour: Colour) -> None:
     """Draw circles of mean radius `radius` and line width `line` around `centre` (n, 2)."""
 
     def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], _: slice) -> NDArray[np.floating]:
-        return np.clip((line + 1.0) / 2.0 - np.abs(np.hypot(dx, dy) - radius), 0.0, 1.0)
+        return np.clip((line + 1.0) / 2.0 - np.abs(_length(dx, dy) - radius), 0.0, 1.0)
 
-    _paint(canvas, centre, radius + line / 2.0 + 1.0, coverage, colour, 1.0)
+    _paint(canvas, centre, radius + (line + 1.0) / 2.0, coverage, colour, 1.0)
 
 
 def paint_squares(canvas: Canvas, centre: ArrayLike, side: float, colour: Colour, opacity: float = 1.0) -> None:
@@ -78,7 +83,7 @@ def paint_squares(canvas: Canvas, centre: ArrayLike, side: float, colour: Colour
         down = np.minimum(dy + 0.5, half) - np.maximum(dy - 0.5, -half)
         return np.clip(across, 0.0, 1.0) * np.clip(down, 0.0, 1.0)
 
-    _paint(canvas, centre, half + 1.0, coverage, colour, opacity)
+    _paint(canvas, centre, half + 0.5, coverage, colour, opacity)
 
 
 def paint_needles(
@@ -91,9 +96,9 @@ def paint_needles(
     def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], rows: slice) -> NDArray[np.floating]:
         ux, uy = along[rows, 0, None, None], along[rows, 1, None, None]
         forward = np.clip(dx * ux + dy * uy, -length / 2.0, length / 2.0)
-        return np.clip((line + 1.0) / 2.0 - np.hypot(dx - forward * ux, dy - forward * uy), 0.0, 1.0)
+        return np.clip((line + 1.0) / 2.0 - _length(dx - forward * ux, dy - forward * uy), 0.0, 1.0)
 
-    _paint(canvas, middle, (length + line) / 2.0 + 1.0, coverage, colour, 1.0)
+    _paint(canvas, middle, (length + line + 1.0) / 2.0, coverage, colour, 1.0)
 
 
 def paint_glows(canvas: Canvas, centre: ArrayLike, radius: float, colour: Colour, opacity: float) -> None:
@@ -103,6 +108,13 @@ def paint_glows(canvas: Canvas, centre: ArrayLike, radius: float, colour: Colour
         return np.clip(1.0 - (dx * dx + dy * dy) / (radius * radius), 0.0, 1.0) ** 3
 
     _paint(canvas, centre, radius, coverage, colour, opacity)
+
+
+def _length(dx: NDArray[np.floating], dy: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Length of vectors, broadcast: what `np.hypot` returns, in a third of its time."""
+    x, y = dx.astype(np.float64), dy.astype(np.float64)  # squares of these cannot overflow or lose digits
+    total = x * x + y * y
+    return np.sqrt(total, out=total).astype(np.float32)
 
 
 def _paint(
@@ -118,7 +130,7 @@ def _paint(
     Args:
         canvas: Painted in place.
         centre: (n, 2) pixel coordinates of the shapes' middles.
-        reach: Distance from the middle beyond which coverage is zero, pixels.
+        reach: Distance from the middle, along an axis, from which on coverage is zero, pixels.
         coverage: A function of the offsets from the middles to pixel centres, (k, 1, P) and (k, P, 1), and of the
             slice of the k shapes; returns shares in [0, 1], (k, P, P).
         colour: Colour of all shapes.
@@ -127,9 +139,14 @@ def _paint(
     assert canvas.flags.c_contiguous, "painting goes through a flat view"
     height, width = canvas.shape[:2]
     middle = np.asarray(centre, np.float64).reshape(-1, 2)
+    if len(middle) == 0:
+        return
     strength = np.broadcast_to(np.asarray(opacity, np.float32), (len(middle),))
-    share = np.zeros(height * width, np.float32)
-    offset = np.arange(-int(np.ceil(reach)), int(np.ceil(reach)) + 1)
+    share = _borrow_zeros(height * width)
+    reached = int(np.ceil(reach + 0.5)) - 1  # the centre of a pixel farther away is beyond reach
+    offset = np.arange(-reached, reached + 1)
+    around = width * offset[:, None] + offset
+    touched = []
     for rows in _chunks(len(middle), offset.size**2):
         corner = np.floor(middle[rows]).astype(np.int64)
         column = corner[:, 0, None, None] + offset[None, None, :]
@@ -137,11 +154,32 @@ def _paint(
         dx = (column + 0.5 - middle[rows, 0, None, None]).astype(np.float32)
         dy = (row + 0.5 - middle[rows, 1, None, None]).astype(np.float32)
         covered = coverage(dx, dy, rows) * strength[rows, None, None]
-        seen = (covered > 0) & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        np.maximum.at(share, (row * width + column)[seen], covered[seen])
-    touched = np.flatnonzero(share > 0)  # several times faster than on floats
+        seen = covered > 0
+        if corner.min() < reached or (corner >= (width - reached, height - reached)).any():
+            seen &= (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        place = np.flatnonzero(seen)
+        pixel = ((width * corner[:, 1] + corner[:, 0])[:, None, None] + around).reshape(-1)[place]
+        np.maximum.at(share, pixel, covered.reshape(-1)[place])
+        touched.append(pixel)
+    # A pixel that several shapes touch stands here several times; it gets the same value each time.
+    pixel = np.concatenate(touched)
     pixels = canvas.reshape(-1, 3)
-    pixels[touched] += (np.asarray(colour, np.float32) - pixels[touched]) * share[touched, None]
+    ground = pixels.take(pixel, axis=0)
+    mixed = np.asarray(colour, np.float32) - ground
+    mixed *= share.take(pixel)[:, None]
+    mixed += ground
+    # As one item of twelve bytes a pixel is stored three times faster than as a row of three numbers.
+    pixels.view(_WHOLE_PIXEL)[:, 0][pixel] = mixed.view(_WHOLE_PIXEL)[:, 0]
+    share[pixel] = 0.0
+    _spare_zeros[share.size] = share
+
+
+def _borrow_zeros(size: int) -> NDArray[np.float32]:
+    """Return an array of zeros; one that is put back into `_spare_zeros`, all zero again, need not be made anew."""
+    if len(_spare_zeros) > _MOST_SPARE:
+        _spare_zeros.clear()
+    spare = _spare_zeros.pop(size, None)
+    return np.zeros(size, np.float32) if spare is None else spare
 
 
 def _chunks(n_shapes: int, stamp_pixels: int) -> Iterator[slice]:

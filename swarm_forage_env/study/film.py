@@ -72,16 +72,7 @@ def record_run(
         number("trail_s", trail_s, at_least=0.0)
     path = check_film(path, fps, len(ticks))
     arena_view(scenario, size_px)  # refuses a bad size before the run starts
-    stating: object = policy
-    if isinstance(policy, str):
-        name = Path(policy).stem if is_policy_file(policy) else policy
-        found, pinned, stating = pin_policy(policy, parameters or {})
-        policy = load_policy(found, pinned)
-    elif parameters:
-        raise ConfigError(f"Expected parameters with a policy's name or file only, got them with {policy!r}.")
-    else:
-        name = getattr(policy, "name", type(policy).__name__)
-    scenario = replace(scenario, caches=chosen_caches(caches, stating, scenario))
+    policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
     title = f"{scenario.name.replace('_', ' ')}, {name}, {scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
     stack = build_env(scenario, wrappers, reads=getattr(policy, "reads", None))
     n_samples = round(trail_s * fps / speedup) + 1
@@ -100,6 +91,25 @@ def record_run(
                 progress(done, len(ticks))
 
     return write_film(frames(), path, fps=fps, n_frames=len(ticks))
+
+
+def cast_policy(
+    policy: str | Policy, scenario: ScenarioConfig, caches: str | None, parameters: Mapping[str, Any] | None
+) -> tuple[Policy, str, ScenarioConfig]:
+    """Return the policy as an object, its name for people, and the scenario with the caches that the run has.
+
+    Arguments and errors are those of `record_run`.
+    """
+    stating: object = policy
+    if isinstance(policy, str):
+        name = Path(policy).stem if is_policy_file(policy) else policy
+        found, pinned, stating = pin_policy(policy, parameters or {})
+        policy = load_policy(found, pinned)
+    elif parameters:
+        raise ConfigError(f"Expected parameters with a policy's name or file only, got them with {policy!r}.")
+    else:
+        name = getattr(policy, "name", type(policy).__name__)
+    return policy, name, replace(scenario, caches=chosen_caches(caches, stating, scenario))
 
 
 def _picture_ticks(scenario: ScenarioConfig, seconds: float, speedup: float, fps: float) -> list[int]:

@@ -54,7 +54,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
             wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
                 ("population:death_per_tick=0.01").
             max_cycles: Ticks until truncation; default the scenario's horizon.
-            render_mode: None or "rgb_array".
+            render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
             snapshots: Keep what copies and snapshots need; see `ForageEnv`.
             overrides: Scenario fields by name (`n_robots=20`).
 
@@ -153,6 +153,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - declared like this by Gymnasium
         **ForageEnv.metadata,
+        "render_modes": ["rgb_array"],  # a window shows one arena
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
 

@@ -73,7 +73,7 @@ def plan_arena(
         interface: See `chosen_interface`.
         wrappers: See `wrapper_configs`.
         max_cycles: Ticks until truncation; default the scenario's horizon.
-        render_mode: None or "rgb_array".
+        render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
         snapshots: Keep what copies and snapshots need; see `ForageEnv`.
 
     Raises:
@@ -141,6 +141,7 @@ class LearnerArena:
         """
         overrides = _scenario_overrides(options)
         if overrides is not None and overrides != self._overrides:
+            self.env.close()
             self._adopt(self._plan.build(overrides))
             self._overrides = overrides
         if seed is None:

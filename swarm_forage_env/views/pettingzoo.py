@@ -48,7 +48,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
                 ("population:death_per_tick=0.01"). Trainers that need a fixed number of agents take
                 "population:deaths=absorbing,...".
             max_cycles: Ticks until truncation; default the scenario's horizon.
-            render_mode: None or "rgb_array".
+            render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
             snapshots: Keep what copies and snapshots need; see `ForageEnv`.
             overrides: Scenario fields by name (`n_robots=20`).
 
@@ -228,7 +228,7 @@ def parallel_env(
         wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
             ("population:death_per_tick=0.01").
         max_cycles: Steps until truncation; default the scenario's horizon.
-        render_mode: None or "rgb_array".
+        render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
         snapshots: Keep what copies and snapshots need; see `ForageEnv`.
         overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
 

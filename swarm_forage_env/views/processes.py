@@ -224,7 +224,16 @@ class ArenaProcesses:
 
 
 def open_arenas(plan: ArenaPlan, n_arenas: int, n_processes: int) -> ArenaBatch | ArenaProcesses:
-    """Build arenas in this process (n_processes = 0) or in n_processes others; raises as their classes do."""
+    """Build arenas in this process (n_processes = 0) or in n_processes others.
+
+    Raises:
+        ValueError: render_mode is "human"; besides, as the classes of the arenas.
+    """
+    if plan.render_mode == "human":
+        raise ValueError(
+            "Expected render_mode None or 'rgb_array' for a vector environment, got 'human'; a window shows one arena, "
+            "of parallel_env or JointForageEnv."
+        )
     if n_processes:
         return ArenaProcesses(plan, n_arenas, n_processes)
     return ArenaBatch(plan, n_arenas)

@@ -34,7 +34,12 @@ class HandlingCost(SwarmWrapper):
         super().__init__(env, config)
         scenario = self.unwrapped.scenario
         self._pickup, self._drop = scenario.objects.pickup_ticks, scenario.objects.drop_ticks
-        self._signal = config.waveform.signal(scenario.dt_s)
+        self.reconfigure(config)
+
+    def reconfigure(self, config: "HandlingCostConfig") -> None:
+        """Go on under another configuration from the next tick on."""
+        self.made_from = config
+        self._signal = config.waveform.signal(self.unwrapped.scenario.dt_s)
 
     def on_reset(self, seed: int) -> None:
         """Start the waveform."""

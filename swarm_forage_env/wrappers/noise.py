@@ -62,6 +62,11 @@ class SensorNoise(SwarmWrapper):
     def __init__(self, env: ForageEnv | SwarmWrapper, config: "SensorNoiseConfig") -> None:
         """Wrap `env`."""
         super().__init__(env, config)
+        self.reconfigure(config)
+
+    def reconfigure(self, config: "SensorNoiseConfig") -> None:
+        """Go on under another configuration from the next tick on; with other noisy groups, all draws are others."""
+        self.made_from = config
         self._is_uniform = config.distribution == "uniform"
         exact = POSE_GROUPS if self.unwrapped.scenario.quirks.pose_sensors_exact else ()
         sigmas = config.group_sigmas().items()
@@ -141,14 +146,20 @@ class ActuatorNoise(SwarmWrapper):
     def __init__(self, env: ForageEnv | SwarmWrapper, config: "ActuatorNoiseConfig") -> None:
         """Wrap `env`."""
         super().__init__(env, config)
-        scenario, sigma = self.unwrapped.scenario, config.sigma
-        self._is_uniform = config.distribution == "uniform"
-        self._is_noisy = _is_noisy(sigma)
-        constant = Waveform(kind="constant", amplitude=sigma) if not isinstance(sigma, Waveform) else sigma
-        self._signal = constant.signal(scenario.dt_s)
+        scenario = self.unwrapped.scenario
+        self.reconfigure(config)
         self._unit_gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
         self._draws: ObsArray = np.zeros((scenario.robots.n_robots, 2), np.float32)
         self._gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
+
+    def reconfigure(self, config: "ActuatorNoiseConfig") -> None:
+        """Go on under another configuration from the next tick on."""
+        self.made_from = config
+        sigma = config.sigma
+        self._is_uniform = config.distribution == "uniform"
+        self._is_noisy = _is_noisy(sigma)
+        constant = Waveform(kind="constant", amplitude=sigma) if not isinstance(sigma, Waveform) else sigma
+        self._signal = constant.signal(self.unwrapped.scenario.dt_s)
 
     def on_reset(self, seed: int) -> None:
         """Start the random stream."""

@@ -14,6 +14,7 @@ from swarm_forage_env.wrappers.population_process import (
     EventTally,
     PopulationState,
     advance_population,
+    die,
 )
 
 BIRTH_MARGIN_M = 2.0
@@ -87,6 +88,14 @@ class PopulationDynamics(SwarmWrapper):
                 self._apply()
             self._next_tick = self._clocks.next_tick
         self._repair_ticks += len(self._state.repair_queue)
+
+    def kill(self, row: int) -> bool:
+        """Let one robot die now, between two ticks; returns whether it was alive."""
+        if not self._state.present[row]:
+            return False
+        die(self._state, row, self.unwrapped.tick + 1)
+        self._apply()
+        return True
 
     def interval_columns(self) -> dict[str, float]:
         """Return the events since the last call, the mean repair queue, and how long stays and absences were."""

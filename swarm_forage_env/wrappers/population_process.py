@@ -176,7 +176,7 @@ def advance_population(
     """
     changed = False
     if tick >= clocks.death.next_tick and state.present.any():
-        _die(state, clocks.death.choose(state.present), tick)
+        die(state, clocks.death.choose(state.present), tick)
         clocks.death.restart(tick)
         changed = True
     if (
@@ -199,7 +199,8 @@ def advance_population(
     return changed
 
 
-def _die(state: PopulationState, row: int, tick: int) -> None:
+def die(state: PopulationState, row: int, tick: int) -> None:
+    """Let a robot that is present leave for good; `tick` is the tick that is about to be executed."""
     if state.active[row]:
         _end_stay(state, row, tick)
     else:

@@ -35,10 +35,15 @@ class Throttle(SwarmWrapper):
         """Wrap `env`."""
         super().__init__(env, config)
         scenario = self.unwrapped.scenario
-        self._only_carriers = config.carriers
-        self._signal = config.waveform.signal(scenario.dt_s)
+        self.reconfigure(config)
         self._limits = drive_limits(scenario)
         self._gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
+
+    def reconfigure(self, config: "ThrottleConfig") -> None:
+        """Go on under another configuration from the next tick on."""
+        self.made_from = config
+        self._only_carriers = config.carriers
+        self._signal = config.waveform.signal(self.unwrapped.scenario.dt_s)
 
     def on_reset(self, seed: int) -> None:
         """Start the waveform."""

@@ -338,8 +338,8 @@ def test_constructor_errors():
             parallel_env(max_cycles=max_cycles, **SMALL)
     with pytest.raises(ConfigError, match=r"ScenarioConfig, got 'warehouse_small'; `parallel_env`"):
         ForageEnv("warehouse_small")
-    with pytest.raises(ValueError, match="render_mode None or 'rgb_array', got 'human'"):
-        parallel_env(render_mode="human", **SMALL)
+    with pytest.raises(ValueError, match="render_mode None, 'rgb_array' or 'human', got 'ansi'"):
+        parallel_env(render_mode="ansi", **SMALL)
     with pytest.raises(ConfigError, match="warehouse_small"):
         parallel_env("warehouse_smal")
     with pytest.raises(ConfigError, match="n_robots"):
