@@ -168,10 +168,8 @@ def main() -> None:
         for row in rows:
             if chosen.all or not row.alike:
                 print(row.text, flush=True)
-    print(
-        f"{n_alike} of {len(cases)} cases have the same numbers in both engines. In {n_apart} of all {n_rows} rows the"
-    )
-    print("interval of the difference leaves out zero.")
+    print(f"{n_alike} of {len(cases)} cases have the same numbers in both engines.")
+    print(f"In {n_apart} of all {n_rows} rows the interval of the difference leaves out zero.")
 
 
 if __name__ == "__main__":
