@@ -136,15 +136,14 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     @property
     def _world(self) -> ForagingArena:
         """The arena; raises RuntimeError before the first reset."""
-        if self.seed_value is None:
-            raise self._not_begun()
+        self._require_reset()
         return self.arena
 
-    @staticmethod
-    def _not_begun() -> RuntimeError:
-        return RuntimeError(
-            "There is no world before the first reset. Call reset before step, state, render or snapshot."
-        )
+    def _require_reset(self) -> None:
+        if self.seed_value is None:
+            raise RuntimeError(
+                "There is no world before the first reset. Call reset before step, state, render or snapshot."
+            )
 
     @property
     def swarm(self) -> SwarmState:
@@ -273,8 +272,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         `begin_step`, the arena's step and `end_step` are `step_batch`; this is for arenas that are stepped together
         (`world.rack`).
         """
-        if self.seed_value is None:
-            raise self._not_begun()
+        self._require_reset()
         actions = self.checked_actions(actions)
         if wheel_gain is not None and wheel_gain.shape != (len(actions), 2):
             raise ActionError(

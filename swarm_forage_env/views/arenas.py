@@ -11,8 +11,7 @@ Row `a * N + i` is always robot i of arena a. The life of a row:
   `ArenaStep.is_episode` is false for them.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
@@ -242,14 +241,10 @@ class ArenaBatch:
         ticks: list[tuple[BoolArray, bool, bool]] = [(np.zeros(0, np.bool_), False, False)] * self.n_arenas
         going = list(range(self.n_arenas))
         for _ in range(self.interface.config.decision_ticks):
-            gains: dict[int, FloatArray | None] = {}
-            for number in going:
-                with self._noted(number):
-                    arena = self.arenas[number]
-                    self._commands[number], gains[number] = arena.env.begin_step(arena.command(actions[number]))
+            gains = {number: self._begin(number, actions[number]) for number in going}
             for number, error in rack.step(gains, self._commands).items():
-                with self._noted(number):
-                    raise error
+                self._note(error, number)
+                raise error
             for number in going:
                 arena = self.arenas[number]
                 ticks[number] = arena.take(arena.env.end_step(), rewards[number])
@@ -258,21 +253,29 @@ class ArenaBatch:
                 break
         return ticks
 
-    def _alone(self, number: int, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
-        with self._noted(number):
-            return self.arenas[number].step(actions, rewards)
-
-    @contextmanager
-    def _noted(self, number: int) -> Iterator[None]:
-        """Tell in every refusal of actions in which arena it was."""
+    def _begin(self, number: int, actions: np.ndarray) -> FloatArray | None:
+        """Write the commands of an arena's next tick; returns the gains on the wheels' speeds, if there are any."""
+        arena = self.arenas[number]
         try:
-            yield
+            self._commands[number], gain = arena.env.begin_step(arena.command(actions))
         except ValueError as error:
-            error.add_note(
-                f"This was in arena {self._first_arena + number}, which was not stepped. Other arenas may have "
-                "been stepped already; where there are others, reset before going on."
-            )
+            self._note(error, number)
             raise
+        return gain
+
+    def _alone(self, number: int, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
+        try:
+            return self.arenas[number].step(actions, rewards)
+        except ValueError as error:
+            self._note(error, number)
+            raise
+
+    def _note(self, error: ValueError, number: int) -> None:
+        """Add to a refusal of actions in which arena it was."""
+        error.add_note(
+            f"This was in arena {self._first_arena + number}, which was not stepped. Other arenas may have been "
+            "stepped already; where there are others, reset before going on."
+        )
 
     def _rack(self) -> Rack | None:
         """Return what steps all arenas together, None where they have to be stepped one by one."""
