@@ -103,9 +103,9 @@ def calls_in(tree: ast.AST) -> set[str]:
 
 @cache
 def calls_of_functions() -> dict[str, set[str]]:
-    """Return what every function of the packages calls, by the last names of both."""
+    """Return what every function of the packages calls, by the last names of both, without the commands on top."""
     found: dict[str, set[str]] = {}
-    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
+    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py") if path.parent.name != "cli"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef):
                 found.setdefault(node.name, set()).update(calls_in(node))
