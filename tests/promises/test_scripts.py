@@ -1,30 +1,49 @@
 """Scripts of measurements run: short, to see that they still fit the packages."""
 
-import subprocess
+import runpy
 import sys
 from pathlib import Path
 
 import pytest
 
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study.run import run_one
+from swarm_forage_env.study.spec import plan_run
+from swarm_forage_env.study.store import RunStore
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def run(*words: str, cwd: Path) -> str:
-    done = subprocess.run([sys.executable, *words], cwd=cwd, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    """Run a script in an empty folder, in this process: a new one would import for seconds; returns code and texts."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+
+    def call(script, *words):
+        monkeypatch.setattr(sys, "argv", [f"{script}.py", *words])
+        code = 0
+        try:
+            runpy.run_path(str(ROOT / f"scripts/{script}.py"), run_name="__main__")
+        except SystemExit as end:
+            code = end.code
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return call
 
 
 @pytest.mark.compiled
-def test_conflicts_over_one_object_are_counted(tmp_path):
-    words = ("--scenario", "warehouse_small", "--seeds", "1", "--seconds", "20")
-    assert "unresolved" in run(str(ROOT / "scripts/contact_conflicts.py"), *words, cwd=tmp_path)
+def test_conflicts_over_one_object_are_counted(run):
+    code, out, _ = run("contact_conflicts", "--scenario", "warehouse_small", "--seeds", "1", "--seconds", "20")
+    assert code == 0
+    assert "unresolved" in out
 
 
 @pytest.mark.compiled
-def test_two_engines_are_compared(tmp_path):
+def test_two_engines_are_compared(run):
     words = ("--policy", "dpo", "--robots", "30", "--seeds", "2", "--horizon", "20", "--all")
-    lines = run(str(ROOT / "scripts/compare_engines.py"), *words, cwd=tmp_path).splitlines()
+    lines = run("compare_engines", *words)[1].splitlines()
     assert len(lines) == 2 + 9 + 2
     assert all(line.startswith("| warehouse_small | dpo | 30 |") for line in lines[2:11])
     assert lines[11:] == [
@@ -33,17 +52,16 @@ def test_two_engines_are_compared(tmp_path):
     ]
 
 
-@pytest.mark.compiled
-def test_two_versions_are_drawn_beside_each_other(tmp_path):
+def test_two_versions_are_drawn_beside_each_other(run):
     pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
-    for robots in ("2", "4"):
-        run(
-            "-m", "swarm_forage_env.cli", "run", "--policy", "crw", "--robots", robots, "--horizon", "4",
-            "--set", "interval_s=4", "--jobs", "1", "--out", "runs/warehouse_small", cwd=tmp_path,
-        )  # fmt: skip
-    printed = run(str(ROOT / "scripts/compare_versions.py"), "runs", "runs", "picture.png", cwd=tmp_path)
-    assert "| 4 | 0.0 → 0.0 |" in printed
-    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
+    store = RunStore("runs/warehouse_small")
+    for robots in (2, 4):
+        world = scenario("warehouse_small", n_robots=robots, horizon_s=4.0, interval_s=4.0)
+        store.write(run_one(plan_run(world, "crw")))
+    code, out, _ = run("compare_versions", "runs", "runs", "picture.png")
+    assert code == 0
+    assert "| 4 | 0.0 → 0.0 |" in out
+    assert Path("picture.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
@@ -63,13 +81,12 @@ def test_two_versions_are_drawn_beside_each_other(tmp_path):
         ("bench", "--only nothing", "expected --only to be part of the name of a case, got 'nothing'"),
     ],
 )
-def test_bad_arguments_end_in_a_message(script, words, fault, tmp_path):
-    (tmp_path / "taken").touch()
-    program = [sys.executable, str(ROOT / f"scripts/{script}.py"), *words.split()]
-    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 2, done.stderr
-    assert f"{script}.py: error: {fault}" in " ".join(done.stderr.split())
-    assert done.stdout == ""
+def test_bad_arguments_end_in_a_message(script, words, fault, run):
+    Path("taken").touch()
+    code, out, err = run(script, *words.split())
+    assert code == 2, err
+    assert f"{script}.py: error: {fault}" in " ".join(err.split())
+    assert out == ""
 
 
 @pytest.mark.parametrize(
@@ -80,11 +97,10 @@ def test_bad_arguments_end_in_a_message(script, words, fault, tmp_path):
         ((), "required: --venvs"),
     ],
 )
-def test_other_packages_are_refused_with_what_was_expected(words, said, tmp_path):
-    command = [sys.executable, str(ROOT / "scripts/bench_peers.py"), *words]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert said in done.stderr
+def test_other_packages_are_refused_with_what_was_expected(words, said, run):
+    code, _, err = run("bench_peers", *words)
+    assert code == 2
+    assert said in err
 
 
 def test_a_package_beside_ours_has_a_row(monkeypatch):
