@@ -31,8 +31,8 @@ def elsewhere() -> dict[str, str]:
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize(("name", "caches", "policy"), RUNS)
-def test_a_seed_is_a_run(name, caches, policy, elsewhere):
+@pytest.mark.parametrize(("policy", "name", "caches"), RUNS)
+def test_a_seed_is_a_run(policy, name, caches, elsewhere):
     env = make(name, caches)
     first = digest(env, fresh(policy), 17)
     assert digest(make(name, caches), fresh(policy), 17) == first, "another instance"
