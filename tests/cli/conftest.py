@@ -5,6 +5,19 @@ import sys
 import pytest
 
 from swarm_forage_env import cli
+from tests.support.pictures import keep_figures
+
+
+@pytest.fixture
+def painted():
+    """Ask for this in a test of the picture itself."""
+
+
+@pytest.fixture(autouse=True)
+def unpainted(request, monkeypatch):
+    """Most tests are about words; to paint a picture takes several times as long as the rest of a short command."""
+    if "painted" not in request.fixturenames:
+        keep_figures(monkeypatch)
 
 
 @pytest.fixture

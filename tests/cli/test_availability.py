@@ -47,7 +47,7 @@ def test_sizes_teams_and_demands_are_chosen(command):
     assert rows(out) == [[2, 1, 0.6, 1.0, 0.143, 0.0]]
 
 
-def test_the_picture_is_written_beside_the_table(command):
+def test_the_picture_is_written_beside_the_table(command, painted):
     code, out, err = command("availability", "--robots", "4,9", "--teams", "2.5", "--out", "some/where.png")
     assert code == 0
     assert len(rows(out)) == 2

@@ -6,7 +6,7 @@ import pytest
 
 
 @pytest.mark.compiled
-def test_maps_draws_runs_and_differences(command):
+def test_maps_draws_runs_and_differences(command, painted):
     pytest.importorskip("matplotlib")
     words = ("--robots", "3", "--seconds", "4")
     assert command("replay", "random", "--beside", "crw", *words, "-o", "two.html")[0] == 0

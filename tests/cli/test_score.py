@@ -31,7 +31,7 @@ def tiny_budget(monkeypatch):
     monkeypatch.setitem(BUDGETS, "tiny", tiny)
 
 
-def test_score_shows_every_measure_keeps_records_and_draws_a_picture(command):
+def test_score_shows_every_measure_keeps_records_and_draws_a_picture(command, painted):
     code, out, err = command(*SCORE)
     assert code == 0
     assert out.splitlines()[0] == "random in warehouse_small, budget tiny, 2 seeds, 4 s"

@@ -36,7 +36,7 @@ def test_help_tells_the_rewards_of_the_recipe():
 
 
 @needs_training
-def test_trains_shows_evaluations_and_goes_on(command):
+def test_trains_shows_evaluations_and_goes_on(command, painted):
     words = ("train", *TINY, "--set", "nest_progress=0.07")
     code, _, err = command(*words)
     assert code == 0, err

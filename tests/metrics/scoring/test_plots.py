@@ -11,8 +11,7 @@ from metrics.scoring.plots import draw_scores
 from metrics.scoring.study_scores import score_study
 from metrics.scoring.table import ScoreTable
 from tests.support.curve_tables import rows, table
-
-PNG = b"\x89PNG"
+from tests.support.pictures import PNG, keep_figures
 
 
 def tables(*names, runs=((1.0, 2.0), (2.0, 2.0))):
@@ -27,17 +26,8 @@ def tables(*names, runs=((1.0, 2.0), (2.0, 2.0))):
 
 
 def drawn(monkeypatch, path, given, **options):
-    """Draw, and return the figure that was saved."""
-    from matplotlib.figure import Figure
-
-    figures = []
-    save = Figure.savefig
-
-    def keep(self, *args, **kwargs):
-        figures.append(self)
-        save(self, *args, **kwargs)
-
-    monkeypatch.setattr(Figure, "savefig", keep)
+    """Draw, and return the figure that was saved, unpainted."""
+    figures = keep_figures(monkeypatch)
     draw_scores(given, path, **options)
     return figures[0]
 
@@ -48,8 +38,9 @@ def panel_of(figure, title):
 
 def test_one_panel_per_measure_and_one_line_per_policy(tmp_path, monkeypatch):
     given = tables("mine", "theirs")
-    figure = drawn(monkeypatch, tmp_path / "scores.png", given)
+    draw_scores(given, tmp_path / "scores.png")
     assert (tmp_path / "scores.png").read_bytes().startswith(PNG)
+    figure = drawn(monkeypatch, tmp_path / "scores.png", given)
     titles = [axes.get_title() for axes in figure.axes if axes.axison]
     measures = dict.fromkeys(score.measure for score in given[0].scores)
     assert list(dict.fromkeys(title.split()[0].rstrip(",") for title in titles)) == list(measures)
