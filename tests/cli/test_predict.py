@@ -1,18 +1,26 @@
 """The command `predict`, as a person uses it."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from metrics import SizeLaw
+from metrics import SizeLaw, predict_performance
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.study.runner import StudyInterrupted, StudyResult
 from swarm_forage_env.study.store import load
 
 RUNS = ("predict", "--policy", "crw", "--fit", "1,2,3,4", "--hold", "6", "--seeds", "2", "--jobs", "1")
 WORLD = ("--horizon", "4", "--set", "interval_s=2", "--objects", "20")
+
+
+@pytest.fixture(autouse=True)
+def few_resamples(monkeypatch):
+    """How an interval is told does not need the resamples that make it exact; they take most of the time."""
+    few = partial(predict_performance, n_resamples=50)
+    monkeypatch.setattr("metrics.scoring.prediction.predict_performance", few)
 
 
 @pytest.fixture
@@ -51,7 +59,7 @@ def one_object_per_robot(monkeypatch):
     monkeypatch.setattr(prediction, "run_totals", totals)
 
 
-def test_predict_runs_all_sizes_prints_the_prediction_and_draws_it(command, one_object_per_robot):
+def test_predict_runs_all_sizes_prints_the_prediction_and_draws_it(command, one_object_per_robot, painted):
     code, out, err = command(*RUNS, *WORLD)
     assert code == 0
     assert out.splitlines()[0] == "crw in warehouse_small: objects in 4 s, fitted to 1, 2, 3, 4 robots"

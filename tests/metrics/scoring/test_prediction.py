@@ -2,11 +2,12 @@
 
 import json
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from metrics import CurveError, SizeLaw, predict_curves, predict_policy
+from metrics import CurveError, SizeLaw, predict_curves, predict_performance, predict_policy
 from metrics.scoring.prediction import counted_inside, law_text, plan_prediction, run_predictions
 from metrics.scoring.prediction_plots import draw_predictions
 from metrics.scoring.totals import PolicyTotals
@@ -14,6 +15,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.experiments import Budget, plan_experiments
 from swarm_forage_env.study.store import load
+from tests.support.pictures import PNG, keep_figures
 
 WORLD = scenario("warehouse_small", n_objects=20, horizon_s=4.0, interval_s=2.0)
 LAW = SizeLaw(name="universal", a=5.0, contention=0.02, coherency=0.002)
@@ -40,6 +42,13 @@ class Failing:
 
     def act(self, obs, active):
         return np.zeros((len(obs), 3), np.float32)
+
+
+@pytest.fixture(autouse=True)
+def few_resamples(monkeypatch):
+    """How an interval is told does not need the resamples that make it exact; they take most of the time."""
+    few = partial(predict_performance, n_resamples=50)
+    monkeypatch.setattr("metrics.scoring.prediction.predict_performance", few)
 
 
 def test_curves_of_a_known_law_are_predicted(tmp_path):
@@ -250,16 +259,12 @@ def test_failed_runs_are_named():
 
 
 def test_the_picture_shows_runs_law_interval_and_critical_size(tmp_path, monkeypatch):
-    from matplotlib.figure import Figure
-
-    figures = []
-    save = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda self, *given, **options: (figures.append(self),
-                                                                           save(self, *given, **options)))  # fmt: skip
     mine = predict_curves(curves_file(tmp_path / "a.csv"), hold=[32, 64])
     linear = predict_curves(curves_file(tmp_path / "b.csv", SizeLaw(name="linear", a=2.0), name="other"))
     draw_predictions([*mine, *linear], tmp_path / "prediction.png")
-    assert (tmp_path / "prediction.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "prediction.png").read_bytes().startswith(PNG)
+    figures = keep_figures(monkeypatch)
+    draw_predictions([*mine, *linear], tmp_path / "prediction.png")
     figure = figures[0]
     first, second = figure.axes
     assert first.get_title() == "mine"
