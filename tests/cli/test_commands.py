@@ -26,7 +26,7 @@ SHORT = ("--robots", "3", "--objects", "20", "--horizon", "4", "--set", "interva
 RUN = ("run", "--policy", "random", *SHORT)
 
 
-def test_run_shows_a_table_and_keeps_records_and_a_picture(command):
+def test_run_shows_a_table_and_keeps_records_and_a_picture(command, painted):
     code, out, err = command(*RUN, "--seeds", "2")
     assert code == 0
     assert "warehouse_small: 3 robots, 20 objects, 4 s" in out
@@ -245,8 +245,12 @@ def test_ctrl_c_with_worker_processes(tmp_path):
         "2",
         "--seeds",
         "6",
+        "--robots",
+        "5",
+        "--objects",
+        "20",
         "--horizon",
-        "20000",
+        "40000",
         "--out",
         str(tmp_path),
     ]
