@@ -77,11 +77,11 @@ def test_the_map_is_held_to_the_tree(tmp_path, monkeypatch, capsys):
 
 
 def run_tests(folder: Path, source: str, *options: str) -> subprocess.CompletedProcess[str]:
-    """Run a file of tests under our conftest."""
+    """Run files of tests under our conftest: one with this source, and those that are there."""
     shutil.copy(ROOT / "tests/conftest.py", folder)
     (folder / "test_it.py").write_text(f"import pytest\n{source}")
     program = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", str(folder), *options]
-    return subprocess.run([*program, "test_it.py"], cwd=folder, capture_output=True, text=True, check=False)
+    return subprocess.run(program, cwd=folder, capture_output=True, text=True, check=False)
 
 
 PASSES = "def test_passes(): pass\n"
@@ -90,17 +90,13 @@ UNNAMED = "def test_unnamed(): pytest.skip('no time')\n"
 
 
 def test_a_skip_without_a_name_fails_and_is_listed(tmp_path):
+    """That of one test, and that of a file as a whole."""
+    (tmp_path / "test_all_of_it.py").write_text(f"import pytest\npytest.importorskip('no_such_module')\n{PASSES}")
     done = run_tests(tmp_path, PASSES + NAMED + UNNAMED, "--no-skips", "--skips-to", "list")
     assert done.returncode == pytest.ExitCode.TESTS_FAILED, done.stdout
-    assert (tmp_path / "list").read_text() == "test_it.py::test_unnamed\n"
+    assert (tmp_path / "list").read_text() == "test_all_of_it.py\ntest_it.py::test_unnamed\n"
     assert "skipped, which --no-skips forbids: test_it.py::test_unnamed: no time" in done.stdout
     assert "skipped, and named: 1 x needs ray: scripts/test_bridges" in done.stdout
-
-
-def test_a_file_that_is_skipped_as_a_whole_counts(tmp_path):
-    done = run_tests(tmp_path, f"pytest.importorskip('no_such_module')\n{PASSES}", "--no-skips", "--skips-to", "list")
-    assert done.returncode != 0
-    assert (tmp_path / "list").read_text() == "test_it.py\n"
 
 
 @pytest.mark.parametrize(("source", "options"), [(PASSES + NAMED, ["--no-skips"]), (PASSES + UNNAMED, [])])
