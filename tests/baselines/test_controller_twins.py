@@ -61,7 +61,7 @@ def test_compiled_controller_acts_like_the_slow_one(policy_class, quirks):
     twins = [ReferenceRobot(task, ObjectDictionary() if has_memory else None) for _ in range(N_ROBOTS)]
     activities: set[int] = set()
     stages: set[int] = set()
-    for _ in range(1500):
+    for _ in range(600):
         for i, twin in enumerate(twins):
             fuzz.perturb(i, twin.goal if has_memory else None)
         active = fuzz.rng.random(N_ROBOTS) < 0.95
@@ -113,7 +113,7 @@ def test_only_declared_slices_are_read(policy_class):
     assert unread
     assert "light if carrying" in policy_class.reads
     active = np.ones(N_ROBOTS, bool)
-    for _ in range(500):
+    for _ in range(150):
         for i in range(N_ROBOTS):
             fuzz.perturb(i, None)
         expected = plain.act(fuzz.seen.array, active).copy()
@@ -134,7 +134,7 @@ def test_actions_repeat_with_the_seed_and_stay_in_range(policy_class):
         policy = policy_class()
         policy.reset(task, np.random.default_rng(seed))
         history = []
-        for _ in range(300):
+        for _ in range(100):
             for i in range(N_ROBOTS):
                 fuzz.perturb(i, None)
             history.append(policy.act(fuzz.seen.array, np.ones(N_ROBOTS, bool)).copy())

@@ -122,7 +122,7 @@ def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings(quirks):
     env.set_population(active=active, present=present)
     rng = np.random.default_rng(2)
     flagged, share = 0, 0.0
-    for _ in range(40):
+    for _ in range(12):
         env.step_batch(rng.uniform(-1, 1, (60, 3)).astype(np.float32))
         expected = [sensing.interferes(env, robot) for robot in range(60)]
         assert env.events.interfering.tolist() == expected
@@ -131,4 +131,4 @@ def test_flags_and_sums_equal_those_of_the_slow_rule_on_slow_readings(quirks):
     assert flagged > 20
     assert env.events.counters[Counter.INTERFERING] == flagged
     assert env.events.interference_sum[0] == pytest.approx(share)
-    assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [40 * 50, 40 * 55]
+    assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [12 * 50, 12 * 55]

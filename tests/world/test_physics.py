@@ -137,11 +137,8 @@ def test_a_wall_stops_but_does_not_hold_back_a_sliding_robot_entirely():
     assert swarm.position[0, 1] <= config.arena.interior_m[3] - RADIUS_M + ROUNDING_M
 
 
-WALLS_AND_CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)]
-
-
 @pytest.mark.compiled
-@pytest.mark.parametrize("at", WALLS_AND_CORNERS)
+@pytest.mark.parametrize("at", [(0, 0), (1, 1), (0.5, 0), (1, 0.5)])  # two corners have all four walls
 def test_a_crowd_does_not_push_anybody_through_a_wall(at):
     x_low, y_low, x_high, y_high = scenario("warehouse_small").arena.interior_m
     corner = np.array([x_low + at[0] * (x_high - x_low), y_low + at[1] * (y_high - y_low)])

@@ -1,5 +1,7 @@
 """Every slice of the observation against a slow twin, and the numbers of the sensor models."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -77,8 +79,7 @@ def build_two_caches(env: ForageEnv) -> None:
         build_cache(env, sorted({*rows, *square[square >= 0].tolist()}), centre)
 
 
-@pytest.mark.parametrize("caches", CACHE_KINDS)
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
+@pytest.mark.parametrize(("name", "caches"), [*zip(SCENARIO_NAMES, itertools.cycle(CACHE_KINDS), strict=False)])
 def test_every_slice_equals_its_twin_along_a_run(name, caches):
     env = ForageEnv(scenario(name, n_robots=12, caches=caches, **crowding(name)))
     assert_matches_twin(env, env.reset_batch(5))

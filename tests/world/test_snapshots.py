@@ -32,7 +32,7 @@ def small(**options) -> ForageEnv:
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("physics", PHYSICS_ENGINES)
-@pytest.mark.parametrize(("name", "caches"), zip(SCENARIO_NAMES, itertools.cycle(CACHES), strict=False))
+@pytest.mark.parametrize(("name", "caches"), [*zip(SCENARIO_NAMES, itertools.cycle(CACHES), strict=False)])
 def test_a_run_goes_on_from_a_snapshot(name, caches, physics):
     run = Branch(crowded(name, caches, physics), BusyPolicy()).go_on(150)
     snapshot = run.env.snapshot()

@@ -139,7 +139,7 @@ def test_policies_wait_and_deliver_less(policy):
 
 
 def test_a_world_with_slow_handling_equals_the_wrapper_that_makes_it_slow():
-    world = quick_world("warehouse_small", horizon_s=60.0, interval_s=60.0)
+    world = quick_world("warehouse_small", n_robots=20, horizon_s=60.0, interval_s=60.0)
     slow = with_overrides(world, pickup_ticks=7, drop_ticks=7)
     fields = run_one(plan_run(slow, "crw", seed=2))
     wrapped = run_one(plan_run(world, "crw", wrappers=(constant(7.4),), seed=2))

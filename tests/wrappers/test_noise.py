@@ -169,7 +169,7 @@ def test_without_noise_observations_are_bitwise_the_same(world, sigma):
 def test_the_world_and_its_rules_use_the_truth():
     config = scenario("warehouse_small", n_robots=40, caches="static")
     rng = np.random.default_rng(0)
-    actions = rng.uniform(-0.3, 1.0, (80, 40, 3)).astype(np.float32)
+    actions = rng.uniform(-0.3, 1.0, (30, 40, 3)).astype(np.float32)
     bare, wrapped = ForageEnv(config), SensorNoise(ForageEnv(config), SensorNoiseConfig(sigma=0.5))
     bare.reset_batch(1)
     wrapped.reset_batch(1)

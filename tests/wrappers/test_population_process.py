@@ -56,8 +56,8 @@ def test_waiting_times_are_floored_exponentials(rate):
 
 def test_gaps_between_events_follow_the_clock():
     """At most one event per tick: a wait of 0 ends in the next tick, like a wait of 1."""
-    rate, n_robots = 0.4, 20_000
-    history = simulate_population(EventRates(death=rate), n_robots, 30_000, seed=3)
+    rate, n_robots = 0.4, 8_000
+    history = simulate_population(EventRates(death=rate), n_robots, 10_000, seed=3)
     deaths = np.flatnonzero(np.diff(history.n_present, prepend=n_robots)) + 1
     gaps = np.diff(deaths, prepend=0)
     counts = np.bincount(gaps, minlength=12)
@@ -305,7 +305,7 @@ def test_more_robots_than_rows_or_none_are_refused(initial_robots):
 
 @pytest.mark.parametrize(("level", "expected", "deviation"), [(0, 45.4, 3.0), (7, 37.7, 7.0)])
 def test_mean_active_robots_of_the_small_warehouse(level, expected, deviation):
-    config, n_runs = malfunction_levels(50)[level], 400
+    config, n_runs = malfunction_levels(50)[level], 100
     means = [simulate_population(config.rates, 50, RUN_TICKS, seed).n_active.mean() for seed in range(n_runs)]
     error = deviation / np.sqrt(n_runs)
     assert np.mean(means) == pytest.approx(expected, abs=0.05 + 3 * error)
