@@ -250,7 +250,7 @@ def test_ctrl_c_with_worker_processes(tmp_path):
         "--objects",
         "20",
         "--horizon",
-        "40000",
+        "10000",
         "--out",
         str(tmp_path),
     ]
