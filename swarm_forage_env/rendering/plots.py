@@ -132,28 +132,28 @@ def draw_availability(path: str | Path, curves: Mapping[int, FloatArray], teams:
 
 def draw_maps(
     path: str | Path,
-    rows: Sequence[tuple[str, Mapping[str, FloatArray], bool]],
+    rows: Sequence[tuple[str, Mapping[str, FloatArray], bool, tuple[float, float]]],
     titles: Mapping[str, str],
-    size_m: tuple[float, float],
 ) -> None:
-    """Draw maps of a floor: a row of panels per run or difference, a column per quantity.
+    """Draw maps of floors of the same proportions: a row of panels per map or difference, a column per quantity.
 
     Args:
         path: File to write; its suffix chooses the format (.png, .svg, .pdf).
-        rows: Label; arrays (ny, nx) by name, row = y from below; and whether they are differences.
+        rows: Label; arrays (ny, nx) by name, row = y from below; whether they are differences; and the extent of the
+            floor along x and y in m.
         titles: Headline of each column, by name of the array; their order is that of the columns.
-        size_m: Extent of the floor along x and y.
 
     Raises:
         ImportError: matplotlib is not installed.
     """
     from matplotlib.figure import Figure
 
-    width, height = 4.2, 4.2 * size_m[1] / size_m[0] + 0.7
+    shape = rows[0][3][1] / rows[0][3][0]
+    width, height = 4.2, 3.5 * shape + 0.7
     figure = Figure(figsize=(width * len(titles), height * len(rows)), layout="constrained")
     panels = figure.subplots(len(rows), len(titles), squeeze=False)
-    bar = min(1.0, 1.2 * size_m[1] / size_m[0])  # as long as a panel is high
-    for (label, arrays, is_difference), line in zip(rows, panels, strict=True):
+    bar = min(1.0, 1.2 * shape)  # as long as a panel is high
+    for (label, arrays, is_difference, size_m), line in zip(rows, panels, strict=True):
         for (name, title), axes in zip(titles.items(), line, strict=True):
             values = arrays[name]
             # Few squares hold most; the last percent would leave all others in one colour.
