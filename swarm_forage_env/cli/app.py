@@ -19,6 +19,7 @@ from swarm_forage_env.cli.record import record
 from swarm_forage_env.cli.replay import replay
 from swarm_forage_env.cli.rerun import rerun
 from swarm_forage_env.cli.run import run
+from swarm_forage_env.cli.saliency import saliency
 from swarm_forage_env.cli.score import score
 from swarm_forage_env.cli.show import info, list_everything, schema
 from swarm_forage_env.cli.stuck import stuck
@@ -57,7 +58,7 @@ for command in (run, score, compare, predict, choose, train):
     app.command()(command)
 app.add_typer(study, name="study")
 app.command("list")(list_everything)
-for command in (info, schema, rerun, watch, record, replay, maps, stuck, ablate, availability):
+for command in (info, schema, rerun, watch, record, replay, maps, saliency, stuck, ablate, availability):
     app.command()(command)
 
 

@@ -166,3 +166,34 @@ def draw_maps(
             axes.tick_params(labelsize=7)
             figure.colorbar(image, ax=axes, shrink=bar).ax.tick_params(labelsize=7)
     figure.savefig(path, dpi=110)
+
+
+def draw_saliency(
+    path: str | Path, slices: Sequence[str], bars: Mapping[str, FloatArray], *, title: str, xlabel: str
+) -> None:
+    """Draw what a network looks at: a group of bars per slice of its observations, the longest on top.
+
+    Args:
+        path: File to write; its suffix chooses the format (.png, .svg, .pdf).
+        slices: (S,) names.
+        bars: Name of a group of robots -> (S,) lengths.
+        title: Headline.
+        xlabel: What the lengths are.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    from matplotlib.figure import Figure
+
+    order = np.argsort(np.max([*bars.values()], axis=0), kind="stable")
+    height = 0.8 / len(bars)
+    figure = Figure(figsize=(7.0, 1.2 + 0.42 * len(slices)), layout="constrained")
+    axes = figure.subplots()
+    for index, (group, lengths) in enumerate(bars.items()):
+        places = np.arange(len(slices)) + (0.5 * (len(bars) - 1) - index) * height
+        axes.barh(places, lengths[order], height, color=COLOURS[index], label=f"{group} robots")
+    axes.set_yticks(np.arange(len(slices)), [slices[row].replace("_", " ") for row in order.tolist()])
+    axes.set(title=title, xlabel=xlabel, xlim=(0, None))
+    axes.grid(alpha=0.3, axis="x")
+    axes.legend(frameon=False, loc="lower right")
+    figure.savefig(path, dpi=110)
