@@ -12,6 +12,7 @@ from swarm_forage_env.cli.ablate import ablate
 from swarm_forage_env.cli.availability import availability
 from swarm_forage_env.cli.choose import choose
 from swarm_forage_env.cli.compare import compare
+from swarm_forage_env.cli.curves import curves
 from swarm_forage_env.cli.maps import maps
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE, complain
 from swarm_forage_env.cli.predict import predict
@@ -54,7 +55,7 @@ def _options(
 
 
 # `--help` lists them in this order.
-for command in (run, score, compare, predict, choose, train):
+for command in (run, score, compare, predict, choose, train, curves):
     app.command()(command)
 app.add_typer(study, name="study")
 app.command("list")(list_everything)

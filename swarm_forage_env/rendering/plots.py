@@ -58,25 +58,22 @@ def draw_curves(
     figure.savefig(path, dpi=150)
 
 
-def draw_training(
+def draw_trainings(
     path: str | Path,
-    steps: Sequence[int],
-    performance: Sequence[float],
-    interference: Sequence[float],
+    trainings: Mapping[str, tuple[Sequence[int], Sequence[float], Sequence[float]]],
     *,
-    baseline: tuple[str, float],
+    beside: Mapping[str, tuple[float, float]],
     stage_ends: Sequence[int],
     title: str,
     ylabel: str,
 ) -> None:
-    """Draw how a policy did in the evaluations of its training into a picture file.
+    """Draw how policies did in the evaluations of their trainings into a picture file.
 
     Args:
         path: File to write; its suffix chooses the format (.png, .svg, .pdf).
-        steps: (E,) decisions before each evaluation.
-        performance: (E,) what the scenario counts.
-        interference: (E,) mean fraction of active robots in interference.
-        baseline: Name of the controller to compare with, and its performance.
+        trainings: Name -> (E,) decisions before each evaluation, (E,) what the scenario counts, and (E,) mean fraction
+            of active robots in interference.
+        beside: Controllers to compare with -> what they achieve, and their interference, NaN if unknown.
         stage_ends: Decisions at which the stages of the training end.
         title: Headline.
         ylabel: What is counted, with its unit.
@@ -86,12 +83,18 @@ def draw_training(
     """
     from matplotlib.figure import Figure
 
-    millions = np.asarray(steps) / 1e6
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    upper.plot(millions, performance, color=COLOURS[0], marker="o", label="trained policy")
-    upper.axhline(baseline[1], color=COLOURS[1], linestyle="--", label=baseline[0])
-    lower.plot(millions, interference, color=COLOURS[0], marker="o")
+    colours = iter(COLOURS * len((*trainings, *beside)))
+    for label, (steps, performance, interference) in trainings.items():
+        millions, colour = np.asarray(steps) / 1e6, next(colours)
+        upper.plot(millions, performance, color=colour, marker="o", label=label)
+        lower.plot(millions, interference, color=colour, marker="o")
+    for (label, levels), dashes in zip(beside.items(), ("--", "-.", ":", (0, (6, 1))) * len(beside), strict=False):
+        colour = next(colours)
+        for axes, level in zip((upper, lower), levels, strict=True):
+            if np.isfinite(level):
+                axes.axhline(level, color=colour, linestyle=dashes, label=label)
     upper.set(title=title, ylabel=ylabel, ylim=(0, None))
     lower.set(xlabel="million decisions of single robots (dotted: a new stage)", ylabel="interference", ylim=(0, 1))
     for axes in (upper, lower):
@@ -192,7 +195,7 @@ def draw_saliency(
     for index, (group, lengths) in enumerate(bars.items()):
         places = np.arange(len(slices)) + (0.5 * (len(bars) - 1) - index) * height
         axes.barh(places, lengths[order], height, color=COLOURS[index], label=f"{group} robots")
-    axes.set_yticks(np.arange(len(slices)), [slices[row].replace("_", " ") for row in order.tolist()])
+    axes.set_yticks(np.arange(len(slices)), [slices[row].replace("_", " ") for row in map(int, order)])
     axes.set(title=title, xlabel=xlabel, xlim=(0, None))
     axes.grid(alpha=0.3, axis="x")
     axes.legend(frameon=False, loc="lower right")
