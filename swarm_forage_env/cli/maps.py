@@ -29,6 +29,11 @@ def maps(
     from swarm_forage_env.study.replay.files import read_replays
     from swarm_forage_env.study.replay.frames import ReplayError
 
+    if page.suffix == ".parquet":
+        raise typer.BadParameter(
+            f"Expected a page that 'swarm-forage replay' has written, got {page}; records of runs hold no positions. "
+            f"'swarm-forage replay {page}' makes the page of a run, and 'swarm-forage study maps' the maps of a study."
+        )
     try:
         found = [floor_maps(replay, side_m=side) for replay in read_replays(page)]
     except ReplayError as error:
