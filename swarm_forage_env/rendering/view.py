@@ -53,7 +53,7 @@ class Palette:
     nest: Colour = (38, 166, 145)
     light: Colour = (255, 240, 190)
     source: Colour = (222, 190, 110)
-    cache: Colour = (178, 140, 255)
+    cache: Colour = (151, 80, 249)
     object: Colour = (240, 224, 170)
     empty: Colour = (76, 180, 255)
     carrying: Colour = (255, 150, 40)
@@ -74,7 +74,7 @@ THEMES = {
         nest=(10, 143, 120),
         light=(199, 154, 0),
         source=(150, 105, 10),
-        cache=(106, 63, 196),
+        cache=(100, 30, 200),
         object=(152, 104, 30),
         empty=(18, 118, 211),
         carrying=(230, 144, 0),

@@ -339,7 +339,7 @@ def test_colours_stay_apart_for_colour_blind_readers(vision, palette):
         mix(palette.floor, palette.cache, CACHE_OPACITY),
         mix(palette.floor, palette.source, SOURCE_OPACITY),
     ]
-    pairs = [*combinations(things, 2), *product(things, grounds)]
+    pairs = [*combinations([*things, palette.cache], 2), *product(things, grounds)]
     close = {
         pair: apart
         for pair in pairs
