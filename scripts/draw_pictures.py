@@ -1,32 +1,34 @@
 """Draw the pictures of robots at work that README and docs show.
 
-    python scripts/draw_pictures.py
+    python scripts/draw_pictures.py [FILE ...]
 
 Each shows a warehouse with trails of 40 s. Needs the render extra.
 """
 
+import sys
 from pathlib import Path
 
 from PIL import Image
 
-from swarm_forage_env import load_policy, scenario
+from swarm_forage_env import load_policy, plan_run, scenario
 from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.study.run import LiveRun, build_env
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 PICTURES = {
-    "warehouse_small_dpo.png": ("warehouse_small", "dpo", 300.0, 900),
-    "warehouse_small_ppo.png": ("warehouse_small", "ppo_warehouse_small", 900.0, 900),
-    "warehouse_quad_dpo.png": ("warehouse_quad", "dpo", 300.0, 700),
+    "warehouse_small_dpo.png": ("warehouse_small", "dpo", 300.0, 900, "dark"),
+    "warehouse_small_ppo.png": ("warehouse_small", "ppo_warehouse_small", 900.0, 900, "dark"),
+    "warehouse_quad_dpo.png": ("warehouse_quad", "dpo", 300.0, 700, "dark"),
+    "warehouse_small_light.png": ("warehouse_small", "stochm", 300.0, 900, "light"),
 }
-"""File -> scenario, policy, the time in s at which the picture is taken, and the width of the picture in pixels."""
+"""File -> scenario, policy, the time in s at which the picture is taken, its width in pixels, and its theme."""
 TRAIL_S = 40.0
 SAMPLE_S = 1.0
 
 
-def draw(file: str, scenario_name: str, policy_name: str, time_s: float, size_px: int) -> None:
+def draw(file: str, scenario_name: str, policy_name: str, time_s: float, size_px: int, theme: str) -> None:
     """Run a policy with seed 0 and draw the arena as it is at `time_s`."""
-    world = scenario(scenario_name)
+    world = plan_run(scenario(scenario_name), policy_name).scenario  # with the caches that the policy is made for
     policy = load_policy(policy_name)
     run = LiveRun(build_env(world), policy, 0)
     env = run.forage_env
@@ -45,11 +47,13 @@ def draw(file: str, scenario_name: str, policy_name: str, time_s: float, size_px
         size_px=size_px,
         trails=trails,
         title=title,
+        theme=theme,
     )
     Image.fromarray(picture).save(IMAGES / file, optimize=True)
     print(IMAGES / file)
 
 
 if __name__ == "__main__":
-    for name, (world_name, policy, seconds, width) in PICTURES.items():
-        draw(name, world_name, policy, seconds, width)
+    for name, about in PICTURES.items():
+        if name in sys.argv[1:] or not sys.argv[1:]:
+            draw(name, *about)

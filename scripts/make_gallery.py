@@ -1,10 +1,12 @@
-"""Make docs/gallery.md: short replays of every scenario, controller and kind of adversity, a picture of each, films.
+"""Make docs/gallery.md: short replays of every scenario, controller and kind of adversity, a picture of each; films.
 
     python scripts/make_gallery.py [NAME ...]
 
-Without names, everything is made: about five minutes of processor time. Needs the render extra.
+The films are those of README.md, whose table is written, too. Without names, everything is made. A NAME is that of a
+replay or of a film. Needs the render extra.
 """
 
+import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +22,7 @@ from swarm_forage_env.study.run import LiveRun, build_env
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 FOLDER = DOCS / "gallery"
+README = DOCS.parent / "README.md"
 HORIZON_S = 1000.0
 FRAME_S = 1.0
 SEED = 1
@@ -107,8 +110,43 @@ EXHIBITS = (
         wrapper="population:malfunction_per_tick=0.02,repair_per_tick=0.025,death_per_tick=0.0015",
     ),
 )
-FILMS = {"dpo": "dpo", "ppo": "ppo_warehouse_small"}
-"""File below docs/images -> policy that it shows at work in the small warehouse."""
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """One short film: a run of an exhibit, from its start."""
+
+    name: str
+    caption: str
+    exhibit: str
+    run: int = -1
+    """Which of its runs."""
+    seconds: float = 300.0
+    """Simulated time; films of large swarms are shorter, since each picture takes more bytes."""
+
+
+FILMS = (
+    Film("film_crw", "CRW: a random walk", "warehouse_small", 0),
+    Film("film_dpo", "DPO: remembers objects", "warehouse_small", 1),
+    Film("film_stochm", "STOCHM: static caches", "warehouse_small", 2),
+    Film("film_stochx", "STOCHX: dynamic caches", "warehouse_small", 3),
+    Film("film_trained", "a trained policy", "trained_policy"),
+    Film("film_throttle", "throttled robots", "throttle"),
+    Film("film_sensor_noise", "sensor noise", "sensor_noise"),
+    Film("film_population", "failures and deaths", "population"),
+    Film("film_medium", "objects anywhere", "warehouse_medium", seconds=240.0),
+    Film("film_quad", "four sources", "warehouse_quad", seconds=240.0),
+    Film("film_search_and_rescue", "search and rescue", "search_and_rescue"),
+    Film("film_dual", "two sources", "warehouse_dual", 1),
+)
+FILM_COLUMNS = 4
+FILM_SPEEDUP = 30.0
+FILM_FPS = 6.0
+FILM_PX = 300
+FILM_TRAIL_S = 10.0
+MOST_FILM_BYTES = 400_000
+"""README shows all films at once."""
+_TABLE = re.compile(r"(<!-- films by scripts/make_gallery.py -->\n).*?(<!-- end of films -->)", re.DOTALL)
 
 
 def draw(exhibit: Exhibit) -> None:
@@ -151,19 +189,58 @@ def page() -> str:
     return "\n".join(lines) + "\n"
 
 
+def shoot(film: Film) -> None:
+    """Make a film."""
+    (exhibit,) = (one for one in EXHIBITS if one.name == film.exhibit)
+    spec = exhibit.specs()[film.run]
+    path = record_run(
+        spec.scenario,
+        spec.policy,
+        FOLDER / f"{film.name}.gif",
+        seconds=film.seconds,
+        seed=SEED,
+        speedup=FILM_SPEEDUP,
+        fps=FILM_FPS,
+        size_px=FILM_PX,
+        trail_s=FILM_TRAIL_S,
+        wrappers=spec.wrappers,
+    )
+    size = path.stat().st_size
+    print(f"{path.name}: {size / 1e3:.0f} kB", flush=True)
+    if size > MOST_FILM_BYTES:
+        sys.exit(f"Expected films of at most {MOST_FILM_BYTES / 1e3:.0f} kB; make it shorter or smaller.")
+
+
+def table_of_films() -> str:
+    """The films as a table in Markdown: each shows its caption and leads to its replay."""
+    lines: list[list[str]] = []
+    for first in range(0, len(FILMS), FILM_COLUMNS):
+        row = FILMS[first : first + FILM_COLUMNS]
+        pictures = [
+            f"[![{film.caption}](docs/gallery/{film.name}.gif)](docs/gallery.md#{film.exhibit.replace('_', '-')})"
+            for film in row
+        ]
+        captions = [film.caption for film in row]
+        lines += [captions, pictures] if lines else [captions, ["---"] * len(row), pictures]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n"
+
+
 def main(names: list[str]) -> None:
-    """Make the exhibits of these names, all if there is none; then the page and the films."""
+    """Make the exhibits and films of these names, all if there is none; then the page, and the table in README.md."""
+    unknown = {*names} - {one.name for one in (*EXHIBITS, *FILMS)}
+    if unknown:
+        known = ", ".join(one.name for one in (*EXHIBITS, *FILMS))
+        sys.exit(f"Expected names among {known}, got {', '.join(sorted(unknown))}.")
     FOLDER.mkdir(exist_ok=True)
     for exhibit in EXHIBITS:
         if not names or exhibit.name in names:
             show(exhibit)
+    for film in FILMS:
+        if not names or film.name in names:
+            shoot(film)
     (DOCS / "gallery.md").write_text(page(), encoding="utf-8")
-    for file, policy in FILMS.items():
-        if not names or file in names:
-            path = DOCS / "images" / f"{file}.gif"
-            world = scenario("warehouse_small", physics="compiled")
-            record_run(world, policy, path, seed=SEED, seconds=300.0, speedup=40.0, fps=10.0, size_px=440)
-            print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB")
+    text = README.read_text(encoding="utf-8")
+    README.write_text(_TABLE.sub(lambda found: found[1] + table_of_films() + found[2], text), encoding="utf-8")
 
 
 if __name__ == "__main__":

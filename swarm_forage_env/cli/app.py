@@ -12,6 +12,7 @@ from swarm_forage_env.cli.ablate import ablate
 from swarm_forage_env.cli.availability import availability
 from swarm_forage_env.cli.choose import choose
 from swarm_forage_env.cli.compare import compare
+from swarm_forage_env.cli.curves import curves
 from swarm_forage_env.cli.maps import maps
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE, complain
 from swarm_forage_env.cli.predict import predict
@@ -19,6 +20,7 @@ from swarm_forage_env.cli.record import record
 from swarm_forage_env.cli.replay import replay
 from swarm_forage_env.cli.rerun import rerun
 from swarm_forage_env.cli.run import run
+from swarm_forage_env.cli.saliency import saliency
 from swarm_forage_env.cli.score import score
 from swarm_forage_env.cli.show import info, list_everything, schema
 from swarm_forage_env.cli.stuck import stuck
@@ -53,11 +55,11 @@ def _options(
 
 
 # `--help` lists them in this order.
-for command in (run, score, compare, predict, choose, train):
+for command in (run, score, compare, predict, choose, train, curves):
     app.command()(command)
 app.add_typer(study, name="study")
 app.command("list")(list_everything)
-for command in (info, schema, rerun, watch, record, replay, maps, stuck, ablate, availability):
+for command in (info, schema, rerun, watch, record, replay, maps, saliency, stuck, ablate, availability):
     app.command()(command)
 
 

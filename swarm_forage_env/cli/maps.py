@@ -1,12 +1,16 @@
 """The command `maps`."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from swarm_forage_env.cli.options import NO_PICTURE
 from swarm_forage_env.cli.terminal import notes
+
+if TYPE_CHECKING:
+    from swarm_forage_env.study.maps import FloorMaps
 
 
 def maps(
@@ -21,22 +25,42 @@ def maps(
     One row per run of the page; then, for each run after the first, what is more in it than in the first. The arrays
     go to .npz files beside the picture.
     """
-    from swarm_forage_env.rendering.plots import draw_maps
-    from swarm_forage_env.study.maps import MEANINGS, floor_maps
+    from swarm_forage_env.study.maps import floor_maps
     from swarm_forage_env.study.replay.files import read_replays
     from swarm_forage_env.study.replay.frames import ReplayError
 
+    if page.suffix == ".parquet":
+        raise typer.BadParameter(
+            f"Expected a page that 'swarm-forage replay' has written, got {page}; records of runs hold no positions. "
+            f"'swarm-forage replay {page}' makes the page of a run, and 'swarm-forage study maps' the maps of a study."
+        )
     try:
         found = [floor_maps(replay, side_m=side) for replay in read_replays(page)]
     except ReplayError as error:
         raise typer.BadParameter(str(error)) from error
-    every = [*found, *(one.minus(found[0]) for one in found[1:])]
     picture = out or page.with_suffix(".maps.png")
+    write_maps(with_differences(found), picture)
+    typer.echo(f"wrote maps of {len(found)} run{'s' * (len(found) > 1)} to {picture} and .npz files beside it")
+
+
+def with_differences(found: "Sequence[FloorMaps]") -> "list[FloorMaps]":
+    """Return maps, and for each after the first what is more in it than in the first."""
+    return [*found, *(one.minus(found[0]) for one in found[1:])]
+
+
+def write_maps(every: "Sequence[FloorMaps]", picture: Path, *, per: str = "") -> None:
+    """Write a picture of maps, and their arrays to files beside it; without matplotlib, say so.
+
+    `per` is what everything is divided by, for the titles.
+    """
+    from swarm_forage_env.rendering.plots import draw_maps
+    from swarm_forage_env.study.maps import MEANINGS
+
     picture.parent.mkdir(parents=True, exist_ok=True)
     for one in every:
         one.write(picture.with_suffix(f".{one.label.replace(' ', '_')}.npz"))
+    titles = {name: f"{meaning}, per {per}" if per else meaning for name, meaning in MEANINGS.items()}
     try:
-        draw_maps(picture, [(one.label, one.arrays, one.is_difference) for one in every], MEANINGS, every[0].size_m)
+        draw_maps(picture, [(one.label, one.arrays, one.is_difference, one.size_m) for one in every], titles)
     except ImportError:
         notes().print(NO_PICTURE, markup=False)
-    typer.echo(f"wrote maps of {len(found)} run{'s' * (len(found) > 1)} to {picture} and .npz files beside it")

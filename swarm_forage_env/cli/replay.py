@@ -116,7 +116,8 @@ def _planned(words: Sequence[str], options: "ScenarioOptions", seed: int) -> "li
             runs.append((RunSpec.from_json(record.spec), record))
         elif runs and runs[0][1] is not None:
             first = runs[0][0]
-            runs.append((plan_run(first.scenario, word, wrappers=first.wrappers, seed=first.seed), None))
+            with _refusing_policies():
+                runs.append((plan_run(first.scenario, word, wrappers=first.wrappers, seed=first.seed), None))
         else:
             runs.append((plan_runs(options, (word,), n_seeds=1, first_seed=seed)[0], None))
     return runs
@@ -152,10 +153,13 @@ def _refuse_scenario_options(context: typer.Context) -> None:
 
 
 def _recorded(spec: "RunSpec", stored: "RunRecord | None", seconds: float | None, frame_s: float | None) -> "Replay":
+    from swarm_forage_env.policies.registry import load_policy
     from swarm_forage_env.study.replay.capture import record_replay
 
+    with _refusing_policies():
+        policy = load_policy(spec.policy, spec.parameters)
     with _bar(f"{spec.policy}, seed {spec.seed}") as progress:
-        made, record = record_replay(spec, seconds=seconds, frame_s=frame_s, progress=progress)
+        made, record = record_replay(spec, policy=policy, seconds=seconds, frame_s=frame_s, progress=progress)
     if stored is not None and record is not None and not record.same_columns(stored):
         notes().print(
             f"The run {spec.run_id} comes out different from its record, which other versions made; "
@@ -188,6 +192,15 @@ def _complaints() -> Iterator[None]:
     try:
         yield
     except (ReplayError, RenderError, ModelError, NetworkError) as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+@contextmanager
+def _refusing_policies() -> Iterator[None]:
+    """Turn what is wrong with a policy's name or file into a complaint; a ValueError of its run is none."""
+    try:
+        yield
+    except ValueError as error:
         raise typer.BadParameter(str(error)) from error
 
 

@@ -1,5 +1,6 @@
 """What `swarm-forage train` shows: progress, evaluations as they come, a picture, and where the results are."""
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -8,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from swarm_forage_env.cli.options import NO_PICTURE
-from swarm_forage_env.rendering.plots import draw_training
+from swarm_forage_env.rendering.plots import draw_trainings
 from swarm_forage_env.scenarios.performance import quantity
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.training.status import Evaluation, TrainingStatus
@@ -54,13 +55,11 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
     if not evaluations:
         return None
     try:
-        draw_training(
+        draw_trainings(
             path,
-            [evaluation.steps for evaluation in evaluations],
-            [evaluation.performance for evaluation in evaluations],
-            [evaluation.interference_fraction for evaluation in evaluations],
-            baseline=(plan.evaluation.baseline, evaluations[-1].baseline),
-            stage_ends=np.cumsum([stage.steps for stage in plan.stages]).tolist(),
+            {"trained policy": points_of(evaluations)},
+            beside={plan.evaluation.baseline: (evaluations[-1].baseline, math.nan)},
+            stage_ends=stage_ends(plan),
             title=f"{plan.algorithm} in {plan.scenario.name}, {plan.scenario.robots.n_robots} robots",
             ylabel=f"{quantity(plan.scenario.performance).title} per 1,000 s",
         )
@@ -68,6 +67,20 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
         console.print(NO_PICTURE, markup=False)
         return None
     return path
+
+
+def points_of(evaluations: Sequence[Evaluation]) -> tuple[list[int], list[float], list[float]]:
+    """Return evaluations as pictures want them: decisions, performance and interference."""
+    return (
+        [evaluation.steps for evaluation in evaluations],
+        [evaluation.performance for evaluation in evaluations],
+        [evaluation.interference_fraction for evaluation in evaluations],
+    )
+
+
+def stage_ends(plan: TrainingPlan) -> list[int]:
+    """Return the decisions at which the stages of a plan end."""
+    return np.cumsum([stage.steps for stage in plan.stages]).tolist()
 
 
 def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | Evaluation], None]:

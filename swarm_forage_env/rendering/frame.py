@@ -22,8 +22,8 @@ from swarm_forage_env.rendering.paint import (
 from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
     NEST_OPACITY,
-    PALETTE,
     SOURCE_OPACITY,
+    Palette,
     RenderError,
     View,
     arena_view,
@@ -92,6 +92,7 @@ def render_frame(
     size_px: int = 900,
     trails: Trails | None = None,
     title: str | None = None,
+    theme: str = "dark",
 ) -> NDArray[np.uint8]:
     """Draw the world. Reads the state, never writes it; equal states give equal pictures.
 
@@ -110,21 +111,22 @@ def render_frame(
         size_px: Longer side of the drawn arena in pixels; a header and a legend come on top.
         trails: Past positions to draw as fading lines.
         title: Headline; default the scenario's name and size.
+        theme: "dark" or "light".
 
     Returns:
         (H, W, 3) uint8 picture, first row at the top.
 
     Raises:
-        RenderError: `size_px` out of range, or trails of another number of robots.
+        RenderError: `size_px` out of range, no such theme, or trails of another number of robots.
         ImportError: Pillow is not installed.
     """
-    view = arena_view(scenario, size_px)
-    canvas = _borrow_canvas(_background(scenario, size_px))
+    view = arena_view(scenario, size_px, theme)
+    canvas = _borrow_canvas(_background(scenario, size_px, theme))
     if trails is not None:
         _draw_trails(canvas, view, trails, len(swarm.heading))
     _draw_caches(canvas, view, scenario, caches)
     lying = objects.cell[objects.status == ObjectStatus.FREE]
-    paint_squares(canvas, view.pixels((lying + 0.5) * CELL_M), view.object_px, PALETTE.object)
+    paint_squares(canvas, view.pixels((lying + 0.5) * CELL_M), view.object_px, view.palette.object)
     _draw_robots(canvas, view, swarm, events)
     picture = _write_text(canvas, view, scenario, swarm, caches, events, tick, title)
     _spare_canvases[canvas.shape] = canvas
@@ -152,14 +154,14 @@ def _whole_numbers(canvas: Canvas) -> NDArray[np.uint8]:
 
 
 @lru_cache(maxsize=4)
-def _background(scenario: ScenarioConfig, size_px: int) -> Canvas:
+def _background(scenario: ScenarioConfig, size_px: int, theme: str) -> Canvas:
     """All parts that never change during a run, painted once."""
-    view = arena_view(scenario, size_px)
+    view = arena_view(scenario, size_px, theme)
     arena = scenario.arena
     canvas = np.empty((view.height, view.width, 3), np.float32)
-    canvas[:] = PALETTE.page
+    canvas[:] = view.palette.page
     left, top, right, bottom = view.box((-WALL_M, -WALL_M, arena.width_m + WALL_M, arena.height_m + WALL_M))
-    paint_box(canvas, (left, top, right, bottom), PALETTE.wall)
+    paint_box(canvas, (left, top, right, bottom), view.palette.wall)
     inner = view.box(arena.interior_m)
     line = 2.0 * view.unit  # walls of huge arenas would vanish
     paint_box(
@@ -170,19 +172,19 @@ def _background(scenario: ScenarioConfig, size_px: int) -> Canvas:
             min(inner[2], right - line),
             min(inner[3], bottom - line),
         ),
-        PALETTE.floor,
+        view.palette.floor,
     )
     nest = view.box(arena.nest_box_m)
     if scenario.objects.placement != "power_law":  # its clusters are drawn anew in each run
         for cells in source_boxes(scenario.objects.placement, *arena.n_cells):
             x_low, y_low, x_high, y_high = (CELL_M * cell for cell in cells)
-            paint_box(canvas, view.box((x_low, y_low, x_high, y_high)), PALETTE.source, SOURCE_OPACITY)
-        paint_box(canvas, nest, PALETTE.floor)
-    paint_box(canvas, nest, PALETTE.nest, NEST_OPACITY)
-    paint_frame(canvas, nest, max(1.0, 1.5 * view.unit), PALETTE.nest)
+            paint_box(canvas, view.box((x_low, y_low, x_high, y_high)), view.palette.source, SOURCE_OPACITY)
+        paint_box(canvas, nest, view.palette.floor)
+    paint_box(canvas, nest, view.palette.nest, NEST_OPACITY)
+    paint_frame(canvas, nest, max(1.0, 1.5 * view.unit), view.palette.nest)
     lights = view.pixels(np.asarray(arena.lights_m)[:, :2])
-    paint_glows(canvas, lights, 26.0 * view.unit, PALETTE.light, 0.5)
-    paint_discs(canvas, lights, max(1.5, 3.0 * view.unit), PALETTE.light)
+    paint_glows(canvas, lights, 26.0 * view.unit, view.palette.light, 0.5)
+    paint_discs(canvas, lights, max(1.5, 3.0 * view.unit), view.palette.light)
     _draw_legend(canvas, view, scenario)
     canvas.flags.writeable = False
     return canvas
@@ -201,7 +203,7 @@ def _draw_trails(canvas: Canvas, view: View, trails: Trails, n_robots: int) -> N
     n_dots = int(np.clip(np.ceil(longest_px / 1.5), 1, 16))
     age = (np.arange(1, n_samples) / n_samples)[:, None]
     fade = np.broadcast_to(0.55 * age**1.5, known.shape)
-    for loaded, colour in ((False, PALETTE.empty), (True, PALETTE.carrying)):
+    for loaded, colour in ((False, view.palette.empty), (True, view.palette.carrying)):
         rows = known & (carrying[:-1] == loaded)
         dots = [start[rows] + (k / n_dots) * step[rows] for k in range(n_dots)]
         radius = max(0.4, 0.2 * view.robot_px)
@@ -212,8 +214,8 @@ def _draw_caches(canvas: Canvas, view: View, scenario: ScenarioConfig, caches: C
     for x, y in (caches.cell[caches.alive] + 0.5) * CELL_M:
         half = scenario.cache_side_cells * CELL_M / 2
         box = view.box((x - half, y - half, x + half, y + half))
-        paint_box(canvas, box, PALETTE.cache, CACHE_OPACITY)
-        paint_frame(canvas, box, max(1.0, 1.5 * view.unit), PALETTE.cache, 0.8)
+        paint_box(canvas, box, view.palette.cache, CACHE_OPACITY)
+        paint_frame(canvas, box, max(1.0, 1.5 * view.unit), view.palette.cache, 0.8)
 
 
 def _draw_robots(canvas: Canvas, view: View, swarm: SwarmState, events: StepEvents) -> None:
@@ -223,21 +225,23 @@ def _draw_robots(canvas: Canvas, view: View, swarm: SwarmState, events: StepEven
     working = swarm.present & swarm.active
     carrying = swarm.carried_object >= 0
     interfering = working & events.interfering
-    paint_rings(canvas, centre[swarm.present & ~swarm.active], 0.8 * radius, 0.4 * radius, PALETTE.repair)
-    for rows, colour in ((working & ~carrying, PALETTE.empty), (working & carrying, PALETTE.carrying)):
-        _draw_bodies(canvas, centre[rows], direction[rows], radius, colour)
-    paint_squares(canvas, centre[swarm.present & carrying], 0.85 * radius, PALETTE.object)
-    paint_rings(canvas, centre[interfering], 1.55 * radius + 0.5, max(1.0, 0.36 * radius), PALETTE.interference)
+    paint_rings(canvas, centre[swarm.present & ~swarm.active], 0.8 * radius, 0.4 * radius, view.palette.repair)
+    for rows, colour in ((working & ~carrying, view.palette.empty), (working & carrying, view.palette.carrying)):
+        _draw_bodies(canvas, centre[rows], direction[rows], radius, colour, view.palette)
+    paint_squares(canvas, centre[swarm.present & carrying], 0.85 * radius, view.palette.object)
+    paint_rings(canvas, centre[interfering], 1.55 * radius + 0.5, max(1.0, 0.36 * radius), view.palette.interference)
 
 
-def _draw_bodies(canvas: Canvas, centre: FloatArray, direction: FloatArray, radius: float, colour: Colour) -> None:
-    """Discs of one colour; unless they are tiny, they get needles and dark rims that separate robots that touch."""
+def _draw_bodies(
+    canvas: Canvas, centre: FloatArray, direction: FloatArray, radius: float, colour: Colour, palette: Palette
+) -> None:
+    """Discs of one colour; unless they are tiny, they get needles and rims that separate robots that touch."""
     detailed = radius >= _SMALLEST_DETAILED_PX
     if detailed:
-        paint_discs(canvas, centre, radius + max(0.5, 0.22 * radius), PALETTE.floor)
+        paint_discs(canvas, centre, radius + max(0.5, 0.22 * radius), palette.floor)
     paint_discs(canvas, centre, radius, colour)
     if detailed:
-        paint_rings(canvas, centre, radius + 0.2, max(0.5, 0.14 * radius), PALETTE.page)
+        paint_rings(canvas, centre, radius + 0.2, max(0.5, 0.14 * radius), palette.page)
         paint_needles(canvas, centre, direction, 2.1 * radius, 0.4 * radius, colour)
 
 
@@ -249,46 +253,46 @@ def _draw_legend(canvas: Canvas, view: View, scenario: ScenarioConfig) -> None:
     rows = legend_rows(scenario, view.width, view.scale)
     for row in rows:
         for name, x, y in row:
-            _draw_symbol(canvas, name, x + 0.5 * text_px, top + y, 0.42 * text_px)
+            _draw_symbol(canvas, view.palette, name, x + 0.5 * text_px, top + y, 0.42 * text_px)
     bar_m = scale_bar_m(scenario.arena.width_m)
     right, middle = view.width - text_px, top + rows[0][0][2]
     start = right - bar_m * view.scale
-    paint_box(canvas, (start, middle - 1, right, middle + 1), PALETTE.faint_text)
+    paint_box(canvas, (start, middle - 1, right, middle + 1), view.palette.faint_text)
     for x in (start, right - 1.5):
-        paint_box(canvas, (x, middle - 4, x + 1.5, middle + 4), PALETTE.faint_text)
+        paint_box(canvas, (x, middle - 4, x + 1.5, middle + 4), view.palette.faint_text)
     picture = Image.fromarray(canvas.round().astype(np.uint8))
     pen = ImageDraw.Draw(picture)
     font = text_font(text_px)
     for row in rows:
         for name, x, y in row:
-            pen.text((x + 1.45 * text_px, top + y), name, fill=PALETTE.faint_text, font=font, anchor="lm")
-    pen.text((start - 0.5 * text_px, middle), f"{bar_m} m", fill=PALETTE.faint_text, font=font, anchor="rm")
+            pen.text((x + 1.45 * text_px, top + y), name, fill=view.palette.faint_text, font=font, anchor="lm")
+    pen.text((start - 0.5 * text_px, middle), f"{bar_m} m", fill=view.palette.faint_text, font=font, anchor="rm")
     canvas[:] = np.asarray(picture, np.float32)
 
 
-def _draw_symbol(canvas: Canvas, name: str, x: float, y: float, radius: float) -> None:
+def _draw_symbol(canvas: Canvas, palette: Palette, name: str, x: float, y: float, radius: float) -> None:
     """Paint the legend's symbol for `name` in a box of half side `radius` around (x, y)."""
     centre, ahead = np.array([[x, y]]), np.array([[1.0, 0.0]])
     box = (x - radius, y - radius, x + radius, y + radius)
     body = 0.75 * radius
     if name in ("empty", "carrying"):
-        _draw_bodies(canvas, centre, ahead, body, PALETTE.empty if name == "empty" else PALETTE.carrying)
+        _draw_bodies(canvas, centre, ahead, body, palette.empty if name == "empty" else palette.carrying, palette)
         if name == "carrying":
-            paint_squares(canvas, centre, 0.85 * body, PALETTE.object)
+            paint_squares(canvas, centre, 0.85 * body, palette.object)
     elif name == "in interference":
-        paint_rings(canvas, centre, radius, max(1.0, 0.3 * radius), PALETTE.interference)
+        paint_rings(canvas, centre, radius, max(1.0, 0.3 * radius), palette.interference)
     elif name == "in repair":
-        paint_rings(canvas, centre, 0.8 * radius, 0.4 * radius, PALETTE.repair)
+        paint_rings(canvas, centre, 0.8 * radius, 0.4 * radius, palette.repair)
     elif name == "object":
-        paint_squares(canvas, centre, 1.2 * radius, PALETTE.object)
+        paint_squares(canvas, centre, 1.2 * radius, palette.object)
     elif name == "source":
-        paint_box(canvas, box, PALETTE.source, 4 * SOURCE_OPACITY)
+        paint_box(canvas, box, palette.source, 4 * SOURCE_OPACITY)
     elif name == "nest":
-        paint_box(canvas, box, PALETTE.nest, NEST_OPACITY)
-        paint_frame(canvas, box, 1.0, PALETTE.nest)
+        paint_box(canvas, box, palette.nest, NEST_OPACITY)
+        paint_frame(canvas, box, 1.0, palette.nest)
     else:
-        paint_box(canvas, box, PALETTE.cache, CACHE_OPACITY)
-        paint_frame(canvas, box, 1.0, PALETTE.cache)
+        paint_box(canvas, box, palette.cache, CACHE_OPACITY)
+        paint_frame(canvas, box, 1.0, palette.cache)
 
 
 def _write_text(
@@ -320,18 +324,18 @@ def _write_text(
     done = f"{count[Counter.COLLECTED]:,} delivered    {count[Counter.FIRST_PICKED]:,} first pick-ups"
     now = f"{n_active:,} robots    {n_carrying:,} carrying    {n_interfering:,} in interference"
     room = view.width - 2 * margin
-    _write_line(pen, 0.33 * top, headline, f"{seconds:,.0f} s", 1.35 * margin, margin, room, PALETTE.text)
-    _write_line(pen, 0.72 * top, done, now, margin, margin, room, PALETTE.faint_text)
+    _write_line(pen, 0.33 * top, headline, f"{seconds:,.0f} s", 1.35 * margin, margin, room, view.palette.text)
+    _write_line(pen, 0.72 * top, done, now, margin, margin, room, view.palette.faint_text)
     for (x, y), n_objects in zip(caches.cell[caches.alive], caches.count[caches.alive], strict=True):
         column, row = view.pixels(((x + 0.5) * CELL_M, (y + 0.5) * CELL_M))
         pen.text(
             (column, row),
             str(n_objects),
-            fill=PALETTE.text,
+            fill=view.palette.text,
             font=text_font(1.5 * margin),
             anchor="mm",
             stroke_width=2,
-            stroke_fill=PALETTE.floor,
+            stroke_fill=view.palette.floor,
         )
     written[:] = np.asarray(picture)
     return done_picture

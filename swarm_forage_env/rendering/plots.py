@@ -58,25 +58,22 @@ def draw_curves(
     figure.savefig(path, dpi=150)
 
 
-def draw_training(
+def draw_trainings(
     path: str | Path,
-    steps: Sequence[int],
-    performance: Sequence[float],
-    interference: Sequence[float],
+    trainings: Mapping[str, tuple[Sequence[int], Sequence[float], Sequence[float]]],
     *,
-    baseline: tuple[str, float],
+    beside: Mapping[str, tuple[float, float]],
     stage_ends: Sequence[int],
     title: str,
     ylabel: str,
 ) -> None:
-    """Draw how a policy did in the evaluations of its training into a picture file.
+    """Draw how policies did in the evaluations of their trainings into a picture file.
 
     Args:
         path: File to write; its suffix chooses the format (.png, .svg, .pdf).
-        steps: (E,) decisions before each evaluation.
-        performance: (E,) what the scenario counts.
-        interference: (E,) mean fraction of active robots in interference.
-        baseline: Name of the controller to compare with, and its performance.
+        trainings: Name -> (E,) decisions before each evaluation, (E,) what the scenario counts, and (E,) mean fraction
+            of active robots in interference.
+        beside: Controllers to compare with -> what they achieve, and their interference, NaN if unknown.
         stage_ends: Decisions at which the stages of the training end.
         title: Headline.
         ylabel: What is counted, with its unit.
@@ -86,12 +83,18 @@ def draw_training(
     """
     from matplotlib.figure import Figure
 
-    millions = np.asarray(steps) / 1e6
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-    upper.plot(millions, performance, color=COLOURS[0], marker="o", label="trained policy")
-    upper.axhline(baseline[1], color=COLOURS[1], linestyle="--", label=baseline[0])
-    lower.plot(millions, interference, color=COLOURS[0], marker="o")
+    colours = iter(COLOURS * len((*trainings, *beside)))
+    for label, (steps, performance, interference) in trainings.items():
+        millions, colour = np.asarray(steps) / 1e6, next(colours)
+        upper.plot(millions, performance, color=colour, marker="o", label=label)
+        lower.plot(millions, interference, color=colour, marker="o")
+    for (label, levels), dashes in zip(beside.items(), ("--", "-.", ":", (0, (6, 1))) * len(beside), strict=False):
+        colour = next(colours)
+        for axes, level in zip((upper, lower), levels, strict=True):
+            if np.isfinite(level):
+                axes.axhline(level, color=colour, linestyle=dashes, label=label)
     upper.set(title=title, ylabel=ylabel, ylim=(0, None))
     lower.set(xlabel="million decisions of single robots (dotted: a new stage)", ylabel="interference", ylim=(0, 1))
     for axes in (upper, lower):
@@ -132,28 +135,28 @@ def draw_availability(path: str | Path, curves: Mapping[int, FloatArray], teams:
 
 def draw_maps(
     path: str | Path,
-    rows: Sequence[tuple[str, Mapping[str, FloatArray], bool]],
+    rows: Sequence[tuple[str, Mapping[str, FloatArray], bool, tuple[float, float]]],
     titles: Mapping[str, str],
-    size_m: tuple[float, float],
 ) -> None:
-    """Draw maps of a floor: a row of panels per run or difference, a column per quantity.
+    """Draw maps of floors of the same proportions: a row of panels per map or difference, a column per quantity.
 
     Args:
         path: File to write; its suffix chooses the format (.png, .svg, .pdf).
-        rows: Label; arrays (ny, nx) by name, row = y from below; and whether they are differences.
+        rows: Label; arrays (ny, nx) by name, row = y from below; whether they are differences; and the extent of the
+            floor along x and y in m.
         titles: Headline of each column, by name of the array; their order is that of the columns.
-        size_m: Extent of the floor along x and y.
 
     Raises:
         ImportError: matplotlib is not installed.
     """
     from matplotlib.figure import Figure
 
-    width, height = 4.2, 4.2 * size_m[1] / size_m[0] + 0.7
+    shape = rows[0][3][1] / rows[0][3][0]
+    width, height = 4.2, 3.5 * shape + 0.7
     figure = Figure(figsize=(width * len(titles), height * len(rows)), layout="constrained")
     panels = figure.subplots(len(rows), len(titles), squeeze=False)
-    bar = min(1.0, 1.2 * size_m[1] / size_m[0])  # as long as a panel is high
-    for (label, arrays, is_difference), line in zip(rows, panels, strict=True):
+    bar = min(1.0, 1.2 * shape)  # as long as a panel is high
+    for (label, arrays, is_difference, size_m), line in zip(rows, panels, strict=True):
         for (name, title), axes in zip(titles.items(), line, strict=True):
             values = arrays[name]
             # Few squares hold most; the last percent would leave all others in one colour.
@@ -165,4 +168,35 @@ def draw_maps(
             axes.set_title(f"{label}\n{title}", fontsize=9)
             axes.tick_params(labelsize=7)
             figure.colorbar(image, ax=axes, shrink=bar).ax.tick_params(labelsize=7)
+    figure.savefig(path, dpi=110)
+
+
+def draw_saliency(
+    path: str | Path, slices: Sequence[str], bars: Mapping[str, FloatArray], *, title: str, xlabel: str
+) -> None:
+    """Draw what a network looks at: a group of bars per slice of its observations, the longest on top.
+
+    Args:
+        path: File to write; its suffix chooses the format (.png, .svg, .pdf).
+        slices: (S,) names.
+        bars: Name of a group of robots -> (S,) lengths.
+        title: Headline.
+        xlabel: What the lengths are.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    from matplotlib.figure import Figure
+
+    order = np.argsort(np.max([*bars.values()], axis=0), kind="stable")
+    height = 0.8 / len(bars)
+    figure = Figure(figsize=(7.0, 1.2 + 0.42 * len(slices)), layout="constrained")
+    axes = figure.subplots()
+    for index, (group, lengths) in enumerate(bars.items()):
+        places = np.arange(len(slices)) + (0.5 * (len(bars) - 1) - index) * height
+        axes.barh(places, lengths[order], height, color=COLOURS[index], label=f"{group} robots")
+    axes.set_yticks(np.arange(len(slices)), [slices[row].replace("_", " ") for row in map(int, order)])
+    axes.set(title=title, xlabel=xlabel, xlim=(0, None))
+    axes.grid(alpha=0.3, axis="x")
+    axes.legend(frameon=False, loc="lower right")
     figure.savefig(path, dpi=110)

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import number
-from swarm_forage_env.rendering.view import CACHE_OPACITY, NEST_OPACITY, PALETTE, SOURCE_OPACITY, RenderError, refusing
+from swarm_forage_env.rendering.view import (
+    CACHE_OPACITY,
+    NEST_OPACITY,
+    SOURCE_OPACITY,
+    THEMES,
+    Palette,
+    RenderError,
+    refusing,
+)
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -49,7 +57,7 @@ def check_film(path: str | Path, fps: float, n_frames: int) -> Path:
     return path
 
 
-def write_film(frames: Iterable[Frame], path: str | Path, *, fps: float, n_frames: int) -> Path:
+def write_film(frames: Iterable[Frame], path: str | Path, *, fps: float, n_frames: int, theme: str = "dark") -> Path:
     """Write pictures as a film; the suffix of `path` chooses the format.
 
     A missing folder is made. The file appears under its name only when it is complete. GIFs use one palette made for
@@ -62,6 +70,7 @@ def write_film(frames: Iterable[Frame], path: str | Path, *, fps: float, n_frame
         path: Ends in .gif or .mp4.
         fps: Pictures per second.
         n_frames: How many pictures will come at most.
+        theme: That of the pictures, whose colours a GIF keeps.
 
     Returns:
         The path written.
@@ -75,7 +84,7 @@ def write_film(frames: Iterable[Frame], path: str | Path, *, fps: float, n_frame
     partial = path.with_name(f".{path.stem}.partial{path.suffix.lower()}")
     try:
         if path.suffix.lower() == ".gif":
-            _write_gif(frames, partial, fps)
+            _write_gif(frames, partial, fps, THEMES[theme])
         else:
             _write_mp4(frames, partial, fps)
         partial.replace(path)
@@ -84,10 +93,10 @@ def write_film(frames: Iterable[Frame], path: str | Path, *, fps: float, n_frame
     return path
 
 
-def _write_gif(frames: Iterable[Frame], path: Path, fps: float) -> None:
+def _write_gif(frames: Iterable[Frame], path: Path, fps: float, colours: Palette) -> None:
     from PIL import Image
 
-    palette = _gif_palette()
+    palette = _gif_palette(colours)
 
     def indexed() -> Iterator["Image.Image"]:
         for frame in frames:
@@ -99,14 +108,13 @@ def _write_gif(frames: Iterable[Frame], path: Path, fps: float) -> None:
     first.save(path, save_all=True, append_images=pictures, duration=delay_ms, loop=0, optimize=True, disposal=1)
 
 
-def _gif_palette() -> "Image.Image":
+def _gif_palette(colour: Palette) -> "Image.Image":
     """Colours of our pictures: grounds, things on them, and mixtures that antialiasing and fading produce.
 
     There are fewer than 256, since one index means "unchanged".
     """
     from PIL import Image
 
-    colour = PALETTE
     nest, cache, source = (
         _mix(colour.floor, tint, share)
         for tint, share in ((colour.nest, NEST_OPACITY), (colour.cache, CACHE_OPACITY), (colour.source, SOURCE_OPACITY))

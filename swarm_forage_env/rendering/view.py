@@ -1,7 +1,8 @@
 """How a picture is laid out: colours, fonts, and where the arena and the legend go.
 
-Design (our choice): robots, objects and caches are bright on a dark floor. The colours differ for readers with the
-common forms of colour blindness, too, and shape is a second sign (interference is a ring, repair a hollow disc).
+Design (our choice): robots, objects and caches are bright on a dark floor, or dark on a light one. The colours differ
+for readers with the common forms of colour blindness, too, and shape is a second sign (interference is a ring, repair a
+hollow disc).
 """
 
 from collections.abc import Generator
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swarm_forage_env._internal.extras import install_command
-from swarm_forage_env._internal.fields import ConfigError, as_whole
+from swarm_forage_env._internal.fields import ConfigError, as_whole, one_of
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.rendering.paint import Colour
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -52,7 +53,7 @@ class Palette:
     nest: Colour = (38, 166, 145)
     light: Colour = (255, 240, 190)
     source: Colour = (222, 190, 110)
-    cache: Colour = (178, 140, 255)
+    cache: Colour = (151, 80, 249)
     object: Colour = (240, 224, 170)
     empty: Colour = (76, 180, 255)
     carrying: Colour = (255, 150, 40)
@@ -63,6 +64,27 @@ class Palette:
 
 
 PALETTE = Palette()
+"""Dark."""
+THEMES = {
+    "dark": PALETTE,
+    "light": Palette(
+        page=(238, 241, 245),
+        floor=(251, 252, 253),
+        wall=(154, 167, 182),
+        nest=(10, 143, 120),
+        light=(199, 154, 0),
+        source=(150, 105, 10),
+        cache=(100, 30, 200),
+        object=(152, 104, 30),
+        empty=(18, 118, 211),
+        carrying=(230, 144, 0),
+        interference=(210, 23, 87),
+        repair=(135, 147, 161),
+        text=(23, 32, 44),
+        faint_text=(90, 102, 117),
+    ),
+}
+"""Name of a theme -> its colours: dark for screens, light for paper."""
 NEST_OPACITY = 0.30
 SOURCE_OPACITY = 0.07
 CACHE_OPACITY = 0.22
@@ -84,6 +106,8 @@ class View:
     """Radius that robots are drawn with."""
     object_px: float
     """Side that objects are drawn with."""
+    palette: Palette = PALETTE
+    """Colours of everything."""
 
     @property
     def unit(self) -> float:
@@ -104,15 +128,16 @@ class View:
 
 
 @lru_cache(maxsize=8)
-def arena_view(scenario: ScenarioConfig, size_px: int = 900) -> View:
+def arena_view(scenario: ScenarioConfig, size_px: int = 900, theme: str = "dark") -> View:
     """Return where `render_frame` puts the arena in its picture.
 
     Raises:
-        RenderError: `size_px` is not a whole number in [240, 4000].
+        RenderError: `size_px` is not a whole number in [240, 4000], or there is no such theme.
         ImportError: Pillow is not installed (the legend's height depends on its text).
     """
     with refusing():
         as_whole("size_px", size_px, at_least=MIN_SIZE_PX, at_most=MAX_SIZE_PX)
+        one_of("theme", theme, THEMES)
     arena = scenario.arena
     width_m, height_m = arena.width_m + 2 * WALL_M, arena.height_m + 2 * WALL_M
     scale = size_px / max(width_m, height_m)
@@ -134,6 +159,7 @@ def arena_view(scenario: ScenarioConfig, size_px: int = 900) -> View:
         bottom=header + floor_px - WALL_M * scale,
         robot_px=max(scenario.robots.radius_m * scale, min(4.6 * grow, max(1.2, 0.065 * robot_gap))),
         object_px=max(0.9 * CELL_M * scale, min(2.6 * grow, max(0.8, 0.35 * object_gap))),
+        palette=THEMES[theme],
     )
 
 

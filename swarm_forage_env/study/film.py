@@ -35,6 +35,7 @@ def record_run(
     fps: float = 20.0,
     size_px: int = 900,
     trail_s: float = 20.0,
+    theme: str = "dark",
     caches: str | None = None,
     parameters: Mapping[str, Any] | None = None,
     wrappers: "Iterable[WrapperConfig]" = (),
@@ -52,6 +53,7 @@ def record_run(
         fps: Pictures per second of film.
         size_px: Longer side of the drawn arena.
         trail_s: Simulated time over which the robots' trails fade; 0 for none.
+        theme: "dark" or "light".
         caches: "none", "static" or "dynamic"; default what the policy states in `caches`, or what the scenario has if
             the policy states nothing (`study.spec.chosen_caches`).
         parameters: Keyword arguments of a policy that is given by name or path.
@@ -71,7 +73,7 @@ def record_run(
     with refusing():
         number("trail_s", trail_s, at_least=0.0)
     path = check_film(path, fps, len(ticks))
-    arena_view(scenario, size_px)  # refuses a bad size before the run starts
+    arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
     policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
     title = f"{scenario.name.replace('_', ' ')}, {name}, {scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
     stack = build_env(scenario, wrappers, reads=getattr(policy, "reads", None))
@@ -86,11 +88,13 @@ def record_run(
             if trails is not None:
                 trails.add(world.swarm)
             state = (world.swarm, world.objects, world.caches, world.events)
-            yield render_frame(scenario, *state, tick=world.tick, size_px=size_px, trails=trails, title=title)
+            yield render_frame(
+                scenario, *state, tick=world.tick, size_px=size_px, trails=trails, title=title, theme=theme
+            )
             if progress is not None:
                 progress(done, len(ticks))
 
-    return write_film(frames(), path, fps=fps, n_frames=len(ticks))
+    return write_film(frames(), path, fps=fps, n_frames=len(ticks), theme=theme)
 
 
 def cast_policy(

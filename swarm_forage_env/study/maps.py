@@ -1,7 +1,8 @@
 """Maps of the floor: where robots were, where they took and left objects, where they got in each other's way."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,30 +33,51 @@ class FloorMaps:
     """Side of a square."""
     size_m: tuple[float, float]
     """Extent of the arena along x and y."""
+    n_robots: int
+    """Swarm size; of a difference, that of the first swarm."""
     arrays: Mapping[str, FloatArray]
     """Name, as in `MEANINGS` -> (ny, nx), row = y from below."""
     is_difference: bool = False
 
     def minus(self, other: "FloorMaps") -> "FloorMaps":
-        """Return what is more here than in `other`.
+        """Return what is more here than in `other`, square by square.
+
+        Arenas may differ in size if they have the same proportions and as many squares: then squares at corresponding
+        places are compared.
 
         Raises:
-            ConfigError: maps of another arena, or of squares of another size.
+            ConfigError: arenas of other proportions, or another number of squares.
         """
-        mine, theirs = (self.size_m, self.side_m), (other.size_m, other.side_m)
-        if mine != theirs:
-            raise ConfigError(f"Expected maps of one arena and one size of squares, got {mine} and {theirs}.")
-        return FloorMaps(
+        if not (same_proportions(self.size_m, other.size_m) and self._grid == other._grid):
+            mine, theirs = ((maps.size_m, maps.side_m) for maps in (self, other))
+            raise ConfigError(
+                "Expected maps of arenas of one shape with as many squares, got sizes and sides of "
+                f"{mine} and {theirs} m."
+            )
+        return replace(
+            self,
             label=f"{self.label} minus {other.label}",
-            side_m=self.side_m,
-            size_m=self.size_m,
             arrays={name: array - other.arrays[name] for name, array in self.arrays.items()},
             is_difference=True,
         )
 
+    def per_robot(self) -> "FloorMaps":
+        """Return everything divided by the swarm size, so that swarms of several sizes can be compared."""
+        return replace(self, arrays={name: array / self.n_robots for name, array in self.arrays.items()})
+
+    @property
+    def _grid(self) -> tuple[int, ...]:
+        """Number of squares along y and x."""
+        return self.arrays["density"].shape
+
     def write(self, path: str | Path) -> None:
         """Write the arrays to an .npz file, whole or not at all."""
-        content: dict[str, Any] = {**self.arrays, "side_m": self.side_m, "size_m": self.size_m}
+        content: dict[str, Any] = {
+            **self.arrays,
+            "side_m": self.side_m,
+            "size_m": self.size_m,
+            "n_robots": self.n_robots,
+        }
         with replacing(Path(path)) as draft, draft.open("wb") as file:
             np.savez_compressed(file, **content)
 
@@ -87,6 +109,7 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
         label=replay.label,
         side_m=side_m,
         size_m=(arena.width_m, arena.height_m),
+        n_robots=replay.scenario.robots.n_robots,
         arrays={
             "density": count(position_m[active]) * of_frames,
             "interference": count(position_m[active & replay.has(Status.INTERFERING)]) * of_frames,
@@ -94,3 +117,14 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
             "drops": count(places_m[signs < 0]) * of_events,
         },
     )
+
+
+def mean_maps(maps: Sequence[FloorMaps], label: str) -> FloorMaps:
+    """Return the mean of maps of several runs of one experiment, under another label."""
+    arrays = {name: np.mean([one.arrays[name] for one in maps], axis=0) for name in MEANINGS}
+    return replace(maps[0], label=label, arrays=arrays)
+
+
+def same_proportions(size_m: tuple[float, float], other_m: tuple[float, float]) -> bool:
+    """Return whether two floors differ by a scale at most."""
+    return math.isclose(size_m[0] * other_m[1], size_m[1] * other_m[0], rel_tol=1e-6)

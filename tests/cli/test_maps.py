@@ -25,6 +25,17 @@ def test_maps_draws_runs_and_differences(command, painted):
 
 def test_maps_refuses_other_files(command):
     Path("page.html").write_text("<p>")
-    code, _, err = command("maps", "page.html")
-    assert code == 2
-    assert "Cannot read page.html: it is no replay page" in err
+    Path("bytes.html").write_bytes(b"\xff\xfe\x00")
+    Path("folder").mkdir()
+    Path("run.parquet").write_bytes(b"PAR1")
+    for name, message in (
+        ("page.html", "Cannot read page.html: it is no replay page"),
+        ("bytes.html", "Cannot read bytes.html: it is no text, so no replay page."),
+        ("folder", "Cannot read folder: Is a directory"),
+        ("gone.html", "Cannot read gone.html: No such file"),
+        ("run.parquet", "records of runs hold no positions. 'swarm-forage replay run.parquet' makes the page"),
+    ):
+        code, out, err = command("maps", name)
+        assert (code, out) == (2, "")
+        assert message in err
+        assert err.count("\n") == 1

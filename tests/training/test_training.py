@@ -20,6 +20,7 @@ from swarm_forage_env.policies.model_files import ModelError, ModelPolicy
 from swarm_forage_env.policies.network import Network, NetworkError
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import search_and_rescue, warehouse_small
+from swarm_forage_env.training.evaluations import read_evaluations, write_evaluations
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv, training
 from swarm_forage_env.training.sb3.export import export_network, note_interface
@@ -158,8 +159,8 @@ def test_time_spent_counts_on(trained, tmp_path):
     folder = tmp_path / "copy"
     shutil.copytree(trained, folder)
     path = folder / "evaluations.csv"
-    before = training._read_evaluations(path)
-    training._write_evaluations(path, [dataclasses.replace(each, wall_time_s=1000.0) for each in before])
+    before = read_evaluations(path)
+    write_evaluations(path, [dataclasses.replace(each, wall_time_s=1000.0) for each in before])
     told = []
     result = train(dataclasses.replace(SHORT, stages=(Stage(steps=256),)), folder, resume=True, report=told.append)
     assert 1000.0 < result.evaluations[-1].wall_time_s < 2000.0
@@ -283,7 +284,7 @@ def test_the_network_is_there_before_the_table_speaks_of_it(tmp_path, monkeypatc
     def full_disk(path, evaluations):
         raise OSError("no space left")
 
-    monkeypatch.setattr(training, "_write_evaluations", full_disk)
+    monkeypatch.setattr(training, "write_evaluations", full_disk)
     with pytest.raises(OSError, match="no space"):
         train(tiny_plan(stages=(Stage(steps=128),)), tmp_path)
     assert Network.load(tmp_path / "policy.npz").about.card["evaluation"]["steps"] == 128

@@ -141,6 +141,7 @@ class Painter {
       pen.globalAlpha = 1;
       pen.lineWidth = 1.5;
       pen.strokeRect(x - side / 2, y - side / 2, side, side);
+      pen.fillStyle = theme.colours.text;
       pen.fillText(String(count), x, y);
     }
   }

@@ -2,12 +2,15 @@
 
 const theme = {
   colours: {},
+  isChosen: false,
 
   /** Take the reader's choice, else the system's. */
   start() {
     const system = matchMedia("(prefers-color-scheme: dark)");
     this.set(system.matches ? "dark" : "light");
-    system.addEventListener("change", () => this.set(system.matches ? "dark" : "light"));
+    system.addEventListener("change", () => {
+      if (!this.isChosen) this.set(system.matches ? "dark" : "light");
+    });
   },
 
   set(name) {
@@ -22,6 +25,7 @@ const theme = {
   },
 
   toggle() {
+    this.isChosen = true;
     this.set(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
   },
 

@@ -90,7 +90,9 @@ def read_replays(path: str | Path) -> tuple[Replay, ...]:
         return tuple(_replay_of(about, block) for about, block in zip(_runs_of(header), blocks, strict=True))
     except OSError as error:
         raise ReplayError(f"Cannot read {path}: {error.strerror or error}.") from error
-    except (PageError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise ReplayError(f"Cannot read {path}: it is no text, so no replay page.") from error
+    except PageError as error:
         raise ReplayError(f"Cannot read {path}: {error}.") from error
     except (ConfigError, ReplayError, KeyError, TypeError, ValueError) as error:
         reason = f"no {error}" if isinstance(error, KeyError) else str(error).rstrip(".")

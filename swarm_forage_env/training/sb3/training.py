@@ -5,13 +5,12 @@ A folder holds everything of a training run: `plan.json`, `model.zip` (the lates
 can hold.
 """
 
-import csv
 import importlib.util
 import inspect
 import math
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +31,7 @@ from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_ch
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.study.record import software_versions
 from swarm_forage_env.study.run import run_policy
+from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, PLAN_FILE, read_evaluations, write_evaluations
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
 from swarm_forage_env.training.sb3.export import export_network, note_interface
@@ -42,9 +42,7 @@ ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "a2c": A2C, "dq
 ON_POLICY = ("ppo", "a2c")
 EXPORTABLE = ("ppo", "a2c", "dqn")
 MODEL_FILE = "model.zip"
-PLAN_FILE = "plan.json"
 POLICY_FILE = "policy.npz"
-EVALUATIONS_FILE = "evaluations.csv"
 _REPORT_EVERY_S = 1.0
 _MOST_WEIGHT = 1e6
 """Where torch fails over the outputs of a network, weights this large tell that the training diverged; our choice."""
@@ -269,7 +267,7 @@ class _Watch(BaseCallback):
         self._last_report = -math.inf
         self._next_evaluation = 0
         self._baseline: float | None = None
-        self.evaluations = _read_evaluations(folder / EVALUATIONS_FILE)
+        self.evaluations = read_evaluations(folder / EVALUATIONS_FILE)
         self._spent_s = self.evaluations[-1].wall_time_s if self.evaluations else 0.0
 
     def _wall_time_s(self) -> float:
@@ -342,7 +340,7 @@ class _Watch(BaseCallback):
         # The network before the table: a table must not boast of a network that is not there.
         if self._plan.algorithm in EXPORTABLE and performance >= max(past.performance for past in self.evaluations):
             self._export(evaluation)
-        _write_evaluations(self._folder / EVALUATIONS_FILE, self.evaluations)
+        write_evaluations(self._folder / EVALUATIONS_FILE, self.evaluations)
         self._report(evaluation)
 
     def _export(self, evaluation: Evaluation) -> None:
@@ -366,24 +364,6 @@ class _Watch(BaseCallback):
         records = [run_policy(make_policy(), spec) for spec in specs]
         performance = np.mean([record.rate_per_1000_s("performance") for record in records])
         return float(performance), float(np.mean([record.interference_fraction.mean() for record in records]))
-
-
-def _write_evaluations(path: Path, evaluations: Sequence[Evaluation]) -> None:
-    with replacing(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, [item.name for item in fields(Evaluation)])
-        table.writeheader()
-        table.writerows(map(asdict, evaluations))
-
-
-def _read_evaluations(path: Path) -> list[Evaluation]:
-    if not path.exists():
-        return []
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
-        return [Evaluation(**{**row, "steps": int(row["steps"])}) for row in rows]
-    except (ValueError, TypeError, KeyError, csv.Error) as error:
-        raise ConfigError(f"Cannot read the evaluations in {path}: {error}; repair or remove the file.") from error
 
 
 def _keep_quiet(news: TrainingStatus | Evaluation) -> None:

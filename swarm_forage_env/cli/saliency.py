@@ -1,0 +1,112 @@
+"""The command `saliency`."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import (
+    NO_PICTURE,
+    Caches,
+    ConfigFile,
+    Density,
+    Objects,
+    Robots,
+    Scenario,
+    Settings,
+    Side,
+    Wrappers,
+)
+from swarm_forage_env.cli.terminal import notes, output
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from swarm_forage_env.study.saliency import Saliency
+
+
+def saliency(  # long: one parameter per option
+    policy: Annotated[str, typer.Argument(metavar="POLICY", help="A shipped network, or an .npz file of a training.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Picture; default results/SCENARIO_POLICY.saliency.png.")
+    ] = None,
+    scenario: Scenario = "warehouse_small",
+    robots: Robots = None,
+    seconds: Annotated[float | None, typer.Option(help="Simulated seconds to look at; default the whole run.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
+    objects: Objects = None,
+    side: Side = None,
+    density: Density = None,
+    caches: Caches = None,
+    settings: Settings = None,
+    wrappers: Wrappers = None,
+    config: ConfigFile = None,
+) -> None:
+    """Show what a trained network looks at: how much it acts otherwise when one part of what it sees is exchanged.
+
+    A robot gets, for example, the light readings of another robot. How often does it then decide otherwise?
+    """
+    from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs
+    from swarm_forage_env.policies.network import NetworkError
+    from swarm_forage_env.rendering.plots import draw_saliency
+    from swarm_forage_env.study.saliency import GROUPS, open_network_of
+    from swarm_forage_env.study.saliency import saliency as measured
+
+    try:
+        network = open_network_of(policy)
+    except NetworkError as error:
+        raise typer.BadParameter(str(error)) from error
+    options = ScenarioOptions(
+        scenario=scenario,
+        robots=robots,
+        objects=objects,
+        side=side,
+        density=density,
+        caches=caches,
+        settings=tuple(settings or ()),
+        wrappers=tuple(wrappers or ()),
+        config_file=config,
+    )
+    (spec,) = plan_runs(options, (policy,), n_seeds=1, first_seed=seed)
+    found = measured(network, spec, seconds=seconds)
+    title = f"{Path(policy).stem} in {spec.scenario.name}, {spec.scenario.robots.n_robots} robots, seed {seed}"
+    output().print(_table(found, title))
+    picture = out or Path("results", f"{spec.scenario.name}_{Path(policy).stem}.saliency.png")
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    bars = {group: found.changed[group] for group in GROUPS[1:] if found.n_rows[group]}
+    try:
+        draw_saliency(picture, found.slices, bars, title=title, xlabel=_words(found))
+    except ImportError:
+        notes().print(NO_PICTURE, markup=False)
+        return
+    typer.echo(f"wrote {picture}")
+
+
+def _words(found: "Saliency") -> str:
+    return "share of decisions that change" if found.moved is not None else "mean change of the commands"
+
+
+def _table(found: "Saliency", title: str) -> "Table":
+    from rich.table import Table
+
+    from swarm_forage_env.study.saliency import GROUPS
+
+    table = Table(title=title, caption=f"{_words(found)} when a slice comes from another observation")
+    table.add_column("slice")
+    table.add_column("columns", justify="right")
+    for group in GROUPS:
+        table.add_column(f"{group}\n{found.n_rows[group]:,} seen", justify="right")
+    if found.moved is not None:
+        table.add_column("probability\nmoved", justify="right")
+    table.add_column("what it holds")
+    for row in found.ranked:
+        numbers = [found.changed[group][row] for group in GROUPS]
+        numbers += [] if found.moved is None else [found.moved["all"][row]]
+        table.add_row(
+            found.slices[row],
+            str(found.n_columns[row]),
+            *("" if math.isnan(number) else f"{number:.3f}" for number in numbers),
+            found.meanings[row],
+        )
+    return table

@@ -1,0 +1,68 @@
+"""The command `study maps`: where robots of a study's cells were, and what they did there."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from swarm_forage_env.cli.maps import with_differences, write_maps
+
+PICTURE_FILE = "maps.png"
+
+
+def maps(
+    place: Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Folder of a study, or its packed file.")],
+    cells: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--cell",
+            metavar="KEY=VALUE,...",
+            help="Only cells with these values, e.g. policy=dpo,population_size=16; may be repeated.",
+        ),
+    ] = None,
+    seeds: Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per cell; default at most 4.")] = None,
+    side: Annotated[float, typer.Option("--side", help="Side of the squares in m, in the smallest arena.")] = 0.4,
+    per_robot: Annotated[
+        bool, typer.Option("--per-robot", help="Divide by the swarm size, to compare swarms of several sizes.")
+    ] = False,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/maps/NAME.")] = None,
+) -> None:
+    """Draw where robots of some cells were, took and left objects, and got in each other's way.
+
+    One row per cell; then, for each cell after the first, what is more in it than in the first. The arrays go to .npz
+    files beside the picture. Stored runs hold no positions, so they are made again.
+    """
+    from swarm_forage_env.cli.terminal import notes
+    from swarm_forage_env.study.cell_maps import choose_cells, maps_of_cells, robot_ticks
+    from swarm_forage_env.study.study_table import read_study
+
+    table = read_study(place)
+    chosen = choose_cells(table.spec, cells or ())
+    with _bar(robot_ticks(table.spec, chosen, seeds)) as advance:
+        found, changed = maps_of_cells(table, chosen, n_seeds=seeds, side_m=side, advance=advance)
+    if per_robot:
+        found = [one.per_robot() for one in found]
+    if changed:
+        notes().print(
+            f"Runs that come out different from their records, which other versions made: {', '.join(changed)}; "
+            "the maps show them as they are now.",
+            markup=False,
+        )
+    picture = (out or Path("results", "maps", table.spec.name)) / PICTURE_FILE
+    write_maps(with_differences(found), picture, per="robot" if per_robot else "")
+    typer.echo(f"wrote maps of {len(found)} cell{'s' * (len(found) > 1)} to {picture} and .npz files beside it")
+
+
+@contextmanager
+def _bar(total: int) -> Iterator[Callable[[float], None]]:
+    """Show how much is done, and an estimate of how long the rest will take."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    screen = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task("making the runs again", total=total)
+        yield lambda done: bar.update(task, completed=done)

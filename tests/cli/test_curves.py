@@ -1,0 +1,71 @@
+"""The command `curves`, on folders as trainings leave them."""
+
+import dataclasses
+import sys
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, PLAN_FILE, write_evaluations
+from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.training.status import Evaluation
+
+PLAN = TrainingPlan(
+    scenario=scenario("warehouse_small", n_robots=2, n_objects=20, horizon_s=4.0, interval_s=2.0),
+    stages=(Stage(steps=10), Stage(steps=20)),
+    evaluation=EvaluationPlan(every_steps=10, horizon_s=4.0, n_runs=2),
+)
+
+
+def training(folder: str, plan: TrainingPlan = PLAN, *, best: float = 40.0) -> None:
+    Path(folder).mkdir()
+    plan.write(Path(folder, PLAN_FILE))
+    rows = [
+        Evaluation(steps=steps, wall_time_s=1.0, performance=per, baseline=5.0, interference_fraction=0.25)
+        for steps, per in ((10, 0.0), (20, best), (30, best / 2))
+    ]
+    write_evaluations(Path(folder, EVALUATIONS_FILE), rows)
+
+
+@pytest.mark.compiled
+def test_trainings_are_drawn_beside_others(command, monkeypatch):
+    pytest.importorskip("matplotlib")
+    training("first")
+    training("second", dataclasses.replace(PLAN, algorithm="a2c"), best=8.0)
+    words = ("curves", "first", "second", "--beside", "random,crw", "--jobs", "1")
+    code, out, _ = command(*words, "-o", "both.png")
+    assert code == 0
+    rows = [line.split("│") for line in out.splitlines() if line.startswith("│")]
+    cells = {row[1].strip(): [cell.strip() for cell in row[2:5]] for row in rows}
+    assert cells["first, at its best"] == ["20", "40.0", "0.250"]
+    assert cells["second, at its best"] == ["20", "8.0", "0.250"]
+    assert cells.keys() >= {"random", "crw"}
+    assert out.endswith("wrote both.png\n")
+    assert Path("both.png").read_bytes().startswith(b"\x89PNG")
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    code, _, err = command("curves", "first", "--beside", "none")
+    assert code == 1
+    assert "No picture without matplotlib" in err
+    assert not Path("first/curves.png").exists()
+
+
+def test_what_curves_refuses(command):
+    training("first")
+    training("elsewhere", dataclasses.replace(PLAN, evaluation=EvaluationPlan(horizon_s=8.0)))
+    Path("empty").mkdir()
+    training("new")
+    Path("new", EVALUATIONS_FILE).unlink()
+    training("broken")
+    Path("broken", EVALUATIONS_FILE).write_text("steps,wall_time_s\nten,1\n")
+    for words, message in (
+        (("empty",), "Expected the folder of a training, got empty without plan.json"),
+        (("new",), "Expected a training with evaluations, got new"),
+        (("broken",), "Cannot read the evaluations in broken/evaluations.csv"),
+        (("first", "elsewhere"), "judged by the same runs, got first and elsewhere"),
+        (("first", "--beside", "crv"), "Did you mean 'crw'"),
+    ):
+        code, _, err = command("curves", *words)
+        assert code == 2
+        assert message in err
+        assert err.count("\n") == 1

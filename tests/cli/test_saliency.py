@@ -1,0 +1,41 @@
+"""The command `saliency`."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+WORDS = ("--robots", "3", "--seconds", "20")
+
+
+@pytest.mark.compiled
+def test_saliency_is_told_and_drawn(command, monkeypatch):
+    pytest.importorskip("matplotlib")
+    code, out, err = command("saliency", "ppo_warehouse_small", *WORDS)
+    assert (code, err) == (0, "")
+    assert "share of decisions that change when a slice comes from another observation" in out
+    assert "cos, sin of the heading" in out
+    picture = Path("results/warehouse_small_ppo_warehouse_small.saliency.png")
+    assert out.endswith(f"wrote {picture}\n")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    code, out, err = command("saliency", "ppo_warehouse_small", *WORDS, "-o", "other.png")
+    assert code == 0
+    assert "No picture without matplotlib" in err
+    assert not Path("other.png").exists()
+
+
+def test_saliency_refuses_what_is_no_network(command):
+    Path("broken.npz").write_text("nothing")
+    for name, message in (
+        ("crw", "Expected a network"),
+        ("broken.npz", "Expected broken.npz to hold a network"),
+        ("model.zip", "Expected a network"),
+    ):
+        code, _, err = command("saliency", name)
+        assert code == 2
+        assert message in err
+        assert err.count("\n") == 1
+    code, _, err = command("saliency", "missing.npz")
+    assert code == 1
+    assert "missing.npz" in err
