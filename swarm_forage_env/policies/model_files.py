@@ -24,7 +24,7 @@ from swarm_forage_env.policies.interface import (
     chosen_interface,
     interface_from_mapping,
 )
-from swarm_forage_env.policies.learned import Choose, LearnedPolicy
+from swarm_forage_env.policies.learned import LearnedPolicy, Remember
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
@@ -50,9 +50,10 @@ class ModelError(ValueError):
 
 
 class ModelPolicy(LearnedPolicy):
-    """A model saved by stable-baselines3 (PPO, A2C, DQN, SAC, TD3, DDPG), acting without exploration.
+    """A model saved by stable-baselines3 (PPO, A2C, DQN, SAC, TD3, DDPG) or sb3-contrib, acting without exploration.
 
-    A model of one robot is applied to every robot, whatever the swarm size. Its interface is given by
+    A model of one robot is applied to every robot, whatever the swarm size; a recurrent one remembers for each of them.
+    Its interface is given by
 
     * the note that our training leaves in the file (`training.sb3.export.note_interface`),
     * the parameter `interface`, whose fields override those of the note,
@@ -86,7 +87,9 @@ class ModelPolicy(LearnedPolicy):
         noted, caches = (None, None) if note is None else _read_note(note, self._path)
         self._is_told = noted is not None or interface is not None
         self._source = f"the note in {self._path.name}" if interface is None else "the parameter interface"
-        super().__init__(chosen_interface(interface, noted), deterministic_choice(self._network), caches=caches)
+        super().__init__(
+            chosen_interface(interface, noted), remember=deterministic_choice(self._network), caches=caches
+        )
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run.
@@ -115,13 +118,21 @@ class ModelPolicy(LearnedPolicy):
         )
 
 
-def deterministic_choice(model: Any) -> Choose:
-    """Return how a model of stable-baselines3, or its policy network, chooses without exploration."""
+def deterministic_choice(model: Any) -> Remember:
+    """Return how a model of stable-baselines3, or its policy network, chooses without exploration.
+
+    The memory is the state of a recurrent model, a row per robot; other models have none.
+    """
     return partial(_predicted, model)
 
 
-def _predicted(model: Any, rows: ObsArray, rng: np.random.Generator) -> np.ndarray:  # noqa: ARG001 - nothing is drawn
-    return model.predict(rows, deterministic=True)[0]
+def _predicted(
+    model: Any,
+    rows: ObsArray,
+    memory: Any,
+    rng: np.random.Generator,  # noqa: ARG001 - nothing is drawn
+) -> tuple[np.ndarray, Any]:
+    return model.predict(rows, state=memory, deterministic=True)
 
 
 def _read_note(note: Any, path: Path) -> tuple[InterfaceConfig, str]:

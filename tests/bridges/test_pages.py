@@ -10,9 +10,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from swarm_forage_env import RunSpec, run_one, scenario
+from swarm_forage_env import RunSpec, load_policy, parallel_env, run_one, scenario
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
@@ -69,6 +71,39 @@ def test_the_example_of_stable_baselines3_trains_and_exports(tmp_path):
     run(["example.py"], tmp_path)
     check_runs(tmp_path / "policy.npz")
     check_runs(tmp_path / "sac.zip")
+
+
+def test_a_recurrent_model_runs_with_its_memory(tmp_path):
+    """Its actions in a run are those of the model itself, told where the run began."""
+    require("sb3_contrib", "sb3")
+    from sb3_contrib import RecurrentPPO
+
+    from swarm_forage_env.training.sb3 import SwarmVecEnv
+    from swarm_forage_env.training.sb3.export import note_interface
+
+    config = InterfaceConfig(observation="compact", automatic_gripper=True, decision_ticks=2)
+    env = SwarmVecEnv("warehouse_small", n_robots=3, n_objects=20, interface=config)
+    model = RecurrentPPO("MlpLstmPolicy", env, n_steps=8, batch_size=24, learning_rate=0.1, seed=0, device="cpu")
+    model.learn(24)
+    note_interface(model, config)
+    model.save(tmp_path / "model.zip")
+
+    arena = parallel_env("warehouse_small", n_robots=3, n_objects=20)
+    interface = LearnerInterface(config, arena.swarm_spec)
+    policy = load_policy(tmp_path / "model.zip")
+    for seed in (1, 2):  # the second run begins without memory, too
+        policy.reset(arena.swarm_spec, np.random.default_rng(0))
+        obs, state = arena.reset_batch(seed), None
+        for tick in range(12):
+            if tick % 2 == 0:
+                seen = interface.observe(obs)
+                choice, state = model.predict(
+                    seen, state=state, episode_start=np.full(3, state is None), deterministic=True
+                )
+            actions = policy.act(obs, arena.active)
+            np.testing.assert_array_equal(actions, interface.command(choice, obs))
+            obs, *_ = arena.step_batch(actions)
+    assert np.any(choice != model.predict(seen, deterministic=True)[0])
 
 
 def test_train_ppo_is_as_short_as_promised():

@@ -13,7 +13,9 @@ from gymnasium import spaces
 from metrics import score_policy
 from metrics.scoring import plan_scores
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.model_files import MODEL_NOTE, ModelError, ModelPolicy, file_digest
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.policies.registry import is_policy_file, load_policy, local_policy, policy_class
@@ -159,6 +161,38 @@ def test_actions_are_kept_for_the_ticks_of_a_decision(tmp_path):
     for wrong in ({"decision_ticks": 0}, {"decision_tick": 2}, 2):
         with pytest.raises(ConfigError, match=r"decision_ticks|InterfaceConfig or its fields"):
             load_policy(str(path), {"interface": wrong})
+
+
+class Counting:
+    """Stands in for the network of a recurrent model: it turns faster in every decision of a run."""
+
+    observation_space, action_space = box(SIZE), box(3)
+
+    def predict(self, rows, state=None, *, deterministic):
+        assert deterministic
+        decisions = np.zeros((len(rows), 1)) if state is None else state[0]
+        assert decisions.shape == (len(rows), 1)
+        return np.repeat(0.1 * decisions, 3, axis=1).astype(np.float32), (decisions + 1,)
+
+
+def test_a_recurrent_model_remembers_within_a_run(monkeypatch, tmp_path):
+    path = tmp_path / "model.zip"
+    path.write_bytes(b"recurrent")
+    monkeypatch.setattr(model_files, "_open_model", lambda path, digest: (Counting(), None))
+    policy = started(path, interface={"decision_ticks": 2})
+    wheels = [policy.act(OBS, ACTIVE)[:, 0].copy() for _ in range(5)]
+    np.testing.assert_allclose(wheels, np.repeat([[0.0], [0.0], [0.1], [0.1], [0.2]], 4, axis=1))
+    twin = copy.deepcopy(policy)
+    for _ in range(2):
+        np.testing.assert_array_equal(twin.act(OBS, ACTIVE), policy.act(OBS, ACTIVE))
+    policy.reset(ENV.swarm_spec, np.random.default_rng(0))
+    np.testing.assert_array_equal(policy.act(OBS, ACTIVE), 0.0)
+
+
+def test_a_controller_is_given_with_memory_or_without():
+    for wrong in ({}, {"choose": len, "remember": len}):
+        with pytest.raises(TypeError, match="either choose or remember"):
+            LearnedPolicy(InterfaceConfig(), **wrong)
 
 
 NOTED = {

@@ -327,7 +327,7 @@ class _Watch(BaseCallback):
         if self._baseline is None:
             self._baseline, _ = self._judged(lambda: load_policy(self._plan.evaluation.baseline))
         performance, interference = self._judged(
-            lambda: LearnedPolicy(self._plan.interface, deterministic_choice(self.model))
+            lambda: LearnedPolicy(self._plan.interface, remember=deterministic_choice(self.model))
         )
         evaluation = Evaluation(
             steps=self.num_timesteps,
