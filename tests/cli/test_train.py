@@ -20,7 +20,7 @@ from swarm_forage_env.training.plan import EvaluationPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 
 TINY = ("--robots", "4", "--objects", "20", "--steps", "128", "--arenas", "2", "--arg", "n_steps=16", "--arg",
-        "batch_size=64", "--evaluate-every", "128")  # fmt: skip
+        "batch_size=64", "--evaluate-every", "128", "--evaluation-horizon", "200")  # fmt: skip
 
 
 needs_training = pytest.mark.skipif(
@@ -190,6 +190,7 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         automatic_gripper=False,
         decision_ticks=2,
         evaluate_every=50,
+        evaluation_horizon=200.0,
         small_start=False,
         horizon_s=400.0,
         hidden="128,32",
@@ -203,7 +204,7 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         seed=4,
         interface={"observation": "full", "automatic_gripper": False, "decision_ticks": 2},
         wrappers=["actuator_noise:sigma=0.1", "sensor_noise:sigma=0.01"],
-        evaluation=EvaluationPlan(every_steps=50),
+        evaluation=EvaluationPlan(every_steps=50, horizon_s=200.0),
         small_start=False,
         hidden=(128, 32),
         options={"batch_size": 8, "gamma": 0.9},
@@ -223,13 +224,13 @@ def test_what_people_set_goes_before_the_recipe(tmp_path, by_file):
     settings = () if by_file else ("nest_progress=0.0", "horizon_s=400")
     plan = build_plan(ScenarioOptions(scenario="warehouse_small", settings=settings, config_file=path), TrainOptions())
     assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.0, 1.0)
-    assert plan.scenario.horizon_s == 400.0
+    assert [stage.scenario["horizon_s"] for stage in plan.stages] == [400.0, 400.0]
 
 
 @needs_training
 def test_small_runs_come_without_warnings(command, recwarn):
     code, _, err = command("train", "--robots", "3", "--objects", "20", "--arenas", "1", "--steps", "6", "--arg",
-                           "n_steps=2", "--evaluate-every", "6")  # fmt: skip
+                           "n_steps=2", "--evaluate-every", "6", "--evaluation-horizon", "200")  # fmt: skip
     assert code == 0, err
     assert not [warning for warning in recwarn if "mini-batch" in str(warning.message)]
 
