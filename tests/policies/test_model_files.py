@@ -2,6 +2,7 @@
 
 import copy
 import sys
+import warnings
 import zipfile
 from pathlib import Path
 
@@ -16,9 +17,21 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.learned import LearnedPolicy
-from swarm_forage_env.policies.model_files import MODEL_NOTE, ModelError, ModelPolicy, file_digest
+from swarm_forage_env.policies.model_files import (
+    MODEL_NOTE,
+    InterfaceGuessWarning,
+    ModelError,
+    ModelPolicy,
+    file_digest,
+)
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.policies.registry import is_policy_file, load_policy, local_policy, policy_class
+from swarm_forage_env.policies.registry import (
+    is_policy_file,
+    load_policy,
+    local_policy,
+    policy_class,
+    split_interface,
+)
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.experiments import Budget
 from swarm_forage_env.study.run import run_one
@@ -26,6 +39,8 @@ from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.support.branches import pickled
 
+pytestmark = pytest.mark.filterwarnings(f"ignore::{InterfaceGuessWarning.__module__}.{InterfaceGuessWarning.__name__}")
+"""Most models here are saved without a note; one test is about that."""
 TINY = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=1, n_sizes=2, n_levels=1)
 ENV = parallel_env("warehouse_small", n_robots=4, n_objects=20)
 OBS = np.random.default_rng(1).uniform(-1.0, 1.0, (4, ENV.layout.size)).astype(np.float32)
@@ -140,6 +155,50 @@ def test_a_planned_run_carries_the_interface_as_plain_values(tmp_path):
     policy.reset(ENV.swarm_spec, np.random.default_rng(0))
     assert policy.interface.config == interface
     assert run_one(spec).scenario == "warehouse_small"
+
+
+def test_an_interface_that_is_guessed_is_said_once_and_on_one_line(tmp_path):
+    _, path = model("A2C", tmp_path)
+    with pytest.warns(InterfaceGuessWarning, match=r"one decision per tick.* model\.zip:decision_ticks=5") as told:
+        spec = plan_run(scenario("warehouse_small", n_robots=4), str(path))
+    assert len(told) == 1
+    assert "\n" not in str(told[0].message)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load_policy(spec.policy, spec.parameters)  # as every run of the plan does
+        plan_run(scenario("warehouse_small", n_robots=4), f"{path}:decision_ticks=1")
+        _, noted, _ = noted_model(tmp_path, NOTED)
+        load_policy(str(noted))
+
+
+def test_an_interface_is_said_with_the_file(tmp_path):
+    _, path, _ = noted_model(tmp_path, NOTED)
+    world = scenario("warehouse_small", n_robots=4)
+    said = plan_run(world, f"{path}:decision_ticks=2,automatic_gripper=true", caches="static")
+    given = {"interface": {"decision_ticks": 2, "automatic_gripper": True}}
+    assert said == plan_run(world, str(path), parameters=given, caches="static")
+    assert load_policy(f"{path}:decision_ticks=7")._config.decision_ticks == 7
+    assert plan_scores([f"{path}:decision_ticks=7"], world, budget=TINY).contestants[0].label == "model"
+    with pytest.raises(ConfigError, match="Did you mean 'decision_ticks'"):
+        load_policy(f"{path}:decision_tick=7")
+    with pytest.raises(ConfigError, match="once, got it with the file and as a parameter"):
+        plan_run(world, f"{path}:decision_ticks=2", parameters=given)
+
+
+@pytest.mark.parametrize(
+    ("policy", "expected"),
+    [
+        ("crw", ("crw", {})),
+        ("crw:decision_ticks=2", ("crw:decision_ticks=2", {})),
+        ("lr=0.1/a.zip", ("lr=0.1/a.zip", {})),
+        ("b:a=1/a.zip:decision_ticks=2", ("b:a=1/a.zip", {"decision_ticks": 2})),
+        ("a.zip:observation=full, actions=discrete", ("a.zip", {"observation": "full", "actions": "discrete"})),
+    ],
+)
+def test_what_is_an_interface_and_what_is_a_path(policy, expected):
+    assert split_interface(policy) == expected
+    with pytest.raises(ConfigError, match=r"interface of a\.zip as field=value, got 'x'"):
+        split_interface("a.zip:decision_ticks=2,x")
 
 
 def test_a_model_of_the_whole_swarm_sees_all_rows_at_once(tmp_path):
@@ -311,6 +370,8 @@ def test_networks_are_policies_by_their_path(network_file):
     np.testing.assert_array_equal(policy.act(OBS, ACTIVE)[:, :2], 0.5)
     with pytest.raises(ModelError, match="changed since"):
         load_policy(str(network_file), {"digest": "0"})
+    with pytest.raises(ModelError, match="a network file holds its own"):
+        load_policy(f"{network_file}:decision_ticks=2")
 
 
 def test_files_are_scored_under_the_name_of_the_file_in_the_world_they_are_made_for(network_file, tmp_path):
