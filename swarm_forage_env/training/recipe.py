@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, table
@@ -130,7 +130,7 @@ class Measured:
 
 @cache
 def _measured_recipes() -> dict[str, Measured]:
-    tables = tomllib.loads((files(__package__) / "recipes.toml").read_text(encoding="utf-8"))
+    tables = tomllib.loads((Path(__file__).parent / "recipes.toml").read_text(encoding="utf-8"))
     return {name: Measured(**values) for name, values in tables.items()}
 
 

@@ -320,7 +320,7 @@ class _Watch(BaseCallback):
         """Let TensorBoard show the settings beside the evaluations."""
         told = {name: value for name, value in self._plan.settings().items() if name.startswith(_TOLD)}
         plain = {name: value if isinstance(value, int | float | str) else str(value) for name, value in told.items()}
-        measures = dict.fromkeys(("evaluation/performance", "evaluation/interference_fraction"), 0.0)
+        measures: dict[str, float] = {"evaluation/performance": 0.0, "evaluation/interference_fraction": 0.0}
         self.logger.record("settings", HParam(plain, measures), exclude=_NO_LINE)
 
     def _on_step(self) -> bool:
