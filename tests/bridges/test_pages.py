@@ -83,8 +83,7 @@ def test_a_recurrent_model_runs_with_its_memory(tmp_path):
 
     config = InterfaceConfig(observation="compact", automatic_gripper=True, decision_ticks=2)
     env = SwarmVecEnv("warehouse_small", n_robots=3, n_objects=20, interface=config)
-    model = RecurrentPPO("MlpLstmPolicy", env, n_steps=8, batch_size=24, learning_rate=0.1, seed=0, device="cpu")
-    model.learn(24)
+    model = RecurrentPPO("MlpLstmPolicy", env, n_steps=8, batch_size=24, seed=0, device="cpu")
     note_interface(model, config)
     model.save(tmp_path / "model.zip")
 
@@ -104,6 +103,32 @@ def test_a_recurrent_model_runs_with_its_memory(tmp_path):
             np.testing.assert_array_equal(actions, interface.command(choice, obs))
             obs, *_ = arena.step_batch(actions)
     assert np.any(choice != model.predict(seen, deterministic=True)[0])
+
+
+def test_supersuit_takes_the_parallel_environments_until_the_last_robot_is_dead():
+    require("supersuit", "sb3")
+    import supersuit
+
+    for interface in (None, {"observation": "compact", "actions": "discrete", "automatic_gripper": True}):
+        mortal = parallel_env("warehouse_small", n_robots=3, n_objects=20, max_cycles=40, interface=interface,
+                              wrappers=["population:death_per_tick=0.2"])  # fmt: skip
+        env = supersuit.frame_skip_v0(supersuit.black_death_v3(mortal), 2)
+        env.reset(seed=1)
+        n_steps = 0
+        while env.agents:
+            assert len(env.agents) == 3
+            env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+            n_steps += 1
+        assert 1 < n_steps < 40
+
+
+def test_torchrl_takes_the_vector_environments():
+    require("torchrl", "torchrl")
+    import gymnasium
+    from torchrl.envs import GymWrapper
+
+    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v1", n_arenas=2, n_robots=3, n_objects=20, max_cycles=5)
+    assert GymWrapper(envs).rollout(3)["next", "reward"].shape == (6, 3, 1)
 
 
 def test_train_ppo_is_as_short_as_promised():

@@ -3,6 +3,7 @@
 import builtins
 import inspect
 import json
+import re
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -12,6 +13,7 @@ import pytest
 
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli import training_report
 from swarm_forage_env.cli.scenario_options import ScenarioOptions
 from swarm_forage_env.cli.train import train
 from swarm_forage_env.cli.training_plan import TrainOptions, build_plan
@@ -36,10 +38,13 @@ def test_help_tells_the_rewards_of_the_recipe():
 
 
 @needs_training
-def test_trains_shows_evaluations_and_goes_on(command):
+def test_trains_shows_evaluations_and_goes_on(command, monkeypatch):
+    monkeypatch.setattr(training_report, "LINE_EVERY_S", 0.0)
     words = ("train", *TINY, "--set", "nest_progress=0.07")
     code, _, err = command(*words)
     assert code == 0, err
+    assert "Evaluated in 1 run of 200 s:" in err
+    assert re.search(r"^128 of 128 decisions, mean return .*, about \d+ s left$", err, re.MULTILINE)
     folder = Path("results/training/warehouse_small_ppo")
     assert "decisions  per 1,000 s" in err
     assert str(folder / "policy.npz") in err
