@@ -2,8 +2,10 @@
 """Train PPO of stable-baselines3 on a swarm: one shared policy, every robot is a sub-environment.
 
 pip install ".[train]" "torch==2.13.0"  # in a checkout
-python scripts/train_ppo.py --steps 3000000 --out ppo_example.npz
+python scripts/train_ppo.py --out ppo_example.npz
 swarm-forage run --policy crw,ppo_example.npz
+
+This is `swarm-forage train` without its checkpoints and evaluations: the same recipe gives the same last weights.
 """
 
 import argparse
@@ -12,45 +14,44 @@ from pathlib import Path
 import torch
 from stable_baselines3 import PPO
 
-from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.training.defaults import DEFAULT_STEPS
+from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, SwarmVecEnv
-from swarm_forage_env.training.sb3.export import export_network
+from swarm_forage_env.training.sb3.export import export_network, note_interface
+from swarm_forage_env.training.sb3.training import training_seed
 
 
 def main() -> None:
     """Train in a narrow warehouse, where ways are short, then in the real one; save the network."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--steps", type=int, default=3_000_000, help="decisions of single robots")
+    parser.add_argument("--steps", type=int, default=DEFAULT_STEPS, help="decisions of single robots")
     parser.add_argument("--out", type=Path, default=Path("ppo_example.npz"))
     arguments = parser.parse_args()
     torch.set_num_threads(1)
-    env = SwarmVecEnv(
-        "warehouse_small",
-        n_arenas=8,
-        interface=InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5),
-        horizon_s=600.0,
-        first_pickup=1.0,
-        nest_progress=0.05,
-    )
+    plan = recipe("warehouse_small", steps=arguments.steps)  # plain numbers: print it, or put your own in their place
+    env = SwarmVecEnv(plan.scenario, n_arenas=plan.n_arenas, interface=plan.interface)
+    checkpoint = arguments.out.with_suffix(".zip")
     model = PPO(
         "MlpPolicy",
         env,
-        n_steps=128,
-        batch_size=3200,
-        n_epochs=4,
-        gae_lambda=0.98,
-        learning_rate=1e-3,
+        **plan.options,  # n_steps, batch_size, learning_rate, ...
+        policy_kwargs={"net_arch": list(plan.hidden)},
         rollout_buffer_class=ActiveRolloutBuffer,  # leaves out robots that are dead or in repair
         rollout_buffer_kwargs=env.rollout_buffer_kwargs,
-        seed=0,
+        seed=training_seed(plan.seed, 0),
         verbose=1,
         device="cpu",
     )
-    for changes in ({"width_m": 12.0, "nest_centre_m": (1.2, 8.0), "nest_size_m": (1.2, 12.8)}, {}):
-        env.set_options({"scenario": changes})
-        model.set_env(env)  # makes the next call of learn reset the arenas
-        model.learn(arguments.steps // 2, reset_num_timesteps=False)
-    export_network(model, env.interface.config).save(arguments.out)
+    note_interface(model, plan.interface)
+    end = 0
+    for stage in plan.stages:
+        env.set_options({"scenario": stage.scenario})
+        if end:  # a new seed, and arenas that start anew
+            model = PPO.load(checkpoint, env=env, device="cpu", seed=training_seed(plan.seed, model.num_timesteps))
+        end += stage.steps
+        model.learn(end - model.num_timesteps, reset_num_timesteps=False)
+        model.save(checkpoint)
+    export_network(model, plan.interface).save(arguments.out)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
-from swarm_forage_env._internal.fields import as_whole, instance, switch
+from swarm_forage_env._internal.fields import ConfigError, as_whole, instance, switch
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, SwarmSpec
@@ -28,6 +28,46 @@ BatchStep: TypeAlias = tuple[ObsArray, np.ndarray, BoolArray, bool]
 
 _STATE = ("_last_obs", "_rewards", "_seeds", "_terminated", "agents", "seed_value")
 """Attributes of a ForageEnv that are state; the arena holds the rest."""
+
+
+OPTION_OF_TESTS = "options"
+"""A reset option without a meaning: PettingZoo's own `parallel_api_test` gives it to every environment."""
+
+
+def no_options(options: Mapping[str, Any] | None) -> None:
+    """Refuse reset options, for environments that take none.
+
+    Raises:
+        ConfigError: there is one; the message names it.
+    """
+    for name in options or ():
+        if name != OPTION_OF_TESTS:
+            raise ConfigError(
+                f"Expected no reset options, got {name!r}. An environment with an interface changes its scenario at a "
+                "reset: parallel_env(..., interface={}), then reset(options={'scenario': {'n_objects': 50}})."
+            )
+
+
+def is_over(agents_left: Collection[str], actions: Any, *, is_reset: bool) -> bool:
+    """Return whether a step has nothing to do, because no agent is left and no action was given.
+
+    Libraries that step many environments side by side ask for it until all of them are done.
+
+    Args:
+        agents_left: Agents of the environment.
+        actions: What its `step` was given.
+        is_reset: Whether it was reset.
+
+    Raises:
+        RuntimeError: no agent is left, but there are actions, or it was never reset.
+    """
+    if agents_left:
+        return False
+    if not is_reset:
+        raise RuntimeError("Call reset before step.")
+    if actions:
+        raise RuntimeError("All agents are done; call reset first.")
+    return True
 
 
 class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
@@ -130,6 +170,14 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     def swarm_spec(self) -> SwarmSpec:
         """What every policy may know before a run."""
         return SwarmSpec.of(self.scenario, horizon_s=self.max_cycles * self.scenario.dt_s)
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        """Generator for wrappers of other libraries; a seed given to a reset starts it. Runs themselves draw elsewhere.
+
+        It is that of the sequence of seeds: what is drawn from it changes the seeds of later resets without one.
+        """
+        return self._seeds
 
     # True state, for wrappers, recorders and pictures
 
@@ -357,13 +405,18 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, dict[str, Any]]]:
-        """Start a run; returns observations and infos per agent. `options` is accepted and ignored."""
+        """Start a run; returns observations and infos per agent.
+
+        Raises:
+            ConfigError: there are `options`; this environment takes none.
+        """
+        no_options(options)
         return self.reset_through(self.reset_batch, seed)
 
     def step(
         self, actions: dict[str, np.ndarray]
     ) -> tuple[dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Advance one tick with one action per agent in `agents`."""
+        """Advance one tick with one action per agent in `agents`; without agents and actions nothing happens."""
         return self.step_through(self.step_batch, actions)
 
     def reset_through(
@@ -382,6 +435,8 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     ) -> tuple[dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Pack actions, step by `step_batch` (a wrapper's or our own) and unpack per agent."""
         agents = self.agents
+        if is_over(agents, actions, is_reset=self.seed_value is not None):
+            return {}, {}, {}, {}, {}
         obs, reward, terminated, truncated = step_batch(self._pack(actions))
         # One copy of the whole batch; the agents' rows are views of it and stay valid.
         rows = dict(zip(self.possible_agents, obs.copy(), strict=True))
@@ -401,10 +456,6 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
     def _pack(self, actions: dict[str, np.ndarray]) -> ActionArray:
         agents = self.agents
-        if not agents:
-            raise RuntimeError(
-                "Call reset before step." if self.seed_value is None else "All agents are done; call reset first."
-            )
         if not isinstance(actions, Mapping):
             raise ActionError(f"Expected actions as a dict by agent, got {type(actions).__name__}.")
         if actions.keys() != self._row_of.keys() and set(actions) != set(agents):

@@ -23,6 +23,10 @@ class ConfigError(ValueError):
     """A configuration that cannot describe a world; the message says what was expected and what came."""
 
 
+class UnknownNameError(ConfigError, TypeError):
+    """A name of a value that there is not; a TypeError, too, as Python's own of an unknown keyword argument."""
+
+
 def number(
     where: str,
     value: Any,
@@ -160,12 +164,12 @@ def known_keys(mapping: Mapping[str, Any], known: Iterable[str], what: str = "ke
         prefix: Where the mapping is, such as "arena."; put before the key.
 
     Raises:
-        ConfigError: with the first unknown key and the nearest known one.
+        UnknownNameError: with the first unknown key and the nearest known one.
     """
     names = tuple(known)
     for key in mapping:
         if key not in names:
-            raise ConfigError(f"Unknown {what} {f'{prefix}{key}'!r}.{suggestion(str(key), names)}")
+            raise UnknownNameError(f"Unknown {what} {f'{prefix}{key}'!r}.{suggestion(str(key), names)}")
 
 
 def known_name(what: str, name: Any, known: Iterable[str]) -> None:

@@ -4,7 +4,8 @@ A command has a file of its own and imports what it needs when it runs, so that 
 """
 
 import sys
-from typing import Annotated
+import warnings
+from typing import Annotated, Any
 
 import typer
 
@@ -63,13 +64,26 @@ for command in (info, schema, rerun, watch, record, replay, maps, saliency, stuc
     app.command()(command)
 
 
+_show_in_full = warnings.showwarning
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+    """Print a warning that is meant for users as one line; those for programmers as Python does."""
+    if category.__module__.partition(".")[0] == __name__.partition(".")[0]:
+        complain(str(message), 0)
+    else:
+        _show_in_full(message, category, *rest)
+
+
 def main() -> None:
     """Run the command line and exit; an error of the user is one line on stderr."""
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.study.record import RecordError
 
     try:
-        code = app(standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            code = app(standalone_mode=False)
     except _USAGE_ERROR as error:
         code = complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined] - see _USAGE_ERROR
     except (ConfigError, RecordError) as error:

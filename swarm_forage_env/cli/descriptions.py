@@ -15,7 +15,7 @@ from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
-from swarm_forage_env.policies.registry import is_policy_file, policy_class, policy_names
+from swarm_forage_env.policies.registry import is_policy_file, policy_class, policy_names, split_interface
 from swarm_forage_env.scenarios import presets
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.study.spec import stated_caches
@@ -49,7 +49,7 @@ def information(name: str) -> str:
         network = network_file(name)
         return "\n".join([*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])])
     if is_policy_file(name):
-        return "\n".join(_file_lines(Path(name)))
+        return "\n".join(_file_lines(Path(split_interface(name)[0])))
     known = (*presets.SCENARIO_NAMES, *policy_names())
     raise ConfigError(f"Unknown scenario or policy {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
 

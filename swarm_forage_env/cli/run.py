@@ -35,7 +35,10 @@ def run(
     policy: Annotated[
         str,
         typer.Option(
-            "--policy", "--controller", help="One or more, separated by commas: names, or files of trained policies."
+            "--policy",
+            "--controller",
+            help="One or more, separated by commas: names, or files of trained policies. A file that does not tell its "
+            "interface can be told it: model.zip:decision_ticks=5.",
         ),
     ] = "crw",
     robots: Robots = None,

@@ -1,6 +1,7 @@
 """From command-line words to run specifications. Every wrong input raises a ConfigError here."""
 
 import dataclasses
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
@@ -8,6 +9,7 @@ from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.cli.config_file import read_config
+from swarm_forage_env.policies.registry import split_interface
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig, field_sections
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.sizing import checked_density
@@ -15,6 +17,7 @@ from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
+_FIELD = re.compile(r"[a-z_]+=[^/\\]*")
 _Number = TypeVar("_Number", int, float)
 
 _TRUTH = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
@@ -44,10 +47,19 @@ class ScenarioOptions:
 def split_names(text: str) -> tuple[str, ...]:
     """Split a comma-separated list of names, dropping repetitions.
 
+    A word field=value belongs to the policy file before it: "crw,model.zip:observation=compact,decision_ticks=5" are
+    two policies.
+
     Raises:
         ConfigError: there is no name in it.
     """
-    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    words: list[str] = []
+    for word in filter(None, (part.strip() for part in text.split(","))):
+        if words and split_interface(words[-1])[1] and _FIELD.fullmatch(word):
+            words[-1] += f",{word}"
+        else:
+            words.append(word)
+    names = tuple(dict.fromkeys(words))
     if not names:
         raise ConfigError(f"Expected one or more names separated by commas, got {text!r}.")
     return names

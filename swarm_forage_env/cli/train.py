@@ -44,7 +44,14 @@ def train(  # long: one parameter per option
     ] = None,
     evaluate_every: Annotated[
         int | None,
-        typer.Option(min=1, help=f"Decisions between evaluations and checkpoints; default {EVALUATE_EVERY:,}."),
+        typer.Option(
+            min=1,
+            help="Decisions between evaluations and checkpoints; "
+            f"default {EVALUATE_EVERY:,}, more where evaluations take long.",
+        ),
+    ] = None,
+    evaluation_horizon: Annotated[
+        float | None, typer.Option(help="Seconds per run of an evaluation; default those of the scenario.")
     ] = None,
     small_start: Annotated[
         bool | None,
@@ -59,7 +66,8 @@ def train(  # long: one parameter per option
         typer.Option("--arg", metavar="KEY=NUMBER", help="Argument of the algorithm; may be repeated."),
     ] = None,
     horizon: Annotated[
-        float | None, typer.Option(help=f"Seconds per episode of the training; default {EPISODE_S:,.0f}.")
+        float | None,
+        typer.Option(help=f"Seconds per episode of the training; default {EPISODE_S:,.0f}, or as measured to be best."),
     ] = None,
     robots: Robots = None,
     objects: Objects = None,
@@ -95,6 +103,7 @@ def train(  # long: one parameter per option
         automatic_gripper=automatic_gripper,
         decision_ticks=decision_ticks,
         evaluate_every=evaluate_every,
+        evaluation_horizon=evaluation_horizon,
         small_start=small_start,
         hidden=hidden,
         horizon_s=horizon,

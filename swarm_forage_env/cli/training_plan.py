@@ -8,7 +8,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, build_wrappers, scenario_overrides
 from swarm_forage_env.policies.pretrained import plan_file
-from swarm_forage_env.training.plan import EvaluationPlan, TrainingPlan, read_plan
+from swarm_forage_env.training.plan import TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 
 _INTERFACE_FIELDS = ("observation", "actions", "automatic_gripper", "decision_ticks")
@@ -27,6 +27,7 @@ class TrainOptions:
     automatic_gripper: bool | None = None
     decision_ticks: int | None = None
     evaluate_every: int | None = None
+    evaluation_horizon: float | None = None
     small_start: bool | None = None
     horizon_s: float | None = None
     hidden: str | None = None
@@ -49,13 +50,13 @@ def build_plan(words: ScenarioOptions, options: TrainOptions) -> TrainingPlan:
     chosen = {name: getattr(options, name) for name in ("algorithm", "steps", "n_arenas", "small_start", "seed")}
     if options.hidden is not None:
         chosen["hidden"] = _layers(options.hidden)
-    if options.evaluate_every is not None:
-        chosen["evaluation"] = EvaluationPlan(every_steps=options.evaluate_every)
+    evaluation = {"every_steps": options.evaluate_every, "horizon_s": options.evaluation_horizon}
     return recipe(
         words.scenario,
         interface=_given(interface),
         wrappers=build_wrappers(words, file_wrappers),
         options=dict(map(_argument, options.arguments)),
+        evaluation=_given(evaluation),
         **_given(chosen),
         **overrides,
     )

@@ -1,6 +1,7 @@
 """What `swarm-forage train` shows: progress, evaluations as they come, a picture, and where the results are."""
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -8,13 +9,17 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from metrics.scoring.texts import counted
 from swarm_forage_env.cli.options import NO_PICTURE
 from swarm_forage_env.rendering.plots import draw_trainings
 from swarm_forage_env.scenarios.performance import quantity
+from swarm_forage_env.study.progress import duration
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.training.status import Evaluation, TrainingStatus
 
 PICTURE_FILE = "training.png"
+LINE_EVERY_S = 60.0
+"""Shortest time between two lines about the progress where stderr is no terminal, s."""
 
 
 def run_training(plan: TrainingPlan, folder: Path, *, n_processes: int, resume: bool) -> None:
@@ -85,10 +90,15 @@ def stage_ends(plan: TrainingPlan) -> list[int]:
 
 def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | Evaluation], None]:
     task = bar.add_task("training", total=plan.total_steps)
-    heading = f"{'decisions':>12} {'per 1,000 s':>12} {plan.evaluation.baseline:>8} {'interference':>13}"
+    heading = (
+        f"Evaluated in {counted(plan.evaluation.n_runs, 'run')} of {_evaluated_s(plan):,.0f} s:\n"
+        f"{'decisions':>12} {'per 1,000 s':>12} {plan.evaluation.baseline:>8} {'interference':>13}"
+    )
+    told: TrainingStatus | None = None
+    told_at = time.monotonic()
 
     def report(news: TrainingStatus | Evaluation) -> None:
-        nonlocal heading
+        nonlocal heading, told, told_at
         if isinstance(news, Evaluation):
             if heading:
                 bar.console.print(heading)
@@ -96,7 +106,25 @@ def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | E
             bar.console.print(
                 f"{news.steps:>12,} {news.performance:>12.1f} {news.baseline:>8.1f} {news.interference_fraction:>13.3f}"
             )
-        else:
+        elif not bar.disable:
             bar.update(task, completed=news.steps, description=f"mean return {news.episode_return:.2f}")
+        elif time.monotonic() - told_at >= LINE_EVERY_S:
+            bar.console.print(_progress_line(plan, news, told))
+            told, told_at = news, time.monotonic()
 
     return report
+
+
+def _evaluated_s(plan: TrainingPlan) -> float:
+    (first, *_) = plan.evaluation.specs(plan.scenario, plan.wrappers, plan.evaluation.baseline)
+    return first.scenario.horizon_s
+
+
+def _progress_line(plan: TrainingPlan, now: TrainingStatus, before: TrainingStatus | None) -> str:
+    """Say how far a training is, and how long it takes at the pace since the line before."""
+    steps, seconds = (0, 0.0) if before is None else (before.steps, before.wall_time_s)
+    left_s = (plan.total_steps - now.steps) * (now.wall_time_s - seconds) / max(1, now.steps - steps)
+    return (
+        f"{now.steps:,} of {plan.total_steps:,} decisions, mean return {now.episode_return:.2f}, "
+        f"about {duration(max(0.0, left_s))} left"
+    )

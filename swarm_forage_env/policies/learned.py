@@ -1,7 +1,8 @@
 """LearnedPolicy: any trained controller that every robot shares, as a policy."""
 
 from collections.abc import Callable
-from typing import TypeAlias
+from functools import partial
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -11,12 +12,17 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 
 Choose: TypeAlias = Callable[[ObsArray, np.random.Generator], np.ndarray]
 """A function from observations of a learner, (N, d), to its actions, one row per robot."""
+Remember: TypeAlias = Callable[[ObsArray, Any, np.random.Generator], tuple[np.ndarray, Any]]
+"""The same for a controller with memory: from observations and memory to actions and the memory of the next decision.
+In the first decision of a run the memory is None."""
 
 
 class LearnedPolicy:
     """A trained controller as a policy: it sees and acts through an interface, once per decision.
 
-    An instance drives one run.
+    An instance drives one run. A controller with memory, such as a recurrent network, begins each run without any. It
+    is asked for all rows in every decision, so a robot in repair goes on remembering, as in training. The memory of a
+    dead robot no longer steers anything.
 
     Attributes:
         reads: Observation slices that are used, None = all.
@@ -26,19 +32,35 @@ class LearnedPolicy:
 
     interface: LearnerInterface
 
-    def __init__(self, interface: InterfaceConfig, choose: Choose, *, caches: str | None = "none") -> None:
+    def __init__(
+        self,
+        interface: InterfaceConfig,
+        choose: Choose | None = None,
+        *,
+        remember: Remember | None = None,
+        caches: str | None = "none",
+    ) -> None:
         """Take the controller.
 
         Args:
             interface: What it saw and did in training.
-            choose: The controller.
+            choose: The controller, if it has no memory.
+            remember: The controller, if it has one.
             caches: Kind of caches that it was trained with; None = unknown, runs then use those of the scenario.
+
+        Raises:
+            TypeError: both `choose` and `remember`, or neither.
         """
+        if choose is not None and remember is None:
+            self._remember: Remember = partial(_forgetful, choose)
+        elif remember is not None and choose is None:
+            self._remember = remember
+        else:
+            raise TypeError("Expected either choose or remember, the controller without or with memory.")
         self.reads = interface.reads
         if caches is not None:
             self.caches = caches
         self._config = interface
-        self._choose = choose
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run."""
@@ -46,11 +68,17 @@ class LearnedPolicy:
         self.interface = LearnerInterface(self._config, spec)
         self._view = np.empty((spec.n_robots, self.interface.layout.size), np.float32)
         self._ticks_left = 0
+        self._memory: Any = None
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
         if self._ticks_left == 0:
-            self._chosen = self._choose(self.interface.observe(obs, self._view), self._rng)
+            view = self.interface.observe(obs, self._view)
+            self._chosen, self._memory = self._remember(view, self._memory, self._rng)
             self._ticks_left = self._config.decision_ticks
         self._ticks_left -= 1
         return self.interface.command(self._chosen, obs)
+
+
+def _forgetful(choose: Choose, rows: ObsArray, memory: Any, rng: np.random.Generator) -> tuple[np.ndarray, Any]:
+    return choose(rows, rng), memory

@@ -6,6 +6,7 @@ wherever the name of a policy may.
 
 import hashlib
 import pickle
+import warnings
 from collections.abc import Mapping
 from functools import lru_cache, partial
 from pathlib import Path
@@ -24,7 +25,7 @@ from swarm_forage_env.policies.interface import (
     chosen_interface,
     interface_from_mapping,
 )
-from swarm_forage_env.policies.learned import Choose, LearnedPolicy
+from swarm_forage_env.policies.learned import LearnedPolicy, Remember
 from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
@@ -45,18 +46,24 @@ MODEL_FAULTS = (
 """Errors that stable-baselines3 and torch raise for a damaged file or one without a model."""
 
 
+class InterfaceGuessWarning(UserWarning):
+    """A model that does not tell its interface runs by the default one, which may not be what it was trained with."""
+
+
 class ModelError(ValueError):
     """A file that does not hold a model, or a model that cannot steer this swarm."""
 
 
 class ModelPolicy(LearnedPolicy):
-    """A model saved by stable-baselines3 (PPO, A2C, DQN, SAC, TD3, DDPG), acting without exploration.
+    """A model saved by stable-baselines3 (PPO, A2C, DQN, SAC, TD3, DDPG) or sb3-contrib, acting without exploration.
 
-    A model of one robot is applied to every robot, whatever the swarm size. Its interface is given by
+    A model of one robot is applied to every robot, whatever the swarm size; a recurrent one remembers for each of them.
+    Its interface is given by
 
     * the note that our training leaves in the file (`training.sb3.export.note_interface`),
     * the parameter `interface`, whose fields override those of the note,
-    * its spaces, where both are missing and the spaces are those of the environment itself, (D,) to (3,).
+    * its spaces, where both are missing and the spaces are those of the environment itself, (D,) to (3,). They do not
+      show how many ticks a decision lasts; 1 is taken, and an `InterfaceGuessWarning` says so unless `digest` is given.
 
     A model of the whole swarm, (N, D) to (N, 3), needs no note either, and works for its own N only. Nothing is
     normalised: a model trained behind `VecNormalize` gets other numbers than in training.
@@ -86,7 +93,16 @@ class ModelPolicy(LearnedPolicy):
         noted, caches = (None, None) if note is None else _read_note(note, self._path)
         self._is_told = noted is not None or interface is not None
         self._source = f"the note in {self._path.name}" if interface is None else "the parameter interface"
-        super().__init__(chosen_interface(interface, noted), deterministic_choice(self._network), caches=caches)
+        super().__init__(
+            chosen_interface(interface, noted), remember=deterministic_choice(self._network), caches=caches
+        )
+        if digest is None and not self._is_told:
+            warnings.warn(
+                f"{self._path.name} does not tell its interface: it runs with full observations, continuous actions "
+                f"and one decision per tick. If it was trained otherwise, say so: {self._path.name}:decision_ticks=5",
+                InterfaceGuessWarning,
+                stacklevel=2,
+            )
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run.
@@ -110,18 +126,27 @@ class ModelPolicy(LearnedPolicy):
             f"Expected {name} to tell what it sees and does, but it has no note, and its spaces, {goes}, are neither "
             f"those of the environment, {' to '.join(fitting)}, nor those of these {n_robots} robots together, "
             f"{' to '.join(whole_swarm)}. Give the interface that it was trained with: "
-            'load_policy(path, {"interface": {"observation": "compact"}}), or such parameters in a RunSpec; or call '
+            f"{name}:observation=compact,decision_ticks=5 as the policy, or "
+            'load_policy(path, {"interface": {"observation": "compact"}}); or call '
             "training.sb3.export.note_interface(model, interface) before the model is saved."
         )
 
 
-def deterministic_choice(model: Any) -> Choose:
-    """Return how a model of stable-baselines3, or its policy network, chooses without exploration."""
+def deterministic_choice(model: Any) -> Remember:
+    """Return how a model of stable-baselines3, or its policy network, chooses without exploration.
+
+    The memory is the state of a recurrent model, a row per robot; other models have none.
+    """
     return partial(_predicted, model)
 
 
-def _predicted(model: Any, rows: ObsArray, rng: np.random.Generator) -> np.ndarray:  # noqa: ARG001 - nothing is drawn
-    return model.predict(rows, deterministic=True)[0]
+def _predicted(
+    model: Any,
+    rows: ObsArray,
+    memory: Any,
+    rng: np.random.Generator,  # noqa: ARG001 - nothing is drawn
+) -> tuple[np.ndarray, Any]:
+    return model.predict(rows, state=memory, deterministic=True)
 
 
 def _read_note(note: Any, path: Path) -> tuple[InterfaceConfig, str]:
@@ -143,17 +168,20 @@ def _read_note(note: Any, path: Path) -> tuple[InterfaceConfig, str]:
     return interface, note["caches"]
 
 
-def open_network(path: str | Path, *, digest: str | None = None) -> NetworkPolicy:
+def open_network(path: str | Path, *, digest: str | None = None, interface: GivenInterface = None) -> NetworkPolicy:
     """Return the policy of a network file; see `policies.network`.
 
     Args:
         path: The file.
         digest: As in `ModelPolicy`.
+        interface: None; such a file holds its own.
 
     Raises:
-        ModelError: the file is missing or has changed.
+        ModelError: the file is missing or has changed, or an interface is given.
         NetworkError: it does not hold a network.
     """
+    if interface is not None:
+        raise ModelError(f"Expected {path} without an interface, got {interface!r}; a network file holds its own.")
     _checked_digest(path, digest)
     return NetworkPolicy(Network.load(path))
 

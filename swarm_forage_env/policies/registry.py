@@ -1,5 +1,6 @@
 """How a policy is found and made: by its registered name, from a file, from a function."""
 
+import re
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from functools import cache, partial
@@ -9,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import Policy, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
@@ -20,6 +22,10 @@ POLICY_FILE_ENTRY_POINTS = "swarm_forage_env.policy_files"
 is called with the path and the parameters of a run."""
 _LOCAL_POLICIES: dict[str, Callable[..., Policy]] = {}
 """Names that `local_policy` has given to policies of this process."""
+
+
+_FILE_WITH_WORDS = re.compile(r"(?P<file>.+?):(?P<words>[a-z_]+=[^/\\:]*)")
+_WORDS: dict[str, Any] = {"true": True, "false": False}
 
 
 class RandomPolicy:
@@ -75,8 +81,32 @@ def policy_names() -> tuple[str, ...]:
 
 
 def is_policy_file(name: str) -> bool:
-    """Return whether `name` has the suffix of files that an installed package opens as policies."""
-    return bool(_openers(name))
+    """Return whether `name` has the suffix of files that an installed package opens as policies.
+
+    The interface may be said with it, see `split_interface`.
+    """
+    return bool(_openers(split_interface(name)[0]))
+
+
+def split_interface(policy: str) -> tuple[str, dict[str, Any]]:
+    """Return a policy without the interface that is said with its file, and the fields of that interface.
+
+    `model.zip:observation=compact,decision_ticks=5` is the file model.zip, trained with compact observations and five
+    ticks per decision. Anything else is returned as it is, with no fields.
+
+    Raises:
+        ConfigError: a word that is no field=value.
+    """
+    found = _FILE_WITH_WORDS.fullmatch(policy)
+    if found is None or not _openers(found["file"]):
+        return policy, {}
+    fields: dict[str, Any] = {}
+    for word in found["words"].split(","):
+        name, equals, value = (part.strip() for part in word.partition("="))
+        if not (name and equals and value):
+            raise ConfigError(f"Expected the interface of {found['file']} as field=value, got {word!r} in {policy!r}.")
+        fields[name] = int(value) if value.isdecimal() else _WORDS.get(value.lower(), value)
+    return found["file"], fields
 
 
 @cache  # every run asks, and the answer is in the files of all packages that are installed
@@ -98,9 +128,9 @@ def policy_class(name: str) -> Callable[..., Policy]:
     """
     if name in _LOCAL_POLICIES:
         return _LOCAL_POLICIES[name]
-    if is_policy_file(name):
-        (opener,) = _openers(name)
-        return partial(opener.load(), name)
+    file, interface = split_interface(name)
+    for opener in _openers(file):
+        return partial(opener.load(), file, **({"interface": interface} if interface else {}))
     for point in _installed(POLICY_ENTRY_POINTS):
         if point.name == name:
             return point.load()

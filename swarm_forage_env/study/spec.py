@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, whole
-from swarm_forage_env.policies.registry import is_policy_file, load_policy, policy_class
+from swarm_forage_env.policies.registry import is_policy_file, load_policy, policy_class, split_interface
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping, whole_intervals
 from swarm_forage_env.wrappers.registry import wrapper_config_class
 
@@ -199,7 +199,8 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
     """Return a policy as specifications name it; the content of a file becomes part of its runs' identity.
 
     Args:
-        policy: Registered name, or path of a policy file. A file is opened once, before anything is run.
+        policy: Registered name, or path of a policy file, with or without its interface (`split_interface`). A file is
+            opened once, before anything is run.
         parameters: Keyword arguments of the policy; a "digest" of a file is kept, and the file checked against it.
 
     Returns:
@@ -207,17 +208,21 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
         name or the opened policy, which may state `caches`.
 
     Raises:
-        ValueError: no installed policy has that name, or the file cannot be opened.
+        ValueError: no installed policy has that name, the file cannot be opened, or an interface is given twice.
     """
-    if not is_policy_file(str(policy)):
-        return str(policy), dict(parameters), policy_class(str(policy))
+    name, interface = split_interface(str(policy))
+    if not is_policy_file(name):
+        return name, dict(parameters), policy_class(name)
     from swarm_forage_env.policies.model_files import file_digest  # late: most runs open no model
 
-    file = str(Path(policy).resolve())
+    file = str(Path(name).resolve())
     pinned = dict(parameters)
-    if "digest" not in pinned:
-        pinned["digest"] = file_digest(file)
-    return file, pinned, load_policy(file, pinned)
+    if interface and "interface" in pinned:
+        raise ConfigError(f"Expected the interface of {file} once, got it with the file and as a parameter.")
+    if interface:
+        pinned["interface"] = interface
+    opened = load_policy(file, pinned)  # without a digest it says what it has to guess, which runs do not repeat
+    return file, {"digest": file_digest(file), **pinned}, opened
 
 
 def wrappers_to_list(wrappers: "Iterable[WrapperConfig]") -> list[dict[str, Any]]:

@@ -17,4 +17,6 @@ EPISODE_S = 1000.0
 DECISION_TICKS = 5
 """Ticks per decision, one second."""
 EVALUATE_EVERY = 1_000_000
-"""Decisions of single robots between two evaluations."""
+"""Decisions of single robots between two evaluations, at least."""
+EVALUATION_SHARE = 0.5
+"""Most that evaluations may add to the simulated time of all robots; large swarms are evaluated less often for it."""

@@ -69,9 +69,9 @@ class EvaluationPlan:
 
     every_steps: int = EVALUATE_EVERY
     """Decisions between two evaluations; there is one more at the end."""
-    horizon_s: float = 2000.0
-    """Length of a run, s."""
-    n_runs: int = 2
+    horizon_s: float | None = None
+    """Length of a run, s; None = that of the plan's scenario. Jams build up, so that short runs promise too much."""
+    n_runs: int = 1
     first_seed: int = 1_000_000
     """Seeds are counted up from here, away from those of training."""
     baseline: str = "crw"
@@ -86,12 +86,12 @@ class EvaluationPlan:
             raise ConfigError(f"Expected evaluation.baseline to be a controller: {error}") from error
 
     def specs(self, scenario: ScenarioConfig, wrappers: tuple[WrapperConfig, ...], policy: str) -> tuple[RunSpec, ...]:
-        """Return one specification per run, in `scenario` but for its horizon.
+        """Return one specification per run, in `scenario`, of another horizon where the plan has one.
 
         Raises:
             ConfigError: a horizon that is not a whole number of recording intervals.
         """
-        whole_run = with_overrides(scenario, horizon_s=self.horizon_s)
+        whole_run = scenario if self.horizon_s is None else with_overrides(scenario, horizon_s=self.horizon_s)
         seeds = range(self.first_seed, self.first_seed + self.n_runs)
         return tuple(RunSpec(scenario=whole_run, policy=policy, wrappers=wrappers, seed=seed) for seed in seeds)
 
@@ -106,7 +106,7 @@ class TrainingPlan:
     """
 
     scenario: ScenarioConfig
-    """What is to be mastered, rewards included; evaluations take place in it."""
+    """What is to be mastered, rewards included; evaluations take place in it. Stages may have shorter episodes."""
     wrappers: tuple[WrapperConfig, ...] = ()
     """What disturbs the swarm, in training and in evaluations."""
     algorithm: str = "ppo"
@@ -151,6 +151,10 @@ class TrainingPlan:
         wrappers = {config.name: config.to_mapping() for config in self.wrappers}
         return {**plain, **nested, "wrappers": wrappers, "stages": [dataclasses.asdict(item) for item in self.stages]}
 
+    def settings(self) -> dict[str, Any]:
+        """Return all plain values of the plan by their names with dots, such as "interface.observation"."""
+        return dict(_leaves(self.to_mapping()))
+
     def differences(self, earlier: "TrainingPlan") -> tuple[str, ...]:
         """Return what keeps this plan from going on with a training by an earlier one, field by field.
 
@@ -161,9 +165,7 @@ class TrainingPlan:
         if last < len(self.stages):
             stages[last] = dataclasses.replace(stages[last], steps=max(stages[last].steps, self.stages[last].steps))
         begun = dataclasses.replace(self, stages=self.stages[: last + 1])
-        before, now = (
-            dict(_leaves(plan.to_mapping())) for plan in (dataclasses.replace(earlier, stages=tuple(stages)), begun)
-        )
+        before, now = (plan.settings() for plan in (dataclasses.replace(earlier, stages=tuple(stages)), begun))
         missing = "nothing"
         return tuple(
             f"{name}: {before.get(name, missing)} before, {now.get(name, missing)} now"

@@ -1,13 +1,18 @@
 """The recipe by which `swarm-forage train` makes its plans: defaults that were seen to learn, for Python, too.
 
 Deliveries are too rare to learn from them alone. Where they count, the recipe also rewards first pick-ups and the way
-home, and begins in a smaller arena.
+home, and begins in a smaller arena. `recipes.toml` holds what was measured to suit single scenarios better.
 """
 
+import dataclasses
+import tomllib
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, known_keys, table
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
 from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
 from swarm_forage_env.scenarios.presets import chosen_scenario
@@ -19,6 +24,8 @@ from swarm_forage_env.training.defaults import (
     DEFAULT_REWARDS,
     DEFAULT_STEPS,
     EPISODE_S,
+    EVALUATE_EVERY,
+    EVALUATION_SHARE,
 )
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan
 from swarm_forage_env.wrappers.base import WrapperConfig
@@ -54,15 +61,16 @@ def recipe(
     hidden: tuple[int, ...] = DEFAULT_HIDDEN,
     options: Mapping[str, Any] | None = None,
     small_start: bool | None = None,
-    evaluation: EvaluationPlan | None = None,
+    evaluation: EvaluationPlan | Mapping[str, Any] | None = None,
     seed: int = 0,
     **overrides: Any,
 ) -> TrainingPlan:
     """Return the plan of a training in a scenario.
 
     Args:
-        scenario: Name of a preset, which gets the recipe's length of episodes (`EPISODE_S`) and, where deliveries
-            count, its rewards (`DEFAULT_REWARDS`); or a complete configuration, which is taken as it is.
+        scenario: Name of a preset, which gets the recipe's length of episodes (`EPISODE_S`), where deliveries count its
+            rewards (`DEFAULT_REWARDS`), and what `recipes.toml` says; or a complete configuration, which is taken as it
+            is.
         algorithm: One of `plan.ALGORITHMS`.
         steps: Decisions of single robots in all stages.
         n_arenas: Arenas side by side.
@@ -74,38 +82,86 @@ def recipe(
         hidden: Sizes of the hidden layers.
         options: Arguments of the algorithm that differ from `DEFAULT_OPTIONS`.
         small_start: Spend the first third of the steps in a smaller arena; default where deliveries count.
-        evaluation: How the policy is judged meanwhile; default `EvaluationPlan()`.
+        evaluation: How the policy is judged meanwhile: an `EvaluationPlan`, or fields by name that differ from the
+            recipe's (whole runs, as often as `EVALUATE_EVERY` and `EVALUATION_SHARE` allow).
         seed: Seed of everything.
-        overrides: Scenario fields by name; they go before the recipe's (`nest_progress=0.1`, `horizon_s=500.0`).
+        overrides: Scenario fields by name; they go before the recipe's (`nest_progress=0.1`). `horizon_s` is the length
+            of the episodes; evaluations last as long as the scenario.
 
     Raises:
         ConfigError: an unknown name or field, values that are refused by what they are for (see `TrainingPlan`), or
             a smaller arena that cannot be.
     """
-    config = _training_scenario(scenario, overrides)
+    measured = Measured() if isinstance(scenario, ScenarioConfig) else measured_recipe(scenario)
+    fields = {name: value for name, value in overrides.items() if name != "horizon_s"}
+    config = _training_scenario(scenario, fields, measured)
+    episodes = {} if isinstance(scenario, ScenarioConfig) else {"horizon_s": measured.episode_s}
+    episodes |= {name: value for name, value in overrides.items() if name not in fields}
+    with_overrides(config, **episodes)  # refuses an impossible length
+    chosen = chosen_interface(interface, _default_interface(algorithm))
     counts_deliveries = config.performance == "collected"
     return TrainingPlan(
         scenario=config,
         wrappers=wrapper_configs(wrappers),
         algorithm=algorithm,
-        interface=chosen_interface(interface, _default_interface(algorithm)),
+        interface=chosen,
         n_arenas=n_arenas,
         hidden=hidden,
-        options=_algorithm_options(algorithm, n_arenas * config.robots.n_robots, options or {}),
-        stages=_stages(config, steps, small_start=counts_deliveries if small_start is None else small_start),
-        evaluation=evaluation or EvaluationPlan(),
+        options=_algorithm_options(
+            algorithm, n_arenas * config.robots.n_robots, {**measured.options.get(algorithm, {}), **(options or {})}
+        ),
+        stages=_stages(config, steps, episodes, small_start=counts_deliveries if small_start is None else small_start),
+        evaluation=_evaluation(evaluation, config, chosen.decision_ticks),
         seed=seed,
     )
 
 
-def _training_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
-    if isinstance(given, ScenarioConfig):
-        return with_overrides(given, **overrides)
-    fields = {"horizon_s": EPISODE_S, **overrides}
-    config = chosen_scenario(given, fields)
-    if config.performance != "collected" or "reward" in overrides:
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Measured:
+    """What was measured to suit a scenario better than the general recipe; see `recipes.toml`."""
+
+    episode_s: float = EPISODE_S
+    """Length of an episode, s."""
+    rewards: Mapping[str, float] = field(default_factory=dict, hash=False)
+    """Fields of `RewardConfig` by name."""
+    options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
+    """Arguments by algorithm."""
+
+
+@cache
+def _measured_recipes() -> dict[str, Measured]:
+    tables = tomllib.loads((Path(__file__).parent / "recipes.toml").read_text(encoding="utf-8"))
+    return {name: Measured(**values) for name, values in tables.items()}
+
+
+def measured_recipe(name: str) -> Measured:
+    """Return what `recipes.toml` says about a preset; for others, what the general recipe says."""
+    return _measured_recipes().get(name, Measured())
+
+
+def _training_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any], measured: Measured) -> ScenarioConfig:
+    config = chosen_scenario(given, overrides)
+    if isinstance(given, ScenarioConfig) or "reward" in overrides:
         return config
-    return chosen_scenario(given, {**DEFAULT_REWARDS, **fields})
+    general = DEFAULT_REWARDS if config.performance == "collected" else {}
+    return chosen_scenario(given, {**general, **measured.rewards, **overrides})
+
+
+def _evaluation(
+    given: EvaluationPlan | Mapping[str, Any] | None, scenario: ScenarioConfig, decision_ticks: int
+) -> EvaluationPlan:
+    if isinstance(given, EvaluationPlan):
+        return given
+    fields = dict(table("evaluation", given or {}))
+    known_keys(fields, [item.name for item in dataclasses.fields(EvaluationPlan)], prefix="evaluation.")
+    plan = EvaluationPlan(**fields)
+    if "every_steps" in fields:
+        return plan
+    (first, *_) = plan.specs(scenario, (), plan.baseline)
+    return dataclasses.replace(
+        plan,
+        every_steps=max(EVALUATE_EVERY, round(plan.n_runs * first.robot_ticks / decision_ticks / EVALUATION_SHARE)),
+    )
 
 
 def _default_interface(algorithm: str) -> InterfaceConfig:
@@ -132,9 +188,11 @@ def _fitting_batch(n_samples: int, most: int) -> int:
     return next((size for size in range(most, most // 2, -1) if n_samples % size == 0), most)
 
 
-def _stages(scenario: ScenarioConfig, steps: int, *, small_start: bool) -> tuple[Stage, ...]:
+def _stages(
+    scenario: ScenarioConfig, steps: int, episodes: Mapping[str, Any], *, small_start: bool
+) -> tuple[Stage, ...]:
     if not small_start:
-        return (Stage(steps=steps),)
+        return (Stage(steps=steps, scenario=episodes),)
     small = small_arena(scenario)
     try:
         with_overrides(scenario, **small)
@@ -143,7 +201,10 @@ def _stages(scenario: ScenarioConfig, steps: int, *, small_start: bool) -> tuple
             f"Cannot begin in a smaller arena (small_start) of {small['width_m']} x {small['height_m']} m: {error} "
             "Or train in the whole arena from the beginning: small_start=False (--no-small-start)."
         ) from error
-    return Stage(steps=max(1, steps // 3), scenario=small), Stage(steps=steps - steps // 3)
+    return (
+        Stage(steps=max(1, steps // 3), scenario={**small, **episodes}),
+        Stage(steps=steps - steps // 3, scenario=episodes),
+    )
 
 
 def small_arena(scenario: ScenarioConfig) -> dict[str, Any]:

@@ -156,6 +156,8 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         "render_modes": ["rgb_array"],  # a window shows one arena
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
+    autoreset_mode = AutoresetMode.SAME_STEP
+    """As in `metadata`; some libraries ask for the attribute."""
 
     def __init__(
         self,

@@ -10,7 +10,7 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
-from swarm_forage_env.env import BatchStep, ForageEnv
+from swarm_forage_env.env import OPTION_OF_TESTS, BatchStep, ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, LearnerInterface, chosen_interface
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig, field_sections, scenario_of_same_size
 from swarm_forage_env.scenarios.presets import chosen_scenario
@@ -19,8 +19,7 @@ from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_
 from swarm_forage_env.wrappers.registry import wrapper_configs
 
 SCENARIO_OPTION = "scenario"
-"""Key of the reset options that is read here. Other keys are ignored, except misplaced scenario fields: Gymnasium and
-PettingZoo pass the options to everything in the stack, so they may be for something else."""
+"""The only reset option."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -132,12 +131,11 @@ class LearnerArena:
         Args:
             seed: Seed of the run and of those that follow it; None continues the sequence of the last seed given.
             options: `{"scenario": {field: value}}` overrides fields of the plan's scenario, in this run and all later
-                ones; `{"scenario": {}}` goes back to the plan. Without that key nothing changes. Keys that have nothing
-                to do with a scenario are ignored.
+                ones; `{"scenario": {}}` goes back to the plan. Without that key nothing changes.
 
         Raises:
-            ConfigError: a scenario field beside `scenario`, an option that is nearly one of these, an unknown field,
-                or another number of robots; the arena stays as it was.
+            ConfigError: another option, a scenario field beside `scenario`, an unknown field, or another number of
+                robots; the arena stays as it was.
         """
         overrides = _scenario_overrides(options)
         if overrides is not None and overrides != self._overrides:
@@ -240,31 +238,30 @@ def _scenario_overrides(options: Mapping[str, Any] | None) -> dict[str, Any] | N
     if not options:
         return None
     for key in options:
-        if key != SCENARIO_OPTION:
-            _refuse_misplaced(key, options[key])
+        if key not in (SCENARIO_OPTION, OPTION_OF_TESTS):
+            raise _misplaced(key, options[key])
     if SCENARIO_OPTION not in options:
         return None
     return dict(table("the reset option 'scenario'", options[SCENARIO_OPTION]))
 
 
-def _refuse_misplaced(key: Any, value: Any) -> None:
-    """Raise ConfigError if a reset option was probably meant for the scenario; it would have no effect."""
+def _misplaced(key: Any, value: Any) -> ConfigError:
+    """Return the error for a reset option that would have no effect, with what was probably meant."""
     if key in _FIXED:
-        raise ConfigError(
+        return ConfigError(
             f"Expected {key} when the environment is made, not at a reset, which changes the scenario only."
         )
     known = (*field_sections(), *SECTIONS)
     if key in known:
-        raise ConfigError(
+        return ConfigError(
             f"Expected the scenario field {key!r} inside of the reset option 'scenario': "
             f"options={{'scenario': {{{key!r}: {value!r}}}}}."
         )
     nearest = suggestion(str(key), (SCENARIO_OPTION,))
-    if nearest:
-        raise ConfigError(f"Unknown reset option {key!r}.{nearest}")
     # A closer match than `suggestion` asks for: options of others, such as "high", are not misspelt fields.
-    for name in get_close_matches(str(key), known, n=1, cutoff=0.8):
-        raise ConfigError(
+    for name in [] if nearest else get_close_matches(str(key), known, n=1, cutoff=0.8):
+        return ConfigError(
             f"Unknown reset option {key!r}. If the scenario field {name!r} is meant: "
             f"options={{'scenario': {{{name!r}: {value!r}}}}}."
         )
+    return ConfigError(f"Unknown reset option {key!r}.{nearest} The only one is {SCENARIO_OPTION!r}.")

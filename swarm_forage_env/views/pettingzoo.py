@@ -8,7 +8,7 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
-from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.env import ForageEnv, is_over
 from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot, plan_arena
@@ -84,6 +84,11 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         """The parallel environment at the bottom; another object after a reset that changed the scenario."""
         return self._arena.forage_env
 
+    @property
+    def np_random(self) -> np.random.Generator:
+        """Generator for wrappers of other libraries; every reset starts it. Runs themselves draw elsewhere."""
+        return self.forage_env.np_random
+
     def observation_space(self, agent: str) -> spaces.Box:
         """(d,) float32 in [-1, 1]."""
         return self._observation_space[agent]
@@ -117,14 +122,14 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
     def step(
         self, actions: dict[str, Any]
     ) -> tuple[dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], Infos]:
-        """Advance by one decision, with one action per agent in `agents`.
+        """Advance by one decision, with one action per agent in `agents`; without agents and actions nothing happens.
 
         Raises:
-            RuntimeError: not reset, or all agents are done.
+            RuntimeError: not reset, or actions although all agents are done.
             ValueError: an agent without an action, or actions outside of its action space.
         """
-        if not self.agents:
-            raise RuntimeError("Call reset before step; no agent is left.")
+        if is_over(self.agents, actions, is_reset=self.forage_env.seed_value is not None):
+            return {}, {}, {}, {}, {}
         missing = [agent for agent in self.agents if agent not in actions]
         if missing:
             raise ValueError(f"Expected an action for each of the {len(self.agents)} agents, missing {missing[:3]}.")

@@ -13,7 +13,7 @@ from pettingzoo.utils import BaseParallelWrapper
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
-from swarm_forage_env.env import BatchStep, ForageEnv
+from swarm_forage_env.env import BatchStep, ForageEnv, no_options
 from swarm_forage_env.scenarios import config as configs
 from swarm_forage_env.world.snapshots import Snapshot
 
@@ -192,7 +192,8 @@ class SwarmWrapper(BaseParallelWrapper):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Reset through the dict API; returns observations and infos by agent. `options` is accepted and ignored."""
+        """Reset through the dict API; returns observations and infos by agent. See `ForageEnv.reset`."""
+        no_options(options)
         return self.unwrapped.reset_through(self.reset_batch, seed)
 
     def step(

@@ -10,9 +10,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from swarm_forage_env import RunSpec, run_one, scenario
+from swarm_forage_env import RunSpec, load_policy, parallel_env, run_one, scenario
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = re.compile(r"^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
@@ -69,6 +71,64 @@ def test_the_example_of_stable_baselines3_trains_and_exports(tmp_path):
     run(["example.py"], tmp_path)
     check_runs(tmp_path / "policy.npz")
     check_runs(tmp_path / "sac.zip")
+
+
+def test_a_recurrent_model_runs_with_its_memory(tmp_path):
+    """Its actions in a run are those of the model itself, told where the run began."""
+    require("sb3_contrib", "sb3")
+    from sb3_contrib import RecurrentPPO
+
+    from swarm_forage_env.training.sb3 import SwarmVecEnv
+    from swarm_forage_env.training.sb3.export import note_interface
+
+    config = InterfaceConfig(observation="compact", automatic_gripper=True, decision_ticks=2)
+    env = SwarmVecEnv("warehouse_small", n_robots=3, n_objects=20, interface=config)
+    model = RecurrentPPO("MlpLstmPolicy", env, n_steps=8, batch_size=24, seed=0, device="cpu")
+    note_interface(model, config)
+    model.save(tmp_path / "model.zip")
+
+    arena = parallel_env("warehouse_small", n_robots=3, n_objects=20)
+    interface = LearnerInterface(config, arena.swarm_spec)
+    policy = load_policy(tmp_path / "model.zip")
+    for seed in (1, 2):  # the second run begins without memory, too
+        policy.reset(arena.swarm_spec, np.random.default_rng(0))
+        obs, state = arena.reset_batch(seed), None
+        for tick in range(12):
+            if tick % 2 == 0:
+                seen = interface.observe(obs)
+                choice, state = model.predict(
+                    seen, state=state, episode_start=np.full(3, state is None), deterministic=True
+                )
+            actions = policy.act(obs, arena.active)
+            np.testing.assert_array_equal(actions, interface.command(choice, obs))
+            obs, *_ = arena.step_batch(actions)
+    assert np.any(choice != model.predict(seen, deterministic=True)[0])
+
+
+def test_supersuit_takes_the_parallel_environments_until_the_last_robot_is_dead():
+    require("supersuit", "sb3")
+    import supersuit
+
+    for interface in (None, {"observation": "compact", "actions": "discrete", "automatic_gripper": True}):
+        mortal = parallel_env("warehouse_small", n_robots=3, n_objects=20, max_cycles=40, interface=interface,
+                              wrappers=["population:death_per_tick=0.2"])  # fmt: skip
+        env = supersuit.frame_skip_v0(supersuit.black_death_v3(mortal), 2)
+        env.reset(seed=1)
+        n_steps = 0
+        while env.agents:
+            assert len(env.agents) == 3
+            env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+            n_steps += 1
+        assert 1 < n_steps < 40
+
+
+def test_torchrl_takes_the_vector_environments():
+    require("torchrl", "torchrl")
+    import gymnasium
+    from torchrl.envs import GymWrapper
+
+    envs = gymnasium.make_vec("swarm_forage/warehouse_small-v1", n_arenas=2, n_robots=3, n_objects=20, max_cycles=5)
+    assert GymWrapper(envs).rollout(3)["next", "reward"].shape == (6, 3, 1)
 
 
 def test_train_ppo_is_as_short_as_promised():

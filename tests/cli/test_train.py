@@ -3,6 +3,7 @@
 import builtins
 import inspect
 import json
+import re
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -12,6 +13,7 @@ import pytest
 
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli import training_report
 from swarm_forage_env.cli.scenario_options import ScenarioOptions
 from swarm_forage_env.cli.train import train
 from swarm_forage_env.cli.training_plan import TrainOptions, build_plan
@@ -20,7 +22,7 @@ from swarm_forage_env.training.plan import EvaluationPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 
 TINY = ("--robots", "4", "--objects", "20", "--steps", "128", "--arenas", "2", "--arg", "n_steps=16", "--arg",
-        "batch_size=64", "--evaluate-every", "128")  # fmt: skip
+        "batch_size=64", "--evaluate-every", "128", "--evaluation-horizon", "200")  # fmt: skip
 
 
 needs_training = pytest.mark.skipif(
@@ -36,10 +38,13 @@ def test_help_tells_the_rewards_of_the_recipe():
 
 
 @needs_training
-def test_trains_shows_evaluations_and_goes_on(command, painted):
+def test_trains_shows_evaluations_and_goes_on(command, painted, monkeypatch):
+    monkeypatch.setattr(training_report, "LINE_EVERY_S", 0.0)
     words = ("train", *TINY, "--set", "nest_progress=0.07")
     code, _, err = command(*words)
     assert code == 0, err
+    assert "Evaluated in 1 run of 200 s:" in err
+    assert re.search(r"^128 of 128 decisions, mean return .*, about \d+ s left$", err, re.MULTILINE)
     folder = Path("results/training/warehouse_small_ppo")
     assert "decisions  per 1,000 s" in err
     assert str(folder / "policy.npz") in err
@@ -190,6 +195,7 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         automatic_gripper=False,
         decision_ticks=2,
         evaluate_every=50,
+        evaluation_horizon=200.0,
         small_start=False,
         horizon_s=400.0,
         hidden="128,32",
@@ -203,7 +209,7 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         seed=4,
         interface={"observation": "full", "automatic_gripper": False, "decision_ticks": 2},
         wrappers=["actuator_noise:sigma=0.1", "sensor_noise:sigma=0.01"],
-        evaluation=EvaluationPlan(every_steps=50),
+        evaluation=EvaluationPlan(every_steps=50, horizon_s=200.0),
         small_start=False,
         hidden=(128, 32),
         options={"batch_size": 8, "gamma": 0.9},
@@ -223,13 +229,13 @@ def test_what_people_set_goes_before_the_recipe(tmp_path, by_file):
     settings = () if by_file else ("nest_progress=0.0", "horizon_s=400")
     plan = build_plan(ScenarioOptions(scenario="warehouse_small", settings=settings, config_file=path), TrainOptions())
     assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.0, 1.0)
-    assert plan.scenario.horizon_s == 400.0
+    assert [stage.scenario["horizon_s"] for stage in plan.stages] == [400.0, 400.0]
 
 
 @needs_training
 def test_small_runs_come_without_warnings(command, recwarn):
     code, _, err = command("train", "--robots", "3", "--objects", "20", "--arenas", "1", "--steps", "6", "--arg",
-                           "n_steps=2", "--evaluate-every", "6")  # fmt: skip
+                           "n_steps=2", "--evaluate-every", "6", "--evaluation-horizon", "200")  # fmt: skip
     assert code == 0, err
     assert not [warning for warning in recwarn if "mini-batch" in str(warning.message)]
 

@@ -2,6 +2,7 @@
 
 import copy
 import sys
+import warnings
 import zipfile
 from pathlib import Path
 
@@ -13,10 +14,24 @@ from gymnasium import spaces
 from metrics import score_policy
 from metrics.scoring import plan_scores
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
-from swarm_forage_env.policies.model_files import MODEL_NOTE, ModelError, ModelPolicy, file_digest
+from swarm_forage_env.policies.learned import LearnedPolicy
+from swarm_forage_env.policies.model_files import (
+    MODEL_NOTE,
+    InterfaceGuessWarning,
+    ModelError,
+    ModelPolicy,
+    file_digest,
+)
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.policies.registry import is_policy_file, load_policy, local_policy, policy_class
+from swarm_forage_env.policies.registry import (
+    is_policy_file,
+    load_policy,
+    local_policy,
+    policy_class,
+    split_interface,
+)
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.experiments import Budget
 from swarm_forage_env.study.run import run_one
@@ -24,6 +39,8 @@ from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.support.branches import pickled
 
+pytestmark = pytest.mark.filterwarnings(f"ignore::{InterfaceGuessWarning.__module__}.{InterfaceGuessWarning.__name__}")
+"""Most models here are saved without a note; one test is about that."""
 TINY = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=1, n_sizes=2, n_levels=1)
 ENV = parallel_env("warehouse_small", n_robots=4, n_objects=20)
 OBS = np.random.default_rng(1).uniform(-1.0, 1.0, (4, ENV.layout.size)).astype(np.float32)
@@ -140,6 +157,50 @@ def test_a_planned_run_carries_the_interface_as_plain_values(tmp_path):
     assert run_one(spec).scenario == "warehouse_small"
 
 
+def test_an_interface_that_is_guessed_is_said_once_and_on_one_line(tmp_path):
+    _, path = model("A2C", tmp_path)
+    with pytest.warns(InterfaceGuessWarning, match=r"one decision per tick.* model\.zip:decision_ticks=5") as told:
+        spec = plan_run(scenario("warehouse_small", n_robots=4), str(path))
+    assert len(told) == 1
+    assert "\n" not in str(told[0].message)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load_policy(spec.policy, spec.parameters)  # as every run of the plan does
+        plan_run(scenario("warehouse_small", n_robots=4), f"{path}:decision_ticks=1")
+        _, noted, _ = noted_model(tmp_path, NOTED)
+        load_policy(str(noted))
+
+
+def test_an_interface_is_said_with_the_file(tmp_path):
+    _, path, _ = noted_model(tmp_path, NOTED)
+    world = scenario("warehouse_small", n_robots=4)
+    said = plan_run(world, f"{path}:decision_ticks=2,automatic_gripper=true", caches="static")
+    given = {"interface": {"decision_ticks": 2, "automatic_gripper": True}}
+    assert said == plan_run(world, str(path), parameters=given, caches="static")
+    assert load_policy(f"{path}:decision_ticks=7")._config.decision_ticks == 7
+    assert plan_scores([f"{path}:decision_ticks=7"], world, budget=TINY).contestants[0].label == "model"
+    with pytest.raises(ConfigError, match="Did you mean 'decision_ticks'"):
+        load_policy(f"{path}:decision_tick=7")
+    with pytest.raises(ConfigError, match="once, got it with the file and as a parameter"):
+        plan_run(world, f"{path}:decision_ticks=2", parameters=given)
+
+
+@pytest.mark.parametrize(
+    ("policy", "expected"),
+    [
+        ("crw", ("crw", {})),
+        ("crw:decision_ticks=2", ("crw:decision_ticks=2", {})),
+        ("lr=0.1/a.zip", ("lr=0.1/a.zip", {})),
+        ("b:a=1/a.zip:decision_ticks=2", ("b:a=1/a.zip", {"decision_ticks": 2})),
+        ("a.zip:observation=full, actions=discrete", ("a.zip", {"observation": "full", "actions": "discrete"})),
+    ],
+)
+def test_what_is_an_interface_and_what_is_a_path(policy, expected):
+    assert split_interface(policy) == expected
+    with pytest.raises(ConfigError, match=r"interface of a\.zip as field=value, got 'x'"):
+        split_interface("a.zip:decision_ticks=2,x")
+
+
 def test_a_model_of_the_whole_swarm_sees_all_rows_at_once(tmp_path):
     made, path = model("A2C", tmp_path, seen=box(4, SIZE), done=box(4, 3))
     np.testing.assert_array_equal(started(path).act(OBS, ACTIVE), made.predict(OBS, deterministic=True)[0])
@@ -159,6 +220,38 @@ def test_actions_are_kept_for_the_ticks_of_a_decision(tmp_path):
     for wrong in ({"decision_ticks": 0}, {"decision_tick": 2}, 2):
         with pytest.raises(ConfigError, match=r"decision_ticks|InterfaceConfig or its fields"):
             load_policy(str(path), {"interface": wrong})
+
+
+class Counting:
+    """Stands in for the network of a recurrent model: it turns faster in every decision of a run."""
+
+    observation_space, action_space = box(SIZE), box(3)
+
+    def predict(self, rows, state=None, *, deterministic):
+        assert deterministic
+        decisions = np.zeros((len(rows), 1)) if state is None else state[0]
+        assert decisions.shape == (len(rows), 1)
+        return np.repeat(0.1 * decisions, 3, axis=1).astype(np.float32), (decisions + 1,)
+
+
+def test_a_recurrent_model_remembers_within_a_run(monkeypatch, tmp_path):
+    path = tmp_path / "model.zip"
+    path.write_bytes(b"recurrent")
+    monkeypatch.setattr(model_files, "_open_model", lambda path, digest: (Counting(), None))
+    policy = started(path, interface={"decision_ticks": 2})
+    wheels = [policy.act(OBS, ACTIVE)[:, 0].copy() for _ in range(5)]
+    np.testing.assert_allclose(wheels, np.repeat([[0.0], [0.0], [0.1], [0.1], [0.2]], 4, axis=1))
+    twin = copy.deepcopy(policy)
+    for _ in range(2):
+        np.testing.assert_array_equal(twin.act(OBS, ACTIVE), policy.act(OBS, ACTIVE))
+    policy.reset(ENV.swarm_spec, np.random.default_rng(0))
+    np.testing.assert_array_equal(policy.act(OBS, ACTIVE), 0.0)
+
+
+def test_a_controller_is_given_with_memory_or_without():
+    for wrong in ({}, {"choose": len, "remember": len}):
+        with pytest.raises(TypeError, match="either choose or remember"):
+            LearnedPolicy(InterfaceConfig(), **wrong)
 
 
 NOTED = {
@@ -277,6 +370,8 @@ def test_networks_are_policies_by_their_path(network_file):
     np.testing.assert_array_equal(policy.act(OBS, ACTIVE)[:, :2], 0.5)
     with pytest.raises(ModelError, match="changed since"):
         load_policy(str(network_file), {"digest": "0"})
+    with pytest.raises(ModelError, match="a network file holds its own"):
+        load_policy(f"{network_file}:decision_ticks=2")
 
 
 def test_files_are_scored_under_the_name_of_the_file_in_the_world_they_are_made_for(network_file, tmp_path):

@@ -219,7 +219,23 @@ def test_step_after_the_end():
     world.reset(seed=0)
     world.step(idle(world))
     with pytest.raises(RuntimeError, match="All agents are done; call reset"):
-        world.step({})
+        world.step({"robot_0": np.zeros(3, np.float32)})
+    assert world.step({}) == ({}, {}, {}, {}, {})
+
+
+@pytest.mark.parametrize("wrappers", [(), ("sensor_noise:sigma=0.02",)])
+def test_a_reset_option_that_would_have_no_effect_is_refused(wrappers):
+    world = parallel_env(wrappers=wrappers, **SMALL)
+    for name in ("scenario", "n_objects"):
+        with pytest.raises(ConfigError, match=f"no reset options, got '{name}'.*interface="):
+            world.reset(seed=0, options={name: {}})
+    world.reset(seed=0, options={})
+
+
+def test_an_unknown_keyword_is_a_type_error_with_the_nearest_name():
+    with pytest.raises(TypeError, match=r"Unknown scenario field 'n_robts'\. Did you mean 'n_robots'") as refusal:
+        parallel_env("warehouse_small", n_robts=3)
+    assert isinstance(refusal.value, ConfigError)
 
 
 @pytest.mark.parametrize("shape", [(4, 3), (5, 2), (5,), (5, 3, 1)])

@@ -64,7 +64,8 @@ def test_a_plan_says_what_its_file_says(plan):
 
 
 def test_evaluations_are_whole_runs_of_the_scenario_under_seeds_of_their_own(plan):
-    specs = plan.evaluation.specs(plan.scenario, plan.wrappers, "crw")
+    twice = replace(plan.evaluation, n_runs=2)
+    specs = twice.specs(plan.scenario, plan.wrappers, "crw")
     assert [spec.seed for spec in specs] == [1_000_000, 1_000_001]
     assert {spec.scenario.horizon_s for spec in specs} == {400.0}
     assert specs[0].wrappers == plan.wrappers

@@ -1,12 +1,17 @@
 """The recipe for a training: its defaults, what overrides them, and the smaller arena it begins in."""
 
+import tomllib
+from pathlib import Path
+
 import pytest
 
+from swarm_forage_env import training
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.config import RewardConfig, with_overrides
-from swarm_forage_env.scenarios.presets import scenario, warehouse_small
-from swarm_forage_env.training.plan import EvaluationPlan, Stage
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario, warehouse_small
+from swarm_forage_env.training.defaults import EVALUATE_EVERY
+from swarm_forage_env.training.plan import ALGORITHMS, EvaluationPlan, Stage
 from swarm_forage_env.training.recipe import recipe, small_arena
 
 
@@ -26,20 +31,24 @@ def test_defaults_are_what_a_driver_needs():
         "ent_coef": 0.003,
     }
     assert plan.evaluation == EvaluationPlan()
+    assert {spec.scenario.horizon_s for spec in plan.evaluation.specs(plan.scenario, (), "crw")} == {10_000.0}
     assert recipe(algorithm="sac").interface.actions == "continuous"
 
 
 def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first():
     plan = recipe("warehouse_small")
-    assert plan.scenario == warehouse_small(horizon_s=1000.0, nest_progress=0.05, first_pickup=1.0)
-    assert plan.stages == (Stage(steps=1_666_666, scenario=small_arena(plan.scenario)), Stage(steps=3_333_334))
+    assert plan.scenario == warehouse_small(nest_progress=0.05, first_pickup=1.0)
+    assert plan.stages == (
+        Stage(steps=1_666_666, scenario={**small_arena(plan.scenario), "horizon_s": 1000.0}),
+        Stage(steps=3_333_334, scenario={"horizon_s": 1000.0}),
+    )
     assert plan == recipe("warehouse_small", small_start=True, nest_progress=0.05, first_pickup=1.0)
 
 
 def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
-    plan = recipe("search_and_rescue")
-    assert plan.scenario == scenario("search_and_rescue", horizon_s=1000.0)
-    assert plan.stages == (Stage(steps=5_000_000),)
+    plan = recipe("search_and_rescue", interference=0.0)
+    assert plan.scenario == scenario("search_and_rescue")
+    assert [stage.steps for stage in plan.stages] == [5_000_000]
     counting = recipe("search_and_rescue", performance="collected", side_m=64.0)
     assert counting.scenario.reward.nest_progress == 0.05
 
@@ -55,12 +64,50 @@ def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
 def test_rewards_that_are_given_go_before_those_of_the_recipe(overrides, expected):
     plan = recipe("warehouse_small", horizon_s=400.0, **overrides)
     assert plan.scenario.reward == expected
-    assert plan.scenario.horizon_s == 400.0
+
+
+def test_a_horizon_is_that_of_the_episodes_and_not_of_the_evaluations():
+    for given in ("warehouse_small", warehouse_small()):
+        plan = recipe(given, horizon_s=400.0)
+        assert [stage.scenario["horizon_s"] for stage in plan.stages] == [400.0, 400.0]
+        assert plan.scenario.horizon_s == 10_000.0
+    with pytest.raises(ConfigError, match="horizon_s"):
+        recipe(horizon_s=-1.0)
+
+
+@pytest.mark.parametrize("name", ["warehouse_medium", "search_and_rescue"])
+def test_what_was_measured_for_a_scenario_goes_before_the_general_recipe(name):
+    plan = recipe(name)
+    assert plan.scenario.reward.interference == -0.002
+    assert plan.options["ent_coef"] == 0.01
+    assert {stage.scenario["horizon_s"] for stage in plan.stages} == {4000.0}
+    other = recipe(name, interference=-0.1, horizon_s=500.0, options={"ent_coef": 0.02})
+    assert (other.scenario.reward.interference, other.options["ent_coef"]) == (-0.1, 0.02)
+    assert {stage.scenario["horizon_s"] for stage in other.stages} == {500.0}
+    assert "ent_coef" not in recipe(name, algorithm="dqn").options
+    assert recipe(scenario(name)).scenario == scenario(name)
+
+
+def test_measured_recipes_are_of_presets_and_of_algorithms():
+    tables = tomllib.loads((Path(training.__file__).parent / "recipes.toml").read_text())
+    assert tables.keys() <= set(SCENARIO_NAMES)
+    for table in tables.values():
+        assert table.keys() == {"episode_s", "rewards", "options"}
+        assert table["options"].keys() <= set(ALGORITHMS)
+
+
+def test_large_swarms_are_evaluated_less_often():
+    assert recipe("warehouse_medium").evaluation.every_steps == 4_000_000
+    assert recipe("warehouse_medium", evaluation={"horizon_s": 2000.0}).evaluation.every_steps == EVALUATE_EVERY
+    assert recipe("warehouse_medium", evaluation={"every_steps": 7}).evaluation == EvaluationPlan(every_steps=7)
+    with pytest.raises(ConfigError, match=r"evaluation\.every_step'.*Did you mean"):
+        recipe(evaluation={"every_step": 7})
 
 
 def test_a_complete_configuration_is_taken_as_it_is():
     config = warehouse_small(n_robots=7, interference=-0.1)
     assert recipe(config).scenario == config
+    assert [stage.scenario.get("horizon_s") for stage in recipe(config).stages] == [None, None]
     assert recipe(config, n_objects=30).scenario == with_overrides(config, n_objects=30)
 
 
@@ -88,7 +135,7 @@ def test_the_other_arguments_reach_the_plan():
         seed=3,
     )
     assert (plan.algorithm, plan.n_arenas, plan.hidden, plan.seed) == ("dqn", 3, (8,), 3)
-    assert (plan.stages, plan.evaluation) == ((Stage(steps=300),), evaluation)
+    assert (plan.stages, plan.evaluation) == ((Stage(steps=300, scenario={"horizon_s": 1000.0}),), evaluation)
     assert [config.name for config in plan.wrappers] == ["sensor_noise"]
     assert (plan.options["gamma"], plan.options["train_freq"]) == (0.9, 4)
 

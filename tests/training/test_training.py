@@ -109,9 +109,48 @@ def test_a_plan_is_carried_out_stage_by_stage(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} >= {"plan.json", "model.zip", "policy.npz"}
 
 
-def test_the_same_plan_gives_the_same_weights(tmp_path):
-    first, second = (train(tiny_plan(), tmp_path / name).model for name in "ab")
-    assert same(weights(first), weights(second))
+def test_the_same_plan_gives_the_same_weights_in_one_process_and_in_two(tmp_path):
+    first, again = (train(tiny_plan(), tmp_path / name) for name in "ab")
+    divided = train(tiny_plan(), tmp_path / "c", n_processes=2)
+    assert not same(weights(first.model), weights(train(tiny_plan(seed=1), tmp_path / "d").model))
+    for other in (again, divided):
+        assert same(weights(first.model), weights(other.model))
+        assert [each.performance for each in first.evaluations] == [each.performance for each in other.evaluations]
+
+
+@pytest.mark.parametrize(("plan", "evaluated"), [(tiny_plan(), [256, 384, 640, 768]), (SHORT, [128])])
+def test_a_training_that_was_killed_in_an_evaluation_goes_on_with_it(tmp_path, monkeypatch, plan, evaluated):
+    """Without the help of Ctrl-C, which keeps a checkpoint itself; after the last decision, too."""
+    judged = training._Watch._judged
+    calls = 0
+
+    def kill(watch, make_policy):
+        nonlocal calls
+        calls += 1
+        if calls == 2:  # the first call is for the baseline
+            raise SystemExit("killed")
+        return judged(watch, make_policy)
+
+    monkeypatch.setattr(training._Watch, "_judged", kill)
+    with pytest.raises(SystemExit):
+        train(plan, tmp_path)
+    assert not (tmp_path / "policy.npz").exists()
+    monkeypatch.setattr(training._Watch, "_judged", judged)
+    result = train(plan, tmp_path, resume=True)
+    assert [each.steps for each in result.evaluations] == evaluated
+    assert result.steps == evaluated[-1] - evaluated[0]
+    assert (tmp_path / "policy.npz").exists()
+
+
+def test_tensorboard_shows_the_settings(trained):
+    name = "tensorboard.backend.event_processing.event_accumulator"
+    event_accumulator = pytest.importorskip(name, reason="needs the train extra: tensorboard")
+    (folder,) = (trained / "tensorboard").iterdir()
+    events = event_accumulator.EventAccumulator(str(folder)).Reload()
+    content = events.summary_metadata["_hparams_/session_start_info"].plugin_data.content
+    for name in (b"options.batch_size", b"interface.decision_ticks", b"stages[0].steps", b"scenario.robots.n_robots"):
+        assert name in content
+    assert "evaluation/performance" in events.Tags()["scalars"]
 
 
 def test_training_goes_on_where_it_stopped(tmp_path):

@@ -158,6 +158,8 @@ def test_a_reset_changes_the_scenario_for_all_later_runs_until_told_otherwise():
         ({"num_robots": 12}, "'n_robots'"),
         ({"wrappers": ["sensor_noise:sigma=0.1"]}, "Expected wrappers when the environment is made"),
         ({"interface": {}}, "Expected interface when the environment is made"),
+        ({"reset_mask": np.ones(1, bool)}, "Unknown reset option 'reset_mask'. The only one is 'scenario'"),
+        ({3: "three"}, "Unknown reset option 3"),
     ],
 )
 def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
@@ -169,12 +171,6 @@ def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
         batch.step(np.zeros((3, 3), np.float32))
     batch.reset([0], [None])
     assert batch.step(np.zeros((3, 3), np.float32)).rewards.tolist() == [1.0, 1.0, 1.0]
-
-
-def test_options_of_others_are_left_to_them():
-    batch = ArenaBatch(plan(), 1)
-    batch.reset([0], [{"reset_mask": np.ones(1, bool), "low": -1, "high": 1, 3: "three", "record": True}])
-    assert batch.arenas[0].forage_env.scenario.objects.n_objects == 4
 
 
 def test_closed_arenas_take_no_reset_and_no_step():

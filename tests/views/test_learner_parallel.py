@@ -10,7 +10,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.learner_arena import ArenaPlan
-from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
+from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, parallel_env
 from swarm_forage_env.wrappers.noise import SensorNoise
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
@@ -74,6 +74,27 @@ def test_a_reset_can_change_the_scenario():
     assert env.state_space.contains(env.state())
     env.reset()
     assert env.forage_env.scenario.arena.width_m == 24.0
+
+
+def test_without_agents_and_actions_a_step_does_nothing():
+    env = ParallelLearnerEnv("warehouse_small", n_robots=3, interface=INTERFACES["numbered"], max_cycles=1)
+    with pytest.raises(RuntimeError, match="Call reset before step"):
+        env.step({})
+    env.reset(seed=0)
+    env.step(dict.fromkeys(env.agents, 0))
+    assert env.step({}) == ({}, {}, {}, {}, {})
+    with pytest.raises(RuntimeError, match="All agents are done"):
+        env.step({"robot_0": 0})
+
+
+@pytest.mark.parametrize("interface", [None, INTERFACES["numbered"]])
+def test_wrappers_of_others_find_a_generator_that_follows_the_seed(interface):
+    env = parallel_env("warehouse_small", n_robots=3, interface=interface)
+    drawn = []
+    for seed in (1, 1, 2):
+        env.reset(seed=seed)
+        drawn.append(env.np_random.random())
+    assert drawn[0] == drawn[1] != drawn[2]
 
 
 def test_actions_are_asked_of_everybody():

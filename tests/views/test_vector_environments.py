@@ -31,7 +31,7 @@ def test_make_vec_gives_one_sub_environment_per_robot(name, interface):
     env_id = f"swarm_forage/{name}-v1"
     envs = gymnasium.make_vec(env_id, num_envs=12, n_robots=6, interface=interface, max_cycles=9)
     assert envs.num_envs == 12
-    assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    assert envs.metadata["autoreset_mode"] == envs.autoreset_mode == AutoresetMode.SAME_STEP
     assert envs.observation_space == batch_space(envs.single_observation_space, 12)
     assert envs.action_space == batch_space(envs.single_action_space, 12)
     assert envs.spec.id == env_id

@@ -20,6 +20,7 @@ import torch
 from stable_baselines3 import A2C, DQN, PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import HParam
 from stable_baselines3.common.utils import safe_mean
 
 from swarm_forage_env._internal.fields import ConfigError
@@ -44,6 +45,11 @@ EXPORTABLE = ("ppo", "a2c", "dqn")
 MODEL_FILE = "model.zip"
 POLICY_FILE = "policy.npz"
 _REPORT_EVERY_S = 1.0
+_TOLD = ("algorithm", "seed", "n_arenas", "hidden", "interface", "options", "stages", "scenario.reward",
+         "scenario.name", "scenario.robots.n_robots")  # fmt: skip
+"""Settings of a plan that TensorBoard shows beside the evaluations, by name or by what their names begin with."""
+_NO_LINE = ("stdout", "log", "json", "csv")
+"""Outputs of the library that hold numbers only."""
 _MOST_WEIGHT = 1e6
 """Where torch fails over the outputs of a network, weights this large tell that the training diverged; our choice."""
 _OURS = frozenset(
@@ -83,7 +89,8 @@ def train(
 
     The same plan gives the same weights on the same machine with the same versions. Resumed training is sound, but
     not the same as one that was never interrupted: arenas start anew, and so does the replay memory of dqn and sac.
-    Ctrl-C keeps a checkpoint before it goes on its way; a crash leaves the one of the latest evaluation.
+    Ctrl-C keeps a checkpoint before it goes on its way; a crash leaves the one of the latest evaluation. One that was
+    killed within an evaluation begins with it when it goes on.
 
     Args:
         plan: What to do. A training goes on by its own plan, or by one with a longer last stage or further stages.
@@ -122,6 +129,9 @@ def train(
                 model = _prepared(plan, stage, folder, env, done)
                 _learn(model, ends - done, watch, f"stage {number}{_changes(stage)}")
         assert model is not None, "a plan has a stage"
+        if watch.lacks_evaluation(model.num_timesteps):
+            model = _prepared(plan, plan.stages[-1], folder, env, model.num_timesteps)
+            _learn(model, 0, watch, "its last evaluation")
     finally:
         env.close()
     policy_file = folder / POLICY_FILE if plan.algorithm in EXPORTABLE else None
@@ -285,14 +295,31 @@ class _Watch(BaseCallback):
         with replacing(self._folder / MODEL_FILE) as draft:
             model.save(draft)
 
+    def lacks_evaluation(self, steps: int) -> bool:
+        """Return whether an evaluation was due by so many decisions, and was not finished."""
+        last = self.evaluations[-1].steps if self.evaluations else 0
+        ends = np.cumsum([stage.steps for stage in self._plan.stages])
+        return steps - last >= self._plan.evaluation.every_steps or bool(np.any((ends > last) & (ends <= steps)))
+
     def _write_plan(self) -> None:
         self._folder.mkdir(parents=True, exist_ok=True)
         self._plan.write(self._folder / PLAN_FILE)
 
     def _on_training_start(self) -> None:
         self._write_plan()  # not before arenas and model are known to be possible
-        if self._next_evaluation == 0:
-            self._next_evaluation = self.num_timesteps + self._plan.evaluation.every_steps
+        if self._next_evaluation > 0:
+            return
+        self._next_evaluation = self.num_timesteps + self._plan.evaluation.every_steps
+        self._tell_settings()
+        if self.lacks_evaluation(self.num_timesteps):
+            self._evaluate()
+
+    def _tell_settings(self) -> None:
+        """Let TensorBoard show the settings beside the evaluations."""
+        told = {name: value for name, value in self._plan.settings().items() if name.startswith(_TOLD)}
+        plain = {name: value if isinstance(value, int | float | str) else str(value) for name, value in told.items()}
+        measures: dict[str, float] = {"evaluation/performance": 0.0, "evaluation/interference_fraction": 0.0}
+        self.logger.record("settings", HParam(plain, measures), exclude=_NO_LINE)
 
     def _on_step(self) -> bool:
         for info in self.locals["infos"]:
@@ -315,7 +342,8 @@ class _Watch(BaseCallback):
             self._report(TrainingStatus(steps=self.num_timesteps, wall_time_s=elapsed, episode_return=mean))
 
     def _on_training_end(self) -> None:
-        self._evaluate()
+        if not self.evaluations or self.evaluations[-1].steps < self.num_timesteps:
+            self._evaluate()
         self.logger.dump(self.num_timesteps)
 
     def _evaluate(self) -> None:
@@ -325,7 +353,7 @@ class _Watch(BaseCallback):
         if self._baseline is None:
             self._baseline, _ = self._judged(lambda: load_policy(self._plan.evaluation.baseline))
         performance, interference = self._judged(
-            lambda: LearnedPolicy(self._plan.interface, deterministic_choice(self.model))
+            lambda: LearnedPolicy(self._plan.interface, remember=deterministic_choice(self.model))
         )
         evaluation = Evaluation(
             steps=self.num_timesteps,
