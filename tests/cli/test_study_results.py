@@ -123,3 +123,31 @@ def test_what_a_report_refuses(ran, monkeypatch):
     code, _, err = ran("study", "plot", "done")
     assert code == 1
     assert "No picture without matplotlib" in err
+
+
+def test_two_studies_are_held_against_each_other(ran):
+    code, out, _ = ran("study", "diff", "done", "done/S1a.parquet")
+    assert code == 0
+    assert out == "8 cells compared\n  8  identical to the last bit\n"
+    Path("later.toml").write_text(FILE.replace("seeds = 2", "seeds = [2, 3]"))
+    assert ran("study", "run", "later.toml", "--workers", "1", "--out", "later")[0] == 0
+    code, out, _ = ran("study", "diff", "done", "later", "--columns", "n_carrying, interference_fraction")
+    assert code == 0
+    assert "8  alike: other bits, no difference beyond chance" in out
+    assert "all cells of a policy together" in out
+    Path("fast.toml").write_text(FILE.replace("n_objects = 20", "n_objects = 20\nmax_speed_mps = 0.9"))
+    assert ran("study", "run", "fast.toml", "--workers", "1", "--seeds", "1", "--out", "fast")[0] == 0
+    code, out, _ = ran("study", "diff", "done", "fast")
+    assert code == 1
+    assert "not the same: settings: max_speed_mps None and 0.9" in out
+    assert "8  open: other bits, and too few runs to say more" in out
+    code, out, _ = ran("study", "diff", "done", "fast", "--json")
+    assert code == 1
+    assert json.loads(out)["cells"][0]["state"] == "open"
+
+
+def test_what_a_diff_refuses(ran):
+    code, _, err = ran("study", "diff", "done", "done", "--columns", "sped")
+    assert code == 2
+    assert "Expected columns that both studies have, got 'sped'" in err
+    assert ran("study", "diff", "done", "nowhere")[0] == 2
