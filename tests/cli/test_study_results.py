@@ -131,7 +131,7 @@ def test_two_studies_are_held_against_each_other(ran):
     assert out == "8 cells compared\n  8  identical to the last bit\n"
     Path("later.toml").write_text(FILE.replace("seeds = 2", "seeds = [2, 3]"))
     assert ran("study", "run", "later.toml", "--workers", "1", "--out", "later")[0] == 0
-    code, out, _ = ran("study", "diff", "done", "later", "--columns", "n_carrying, interference_fraction")
+    code, out, _ = ran("study", "diff", "done", "later", "--columns", "n_active, interference_fraction")
     assert code == 0
     assert "8  alike: other bits, no difference beyond chance" in out
     assert "all cells of a policy together" in out
