@@ -224,17 +224,12 @@ def _cost(table: "StudyTable") -> list[str | int | float]:
 
 def command_of(table: "StudyTable") -> str:
     """Return the command that makes the runs of a study."""
-    from swarm_forage_env._internal.fields import ConfigError
-    from swarm_forage_env.study.study_file import load_study
+    from swarm_forage_env.study.study_file import is_set_of_paper
 
     spec = table.spec
     reading, *others = spec.readings
     budget = f" --budget {spec.budget}" if spec.budget else ""
     command = f"swarm-forage study run {{}}{budget} --seeds {len(spec.seeds)} --reading {'both' if others else reading}"
-    try:
-        same = load_study(spec.name, spec.budget, seeds=len(spec.seeds), readings=spec.readings)
-    except ConfigError:  # no set of the paper, or no budget of it
-        same = None
-    if same is not None and same.study_id == spec.study_id:
+    if is_set_of_paper(spec):
         return command.format(spec.name)
     return f"{command.format('FILE')}  # the file of study {spec.name}, identity {spec.study_id}"

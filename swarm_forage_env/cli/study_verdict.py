@@ -27,18 +27,26 @@ def verdict(
     Below them the same for its intuitions, what it expected of each algorithm before the experiments.
     """
     from metrics.claims import INTUITIONS
-    from metrics.scoring.verdicts import VARIANTS, judge_claims
+    from metrics.scoring.verdicts import VARIANTS, judge_claims, why_no_claims
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.cli.terminal import notes, output
+    from swarm_forage_env.study.study_file import is_set_of_paper
     from swarm_forage_env.study.study_table import read_study
 
     tables = [read_study(place) for place in places]
+    refused = next(filter(None, map(why_no_claims, tables)), "")
+    if refused:
+        raise ConfigError(f"{refused} 'swarm-forage study plot' and 'report' take any study.")
     try:
         scored = scored_studies(tables, VARIANTS)
         judged, waiting = judge_claims(tables, scored)
         expected, expected_later = judge_claims(tables, scored, ("corrected",), INTUITIONS)
-    except ValueError as error:  # a study that no claim is about
+    except ValueError as error:  # a study twice
         raise ConfigError(str(error)) from error
+    for table in tables:
+        if not is_set_of_paper(table.spec):
+            words = f"note: {table.spec.name} has the name of one of the paper's sets and other settings"
+            notes().print(words, markup=False)
     console = output()
     for key in dict.fromkeys((one.reading, one.variant) for one in judged):
         console.print(_table([one for one in judged if (one.reading, one.variant) == key]))

@@ -47,6 +47,7 @@ def test_claims_are_held_against_a_study(ran):
     assert "reading described, measures sierra" in out
     assert "E4, E5, E6, C1, C2, C3, P1, X3: for S1b" in out
     assert "scoring S1a" in err
+    assert "note: S1a has the name of one of the paper's sets and other settings" in err
     document = json.loads(Path("there/verdict.json").read_text())
     assert [study["name"] for study in document["studies"]] == ["S1a"]
     answers = {(one["claim"], one["variant"]): one["answer"] for one in document["verdicts"]}
