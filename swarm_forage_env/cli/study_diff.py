@@ -61,10 +61,11 @@ def diff_report(found: "StudyDiff", header: Sequence[str]) -> str:
     counts = [(str(found.count(state)), text) for state, text in words.items() if found.count(state)]  # type: ignore[arg-type] - its keys are the states
     lines = [f"{counted(len(found.cells), 'cell')} compared", *(f"  {row}" for row in aligned(counts))]
     lines += [f"not the same: {text}" for text in found.settings]
-    shown = sorted((shift for shift in found.shifts if shift.is_significant), key=lambda shift: shift.p)
+    of_cells = [shift for cell in found.cells for shift in cell.shifts if shift.is_significant]
+    shown = sorted(of_cells, key=lambda shift: shift.p)
     if shown:
         heads = (*header, "column", "A", "B", "B - A", "95 % interval", "runs", "p (Holm)")
-        lines += ["", *aligned([heads, *(_row(shift, len(header)) for shift in shown[:ROWS_SHOWN])])]
+        lines += ["", *aligned([heads, *map(_row, shown[:ROWS_SHOWN])])]
         lines += [f"and {len(shown) - ROWS_SHOWN} more; --json has all"] if len(shown) > ROWS_SHOWN else []
     if found.lines:
         lines += ["", "all cells of a policy together, in shares of each cell's mean:"]
@@ -78,23 +79,12 @@ def diff_report(found: "StudyDiff", header: Sequence[str]) -> str:
     return "\n".join([*lines, *(["", TEST] if found.shifts else [])])
 
 
-def _row(shift: "Shift", n_places: int) -> tuple[str, ...]:
-    from metrics.scoring.texts import limits, number, percent
+def _row(shift: "Shift") -> tuple[str, ...]:
+    from metrics.scoring.texts import limits, number
 
-    place = (*shift.place, *["(all)"] * (n_places - len(shift.place)))
-    is_line = n_places > len(shift.place)
-    between = f"{percent(shift.lower)} to {percent(shift.upper)}" if is_line else limits(shift.lower, shift.upper)
     runs = str(shift.n_first) if shift.n_first == shift.n_second else f"{shift.n_first}, {shift.n_second}"
-    return (
-        *place,
-        shift.column,
-        number(shift.first),
-        number(shift.second),
-        percent(shift.difference) if is_line else number(shift.difference),
-        between,
-        runs,
-        f"{shift.p_holm:.2g} *",
-    )
+    means = (number(value) for value in (shift.first, shift.second, shift.difference))
+    return (*shift.place, shift.column, *means, limits(shift.lower, shift.upper), runs, f"{shift.p_holm:.2g}")
 
 
 def _line(shift: "Shift") -> tuple[str, ...]:
