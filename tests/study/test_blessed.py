@@ -9,7 +9,7 @@ from swarm_forage_env.study.study_file import load_study
 from swarm_forage_env.study.study_run import StudyFolder, run_study
 from swarm_forage_env.study.study_table import gather_study, read_study
 
-BLESSED = Path(__file__).parent / "blessed"
+BLESSED = Path(__file__).parent.parent / "support"
 
 
 @pytest.mark.compiled
@@ -20,4 +20,4 @@ def test_controllers_do_what_they_did(tmp_path):
     found = diff_studies(read_study(BLESSED / "blessed.parquet"), gather_study(folder))
     assert (len(found.cells), found.lacking) == (16, ())
     significant = [shift for shift in found.shifts if shift.is_significant]
-    assert not found.differs, f"see tests/study/blessed/blessed.toml: {significant}"
+    assert not found.differs, f"see tests/support/blessed.toml: {significant}"
