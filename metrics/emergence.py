@@ -24,8 +24,8 @@ def spatial_emergence(
     perf2: ArrayLike,
     t_lost2: ArrayLike,
     n2: int,
-    perf_one: ArrayLike,
-    t_lost_one: ArrayLike,
+    perf_one: ArrayLike | None,
+    t_lost_one: ArrayLike | None,
     *,
     variant: Variant = "corrected",
     reduce: Reduction = "sum",
@@ -39,6 +39,10 @@ def spatial_emergence(
     The paper's figures use neighbouring sizes (marginal form) or N independent robots (interactive form: n1 = 1, with
     the one-robot curves in both places).
 
+    The loss of one robot drops out of the equation for N1 > 1: P_lost(N1) has N1 P_lost(1) in it, P_lost(N2) has N2
+    P_lost(1), and (N2 / N1) N1 - N2 = 0. So E_S = sum_t [ (N2 / N1) P(N1, t) t_lost(N1, t) - P(N2, t) t_lost(N2, t) ],
+    which needs no run of one robot.
+
     Args:
         perf1: P(N1, t), shape (..., T), objects per interval; `perf2` for the larger swarm.
         t_lost1: Interference fraction of the smaller swarm, shape (..., T); `t_lost2` for the larger.
@@ -46,8 +50,8 @@ def spatial_emergence(
         perf2: P(N2, t).
         t_lost2: Interference fraction of the larger swarm.
         n2: Larger size N2.
-        perf_one: P(1, t) of one robot alone.
-        t_lost_one: Interference fraction of one robot alone.
+        perf_one: P(1, t) of one robot alone; None where there is no such run, which needs N1 > 1 and no `sierra`.
+        t_lost_one: Interference fraction of one robot alone, or None as well.
         variant: `paper` as printed. `corrected` sets P_lost(1) to zero when N1 = 1: it is the loss to walls, which
             P_lost(N > 1) does not contain, and with it independent robots would seem organised. `sierra` uses
             fractional losses of the last interval, takes sizes in any order, and is 0 for N2 = 1; independent robots
@@ -69,6 +73,8 @@ def spatial_emergence(
     and the value can be positive although more time is lost: read `time_emergence` beside it.
     """
     n1, n2 = check_size("n1", n1), check_size("n2", n2)
+    if perf_one is None and t_lost_one is None and n1 > 1 and variant != "sierra":
+        perf_one = t_lost_one = np.zeros(np.shape(perf1)[-1:])  # their terms cancel, whatever they are
     perf1, t_lost1, perf2, t_lost2, perf_one, t_lost_one = as_curves(
         perf1=perf1, t_lost1=t_lost1, perf2=perf2, t_lost2=t_lost2, perf_one=perf_one, t_lost_one=t_lost_one
     )

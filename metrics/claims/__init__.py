@@ -1,7 +1,8 @@
-"""The claims of the paper, each with a verdict by its rule and by ours: arrays in, answers out."""
+"""The claims of the paper and its intuitions, each with a verdict by its rule and by ours: arrays in, answers out."""
 
 from .checking import Claim, PanelName, Statement, Verdict, check_claim
+from .intuitions import INTUITIONS
 from .panel import Panel
 from .paper import CLAIMS, EXPERIMENTS
 
-__all__ = ["CLAIMS", "EXPERIMENTS", "Claim", "Panel", "PanelName", "Statement", "Verdict", "check_claim"]
+__all__ = ["CLAIMS", "EXPERIMENTS", "INTUITIONS", "Claim", "Panel", "PanelName", "Statement", "Verdict", "check_claim"]

@@ -7,15 +7,11 @@ the paper says nothing of a direction but its text implies one, the text below s
 Nothing here was chosen with results in view: the statements are the general ones of `predicates` and `shapes`.
 """
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
 from metrics.population import availability, ratio_for_team
 
-from .checking import Claim, PanelName, Statement
-from .panel import Panel
+from .checking import Claim
 from .predicates import (
     Answer,
     Outcome,
@@ -44,6 +40,25 @@ from .shapes import (
     slope_of,
     with_zero,
 )
+from .stating import (
+    ALL_PAIRS,
+    COMPLEX,
+    E_S,
+    E_T,
+    POLICIES,
+    SIMPLE,
+    STEADY,
+    UNSTEADY,
+    A,
+    C,
+    D,
+    N,
+    P,
+    R,
+    best_of,
+    better,
+    states,
+)
 
 EXPERIMENTS: dict[str, str] = {
     "S1a": "small warehouse, 1 to 128 robots",
@@ -66,37 +81,9 @@ EXPERIMENTS: dict[str, str] = {
 """Experiments whose scores the claims speak of. In S1a, S1b and S2a the levels are swarm sizes, in S1c, S1d and S2b
 distances from ideal conditions, in the others the disturbance; the undisturbed level is left out."""
 
-POLICIES = ("crw", "dpo", "stochm", "stochx")
-SIMPLE, COMPLEX = ("crw", "dpo"), ("stochm", "stochx")
-STEADY, UNSTEADY = ("crw", "stochx"), ("dpo", "stochm")
-_E_S, _E_T, _C, _P = "spatial_emergence", "task_emergence", "scalability", "raw_performance"
-_R, _A, _N, _D = "reactivity", "adaptability", "noise_robustness", "population_robustness"
-_ALL_PAIRS = every_pair(POLICIES)
 _ONSET = (0.0129, 0.0215)
 """About 0.017: one level of the sweep below it to one above, three to five sevenths of 0.03."""
 _LARGER = (0.01, 0.05)
-
-
-def _states(
-    predicate: Callable[..., Outcome],
-    *panels: PanelName,
-    views: tuple[Callable[[Panel], Panel], ...] = (),
-    **parameters: Any,
-) -> Statement:
-    return Statement(predicate=predicate, panels=panels, views=views, parameters=parameters)
-
-
-def _best(experiment: str, measure: str, policy: str, levels: str = "all") -> Statement:
-    """Statement that a policy is better than the three others."""
-    return _better(experiment, measure, (policy,), tuple(name for name in POLICIES if name != policy), levels)
-
-
-def _better(
-    experiment: str, measure: str, better: tuple[str, ...], worse: tuple[str, ...], levels: str = "all"
-) -> Statement:
-    """Statement that each of some policies is better than each of others; distances are better where they are lower."""
-    upper, lower = (worse, better) if measure in (_R, _A, _N) else (better, worse)
-    return _states(is_higher, (experiment, measure), upper=upper, lower=lower, levels=levels)
 
 
 def availability_is(*, n: int, n_min: int, team: float, expected: float, within: float) -> Outcome:
@@ -135,32 +122,32 @@ def _flexibility(letter: str, measure: str) -> tuple[Claim, ...]:
             text="Under strong disturbance STOCHM and STOCHX are best; STOCHX is best in general.",
             figure=f"{where}, both warehouses",
             statements=(
-                _better(*small, COMPLEX, SIMPLE, "high"),
-                _better(*medium, COMPLEX, SIMPLE, "high"),
-                _best(*small, "stochx"),
-                _best(*medium, "stochx"),
+                better(*small, COMPLEX, SIMPLE, "high"),
+                better(*medium, COMPLEX, SIMPLE, "high"),
+                best_of(*small, "stochx"),
+                best_of(*medium, "stochx"),
             ),
         ),
         Claim(
             name=f"{letter}2",
             text="DPO is not better than CRW.",
             figure=f"{where}, both warehouses",
-            statements=tuple(_states(is_not_higher, panel, first="crw", second="dpo") for panel in (small, medium)),
+            statements=tuple(states(is_not_higher, panel, first="crw", second="dpo") for panel in (small, medium)),
         ),
         Claim(
             name=f"{letter}3",
             text="More differences are significant in the medium warehouse than in the small one.",
             figure=f"{where}, both warehouses",
-            statements=(_states(differs_more, small, medium, pairs=_ALL_PAIRS),),
+            statements=(states(differs_more, small, medium, pairs=ALL_PAIRS),),
         ),
         Claim(
             name=f"{letter}4",
             text="STOCHX rises slowly and evenly with the disturbance; the others rise ever faster.",
             figure=f"{where}, medium warehouse",
             statements=(
-                _states(is_higher, medium, views=(slope_of,), upper=others, lower=("stochx",)),
-                _states(ties, medium, views=(bend_of, with_zero), pairs=(("stochx", ZERO),)),
-                _states(is_higher, medium, views=(bend_of, with_zero), upper=others, lower=(ZERO,)),
+                states(is_higher, medium, views=(slope_of,), upper=others, lower=("stochx",)),
+                states(ties, medium, views=(bend_of, with_zero), pairs=(("stochx", ZERO),)),
+                states(is_higher, medium, views=(bend_of, with_zero), upper=others, lower=(ZERO,)),
             ),
         ),
     )
@@ -171,60 +158,60 @@ _SELF_ORGANISATION = (
         name="E1",
         text="Every algorithm stays roughly constant over the swarm size.",
         figure="scenario 1, spatial self-organisation, small warehouse",
-        statements=(_states(is_constant, ("S1a", _E_S), policies=POLICIES),),
+        statements=(states(is_constant, ("S1a", E_S), policies=POLICIES),),
     ),
     Claim(
         name="E2",
         text="CRW differs from the other three; it is higher (implied).",
         figure="scenario 1, spatial self-organisation, small warehouse",
-        statements=(_best("S1a", _E_S, "crw"),),
+        statements=(best_of("S1a", E_S, "crw"),),
     ),
     Claim(
         name="E3",
         text="STOCHM and STOCHX tie.",
         figure="scenario 1, spatial self-organisation, small warehouse",
-        statements=(_states(ties, ("S1a", _E_S), pairs=(COMPLEX,)),),
+        statements=(states(ties, ("S1a", E_S), pairs=(COMPLEX,)),),
     ),
     Claim(
         name="E4",
         text="CRW, DPO and STOCHM mostly tie.",
         figure="scenario 1, task self-organisation, medium warehouse",
-        statements=(_states(ties, ("S1b", _E_T), pairs=every_pair(("crw", "dpo", "stochm"))),),
+        statements=(states(ties, ("S1b", E_T), pairs=every_pair(("crw", "dpo", "stochm"))),),
     ),
     Claim(
         name="E5",
         text="STOCHX is highest.",
         figure="scenario 1, task self-organisation, medium warehouse",
-        statements=(_best("S1b", _E_T, "stochx"),),
+        statements=(best_of("S1b", E_T, "stochx"),),
     ),
     Claim(
         name="E6",
         text="STOCHX grows nearly linearly with the swarm size.",
         figure="scenario 1, task self-organisation, medium warehouse",
-        statements=(_states(is_linear, ("S1b", _E_T), policies=("stochx",)),),
+        statements=(states(is_linear, ("S1b", E_T), policies=("stochx",)),),
     ),
     Claim(
         name="E7",
         text="STOCHX and CRW are steady over the swarm size, DPO and STOCHM vary strongly.",
         figure="scenario 2, task self-organisation, objects at rest",
         statements=(
-            _states(is_constant, ("S2a still", _E_T), policies=STEADY),
-            _states(varies, ("S2a still", _E_T), policies=UNSTEADY),
+            states(is_constant, ("S2a still", E_T), policies=STEADY),
+            states(varies, ("S2a still", E_T), policies=UNSTEADY),
         ),
     ),
     Claim(
         name="E8",
         text="In small swarms STOCHX is best, by a little.",
         figure="scenario 2, task self-organisation, objects at rest",
-        statements=(_best("S2a still", _E_T, "stochx", "low"),),
+        statements=(best_of("S2a still", E_T, "stochx", "low"),),
     ),
     Claim(
         name="E9",
         text="As E7, for spatial self-organisation with moving objects.",
         figure="scenario 2, spatial self-organisation, moving objects",
         statements=(
-            _states(is_constant, ("S2a slow", _E_S), policies=STEADY),
-            _states(varies, ("S2a slow", _E_S), policies=UNSTEADY),
+            states(is_constant, ("S2a slow", E_S), policies=STEADY),
+            states(varies, ("S2a slow", E_S), policies=UNSTEADY),
         ),
     ),
 )
@@ -234,46 +221,46 @@ _SCALING = (
         name="C1",
         text="CRW and DPO have narrow bands.",
         figure="scenario 1, scalability, medium warehouse",
-        statements=(_states(is_narrow, ("S1b", _C), policies=SIMPLE),),
+        statements=(states(is_narrow, ("S1b", C), policies=SIMPLE),),
     ),
     Claim(
         name="C2",
         text="STOCHM and STOCHX have wide bands.",
         figure="scenario 1, scalability, medium warehouse",
-        statements=(_states(is_wide, ("S1b", _C), policies=COMPLEX),),
+        statements=(states(is_wide, ("S1b", C), policies=COMPLEX),),
     ),
     Claim(
         name="C3",
         text="The complex algorithms can reach higher values than the simple ones, but less reliably.",
         figure="scenario 1, scalability, medium warehouse",
         statements=(
-            _states(reaches_higher, ("S1b", _C), upper=COMPLEX, lower=SIMPLE),
-            _states(is_wider, ("S1b", _C), upper=COMPLEX, lower=SIMPLE),
+            states(reaches_higher, ("S1b", C), upper=COMPLEX, lower=SIMPLE),
+            states(is_wider, ("S1b", C), upper=COMPLEX, lower=SIMPLE),
         ),
     ),
     Claim(
         name="C4",
         text="There are no significant differences at all.",
         figure="scenario 2, scalability (no figure)",
-        statements=(_states(ties, ("S2a still", _C), pairs=_ALL_PAIRS),),
+        statements=(states(ties, ("S2a still", C), pairs=ALL_PAIRS),),
     ),
     Claim(
         name="P1",
         text="CRW and DPO deliver more than STOCHM and STOCHX.",
         figure="scenario 1, raw performance, medium warehouse",
-        statements=(_better("S1b", _P, SIMPLE, COMPLEX),),
+        statements=(better("S1b", P, SIMPLE, COMPLEX),),
     ),
     Claim(
         name="P2",
         text="The small warehouse shows the same picture.",
         figure="scenario 1, raw performance (no figure)",
-        statements=(_better("S1a", _P, SIMPLE, COMPLEX),),
+        statements=(better("S1a", P, SIMPLE, COMPLEX),),
     ),
     Claim(
         name="P3",
         text="Simpler algorithms perform better: CRW and DPO above STOCHM and STOCHX (implied).",
         figure="scenario 2, raw performance, objects at rest and at their fastest",
-        statements=tuple(_better(experiment, _P, SIMPLE, COMPLEX) for experiment in ("S2a still", "S2a fast")),
+        statements=tuple(better(experiment, P, SIMPLE, COMPLEX) for experiment in ("S2a still", "S2a fast")),
     ),
 )
 
@@ -283,21 +270,21 @@ _FLEXIBILITY_2 = (
         text="CRW and STOCHX are best, DPO and STOCHM worst; only under strong disturbance, else they tie.",
         figure="scenario 2, reactivity, 115 robots",
         statements=(
-            _better("S2b 115", _R, STEADY, UNSTEADY, "high"),
-            _states(ties, ("S2b 115", _R), pairs=_ALL_PAIRS, levels="low"),
+            better("S2b 115", R, STEADY, UNSTEADY, "high"),
+            states(ties, ("S2b 115", R), pairs=ALL_PAIRS, levels="low"),
         ),
     ),
     Claim(
         name="A5",
         text="The algorithms mostly tie.",
         figure="scenario 2, adaptability, 320 robots",
-        statements=(_states(ties, ("S2b 320", _A), pairs=_ALL_PAIRS),),
+        statements=(states(ties, ("S2b 320", A), pairs=ALL_PAIRS),),
     ),
     Claim(
         name="A6",
         text="Under strong disturbance CRW is better than DPO and STOCHM.",
         figure="scenario 2, adaptability, 320 robots",
-        statements=(_better("S2b 320", _A, ("crw",), UNSTEADY, "high"),),
+        statements=(better("S2b 320", A, ("crw",), UNSTEADY, "high"),),
     ),
 )
 
@@ -306,65 +293,65 @@ _NOISE = (
         name="N1",
         text="CRW and STOCHX tie.",
         figure="scenario 1, noise, small warehouse",
-        statements=(_states(ties, ("S1e", _N), pairs=(STEADY,)),),
+        statements=(states(ties, ("S1e", N), pairs=(STEADY,)),),
     ),
     Claim(
         name="N2",
         text="DPO and STOCHM tie except under strong noise.",
         figure="scenario 1, noise, small warehouse",
         statements=(
-            _states(ties, ("S1e", _N), pairs=(UNSTEADY,), levels="low"),
-            _states(differ, ("S1e", _N), pairs=(UNSTEADY,), levels="high"),
+            states(ties, ("S1e", N), pairs=(UNSTEADY,), levels="low"),
+            states(differ, ("S1e", N), pairs=(UNSTEADY,), levels="high"),
         ),
     ),
     Claim(
         name="N3",
         text="From a standard deviation of about 0.017 on, all algorithms change their behaviour.",
         figure="scenario 1, noise, small warehouse",
-        statements=(_states(changes_within, ("S1e", _N), policies=POLICIES, between=_ONSET),),
+        statements=(states(changes_within, ("S1e", N), policies=POLICIES, between=_ONSET),),
     ),
     Claim(
         name="N4",
         text="The change is strongest for DPO and STOCHM.",
         figure="scenario 1, noise, small warehouse",
-        statements=(_states(is_higher, ("S1e", _N), views=(rise_of,), upper=UNSTEADY, lower=STEADY),),
+        statements=(states(is_higher, ("S1e", N), views=(rise_of,), upper=UNSTEADY, lower=STEADY),),
     ),
     Claim(
         name="N5",
         text="The algorithms are further apart than in the small warehouse; N3 and N4 hold again.",
         figure="scenario 1, noise, medium warehouse",
         statements=(
-            _states(differs_more, ("S1e", _N), ("S1f", _N), pairs=_ALL_PAIRS),
-            _states(changes_within, ("S1f", _N), policies=POLICIES, between=_ONSET),
-            _states(is_higher, ("S1f", _N), views=(rise_of,), upper=UNSTEADY, lower=STEADY),
+            states(differs_more, ("S1e", N), ("S1f", N), pairs=ALL_PAIRS),
+            states(changes_within, ("S1f", N), policies=POLICIES, between=_ONSET),
+            states(is_higher, ("S1f", N), views=(rise_of,), upper=UNSTEADY, lower=STEADY),
         ),
     ),
     Claim(
         name="N6",
         text="CRW and STOCHX tie in most cases.",
         figure="scenario 2, noise, 320 robots",
-        statements=(_states(ties, ("S2c 320", _N), pairs=(STEADY,)),),
+        statements=(states(ties, ("S2c 320", N), pairs=(STEADY,)),),
     ),
     Claim(
         name="N7",
         text="DPO, STOCHM and STOCHX get clearly worse with stronger noise, from 0.01 to 0.05 on.",
         figure="scenario 2, noise, 320 robots",
         statements=(
-            _states(
+            states(
                 is_higher,
-                ("S2c 320", _N),
+                ("S2c 320", N),
                 views=(rise_of, with_zero),
                 upper=("dpo", "stochm", "stochx"),
                 lower=(ZERO,),
             ),
-            _states(changes_within, ("S2c 320", _N), policies=("dpo", "stochm", "stochx"), between=_LARGER),
+            states(changes_within, ("S2c 320", N), policies=("dpo", "stochm", "stochx"), between=_LARGER),
         ),
     ),
     Claim(
         name="N8",
         text="STOCHM changes under weaker noise than DPO and STOCHX.",
         figure="scenario 2, noise, 320 robots",
-        statements=(_states(changes_before, ("S2c 320", _N), first="stochm", others=("dpo", "stochx")),),
+        statements=(states(changes_before, ("S2c 320", N), first="stochm", others=("dpo", "stochx")),),
     ),
 )
 
@@ -373,14 +360,14 @@ _POPULATION = (
         name="V1",
         text="With 50 robots, 5 needed and a mean team of 5, availability is about 0.40.",
         figure="scenario 1, availability (formula)",
-        statements=(_states(availability_is, n=50, n_min=5, team=5.0, expected=0.40, within=0.005),),
+        statements=(states(availability_is, n=50, n_min=5, team=5.0, expected=0.40, within=0.005),),
     ),
     Claim(
         name="V2",
         text="With 200 robots and 20 needed, larger teams are needed for the same availability.",
         figure="scenario 1, availability (formula)",
         statements=tuple(
-            _states(needs_larger_team, few=(50, 5), many=(200, 20), team=team) for team in (5.0, 10.0, 20.0)
+            states(needs_larger_team, few=(50, 5), many=(200, 20), team=team) for team in (5.0, 10.0, 20.0)
         ),
     ),
     Claim(
@@ -388,8 +375,8 @@ _POPULATION = (
         text="Under larger population variance STOCHX is most robust, and STOCHX and CRW are above DPO and STOCHM.",
         figure="scenario 1, population robustness, small warehouse",
         statements=(
-            _best("S1g", _D, "stochx", "high"),
-            _better("S1g", _D, STEADY, UNSTEADY, "high"),
+            best_of("S1g", D, "stochx", "high"),
+            better("S1g", D, STEADY, UNSTEADY, "high"),
         ),
     ),
     Claim(
@@ -397,33 +384,33 @@ _POPULATION = (
         text="The order is that of task self-organisation, STOCHX first.",
         figure="scenario 1, population robustness, medium warehouse",
         statements=(
-            _best("S1h", _D, "stochx"),
-            _states(same_order, ("S1b", _E_T), ("S1h", _D), policies=POLICIES),
+            best_of("S1h", D, "stochx"),
+            states(same_order, ("S1b", E_T), ("S1h", D), policies=POLICIES),
         ),
     ),
     Claim(
         name="D3",
         text="CRW and STOCHX are high, DPO and STOCHM much lower.",
         figure="scenario 2, population robustness, 115 robots",
-        statements=(_better("S2d 115", _D, STEADY, UNSTEADY),),
+        statements=(better("S2d 115", D, STEADY, UNSTEADY),),
     ),
     Claim(
         name="D4",
         text="With 320 robots all tie.",
         figure="scenario 2, population robustness (no figure)",
-        statements=(_states(ties, ("S2d 320", _D), pairs=_ALL_PAIRS),),
+        statements=(states(ties, ("S2d 320", D), pairs=ALL_PAIRS),),
     ),
 )
 
-_DISTURBED = (("S1c", _R), ("S1d", _R), ("S1c", _A), ("S1d", _A), ("S1e", _N), ("S1f", _N), ("S1g", _D), ("S1h", _D))
-_DISTURBED_2 = (("S2b 115", _R), ("S2b 320", _A), ("S2c 320", _N), ("S2d 115", _D))
+_DISTURBED = (("S1c", R), ("S1d", R), ("S1c", A), ("S1d", A), ("S1e", N), ("S1f", N), ("S1g", D), ("S1h", D))
+_DISTURBED_2 = (("S2b 115", R), ("S2b 320", A), ("S2c 320", N), ("S2d 115", D))
 
 _TOGETHER = (
     Claim(
         name="X1",
         text="In flexibility and robustness CRW and STOCHX stand together, better than DPO and STOCHM.",
         figure="scenarios 1 and 2, flexibility and robustness",
-        statements=tuple(_better(*panel, STEADY, UNSTEADY) for panel in (*_DISTURBED, *_DISTURBED_2)),
+        statements=tuple(better(*panel, STEADY, UNSTEADY) for panel in (*_DISTURBED, *_DISTURBED_2)),
         needs="most",
     ),
     Claim(
@@ -431,7 +418,7 @@ _TOGETHER = (
         text="Higher self-organisation goes with better flexibility and robustness.",
         figure="scenario 1, task self-organisation beside flexibility and robustness, medium warehouse",
         statements=tuple(
-            _states(same_order, ("S1b", _E_T), panel, policies=POLICIES, better=(1, 1 if panel[1] == _D else -1))
+            states(same_order, ("S1b", E_T), panel, policies=POLICIES, better=(1, 1 if panel[1] == D else -1))
             for panel in _DISTURBED
             if panel[0] in ("S1d", "S1f", "S1h")
         ),
@@ -442,14 +429,14 @@ _TOGETHER = (
         text="Self-organisation is not tied to scalability or raw performance.",
         figure="scenario 1, task self-organisation beside scalability and raw performance, medium warehouse",
         statements=tuple(
-            _states(not_same_order, ("S1b", _E_T), ("S1b", measure), policies=POLICIES) for measure in (_C, _P)
+            states(not_same_order, ("S1b", E_T), ("S1b", measure), policies=POLICIES) for measure in (C, P)
         ),
     ),
     Claim(
         name="X4",
         text="For scenario 2 STOCHX is the best choice overall.",
         figure="scenario 2, all figures",
-        statements=tuple(_best(*panel, "stochx") for panel in (("S2a still", _E_T), ("S2a slow", _E_S), *_DISTURBED_2)),
+        statements=tuple(best_of(*panel, "stochx") for panel in (("S2a still", E_T), ("S2a slow", E_S), *_DISTURBED_2)),
         needs="most",
     ),
 )
@@ -459,8 +446,8 @@ CLAIMS: dict[str, Claim] = {
     for claim in (
         *_SELF_ORGANISATION,
         *_SCALING,
-        *_flexibility("R", _R),
-        *_flexibility("A", _A),
+        *_flexibility("R", R),
+        *_flexibility("A", A),
         *_FLEXIBILITY_2,
         *_NOISE,
         *_POPULATION,

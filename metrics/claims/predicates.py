@@ -69,6 +69,13 @@ def ties(panel: Panel, *, pairs: Pairs, levels: Levels = "all", rule: Rule = "in
     )
 
 
+def stays_alike(first: Panel, second: Panel, *, policy: str, rule: Rule = "intervals") -> Outcome:
+    """Whether a policy scores alike in two panels of the same levels and runs: it ties with itself at most levels."""
+    both = Panel(levels=first.levels, scores={"first": first.scores[policy], "second": second.scores[policy]})
+    outcome = ties(both, pairs=(("first", "second"),), rule=rule)
+    return replace(outcome, why=f"{policy} in both panels: {outcome.why}")
+
+
 def differ(panel: Panel, *, pairs: Pairs, levels: Levels = "all", rule: Rule = "intervals") -> Outcome:
     """Whether pairs of policies mostly differ; the contrary of `ties`."""
     return contrary(ties(panel, pairs=pairs, levels=levels, rule=rule))

@@ -11,6 +11,7 @@ from .plots import draw_scores
 from .prediction import PredictionTable, predict_curves, predict_policy
 from .prediction_plots import draw_predictions
 from .runs import run_scores
+from .study_diff import StudyDiff, diff_studies
 from .study_plots import StudyFigure, draw_figure, draw_map, study_figures
 from .study_tables import StudyLine, study_lines
 from .table import Score, ScoreTable
@@ -29,6 +30,7 @@ __all__ = [
     "draw_figure",
     "draw_map",
     "judge_claims",
+    "diff_studies",
     "draw_scores",
     "predict_policy",
     "predict_curves",
@@ -43,6 +45,7 @@ __all__ = [
     "StudyPanel",
     "StudyPanels",
     "StudyFigure",
+    "StudyDiff",
     "Judged",
     "Waiting",
     "Performance",

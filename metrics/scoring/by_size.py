@@ -50,7 +50,10 @@ def _performance_lost(one: RunCurves, runs: RunCurves, *, variant: Variant) -> F
     return lost[..., -1] if variant == "sierra" else lost.sum(axis=-1)
 
 
-def _spatial_emergence(one: RunCurves, few: RunCurves, many: RunCurves, *, variant: Variant) -> FloatArray:
+def _spatial_emergence(*swarms: RunCurves, variant: Variant) -> FloatArray:
+    """Of one robot, the smaller and the larger swarm; without the first where there is no run of one robot."""
+    one = swarms[0] if len(swarms) == 3 else None
+    few, many = swarms[-2:]
     return spatial_emergence(
         few.performance,
         few.interference,
@@ -58,10 +61,10 @@ def _spatial_emergence(one: RunCurves, few: RunCurves, many: RunCurves, *, varia
         many.performance,
         many.interference,
         many.n_robots,
-        one.performance,
-        one.interference,
+        None if one is None else one.performance,
+        None if one is None else one.interference,
         variant=variant,
-        n_reference=one.n_robots,
+        n_reference=1 if one is None else one.n_robots,
     )
 
 
@@ -102,6 +105,8 @@ class _SizeMeasure:
     sierra_unit: str = ""
     """Unit in the program's form, where it is another one."""
     from_one: bool = False
+    one_drops_out: bool = False
+    """Whether the marginal form has the run of one robot on both sides of a difference, and can do without it."""
     of_two_sizes: bool = False
     needs_interference: bool = False
     is_gain: bool = False
@@ -131,6 +136,7 @@ _SIZE_MEASURES: dict[str, _SizeMeasure] = {
         unit="objects {span}",
         sierra_unit="share of performance",
         from_one=True,
+        one_drops_out=True,
         of_two_sizes=True,
         needs_interference=True,
         is_gain=True,
@@ -174,7 +180,7 @@ def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) ->
             smaller = one if form == "interactive" else previous
             experiments = (smaller, larger)
             at = f"N = {smaller.n_robots} to {larger.n_robots}"
-        if measure.from_one:
+        if measure.from_one and not _without_one(measure, one, variant, form):
             experiments = (one, *experiments)
         falls = variant in measure.weighted_in and previous is not None and _falls(previous, larger)
         score = ScoreDraft(
@@ -225,11 +231,17 @@ def _sizes(study: StudyCurves, measure: _SizeMeasure, variant: Variant, form: Fo
     if measure.needs_interference and any("interference_fraction" not in e.curves and e.seeds for e in sizes):
         raise Uncomputable("there is no column interference_fraction for every swarm size")
     # The authors' program takes its first experiment for the run of one robot, whatever its size.
-    if (measure.from_one or form == "interactive") and smallest != 1 and variant != "sierra":
+    needs_one = (measure.from_one or form == "interactive") and not _without_one(measure, sizes[0], variant, form)
+    if needs_one and smallest != 1 and variant != "sierra":
         raise Uncomputable(f"there is no reference run of one robot, the smallest swarm has {smallest}")
     if len(sizes) < 2 and (measure.from_one or measure.of_two_sizes):
         raise Uncomputable(f"there is one swarm size only, N = {smallest}")
     return sizes
+
+
+def _without_one(measure: _SizeMeasure, smallest: RunCurves, variant: Variant, form: Form) -> bool:
+    """Whether a measure is computed without a run of one robot: there is none, and it drops out."""
+    return measure.one_drops_out and smallest.n_robots != 1 and form == "marginal" and variant != "sierra"
 
 
 BY_SIZE: dict[str, Callable[[str, StudyCurves, Variant, Form], Iterator[Score]]] = dict.fromkeys(

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 Band: TypeAlias = Literal["ci", "sd"]
 """What is shaded: the 95 % confidence interval of the mean, or the mean plus and minus two standard deviations."""
 
+MARKERS = "osD^vPX"
+"""Of the means of each policy in turn, so that lines differ without their colours, too."""
 _BANDS: dict[Band, str] = {"ci": "95 % interval of the mean", "sd": "mean ± 2 standard deviations of runs"}
 _NOTHING = Summary(mean=math.nan, std=math.nan, lower=math.nan, upper=math.nan, n_used=0, n_nan=0)
 _APART = 0.012
@@ -157,7 +159,7 @@ def draw_map(figure: StudyFigure, paths: Sequence[Path]) -> None:
 def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
     is_log = panel.criterion == SIZE
     levels = np.log2(panel.levels) if is_log else panel.levels
-    step = _APART * (float(np.ptp(levels)) or 1.0)
+    step = _APART * (float(np.ptp(levels)) or abs(float(levels[0])) or 1.0)
     are_many = sum(scores.size for scores in panel.scores.values()) > MANY_DOTS
     for index, (policy, scores) in enumerate(panel.scores.items()):
         colour = COLOURS[index % len(COLOURS)]
@@ -168,7 +170,8 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
         dots = np.repeat(2.0**beside if is_log else beside, scores.shape[1])
         (marks,) = place.plot(dots, scores.ravel(), ".", markersize=4, color=colour, alpha=0.35, zorder=2.5)
         marks.set_rasterized(are_many)
-        place.plot(panel.levels, mean, color=colour, marker="o", markersize=4, linewidth=1.6, label=policy, zorder=3)
+        marker = MARKERS[index % len(MARKERS)]
+        place.plot(panel.levels, mean, color=colour, marker=marker, markersize=4, linewidth=1.6, label=policy, zorder=3)
         place.fill_between(panel.levels, lower, upper, color=colour, alpha=0.2, linewidth=0.0, zorder=2)
         if len(panel.levels) == 1:  # a band has no width there
             place.vlines(panel.levels, lower, upper, color=colour, linewidth=3.0, alpha=0.4, zorder=2)

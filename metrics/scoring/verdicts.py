@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from metrics.checks import CurveError
 from metrics.claims import CLAIMS, Claim, PanelName, Verdict, check_claim
-from metrics.claims.paper import POLICIES
+from metrics.claims.stating import POLICIES
 from metrics.curves import Variant
 
 from .figure_panels import StudyPanel, StudyPanels
@@ -91,14 +91,18 @@ def why_no_claims(table: "StudyTable") -> str:
 
 
 def judge_claims(
-    tables: "Sequence[StudyTable]", scored: Sequence[StudyPanels], variants: Sequence[Variant] = VARIANTS
+    tables: "Sequence[StudyTable]",
+    scored: Sequence[StudyPanels],
+    variants: Sequence[Variant] = VARIANTS,
+    claims: Mapping[str, Claim] = CLAIMS,
 ) -> tuple[tuple[Judged, ...], tuple[Waiting, ...]]:
-    """Hold all claims against studies; a claim is left out in a variant that none of its measures has.
+    """Hold claims against studies; a claim is left out in a variant that none of its measures has.
 
     Args:
         tables: Studies, each once.
         scored: The panels of each in the same order, in these variants and the corrected one.
         variants: Which.
+        claims: By name; those of the paper's text, or its `INTUITIONS`.
 
     Returns:
         The answered claims, by reading, variant and claim, formulas first; and those that wait for runs.
@@ -123,12 +127,12 @@ def judge_claims(
     )
     judged = [
         Judged(claim=claim, reading="", variant="corrected", verdict=check_claim(claim, {}))
-        for claim in CLAIMS.values()
+        for claim in claims.values()
         if not claim.panels
     ]
     waiting: list[Waiting] = []
     readings = dict.fromkeys(reading for table in tables for reading in table.spec.readings)
-    for reading, variant, claim in product(readings, variants, CLAIMS.values()):
+    for reading, variant, claim in product(readings, variants, claims.values()):
         if claim.panels and any(_variant_of(measure, variant) == variant for _, measure in claim.panels):
             outcome = _judge(claim, reading, variant, found)
             if isinstance(outcome, Judged):

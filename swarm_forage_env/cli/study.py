@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, AsJson, DryRun, complain
+from swarm_forage_env.cli.study_diff import diff
 from swarm_forage_env.cli.study_maps import maps
 from swarm_forage_env.cli.study_page import report
 from swarm_forage_env.cli.study_plot import plot
@@ -118,7 +119,7 @@ def pack(
     typer.echo(f"packed into {_pack(folder, out)}")
 
 
-for command in (verdict, plot, maps, report):
+for command in (verdict, plot, maps, report, diff):
     study.command()(command)
 
 

@@ -2,9 +2,9 @@
 
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args
 
 import typer
 
@@ -12,6 +12,7 @@ from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env.cli.study_verdict import Places, scored_studies, waiting_lines
 
 if TYPE_CHECKING:
+    from metrics.claims import Claim
     from metrics.scoring.figure_panels import StudyPanels
     from metrics.scoring.study_plots import StudyFigure
     from metrics.scoring.verdicts import Judged, Waiting
@@ -28,6 +29,7 @@ def report(
     ] = "ci",
 ) -> None:
     """Write one page about studies: what they say of the paper's claims, figures, numbers, settings, versions."""
+    from metrics.claims import INTUITIONS
     from metrics.scoring.verdicts import VARIANTS, judge_claims, why_no_claims
     from swarm_forage_env._internal.fields import ConfigError, known_name
     from swarm_forage_env.cli.terminal import notes
@@ -40,11 +42,14 @@ def report(
     scored = scored_studies(tables, VARIANTS)
     about = [pair for pair in zip(tables, scored, strict=True) if not why_no_claims(pair[0])]
     try:
-        judged, waiting = judge_claims([table for table, _ in about], [panels for _, panels in about])
+        sets, panels = [table for table, _ in about], [panels for _, panels in about]
+        judged, waiting = judge_claims(sets, panels)
+        expected, expected_later = judge_claims(sets, panels, ("corrected",), INTUITIONS)
     except ValueError as error:  # a study twice
         raise ConfigError(str(error)) from error
     try:
-        text = page_of(tables, scored, judged if about else (), waiting if about else (), band)
+        verdicts = Verdicts(judged, waiting, expected, expected_later) if about else Verdicts()
+        text = page_of(tables, scored, verdicts, band)
     except ImportError as error:
         raise ImportError(NO_REPORT) from error
     out.parent.mkdir(parents=True, exist_ok=True)
@@ -52,21 +57,27 @@ def report(
     notes().print(f"written {out}", markup=False)
 
 
-def page_of(
-    tables: "Sequence[StudyTable]",
-    scored: "Sequence[StudyPanels]",
-    judged: "Sequence[Judged]",
-    waiting: "Sequence[Waiting]",
-    band: str,
-) -> str:
+class Verdicts(NamedTuple):
+    """What studies say of the paper's claims, and of its intuitions."""
+
+    judged: "Sequence[Judged]" = ()
+    waiting: "Sequence[Waiting]" = ()
+    expected: "Sequence[Judged]" = ()
+    """Intuitions, corrected measures only."""
+    expected_later: "Sequence[Waiting]" = ()
+
+
+def page_of(tables: "Sequence[StudyTable]", scored: "Sequence[StudyPanels]", verdicts: Verdicts, band: str) -> str:
     """Return the page as text; without verdicts it has no part about claims.
 
     Raises:
         ImportError: matplotlib or Jinja2 is not installed.
     """
+    from metrics.claims import CLAIMS, INTUITIONS
     from metrics.claims.predicates import Answer
     from swarm_forage_env.rendering.report import build_report
 
+    judged, waiting, expected, expected_later = verdicts
     columns = list(dict.fromkeys((one.reading, one.variant) for one in (*judged, *waiting) if one.reading))
     names = sorted({name for table in tables for made in table.versions for name in made})
     answers = get_args(Answer)
@@ -80,8 +91,15 @@ def page_of(
                 {"reading": reading, "variant": variant, "counts": [counts[reading, variant, word] for word in answers]}
                 for reading, variant in columns
             ],
-            "claims": _claim_rows(columns, judged, waiting),
-            "waiting": [line.strip() for line in waiting_lines(waiting)[1:]],
+            "claims": _claim_rows(CLAIMS, columns, judged, waiting),
+            "readings": list(dict.fromkeys(one.reading for one in (*expected, *expected_later))),
+            "intuitions": _claim_rows(
+                INTUITIONS,
+                list(dict.fromkeys((one.reading, one.variant) for one in (*expected, *expected_later))),
+                expected,
+                expected_later,
+            ),
+            "waiting": [line.strip() for line in waiting_lines((*waiting, *expected_later))[1:]],
             "studies": [
                 _study(table, panels, judged, waiting, band) for table, panels in zip(tables, scored, strict=True)
             ],
@@ -92,21 +110,22 @@ def page_of(
                 for table in tables
                 for made in table.versions
             ],
-            "commands": "\n".join(_again(table) for table in tables),
+            "commands": "\n".join(command_of(table) for table in tables),
         }
     )
 
 
 def _claim_rows(
-    columns: Sequence[tuple[str, str]], judged: "Sequence[Judged]", waiting: "Sequence[Waiting]"
+    claims: "Mapping[str, Claim]",
+    columns: Sequence[tuple[str, str]],
+    judged: "Sequence[Judged]",
+    waiting: "Sequence[Waiting]",
 ) -> list[dict[str, Any]]:
     """Return one row per claim that is answered somewhere, with a cell per column."""
-    from metrics.claims import CLAIMS
-
     found = {(one.claim.name, one.reading, one.variant): one.verdict for one in judged}
     waits = {(one.claim.name, one.reading, one.variant) for one in waiting}
     rows: list[dict[str, Any]] = []
-    for name in (name for name in CLAIMS if name in {one.claim.name for one in judged}):
+    for name in (name for name in claims if name in {one.claim.name for one in judged}):
         formula = found.get((name, "", "corrected"))
         cells: list[dict[str, Any]] = []
         for column in columns if formula is None else [("", "corrected")]:
@@ -117,7 +136,7 @@ def _claim_rows(
                 cells.append({"answer": "", "by_bands": "", "why": why, "span": span})
             else:
                 cells.append({"answer": verdict.answer, "by_bands": verdict.by_bands, "why": "", "span": span})
-        rows.append({"name": name, "text": CLAIMS[name].text, "cells": cells})
+        rows.append({"name": name, "text": claims[name].text, "where": claims[name].figure, "cells": cells})
     return rows
 
 
@@ -199,22 +218,18 @@ def _cost(table: "StudyTable") -> list[str | int | float]:
     spec = table.spec
     n_done = sum(state.n_runs[DONE] for state in table.cell_states())
     hours = spec.n_runs * spec.horizon_s / 3600.0
-    return [spec.name, spec.budget, n_done, spec.n_runs, float(spec.robot_ticks), hours]
+    took = "not kept" if table.wall_time_s is None else table.wall_time_s / 3600.0
+    return [spec.name, spec.budget, n_done, spec.n_runs, float(spec.robot_ticks), hours, took]
 
 
-def _again(table: "StudyTable") -> str:
+def command_of(table: "StudyTable") -> str:
     """Return the command that makes the runs of a study."""
-    from swarm_forage_env._internal.fields import ConfigError
-    from swarm_forage_env.study.study_file import load_study
+    from swarm_forage_env.study.study_file import is_set_of_paper
 
     spec = table.spec
     reading, *others = spec.readings
     budget = f" --budget {spec.budget}" if spec.budget else ""
     command = f"swarm-forage study run {{}}{budget} --seeds {len(spec.seeds)} --reading {'both' if others else reading}"
-    try:
-        same = load_study(spec.name, spec.budget, seeds=len(spec.seeds), readings=spec.readings)
-    except ConfigError:  # no set of the paper, or no budget of it
-        same = None
-    if same is not None and same.study_id == spec.study_id:
+    if is_set_of_paper(spec):
         return command.format(spec.name)
     return f"{command.format('FILE')}  # the file of study {spec.name}, identity {spec.study_id}"

@@ -25,7 +25,7 @@ def table_of_sets() -> Table:
         title="experiment sets of the paper",
         caption="of four controllers at budget paper, for each of the two readings",
     )
-    for name in ("set", "about", "varies"):
+    for name in ("set", "about"):
         table.add_column(name)
     for name in ("experiments", "runs", "robot-ticks"):
         table.add_column(name, justify="right")
@@ -34,10 +34,9 @@ def table_of_sets() -> Table:
         spec = load_study(name, PAPER, readings=("described",))
         numbers = [spec.n_experiments, spec.n_runs, spec.robot_ticks]
         totals = [total + number for total, number in zip(totals, numbers, strict=True)]
-        varied = " x ".join(axis.name for axis in spec.axes)
-        table.add_row(spec.name, spec.title, varied, *_numbers(numbers))
+        table.add_row(spec.name, spec.title, *_numbers(numbers))
     table.add_section()
-    table.add_row("all", "", "", *_numbers(totals))
+    table.add_row("all", "", *_numbers(totals))
     return table
 
 

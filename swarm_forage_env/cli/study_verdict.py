@@ -1,4 +1,4 @@
-"""The command `study verdict`: the paper's claims held against studies."""
+"""The command `study verdict`: the paper's claims and intuitions held against studies."""
 
 import json
 from collections.abc import Sequence
@@ -22,24 +22,40 @@ def verdict(
     places: Places,
     json_file: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write all of it as JSON.")] = None,
 ) -> None:
-    """Hold the claims of the paper against runs of its sets: what they support, contradict or leave open."""
-    from metrics.scoring.verdicts import VARIANTS, judge_claims
+    """Hold the claims of the paper against runs of its sets: what they support, contradict or leave open.
+
+    Below them the same for its intuitions, what it expected of each algorithm before the experiments.
+    """
+    from metrics.claims import INTUITIONS
+    from metrics.scoring.verdicts import VARIANTS, judge_claims, why_no_claims
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.cli.terminal import notes, output
+    from swarm_forage_env.study.study_file import is_set_of_paper
     from swarm_forage_env.study.study_table import read_study
 
     tables = [read_study(place) for place in places]
+    refused = next(filter(None, map(why_no_claims, tables)), "")
+    if refused:
+        raise ConfigError(f"{refused} 'swarm-forage study plot' and 'report' take any study.")
     try:
-        judged, waiting = judge_claims(tables, scored_studies(tables, VARIANTS))
-    except ValueError as error:  # a study that no claim is about
+        scored = scored_studies(tables, VARIANTS)
+        judged, waiting = judge_claims(tables, scored)
+        expected, expected_later = judge_claims(tables, scored, ("corrected",), INTUITIONS)
+    except ValueError as error:  # a study twice
         raise ConfigError(str(error)) from error
+    for table in tables:
+        if not is_set_of_paper(table.spec):
+            words = f"note: {table.spec.name} has the name of one of the paper's sets and other settings"
+            notes().print(words, markup=False)
     console = output()
     for key in dict.fromkeys((one.reading, one.variant) for one in judged):
         console.print(_table([one for one in judged if (one.reading, one.variant) == key]))
-    typer.echo("\n".join(waiting_lines(waiting)))
+    for reading in dict.fromkeys(one.reading for one in expected):
+        console.print(_table([one for one in expected if one.reading == reading], "intuitions"))
+    typer.echo("\n".join(waiting_lines((*waiting, *expected_later))))
     if json_file is not None:
         json_file.parent.mkdir(parents=True, exist_ok=True)
-        json_file.write_text(verdict_json(tables, judged, waiting) + "\n", encoding="utf-8")
+        json_file.write_text(verdict_json(tables, judged, waiting, expected, expected_later) + "\n", encoding="utf-8")
         notes().print(f"written {json_file}", markup=False)
 
 
@@ -55,8 +71,14 @@ def scored_studies(tables: "Sequence[StudyTable]", variants: "Sequence[Variant]"
     return scored
 
 
-def verdict_json(tables: "Sequence[StudyTable]", judged: "Sequence[Judged]", waiting: "Sequence[Waiting]") -> str:
-    """Return everything as a JSON document; numbers that do not exist are null."""
+def verdict_json(
+    tables: "Sequence[StudyTable]",
+    judged: "Sequence[Judged]",
+    waiting: "Sequence[Waiting]",
+    expected: "Sequence[Judged]",
+    expected_later: "Sequence[Waiting]",
+) -> str:
+    """Return claims, and what was expected, as a JSON document; numbers that do not exist are null."""
     studies = [
         {
             "name": table.spec.name,
@@ -71,6 +93,8 @@ def verdict_json(tables: "Sequence[StudyTable]", judged: "Sequence[Judged]", wai
         "studies": studies,
         "verdicts": [one.to_mapping() for one in judged],
         "waiting": [one.to_mapping() for one in waiting],
+        "intuitions": [one.to_mapping() for one in expected],
+        "intuitions_waiting": [one.to_mapping() for one in expected_later],
     }
     return json.dumps(document, indent=1)
 
@@ -85,17 +109,20 @@ def waiting_lines(waiting: "Sequence[Waiting]") -> list[str]:
         claims.setdefault(words, {})[one.claim.name] = None
     if not claims:
         return ["No claim waits for runs."]
-    return ["These claims wait:", *(f"  {', '.join(names)}: {words}" for words, names in claims.items())]
+    return [
+        "These claims and intuitions (H) wait:",
+        *(f"  {', '.join(names)}: {words}" for words, names in claims.items()),
+    ]
 
 
-def _table(judged: "Sequence[Judged]") -> "Table":
+def _table(judged: "Sequence[Judged]", what: str = "") -> "Table":
     from rich.table import Table
 
     from metrics.scoring.texts import number, percent
 
     first = judged[0]
     title = f"reading {first.reading}, measures {first.variant}" if first.reading else "from formulas alone"
-    table = Table(title=title, title_justify="left")
+    table = Table(title=f"{what}, {title}" if what else title, title_justify="left")
     for name in ("claim", "text", "by intervals", "by bands"):
         table.add_column(name)
     for name in ("statistic", "effect", "runs"):

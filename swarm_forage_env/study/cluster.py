@@ -4,9 +4,12 @@ Workers need the same versions of the packages, and no shared disk: tasks and re
 worker may join or be killed at any time; what it was running is run elsewhere.
 """
 
+import signal
+import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import ExitStack, contextmanager
+from multiprocessing import resource_tracker
 from typing import Any
 
 from swarm_forage_env._internal.extras import install_command
@@ -40,14 +43,15 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
     with ExitStack() as stack:
         target: Any = where
         if where == LOCAL:
-            target = stack.enter_context(
-                distributed.LocalCluster(
-                    n_workers=workers or available_cores(),
-                    threads_per_worker=1,
-                    host="127.0.0.1",
-                    dashboard_address=None,  # type: ignore[arg-type] - None is documented: no dashboard
+            with _interrupts_later():
+                target = stack.enter_context(
+                    distributed.LocalCluster(
+                        n_workers=workers or available_cores(),
+                        threads_per_worker=1,
+                        host="127.0.0.1",
+                        dashboard_address=None,  # type: ignore[arg-type] - None is documented: no dashboard
+                    )
                 )
-            )
         elif where == SLURM:
             target = stack.enter_context(slurm_cluster())
             target.scale(jobs=workers or available_cores())
@@ -58,6 +62,29 @@ def cluster_executor(where: str, workers: int | None = None) -> Iterator[Executo
                 f"Expected the address of a Dask scheduler, local or slurm, got {where!r}: {error}"
             ) from error
         yield client.get_executor(pure=False)
+
+
+@contextmanager
+def _interrupts_later() -> Iterator[None]:
+    """Hold back Ctrl-C until the end of the block.
+
+    A terminal sends it to the workers, too. Dask prints tracebacks where it ends a worker, or this process, while they
+    start. So it is raised here when all have started, and workers, which inherit what is blocked, never see it.
+    """
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
+        yield  # only the main thread has handlers; Windows cannot block
+        return
+    caught: list[int] = []
+    usual = signal.signal(signal.SIGINT, lambda number, _: caught.append(number))
+    resource_tracker.ensure_running()  # multiprocessing's; started later it would unblock it again
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        signal.signal(signal.SIGINT, usual)
+    if caught:
+        raise KeyboardInterrupt
 
 
 def slurm_cluster(**settings: Any) -> Any:

@@ -28,7 +28,7 @@ The files of the paper's sets are in the folder `sets`.
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +104,15 @@ def load_study(
         return _study(_read(file), file.parent, budget, seeds, readings)
     except ConfigError as error:
         raise error if str(file) in str(error) else ConfigError(f"Cannot use {file}: {error}") from error
+
+
+def is_set_of_paper(spec: StudySpec) -> bool:
+    """Return whether a study is one of the paper's sets at one of its budgets, with any seeds, or only has its name."""
+    try:
+        same = load_study(spec.name, spec.budget, readings=spec.readings)
+    except ConfigError:  # no such set, or no such budget of it
+        return False
+    return spec.name in set_names() and replace(same, seeds=spec.seeds).study_id == spec.study_id
 
 
 def _read(file: Path) -> dict[str, Any]:

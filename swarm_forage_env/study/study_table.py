@@ -8,6 +8,7 @@ bytes, in whatever order and on however many machines they were made.
 
 import hashlib
 import json
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -50,6 +51,9 @@ class StudyTable:
     `RunRecord`, null where a run has no such column; `LOSS_COLUMNS`."""
     versions: tuple[Mapping[str, str], ...]
     """Versions and commits that made the runs, each once."""
+    wall_time_s: float | None = None
+    """How long all finished runs took together, by the clock. None where it is not known: a file leaves it out, so that
+    the same runs make the same bytes."""
 
     def rows(self, cell: Cell) -> "pl.DataFrame":
         """Return the rows of a cell, those of failed and missing runs included.
@@ -153,6 +157,7 @@ def gather_study(folder: StudyFolder) -> StudyTable:
     spec = folder.study()
     versions: set[tuple[tuple[str, str], ...]] = set()
     frames: list[pl.DataFrame] = []
+    wall_time_s = 0.0
     for number, cell in enumerate(spec.cells):
         records: list[RunRecord] = []
         lost: list[dict[str, Any]] = []
@@ -162,6 +167,7 @@ def gather_study(folder: StudyFolder) -> StudyTable:
                 lost.append(_loss(folder.store, run))
             else:
                 records.append(record)
+                wall_time_s += record.wall_time_s
                 versions.add(tuple((name, record.provenance.get(name, "")) for name in (*PACKAGES, "commit")))
         first = {"study": spec.name, "cell": number, **place(spec, cell)}
         rows = pl.concat([_frame(records), _losses(lost)], how="diagonal").sort("seed", "interval")
@@ -171,6 +177,7 @@ def gather_study(folder: StudyFolder) -> StudyTable:
         spec=spec,
         frame=frame.select(_in_order(frame.columns, spec)),
         versions=tuple(dict(pairs) for pairs in sorted(versions)),
+        wall_time_s=None if math.isnan(wall_time_s) else wall_time_s,
     )
 
 

@@ -2,9 +2,10 @@
 
 import pytest
 
+from metrics.claims import INTUITIONS
 from metrics.scoring import judge_claims, study_panels
 from metrics.scoring.verdicts import VARIANTS
-from swarm_forage_env.cli.study_page import page_of
+from swarm_forage_env.cli.study_page import Verdicts, page_of
 from swarm_forage_env.study.studies import Axis
 from swarm_forage_env.study.study_file import load_study
 from tests.support.browser import Browser, chromium
@@ -20,7 +21,8 @@ def by_policy(cell):
 def page(*specs):
     tables = [made_table(spec, by_policy) for spec in specs]
     scored = [study_panels(table, VARIANTS) for table in tables]
-    return page_of(tables, scored, *judge_claims(tables, scored), "ci")
+    expected = judge_claims(tables, scored, ("corrected",), INTUITIONS)
+    return page_of(tables, scored, Verdicts(*judge_claims(tables, scored), *expected), "ci")
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +44,7 @@ def test_it_fits_and_asks_for_nothing(written, tmp_path, width):
         assert [address for address in browser.requests if not address.startswith("data:")] == []
         assert browser.complaints == []
         assert browser.ask("[...document.images].every((image) => image.naturalWidth > 100)")
-        assert browser.ask("document.images.length") == 10, "four and three figures, three of them with a map"
+        assert browser.ask("document.images.length") == 12, "twice four figures, four of them with a map"
 
 
 def test_tables_are_sorted_by_a_click(written, tmp_path):
@@ -88,3 +90,12 @@ def test_a_figure_has_its_claims_beside_it():
 def test_a_claim_that_needs_another_set_says_which():
     article = next(part for part in page(made_study("S1b")).split("<article") if "<h3>S1b: task emergence" in part)
     assert "corrected: waits for S1d reactivity" in article
+
+
+def test_what_the_paper_expected_stands_below_its_claims():
+    walking = Axis(name="walk_probability", values=(0.0, 0.051))
+    text = page(made_study("S2a", walking, Axis(name="population_size", values=(2, 4))))
+    table = text.split('id="intuitions"')[1].split("</table>")[0]
+    assert "CRW: Moving objects do not affect it" in table, "H14 needs no other set"
+    assert '<span class="answer supported">' in table
+    assert "DPO" not in table, "the others wait"

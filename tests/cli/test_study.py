@@ -43,7 +43,7 @@ def test_the_sets_are_listed_with_their_runs(command):
     code, out, _ = command("study", "list")
     assert code == 0
     assert len(re.findall(r"^│ S[12][a-h] │", out, re.MULTILINE)) == 12
-    assert re.search(r"│ all +│ +│ +│ +168 │ 129,024 │", out)
+    assert re.search(r"│ all +│ +│ +168 │ 129,024 │", out)
 
 
 def test_a_study_is_shown(written):

@@ -52,6 +52,22 @@ def test_corrected_form_drops_the_loss_of_a_lone_robot_only_where_it_stands_alon
     assert spatial(1, 4, variant="paper") == pytest.approx(4 * 0.1 - 0.56, abs=1e-9)
 
 
+@pytest.mark.parametrize("variant", ["paper", "corrected"])
+def test_one_robot_drops_out_between_larger_swarms(variant):
+    twelve, fifty = ([30.0, 25.0], [0.1, 0.2], 12), ([90.0, 70.0], [0.3, 0.25], 50)
+    one = ([2.0, 3.0], [0.05, 0.1])
+    with_one = spatial_emergence(*twelve, *fifty, *one, variant=variant)
+    without = spatial_emergence(*twelve, *fifty, None, None, variant=variant)
+    assert without == pytest.approx(float(with_one), rel=1e-12)
+    assert without == pytest.approx(50 / 12 * (3.0 + 5.0) - (27.0 + 17.5))
+
+
+@pytest.mark.parametrize(("n1", "variant"), [(1, "paper"), (1, "corrected"), (12, "sierra")])
+def test_elsewhere_one_robot_is_needed(n1, variant):
+    with pytest.raises(CurveError, match="perf_one"):
+        spatial_emergence([1.0], [0.1], n1, [2.0], [0.1], 50, None, None, variant=variant)
+
+
 def test_program_finds_organisation_where_the_print_finds_none():
     assert spatial(2, 4, variant="sierra") == pytest.approx(2 * 0.14444444 - 0.26875, abs=1e-15)
     assert spatial(2, 4, variant="sierra") == pytest.approx(0.02013888, abs=1e-9)

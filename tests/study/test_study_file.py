@@ -1,6 +1,7 @@
 """Study files, and the paper's sets among them."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.study.experiments import BUDGETS
 from swarm_forage_env.study.studies import Cell, StudySpec
-from swarm_forage_env.study.study_file import budget_names, load_study, set_names
+from swarm_forage_env.study.study_file import budget_names, is_set_of_paper, load_study, set_names
 
 EXPERIMENTS = {"S1a": 8, "S1b": 10, "S1c": 7, "S1d": 7, "S1e": 8, "S1f": 8, "S1g": 8, "S1h": 8,
                "S2a": 32, "S2b": 24, "S2c": 24, "S2d": 24}  # fmt: skip
@@ -190,3 +191,12 @@ def test_the_study_of_the_page_is_one(written, tmp_path):
     first, full = load_study(file, "first"), load_study(file, "full")
     assert (first.n_experiments, first.n_runs, full.n_runs) == (6, 48, 384)
     assert first.reference_of(first.cells[0]) == Cell("described", "crw", (10, 0.1))
+
+
+def test_a_set_of_the_paper_is_known_by_more_than_its_name():
+    some = load_study("S1a", "reduced", seeds=2, readings=("program",))
+    assert is_set_of_paper(some)
+    assert is_set_of_paper(replace(some, seeds=(5, 9)))
+    assert not is_set_of_paper(replace(some, settings={"n_objects": 20}))
+    assert not is_set_of_paper(replace(some, name="mine"))
+    assert not is_set_of_paper(replace(some, budget="mine"))

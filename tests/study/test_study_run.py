@@ -14,6 +14,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.study.record import RecordError
+from swarm_forage_env.study.study_file import load_study
 from swarm_forage_env.study.study_run import (
     DONE,
     FAILED,
@@ -203,6 +204,53 @@ def test_a_kill_at_a_random_moment_changes_nothing(tmp_path, sent, request):
     assert 0 < n_kept < study.n_runs
     with ThreadPoolExecutor(3) as executor:
         run_study(study, broken, executor=executor)
+    for folder in (straight, broken):
+        gather_study(folder).write(folder.folder / "table.parquet")
+    tables = [(folder.folder / "table.parquet").read_bytes() for folder in (straight, broken)]
+    assert tables[0] == tables[1]
+
+
+KILLED_STUDY = """
+name = "tiny"
+scenario = "warehouse_small"
+policies = ["random"]
+
+[set]
+n_objects = 20
+
+[[axis]]
+criterion = "population_size"
+values = [2, 3]
+
+[budget.tiny]
+seeds = 100
+horizon_s = 4.0
+interval_s = 2.0
+"""
+N_KILLS = 10
+
+
+@pytest.mark.slow
+def test_ten_kills_of_the_command_and_its_workers_change_nothing(tmp_path):
+    """The command and its two workers get SIGKILL together, each time somewhere in the first runs that they make."""
+    (tmp_path / "tiny.toml").write_text(KILLED_STUDY)
+    study = load_study(tmp_path / "tiny.toml")
+    straight, broken = StudyFolder(tmp_path / "straight"), StudyFolder(tmp_path / "broken")
+    run_study(study, straight, jobs=1)
+    words = ("study", "run", "tiny.toml", "--workers", "2", "--out", "broken")
+    for n_before in range(N_KILLS):
+        n_kept = len(broken.store.run_ids())
+        started = subprocess.Popen([sys.executable, "-m", "swarm_forage_env.cli", *words], cwd=tmp_path,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                   start_new_session=True)  # fmt: skip
+        while len(broken.store.run_ids()) == n_kept:
+            assert started.poll() is None, f"it ended after {n_before} kills"
+            time.sleep(0.002)
+        time.sleep(random.Random().uniform(0.0, 0.05))
+        os.killpg(started.pid, signal.SIGKILL)
+        started.wait()
+    assert N_KILLS <= len(broken.store.run_ids()) < study.n_runs
+    run_study(study, broken, jobs=1)
     for folder in (straight, broken):
         gather_study(folder).write(folder.folder / "table.parquet")
     tables = [(folder.folder / "table.parquet").read_bytes() for folder in (straight, broken)]

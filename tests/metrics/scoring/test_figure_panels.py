@@ -69,7 +69,7 @@ def test_a_panel_per_value_of_the_first_axis():
         ({"walk_probability": 0.001}, "S2a slow"),
         ({"walk_probability": 0.3}, None),
     ]
-    assert "no reference run of one robot" in scored.missing["spatial_emergence", "corrected"]
+    assert only(scored.panels, "spatial_emergence", experiment="S2a slow").x.tolist() == [4.0], "without one robot"
 
 
 def test_throttles_are_placed_by_the_distance_of_conditions():
@@ -133,11 +133,18 @@ def test_a_claim_may_need_two_studies():
 
 
 def test_what_cannot_be_computed_is_told_with_the_claim():
-    axes = (Axis(name="walk_probability", values=(0.001,)), Axis(name="population_size", values=(2, 4)))
+    axes = (Axis(name="walk_probability", values=(0.001,)), Axis(name="population_size", values=(2,)))
     table = made_table(made_study("S2a", *axes), by_policy)
     _, waiting = judge_claims([table], [study_panels(table)], ("corrected",))
     (one,) = [one for one in waiting if one.claim.name == "E9"]
-    assert "no reference run of one robot" in one.to_mapping()["reasons"][0]
+    assert "there is one swarm size only" in one.to_mapping()["reasons"][0]
+
+
+def test_the_claim_on_spatial_emergence_of_search_and_rescue_needs_no_lone_robot():
+    axes = (Axis(name="walk_probability", values=(0.001,)), Axis(name="population_size", values=(12, 51)))
+    table = made_table(made_study("S2a", *axes), by_policy)
+    judged, _ = judge_claims([table], [study_panels(table, VARIANTS)])
+    assert [one.variant for one in judged if one.claim.name == "E9"] == list(VARIANTS)
 
 
 @pytest.mark.parametrize(

@@ -350,6 +350,19 @@ def test_the_interactive_form_needs_a_run_of_one_robot():
     assert missing == {"task_emergence, interactive": reason}
 
 
+def test_the_marginal_form_of_spatial_emergence_needs_no_run_of_one_robot():
+    forms = ScoreForms(variants=("corrected", "paper"), forms=("marginal", "interactive"))
+    (study,) = study_curves(table(*COLLAPSE[1:]))
+    found, missing = score_study(study, ["spatial_emergence"], forms)
+    assert [(score.label, score.n_robots) for score in found] == [
+        ("spatial_emergence", (2, 4)),
+        ("spatial_emergence, paper", (2, 4)),
+    ]
+    (with_one,) = (score for score in scored(*COLLAPSE, measures=["spatial_emergence"]) if score.x == 4)
+    assert found[0].summary.mean == pytest.approx(with_one.summary.mean)
+    assert set(missing) == {"spatial_emergence, interactive", "spatial_emergence, interactive, paper"}
+
+
 def test_the_programs_form_takes_the_first_size_for_one_robot():
     (score,) = scored(*COLLAPSE[1:], measures=["spatial_emergence"], variants=("sierra",), forms=("interactive",))
     few, many = ([8.0], [0.2]), ([1.6], [0.6])

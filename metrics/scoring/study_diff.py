@@ -1,0 +1,379 @@
+"""Two studies of the same cells held against each other: do their runs differ beyond chance?
+
+A change of the code may change the last bits of every run and leave the science as it is. So runs are compared first
+bit by bit, and where they differ, by tests of their means.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import numpy as np
+from scipy.special import stdtr, stdtrit  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
+
+from metrics.checks import CurveError
+from metrics.curves import FloatArray
+from metrics.significance import ROUNDING, holm
+
+from .texts import plain
+
+if TYPE_CHECKING:
+    from swarm_forage_env.study.studies import Cell
+    from swarm_forage_env.study.study_table import StudyTable
+
+COLUMNS = ("performance", "interference_fraction", "n_carrying", "cache_pickups")
+"""Columns that are compared by default: what is achieved, the time lost, and what robots do. Each run counts with the
+mean over its intervals (our choice: few, so that the correction for many tests stays small)."""
+FAMILY_ERROR = 0.05
+"""Probability that one or more differences are called significant by chance."""
+TEST = (
+    "Means over the intervals of a run are compared. Studies of the same seeds are paired by seed, others by Welch's "
+    "test. A line is all cells of a policy in a reading, each in shares of its own mean, so that a small change "
+    "everywhere is found, too. * = significant: p at most 0.05 after Holm's correction over all tests of cells and "
+    "lines together. Intervals are Student's, 95 %."
+)
+"""How studies are compared, as a text for readers."""
+_LEVEL = 0.975
+"""Quantile of the upper bound of a 95 % interval."""
+
+State: TypeAlias = Literal["identical", "alike", "different", "open"]
+"""Of a cell: same seeds and every recorded number the same; no column differs significantly; one does; the numbers
+differ and there are too few runs to say more."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shift:
+    """The mean of a column in the second study less that in the first."""
+
+    column: str
+    place: tuple[str, ...]
+    """Reading, policy and the value on each axis; of a line reading and policy alone."""
+    first: float
+    """Mean of the first study; NaN for a line."""
+    second: float
+    difference: float
+    """Mean difference; of a line the mean over its cells, as a share of the mean of both studies."""
+    lower: float
+    """Bounds of its 95 % interval; NaN where there is none."""
+    upper: float
+    n_first: int
+    """Runs."""
+    n_second: int
+    is_paired: bool
+    p: float
+    """Two-sided; NaN where there are too few runs."""
+    p_holm: float = math.nan
+    """After Holm's correction over all tests of the two studies."""
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether p_holm is at most `FAMILY_ERROR`."""
+        return self.p_holm <= FAMILY_ERROR
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return it as plain values; numbers that JSON does not have are None."""
+        numbers = ("first", "second", "difference", "lower", "upper", "p", "p_holm")
+        return {
+            "column": self.column,
+            "place": list(self.place),
+            **{name: plain(getattr(self, name)) for name in numbers},
+            "n_first": self.n_first,
+            "n_second": self.n_second,
+            "paired": self.is_paired,
+            "significant": self.is_significant,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class CellDiff:
+    """A cell of both studies."""
+
+    cell: "Cell"
+    state: State
+    n_identical: int
+    """Runs of the same seed with the same numbers in all columns of both studies."""
+    shifts: tuple[Shift, ...]
+    """One per column that was tested; none for an identical cell."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyDiff:
+    """How two studies differ."""
+
+    cells: tuple[CellDiff, ...]
+    """Cells that both have, with runs in both."""
+    lines: tuple[Shift, ...]
+    """All cells of a policy in a reading together, per column; none where all of them are identical."""
+    lacking: "tuple[tuple[Cell, str], ...]"
+    """Cells that cannot be compared, and why."""
+    settings: tuple[str, ...]
+    """What differs between the two studies apart from their runs, in words."""
+
+    def count(self, state: State) -> int:
+        """Return how many cells are in a state."""
+        return sum(cell.state == state for cell in self.cells)
+
+    @property
+    def differs(self) -> bool:
+        """Whether a cell or a line differs significantly, or a cell is open."""
+        return any(cell.state in ("different", "open") for cell in self.cells) or any(
+            line.is_significant for line in self.lines
+        )
+
+    @property
+    def shifts(self) -> tuple[Shift, ...]:
+        """All tests, those of lines first."""
+        return (*self.lines, *(shift for cell in self.cells for shift in cell.shifts))
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return everything as plain values, ready for JSON."""
+        return {
+            "differs": self.differs,
+            "test": TEST,
+            "settings": list(self.settings),
+            "cells": [
+                {
+                    "place": list(place_of(cell.cell)),
+                    "state": cell.state,
+                    "n_identical": cell.n_identical,
+                    "shifts": [shift.to_mapping() for shift in cell.shifts],
+                }
+                for cell in self.cells
+            ],
+            "lines": [shift.to_mapping() for shift in self.lines],
+            "lacking": [{"place": list(place_of(cell)), "why": why} for cell, why in self.lacking],
+        }
+
+
+def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[str] = COLUMNS) -> StudyDiff:
+    """Compare two studies cell by cell.
+
+    Cells are those of the same reading, policy and values. Only finished runs count.
+
+    Args:
+        first: From `swarm_forage_env.read_study`.
+        second: The other, with the same axes, horizon and intervals.
+        columns: Recorded columns whose means are tested; the comparison of bits takes all.
+
+    Raises:
+        CurveError: studies that have no cell with runs in common, other axes or times, or a column that neither has.
+    """
+    _check_alike(first, second)
+    unknown = [name for name in columns if name not in first.frame.columns or name not in second.frame.columns]
+    if unknown:
+        raise CurveError(f"Expected columns that both studies have, got {unknown[0]!r}; see 'swarm-forage schema'.")
+    cells: list[tuple[Cell, int, list[tuple[Shift, _Sample]]]] = []
+    lacking: list[tuple[Cell, str]] = []
+    for cell in dict.fromkeys((*first.spec.cells, *second.spec.cells)):
+        why = _why_not(cell, first, second)
+        if why:
+            lacking.append((cell, why))
+            continue
+        n_identical, is_same = _identical(cell, first, second)
+        tests = [] if is_same else [_tested(cell, column, first, second) for column in columns]
+        cells.append((cell, n_identical, [test for test in tests if test is not None]))
+    if not cells:
+        raise CurveError("Expected two studies with finished runs of the same cells, got none that both have.")
+    lines = _lines(cells, columns)
+    every = [*lines, *(shift for _, _, found in cells for shift, _ in found)]
+    corrected = iter(holm(np.array([shift.p for shift in every])).tolist())
+    lines = tuple(replace(line, p_holm=next(corrected)) for line in lines)
+    return StudyDiff(
+        cells=tuple(
+            _cell_diff(cell, n_identical, tuple(replace(shift, p_holm=next(corrected)) for shift, _ in found))
+            for cell, n_identical, found in cells
+        ),
+        lines=lines,
+        lacking=tuple(lacking),
+        settings=_settings(first, second),
+    )
+
+
+def place_of(cell: "Cell") -> tuple[str, ...]:
+    """Return reading, policy and the value on each axis as texts."""
+    return (cell.reading, cell.policy, *(f"{v:.4g}" if isinstance(v, float) else str(v) for v in cell.values))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Sample:
+    """The runs of a cell in one column, for the test of a line."""
+
+    scale: float
+    """Mean of both studies; what a line is measured in shares of."""
+    variance: float
+    """Of the mean difference."""
+    freedom: float
+    """Degrees of freedom of the variance."""
+
+
+def _check_alike(first: "StudyTable", second: "StudyTable") -> None:
+    for what in ("axes", "horizon_s", "interval_s"):
+        words = [
+            ", ".join(axis.name for axis in table.spec.axes) if what == "axes" else f"{getattr(table.spec, what):g}"
+            for table in (first, second)
+        ]
+        if words[0] != words[1]:
+            raise CurveError(f"Expected two studies of the same {what}, got {words[0]} and {words[1]}.")
+
+
+def _why_not(cell: "Cell", first: "StudyTable", second: "StudyTable") -> str:
+    for name, table in (("first", first), ("second", second)):
+        if cell not in table.spec.cells:
+            return f"the {name} study does not have it"
+        if not table.curves(cell, "performance")[0]:
+            return f"the {name} study has no finished run of it"
+    return ""
+
+
+def _identical(cell: "Cell", first: "StudyTable", second: "StudyTable") -> tuple[int, bool]:
+    """Runs of the same seed with the same numbers, and whether that is all of them on both sides."""
+    names = [name for name, kind in first.frame.schema.items() if kind.is_numeric() and name in second.frame.columns]
+    (seeds, mine), (others, theirs) = (table.curves(cell, *names) for table in (first, second))
+    shared = [seed for seed in seeds if seed in others]
+    same = [
+        all(
+            np.array_equal(mine[name][seeds.index(seed)], theirs[name][others.index(seed)])
+            for name in mine
+            if name in theirs and name != "cell"
+        )
+        for seed in shared
+    ]
+    return sum(same), seeds == others and all(same) and mine.keys() == theirs.keys()
+
+
+def _tested(cell: "Cell", column: str, first: "StudyTable", second: "StudyTable") -> "tuple[Shift, _Sample] | None":
+    """The test of one column; None where runs of this cell do not have it."""
+    (seeds, mine), (others, theirs) = (table.curves(cell, column) for table in (first, second))
+    if column not in mine or column not in theirs:
+        return None
+    a, b = (np.atleast_1d(curves[column].mean(axis=-1)) for curves in (mine, theirs))
+    is_paired = seeds == others
+    difference = float((b - a).mean()) if is_paired else float(b.mean() - a.mean())
+    variance, freedom = _variance_of_difference(a, b, is_paired=is_paired)
+    p, half = _test(difference, variance, freedom, scale=float(np.abs([*a, *b]).max()), n_runs=len({*seeds, *others}))
+    shift = Shift(
+        column=column,
+        place=place_of(cell),
+        first=float(a.mean()),
+        second=float(b.mean()),
+        difference=difference,
+        lower=difference - half,
+        upper=difference + half,
+        n_first=a.size,
+        n_second=b.size,
+        is_paired=is_paired,
+        p=p,
+    )
+    return shift, _Sample(scale=0.5 * (shift.first + shift.second), variance=variance, freedom=freedom)
+
+
+def _variance_of_difference(a: FloatArray, b: FloatArray, *, is_paired: bool) -> tuple[float, float]:
+    """Variance of the mean difference and its degrees of freedom (Welch 1947); NaN for fewer than two runs."""
+    if min(a.size, b.size) < 2:
+        return math.nan, math.nan
+    if is_paired:
+        return float((b - a).var(ddof=1)) / a.size, a.size - 1.0
+    return _sum_of_variances([(float(x.var(ddof=1)) / x.size, x.size - 1.0) for x in (a, b)])
+
+
+def _sum_of_variances(parts: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Variance of a sum, and its degrees of freedom after Welch and Satterthwaite."""
+    variance = sum(part for part, _ in parts)
+    if not variance > 0.0:
+        return variance, min(freedom for _, freedom in parts)
+    return variance, variance**2 / sum(part**2 / freedom for part, freedom in parts if part > 0.0)
+
+
+def _test(difference: float, variance: float, freedom: float, *, scale: float, n_runs: int) -> tuple[float, float]:
+    """Two-sided p value that a mean difference is zero, and half of its interval.
+
+    Without any scatter Student's t does not exist; the value is then 1 for no difference, else that of the sign test,
+    2^(1 - runs).
+    """
+    if math.isnan(variance):
+        return math.nan, math.nan
+    error = math.sqrt(variance)
+    if error <= ROUNDING * scale:
+        return (1.0 if abs(difference) <= ROUNDING * scale else 2.0 ** (1 - n_runs)), 0.0
+    return 2.0 * float(stdtr(freedom, -abs(difference) / error)), float(stdtrit(freedom, _LEVEL)) * error
+
+
+def _lines(
+    cells: "Sequence[tuple[Cell, int, list[tuple[Shift, _Sample]]]]", columns: Sequence[str]
+) -> tuple[Shift, ...]:
+    """One test per reading, policy and column over all cells; identical ones count with a difference of 0."""
+    groups: dict[tuple[str, str], list[list[tuple[Shift, _Sample]]]] = {}
+    for cell, _, found in cells:
+        groups.setdefault((cell.reading, cell.policy), []).append(found)
+    lines = [
+        line
+        for place, together in groups.items()
+        for column in columns
+        if (line := _line(place, column, [t for found in together for t in found if t[0].column == column], together))
+        is not None
+    ]
+    return tuple(lines)
+
+
+def _line(
+    place: tuple[str, str], column: str, found: Sequence[tuple[Shift, _Sample]], together: Sequence[object]
+) -> Shift | None:
+    """The mean over cells of the difference, in shares of each cell's mean; None where no cell can be tested."""
+    usable = [(shift, sample) for shift, sample in found if sample.variance >= 0.0 and sample.scale > 0.0]
+    n_cells = len(together)
+    if not usable or n_cells < 2:
+        return None
+    difference = sum(shift.difference / sample.scale for shift, sample in usable) / n_cells
+    variance, freedom = _sum_of_variances(
+        [(sample.variance / (sample.scale * n_cells) ** 2, sample.freedom) for _, sample in usable]
+    )
+    n_first, n_second = (sum(getattr(shift, name) for shift, _ in usable) for name in ("n_first", "n_second"))
+    p, half = _test(difference, variance, freedom, scale=1.0, n_runs=max(n_first, n_second))
+    return Shift(
+        column=column,
+        place=place,
+        first=math.nan,
+        second=math.nan,
+        difference=difference,
+        lower=difference - half,
+        upper=difference + half,
+        n_first=n_first,
+        n_second=n_second,
+        is_paired=all(shift.is_paired for shift, _ in usable),
+        p=p,
+    )
+
+
+def _cell_diff(cell: "Cell", n_identical: int, shifts: tuple[Shift, ...]) -> CellDiff:
+    state: State = "alike"
+    if not shifts:
+        state = "identical"
+    elif all(math.isnan(shift.p) for shift in shifts):
+        state = "open"
+    elif any(shift.is_significant for shift in shifts):
+        state = "different"
+    return CellDiff(cell=cell, state=state, n_identical=n_identical, shifts=shifts)
+
+
+def _settings(first: "StudyTable", second: "StudyTable") -> tuple[str, ...]:
+    """What differs between two studies besides seeds, budget and title, whose runs show it."""
+    mine, other = first.spec.to_mapping(), second.spec.to_mapping()
+    told = ("title", "budget", "seeds", "readings", "policies", "axes")
+    words = [_two(key, mine[key], other[key]) for key in mine if key not in told and mine[key] != other[key]]
+    if first.versions != second.versions:
+        names = sorted({name for made in (*first.versions, *second.versions) for name in made})
+        differing = [
+            name
+            for name in names
+            if len({frozenset(made.get(name) for made in t.versions) for t in (first, second)}) > 1
+        ]
+        words.append(f"versions: {', '.join(differing)}")
+    return tuple(words)
+
+
+def _two(key: str, mine: Any, other: Any) -> str:
+    if key != "settings":
+        return f"{key}: {mine} and {other}"
+    names = [name for name in {**mine, **other} if mine.get(name) != other.get(name)]
+    return "settings: " + ", ".join(f"{name} {mine.get(name)} and {other.get(name)}" for name in names)

@@ -1,0 +1,95 @@
+"""The command `study diff`: which cells of two studies differ beyond chance."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson
+
+if TYPE_CHECKING:
+    from metrics.scoring.study_diff import Shift, StudyDiff
+
+ROWS_SHOWN = 20
+"""Differences that are listed; `--json` has all."""
+
+
+def diff(
+    first: Annotated[Path, typer.Argument(metavar="A", help="Folder of a study, or its packed file.")],
+    second: Annotated[Path, typer.Argument(metavar="B", help="The same of the other study.")],
+    columns: Annotated[
+        str | None,
+        typer.Option("--columns", help="Recorded columns to test, separated by commas; see 'swarm-forage schema'."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say which cells of two studies differ beyond chance; exit code 0 if none does, 1 if one does or may."""
+    from metrics.scoring.study_diff import COLUMNS, diff_studies
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.study.study_table import read_study
+
+    names = COLUMNS if columns is None else tuple(name.strip() for name in columns.split(","))
+    mine, other = read_study(first), read_study(second)
+    try:
+        found = diff_studies(mine, other, names)
+    except ValueError as error:  # studies that cannot be compared
+        raise ConfigError(str(error)) from error
+    header = ("reading", "policy", *(axis.name for axis in mine.spec.axes))
+    typer.echo(json.dumps(found.to_mapping(), indent=1) if as_json else diff_report(found, header))
+    if found.differs:
+        raise typer.Exit(EXIT_FAILURE)
+
+
+def diff_report(found: "StudyDiff", header: Sequence[str]) -> str:
+    """Return what was found in words: how many cells differ, the tests that say so, and what was not compared.
+
+    Args:
+        found: From `metrics.scoring.diff_studies`.
+        header: Names of what a cell is placed by.
+    """
+    from metrics.scoring.study_diff import TEST
+    from metrics.scoring.texts import aligned, counted
+
+    words = {
+        "identical": "identical to the last bit",
+        "alike": "alike: other bits, no difference beyond chance",
+        "different": "different",
+        "open": "open: other bits, and too few runs to say more",
+    }
+    counts = [(str(found.count(state)), text) for state, text in words.items() if found.count(state)]  # type: ignore[arg-type] - its keys are the states
+    lines = [f"{counted(len(found.cells), 'cell')} compared", *(f"  {row}" for row in aligned(counts))]
+    lines += [f"not the same: {text}" for text in found.settings]
+    of_cells = [shift for cell in found.cells for shift in cell.shifts if shift.is_significant]
+    shown = sorted(of_cells, key=lambda shift: shift.p)
+    if shown:
+        heads = (*header, "column", "A", "B", "B - A", "95 % interval", "runs", "p (Holm)")
+        lines += ["", *aligned([heads, *map(_row, shown[:ROWS_SHOWN])])]
+        lines += [f"and {len(shown) - ROWS_SHOWN} more; --json has all"] if len(shown) > ROWS_SHOWN else []
+    if found.lines:
+        lines += ["", "all cells of a policy together, in shares of each cell's mean:"]
+        lines += aligned(
+            [("reading", "policy", "column", "B - A", "95 % interval", "p (Holm)"), *map(_line, found.lines)]
+        )
+    if found.lacking:
+        reasons = dict.fromkeys(why for _, why in found.lacking)
+        counted_reasons = (f"{sum(w == why for _, w in found.lacking)}: {why}" for why in reasons)
+        lines += ["", "cells not compared: " + "; ".join(counted_reasons)]
+    return "\n".join([*lines, *(["", TEST] if found.shifts else [])])
+
+
+def _row(shift: "Shift") -> tuple[str, ...]:
+    from metrics.scoring.texts import limits, number
+
+    runs = str(shift.n_first) if shift.n_first == shift.n_second else f"{shift.n_first}, {shift.n_second}"
+    means = (number(value) for value in (shift.first, shift.second, shift.difference))
+    return (*shift.place, shift.column, *means, limits(shift.lower, shift.upper), runs, f"{shift.p_holm:.2g}")
+
+
+def _line(shift: "Shift") -> tuple[str, ...]:
+    from metrics.scoring.texts import percent
+
+    mark = " *" if shift.is_significant else ""
+    between = f"{percent(shift.lower)} to {percent(shift.upper)}"
+    return (*shift.place, shift.column, percent(shift.difference), between, f"{shift.p_holm:.2g}{mark}")

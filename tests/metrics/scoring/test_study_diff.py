@@ -1,0 +1,152 @@
+"""Two studies held against each other: bits, cells, lines."""
+
+import math
+
+import numpy as np
+import polars as pl
+import pytest
+from scipy import stats
+
+from metrics import CurveError
+from metrics.scoring import diff_studies
+from metrics.scoring.study_diff import place_of
+from swarm_forage_env.study.studies import Axis
+from swarm_forage_env.study.study_table import StudyTable
+from tests.support.made_tables import made_study, made_table
+
+PERFORMANCE = ("performance",)
+
+
+def steady(cell):
+    return 10.0 * cell.values[-1]
+
+
+def noisy(spec, *, of=1, shift=0.0, where=lambda cell: True, lost=()):
+    """A study whose runs scatter by a tenth, on their own for each `of`; cells `where` are shifted by a share."""
+    table = made_table(spec, steady, lost=lost)
+    rng = np.random.default_rng(of)
+    factors = {
+        (number, seed): (1.0 + 0.1 * rng.normal()) * (1.0 + shift * where(cell))
+        for number, cell in enumerate(spec.cells)
+        for seed in spec.seeds
+    }
+    frame = table.frame.with_columns(
+        performance=pl.Series(
+            None if value is None else value * factors[cell, seed]
+            for value, cell, seed in table.frame.select("performance", "cell", "seed").iter_rows()
+        )
+    )
+    return StudyTable(spec=spec, frame=frame, versions=table.versions)
+
+
+def test_the_same_runs_are_identical_and_need_no_test():
+    table = noisy(made_study())
+    found = diff_studies(table, table, PERFORMANCE)
+    assert {cell.state for cell in found.cells} == {"identical"}
+    assert {cell.n_identical for cell in found.cells} == {6}
+    assert (found.shifts, found.differs, found.settings) == ((), False, ())
+
+
+def test_other_runs_of_the_same_science_are_alike():
+    found = diff_studies(noisy(made_study()), noisy(made_study(), of=2), PERFORMANCE)
+    assert {cell.state for cell in found.cells} == {"alike"}
+    assert not found.differs
+
+
+def test_a_cell_that_changed_is_found_and_the_others_are_not():
+    spec = made_study(seeds=tuple(range(12)))
+    changed = spec.cells[4]
+    found = diff_studies(noisy(spec), noisy(spec, of=2, shift=0.5, where=lambda cell: cell == changed), PERFORMANCE)
+    assert [cell.cell for cell in found.cells if cell.state == "different"] == [changed]
+    (shift,) = (shift for cell in found.cells for shift in cell.shifts if shift.is_significant)
+    assert shift.place == place_of(changed) == ("described", "dpo", "2")
+    assert shift.lower < 10.0 < shift.upper, "half of 20"
+    assert found.differs
+
+
+def test_a_small_change_everywhere_is_found_in_a_line_only():
+    axis = Axis(name="population_size", values=tuple(range(1, 13)))
+    spec = made_study("S1a", axis)
+    found = diff_studies(
+        noisy(spec), noisy(spec, of=2, shift=0.1, where=lambda cell: cell.policy == "dpo"), PERFORMANCE
+    )
+    assert found.count("different") == 0
+    (line,) = (line for line in found.lines if line.is_significant)
+    assert (line.place, line.column) == (("described", "dpo"), "performance")
+    assert line.lower < 0.1 < line.upper
+    assert found.differs
+
+
+def test_the_same_seeds_are_paired_and_others_are_not():
+    spec = made_study()
+    table, other = noisy(spec), noisy(spec, of=2)
+    cell = spec.cells[0]
+    a, b = (t.curves(cell, "performance")[1]["performance"].mean(axis=1) for t in (table, other))
+    paired = diff_studies(table, other, PERFORMANCE).cells[0].shifts[0]
+    assert paired.is_paired
+    assert paired.p == pytest.approx(stats.ttest_rel(b, a).pvalue)
+    late = noisy(made_study(seeds=tuple(range(6, 11))), of=2)
+    c = late.curves(cell, "performance")[1]["performance"].mean(axis=1)
+    welch = diff_studies(table, late, PERFORMANCE).cells[0].shifts[0]
+    expected = stats.ttest_ind(c, a, equal_var=False)
+    assert (welch.is_paired, welch.n_first, welch.n_second) == (False, 6, 5)
+    assert welch.p == pytest.approx(expected.pvalue)
+    assert [welch.lower, welch.upper] == pytest.approx([*expected.confidence_interval()])
+
+
+def test_single_runs_with_other_bits_leave_it_open():
+    spec = made_study(seeds=(3,))
+    found = diff_studies(noisy(spec), noisy(spec, of=2), PERFORMANCE)
+    assert {cell.state for cell in found.cells} == {"open"}
+    assert found.differs, "nobody can say that they are alike"
+    assert all(math.isnan(shift.p) for shift in found.shifts)
+    assert found.to_mapping()["cells"][0]["shifts"][0]["p"] is None
+
+
+def test_columns_without_any_scatter_are_told_apart_too():
+    table = made_table(made_study(), steady)
+    frame = table.frame.with_columns(n_active=pl.col("n_active") + 1.0)
+    other = StudyTable(spec=table.spec, frame=frame, versions=table.versions)
+    found = diff_studies(table, other, ("n_active", "performance"))
+    by_column = {shift.column: shift for shift in found.cells[0].shifts}
+    assert by_column["n_active"].p == 2.0**-5
+    assert by_column["performance"].p == 1.0
+
+
+def test_what_is_not_compared_is_told():
+    small, large = made_study(), made_study("S1a", Axis(name="population_size", values=(1, 2, 8)))
+    lost = {(small.cells[0], seed) for seed in small.seeds}
+    found = diff_studies(noisy(small, lost=lost), noisy(large), PERFORMANCE)
+    reasons = {cell.values[-1]: why for cell, why in found.lacking if cell.policy == "crw"}
+    assert reasons == {
+        1: "the first study has no finished run of it",
+        4: "the second study does not have it",
+        8: "the first study does not have it",
+    }
+    assert len(found.cells) == 7
+
+
+def test_settings_and_versions_that_differ_are_told():
+    first = noisy(made_study())
+    other = noisy(made_study(settings={"n_objects": 30}))
+    other = StudyTable(spec=other.spec, frame=other.frame, versions=({"numpy": "3.0"},))
+    assert diff_studies(first, other, PERFORMANCE).settings == ("settings: n_objects 20 and 30", "versions: numpy")
+
+
+@pytest.mark.parametrize(
+    ("changes", "columns", "message"),
+    [
+        ({"horizon_s": 80.0}, PERFORMANCE, "the same horizon_s, got 40 and 80"),
+        (
+            {"axes": (Axis(name="noise", values=(0.0, 0.1)),)},
+            PERFORMANCE,
+            "the same axes, got population_size and noise",
+        ),
+        ({"readings": ("program",)}, PERFORMANCE, "got none that both have"),
+        ({}, ("speed",), "got 'speed'"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(changes, columns, message):
+    other = made_study(**changes)
+    with pytest.raises(CurveError, match=message):
+        diff_studies(noisy(made_study()), made_table(other, steady), columns)
