@@ -205,6 +205,7 @@ def test_mapping_refuses_a_value_where_a_section_belongs():
         ({"physics_substeps": 5}, ("scenario.physics_substeps", "sum to 1", "got 5")),
         ({"physics_substeps": (1.5, -0.5)}, ("scenario.physics_substeps to be positive shares", "got (1.5, -0.5)")),
         ({"physics_substeps": (1.0,)}, ("scenario.physics_substeps to be at least 4 equal shares", "got (1.0,)")),
+        ({"physics_substeps": (1 / 101,) * 101}, ("equal shares of a tick", "and at most 100, got 101.")),
         ({"physics_substeps": (0.5, 0.25, 0.25)}, ("at least 4 equal shares", "got (0.5, 0.25, 0.25)")),
         ({"physics_substeps": (0.5, 0.2, 0.15, 0.15)}, ("at least 4 equal shares", "got (0.5, 0.2, 0.15, 0.15)")),
         ({"quirks": True}, ("quirks to be a Quirks", "got True")),
