@@ -56,6 +56,15 @@ def package(tmp_path):
 
 def call(folder: Path, program: str) -> str:
     """Run a program that can import `folder`, in a process of its own with a cache beside the folder."""
+    return finished(folder, program).stdout.strip()
+
+
+def errors(folder: Path, program: str) -> str:
+    """What such a program says on stderr."""
+    return finished(folder, program).stderr
+
+
+def finished(folder: Path, program: str) -> subprocess.CompletedProcess[str]:
     places = [str(folder.parent), str(Path(compiling.__file__).parents[2])]
     environ = os.environ | {"NUMBA_CACHE_DIR": str(folder.parent / "cache"), "NUMBA_DISABLE_JIT": "0"}
     environ["PYTHONDONTWRITEBYTECODE"] = "1"  # Python's own cache does not notice two edits within a second
@@ -67,7 +76,7 @@ def call(folder: Path, program: str) -> str:
         check=False,
     )
     assert run.returncode == 0, run.stderr
-    return run.stdout.strip()
+    return run
 
 
 def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(package):
@@ -198,3 +207,40 @@ def test_a_callback_can_be_called_from_python():
 def test_a_callback_is_not_taken_to_another_process(copied):
     with pytest.raises(TypeError, match="cannot be pickled; make it anew from its function"):
         copied(Callback(double, np.zeros(2)))
+
+
+# Caches that cannot be used. Whoever runs the tests may be allowed to write everywhere, so the folders are impossible.
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", ["*.nbi", "*.nbc"])
+def test_damaged_files_of_the_cache_are_made_anew(package, name):
+    (package / "inner.py").write_text(INNER.format(added=1.0))
+    program = "from controllers.inner import inner; print(inner(1.0), sum(inner.stats.cache_hits.values()))"
+    assert call(package, program) == "2.0 0"
+    (file,) = (package.parent / "cache").rglob(name)
+    file.write_bytes(file.read_bytes()[:20])
+    assert call(package, program) == "2.0 0", "compiled again"
+    assert call(package, program) == "2.0 1", "and kept"
+
+
+@pytest.mark.compiled
+def test_without_a_place_for_compiled_functions_they_are_compiled_in_every_process(package):
+    (package / "inner.py").write_text(INNER.format(added=1.0))
+    nowhere = "import numba.core.caching as c; c.CacheImpl._locator_classes = []"
+    program = f"{nowhere}; from controllers.inner import inner; print(inner(1.0))"
+    told = errors(package, program)
+    assert told.count("\n") == 1
+    assert "Compiled functions cannot be kept" in told
+    assert "Set NUMBA_CACHE_DIR" in told
+
+
+@pytest.mark.compiled
+def test_a_full_disk_keeps_no_compiled_functions_and_says_so_once(package):
+    (package / "inner.py").write_text(INNER.format(added=1.0))
+    full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10))"
+    program = f"{full}; from controllers.inner import inner; print(inner(1.0), inner(1))"
+    told = errors(package, program)
+    assert told.count("\n") == 1
+    assert "cannot be kept" in told
+    assert "File too large" in told
