@@ -21,6 +21,7 @@ def maps(
     One row per run of the page; then, for each run after the first, what is more in it than in the first. The arrays
     go to .npz files beside the picture.
     """
+    from swarm_forage_env._internal.files import as_file_name, check_file
     from swarm_forage_env.rendering.plots import draw_maps
     from swarm_forage_env.study.maps import MEANINGS, floor_maps
     from swarm_forage_env.study.replay.files import read_replays
@@ -32,9 +33,9 @@ def maps(
         raise typer.BadParameter(str(error)) from error
     every = [*found, *(one.minus(found[0]) for one in found[1:])]
     picture = out or page.with_suffix(".maps.png")
-    picture.parent.mkdir(parents=True, exist_ok=True)
+    check_file(picture)
     for one in every:
-        one.write(picture.with_suffix(f".{one.label.replace(' ', '_')}.npz"))
+        one.write(picture.with_suffix(f".{as_file_name(one.label)}.npz"))
     try:
         draw_maps(picture, [(one.label, one.arrays, one.is_difference) for one in every], MEANINGS, every[0].size_m)
     except ImportError:

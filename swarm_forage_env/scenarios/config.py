@@ -246,7 +246,7 @@ class ScenarioConfig:
     quirks: Quirks = field(default_factory=Quirks)
 
     def __post_init__(self) -> None:
-        fields.text("scenario.name", self.name)
+        fields.file_name("scenario.name", self.name)
         for section, section_class in SECTIONS.items():
             fields.instance(section, getattr(self, section), section_class)
         for name, value in dataclasses.asdict(self.quirks).items():

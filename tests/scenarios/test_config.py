@@ -197,6 +197,7 @@ def test_mapping_refuses_a_value_where_a_section_belongs():
         ({"caches": "dinamic"}, ("none, static, dynamic", "got 'dinamic'", "Did you mean 'dynamic'?")),
         ({"performance": "colected"}, ("performance to be a recorded column", "Did you mean 'collected'?")),
         ({"physics": "compild"}, ("physics to be one of chipmunk, compiled", "Did you mean 'compiled'?")),
+        ({"name": "../elsewhere"}, ("scenario.name to be at most 60 characters", "got '../elsewhere'")),
         ({"name": ""}, ("scenario.name to be a non-empty text", "got ''")),
         ({"dt_s": 0.0}, ("scenario.dt_s to be a finite number > 0", "got 0.0")),
         ({"horizon_s": 100.1}, ("horizon_s to be a whole number of ticks of 0.2 s", "got 100.1")),
