@@ -29,11 +29,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def full_disk() -> Iterator[None]:
-    """A disk on which no file can be longer than 10 kB, also for those who may write everywhere."""
+    """A disk on which no file can be longer than 1 kB, also for those who may write everywhere."""
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000, before[1]))
     yield
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
 

@@ -7,10 +7,13 @@ import pickle
 import re
 import subprocess
 import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
+from numba.core.caching import CacheImpl
 
 from swarm_forage_env._internal import compiling
 from swarm_forage_env._internal.compiling import Callback, direct, kernel
@@ -56,15 +59,6 @@ def package(tmp_path):
 
 def call(folder: Path, program: str) -> str:
     """Run a program that can import `folder`, in a process of its own with a cache beside the folder."""
-    return finished(folder, program).stdout.strip()
-
-
-def errors(folder: Path, program: str) -> str:
-    """What such a program says on stderr."""
-    return finished(folder, program).stderr
-
-
-def finished(folder: Path, program: str) -> subprocess.CompletedProcess[str]:
     places = [str(folder.parent), str(Path(compiling.__file__).parents[2])]
     environ = os.environ | {"NUMBA_CACHE_DIR": str(folder.parent / "cache"), "NUMBA_DISABLE_JIT": "0"}
     environ["PYTHONDONTWRITEBYTECODE"] = "1"  # Python's own cache does not notice two edits within a second
@@ -76,7 +70,7 @@ def finished(folder: Path, program: str) -> subprocess.CompletedProcess[str]:
         check=False,
     )
     assert run.returncode == 0, run.stderr
-    return run
+    return run.stdout.strip()
 
 
 def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(package):
@@ -209,38 +203,75 @@ def test_a_callback_is_not_taken_to_another_process(copied):
         copied(Callback(double, np.zeros(2)))
 
 
-# Caches that cannot be used. Whoever runs the tests may be allowed to write everywhere, so the folders are impossible.
+# Caches that cannot be used
+
+
+@pytest.fixture
+def inner(tmp_path, monkeypatch, caplog):
+    """Load the module of a kernel anew, with a cache in `tmp_path`; returns its kernel."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
+    compiling._say.cache_clear()
+    file = tmp_path / "inner.py"
+    file.write_text(INNER.format(added=1.0))
+
+    def load():
+        caplog.clear()
+        spec = spec_from_file_location("inner", file)
+        module = module_from_spec(spec)
+        spec.loader.exec_module(module)
+        assert module.inner(1.0) == 2.0
+        return module.inner
+
+    return load
+
+
+def hits(function) -> int:
+    return sum(function.stats.cache_hits.values())
 
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("name", ["*.nbi", "*.nbc"])
-def test_damaged_files_of_the_cache_are_made_anew(package, name):
-    (package / "inner.py").write_text(INNER.format(added=1.0))
-    program = "from controllers.inner import inner; print(inner(1.0), sum(inner.stats.cache_hits.values()))"
-    assert call(package, program) == "2.0 0"
-    (file,) = (package.parent / "cache").rglob(name)
+def test_damaged_files_of_the_cache_are_made_anew(inner, tmp_path, name, caplog):
+    assert hits(inner()) == 0
+    assert hits(inner()) == 1
+    (file,) = tmp_path.rglob(name)
     file.write_bytes(file.read_bytes()[:20])
-    assert call(package, program) == "2.0 0", "compiled again"
-    assert call(package, program) == "2.0 1", "and kept"
+    assert hits(inner()) == 0, "compiled again"
+    assert "cannot be read and are made anew" in caplog.text
+    assert hits(inner()) == 1, "and kept"
+    assert caplog.text == ""
 
 
 @pytest.mark.compiled
-def test_without_a_place_for_compiled_functions_they_are_compiled_in_every_process(package):
-    (package / "inner.py").write_text(INNER.format(added=1.0))
-    nowhere = "import numba.core.caching as c; c.CacheImpl._locator_classes = []"
-    program = f"{nowhere}; from controllers.inner import inner; print(inner(1.0))"
-    told = errors(package, program)
-    assert told.count("\n") == 1
+def test_without_a_place_for_compiled_functions_they_are_compiled_in_every_process(inner, monkeypatch, caplog):
+    # Not by permissions: whoever runs the tests may be allowed to write everywhere.
+    monkeypatch.setattr(CacheImpl, "_locator_classes", [])
+    assert hits(inner()) == 0
+    (told,) = caplog.messages
     assert "Compiled functions cannot be kept" in told
     assert "Set NUMBA_CACHE_DIR" in told
 
 
 @pytest.mark.compiled
-def test_a_full_disk_keeps_no_compiled_functions_and_says_so_once(package):
-    (package / "inner.py").write_text(INNER.format(added=1.0))
-    full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (10, 10))"
-    program = f"{full}; from controllers.inner import inner; print(inner(1.0), inner(1))"
-    told = errors(package, program)
-    assert told.count("\n") == 1
+def test_a_full_disk_keeps_no_compiled_functions_and_says_so(inner, full_disk, caplog):
+    assert hits(inner()) == 0
+    (told,) = caplog.messages
     assert "cannot be kept" in told
     assert "File too large" in told
+
+
+BEYOND = """
+from swarm_forage_env._internal.compiling import kernel
+
+@kernel
+def beyond(row: object) -> float:
+    return row[5]
+"""
+
+
+@pytest.mark.compiled
+def test_kernels_check_every_index_where_numba_is_told_to(package, monkeypatch):
+    (package / "beyond.py").write_text(BEYOND)
+    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
+    reading = "import numpy as np; from controllers.beyond import beyond\ntry: beyond(np.zeros(3))"
+    assert call(package, f"{reading}\nexcept IndexError: print('refused')") == "refused"
