@@ -4,6 +4,7 @@ import os
 import resource
 import signal
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,9 @@ from swarm_forage_env.study.store import load
 
 RUN = ("run", "--policy", "random", "--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
 NO_SPACE = OSError(28, "No space left on device")
+needs_training = pytest.mark.skipif(
+    find_spec("stable_baselines3") is None or find_spec("torch") is None, reason="needs the train extra"
+)
 FILMED = ("--policy", "random", "--robots", "3")
 
 
@@ -28,6 +32,7 @@ FILMED = ("--policy", "random", "--robots", "3")
         ("study", "run", "S1a", "--budget", "smoke", "--workers", "1"),
         ("record", *FILMED),
         ("replay", "random", "--robots", "3"),
+        pytest.param(("train", "--robots", "3", "--steps", "1", "--arenas", "1"), marks=needs_training),
     ],
     ids=lambda words: words[0],
 )
