@@ -1,6 +1,8 @@
 """Distance between two curves: exact dynamic time warping, and its limit without warping."""
 
-from typing import Literal, TypeAlias
+import logging
+from collections.abc import Callable
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 from numba import njit
@@ -11,6 +13,15 @@ from .curves import FloatArray, Variant, as_curve, as_curves, check_broadcast
 
 Ground: TypeAlias = Literal["value", "time_value"]
 """Local cost: |x_i - y_j|, so that shifts in time cost nothing; or the same plus |clock_i - clock_j|."""
+
+
+MAX_CELLS = 1_000_000_000_000
+"""Most cells of all warping tables of a call, pairs x n x m; at about 1.5 ns each they take half an hour (our choice:
+nobody waits longer without having meant it). For example 120 pairs, as of the noise
+floor of sixteen runs, of 91,000 intervals."""
+TOLD_CELLS = 40_000_000_000
+"""From so many on, a minute, a line on stderr says what is going on."""
+_CELL_S = 1.5e-9
 
 
 def dtw(
@@ -46,8 +57,8 @@ def dtw(
         Distances, shape (...,), in the unit of the cost times samples. A pair with a NaN gives NaN. Lower is closer.
 
     Raises:
-        CurveError: A curve is missing, empty or infinite, leading axes do not broadcast, the clock does not fit, or the
-            window lets no path through.
+        CurveError: A curve is missing, empty or infinite, leading axes do not broadcast, the clock does not fit, the
+            window lets no path through, or the tables have more than `MAX_CELLS` cells.
         ValueError: Unknown ground cost.
     """
     x, y = as_curve("x", x, signed=True), as_curve("y", y, signed=True)
@@ -62,8 +73,12 @@ def dtw(
     all_x = np.ascontiguousarray(np.broadcast_to(x, (*shape, n))).reshape(-1, n)
     all_y = np.ascontiguousarray(np.broadcast_to(y, (*shape, m))).reshape(-1, m)
     distances: FloatArray = np.empty(all_x.shape[0])
-    row: FloatArray = np.empty(m + 1)
-    _dtw_pairs(all_x, all_y, clock_x, clock_y, reach, row, distances)
+    _check_cells(len(all_x), n, m, reach)
+    diagonals: FloatArray = np.empty((3, n + 2))
+    for pair in range(len(distances)):
+        distances[pair] = _warping_cost(
+            all_x[pair], all_y[pair, ::-1].copy(), clock_x, clock_y[::-1].copy(), reach, diagonals
+        )
     distances[np.isnan(all_x).any(axis=1) | np.isnan(all_y).any(axis=1)] = np.nan
     if per_interval:
         distances /= max(n, m)
@@ -124,6 +139,21 @@ def noise_floor(perf_ideal: ArrayLike, *, variant: Variant = "corrected", clock:
     return curve_distance(runs[first], runs[second], variant, clock)
 
 
+def _check_cells(n_pairs: int, n: int, m: int, reach: int) -> None:
+    """Refuse tables that would take hours, and announce those that take minutes."""
+    n_cells = n_pairs * max(n, m) * min(n, m, 2 * reach + 1)
+    told = (
+        f"{n_pairs:,} pairs of curves with {n:,} and {m:,} samples, about {n_cells * _CELL_S / 60:,.0f} min of warping"
+    )
+    if n_cells > MAX_CELLS:
+        raise CurveError(
+            f"Expected warping tables of at most {MAX_CELLS:,} cells in all, got {told}; "
+            "use longer intervals, or a window."
+        )
+    if n_cells > TOLD_CELLS:
+        logging.getLogger("metrics").warning(told)
+
+
 def _clocks(clock: ArrayLike | None, n: int, m: int) -> tuple[FloatArray, FloatArray]:
     """Sample times of curves with n and m samples."""
     times = as_curve("clock", 1.0 if clock is None else clock, signed=True)
@@ -140,36 +170,72 @@ def _clocks(clock: ArrayLike | None, n: int, m: int) -> tuple[FloatArray, FloatA
     return times, times
 
 
-@njit(cache=True)
-def _dtw_pairs(
+def _njit(**options: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Compile functions that allocate nothing: without numba's memory runtime, calls with arrays take half the time."""
+    return cast(Any, njit)(_nrt=False, **options)
+
+
+def _compiled(function: Callable[..., float]) -> Callable[..., float]:
+    """Compile a function that allocates nothing, and keep the result where a folder can be written to."""
+    try:
+        return _njit(cache=True)(function)
+    except RuntimeError:  # no folder can be; compiling then takes a second in every process
+        return _njit()(function)
+
+
+@_njit(forceinline=True)
+def _next_diagonal(
+    x: FloatArray,
+    y: FloatArray,
+    clock_x: FloatArray,
+    clock_y: FloatArray,
+    diagonal: FloatArray,
+    above: FloatArray,
+    left: FloatArray,
+    now: FloatArray,
+) -> None:
+    """Fill a diagonal of D, `now` (L,), from the costs and the three neighbours of each of its cells."""
+    for t in range(now.shape[0]):
+        cost = abs(x[t] - y[t]) + abs(clock_x[t] - clock_y[t])
+        least = above[t] if above[t] < left[t] else left[t]
+        least = diagonal[t] if diagonal[t] < least else least
+        now[t] = cost + least
+
+
+@_compiled
+def _warping_cost(
     x: FloatArray,
     y: FloatArray,
     clock_x: FloatArray,
     clock_y: FloatArray,
     window: int,
-    row: FloatArray,
-    distances: FloatArray,
-) -> None:
-    """Fill distances (B,) with the DTW of each curve of x (B, n) and the curve of y (B, m) at the same index.
+    diagonals: FloatArray,
+) -> float:
+    """D(n, m) of one pair of curves x (n,) and y (m,); both arrays of y are given backwards.
 
-    `row` (m + 1,) is workspace for one row of D: while row i is written from left to right, entries still to the right
-    belong to row i - 1. The cost `value` is the case of clocks that stand still.
+    The table is filled diagonal by diagonal, k = i + j: cells of one diagonal do not depend on each other, so that the
+    processor works out several at a time. `diagonals` (3, n + 2) is workspace for D on the diagonals k, k - 1 and
+    k - 2 by i; beside the cells of a diagonal stands infinity. The cost `value` is the case of clocks that stand still.
     """
-    n = x.shape[1]
-    m = y.shape[1]
-    for pair in range(x.shape[0]):
-        row[0] = 0.0
-        for j in range(1, m + 1):
-            row[j] = np.inf
-        for i in range(1, n + 1):
-            diagonal = row[0]  # D(i-1, j-1) of the next column
-            row[0] = np.inf
-            for j in range(1, m + 1):
-                above = row[j]
-                if abs(i - j) > window:
-                    row[j] = np.inf
-                else:
-                    cost = abs(x[pair, i - 1] - y[pair, j - 1]) + abs(clock_x[i - 1] - clock_y[j - 1])
-                    row[j] = cost + min(above, row[j - 1], diagonal)
-                diagonal = above
-        distances[pair] = row[m]
+    n, m = x.shape[0], y.shape[0]
+    diagonals[:, :] = np.inf
+    diagonals[0, 0] = 0.0
+    earlier, before, now = diagonals[0], diagonals[1], diagonals[2]
+    for k in range(2, n + m + 1):
+        low = max(1, k - m, (k - window + 1) // 2)
+        high = min(n, k - 1, (k + window) // 2)
+        first, last = low + m - k, high + m - k + 1
+        _next_diagonal(
+            x[low - 1 : high],
+            y[first:last],
+            clock_x[low - 1 : high],
+            clock_y[first:last],
+            earlier[low - 1 : high],
+            before[low - 1 : high],
+            before[low : high + 1],
+            now[low : high + 1],
+        )
+        now[low - 1] = np.inf
+        now[max(low, high + 1)] = np.inf
+        earlier, before, now = before, now, earlier
+    return before[n]

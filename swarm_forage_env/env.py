@@ -272,7 +272,9 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
         Raises:
             ActionError: values that are not numbers, or another shape.
+            RuntimeError: before the first reset.
         """
+        self._require_reset()
         expected = self._actions.shape
         try:
             # Kernels are compiled for contiguous float32 only; another type would start a compilation of a minute.
@@ -320,7 +322,6 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         `begin_step`, the arena's step and `end_step` are `step_batch`; this is for arenas that are stepped together
         (`world.rack`).
         """
-        self._require_reset()
         actions = self.checked_actions(actions)
         if wheel_gain is not None and wheel_gain.shape != (len(actions), 2):
             raise ActionError(

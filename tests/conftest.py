@@ -1,6 +1,7 @@
 """Settings shared by all tests, and rules for skipped tests."""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,17 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("swarm_forage_env")
     group.addoption("--no-skips", action="store_true", help="fail on skips that tests/conftest.py does not name")
     group.addoption("--skips-to", type=Path, metavar="FILE", help="write tests skipped without a name, one a line")
+
+
+@pytest.fixture
+def full_disk() -> Iterator[None]:
+    """A disk on which no file can be longer than 1 kB, also for those who may write everywhere."""
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1_000, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def _note(report: pytest.TestReport | pytest.CollectReport) -> None:

@@ -2,7 +2,9 @@
 
 import functools
 import hashlib
+import logging
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -47,15 +49,58 @@ def sources_of(folder: Path) -> tuple[Path, ...]:
 def kernel(function: F) -> F:
     """Compile a function that allocates nothing; the result is cached on disk until one of its sources changes."""
     # Left to itself the compiler calls all but the smallest kernels: rows and tuples then travel over the stack.
-    compiled = njit(cache=True, forceinline=True, **_OPTIONS)(function)
-    cache = getattr(compiled, "_cache", None)
-    if isinstance(cache, FunctionCache):  # there is none with the compiler switched off
+    compiled = njit(forceinline=True, **_OPTIONS)(function)
+    cache = _new_cache(function) if is_compiled(compiled) else None
+    if cache is not None:
         # By itself numba watches only the file of the function, and would keep what it has compiled into it from
         # others. It offers no public way to watch more. The version is what it looks at first, before it opens an
         # index that may name types which the sources no longer have.
         cache_file = cache._cache_file
         cache_file._version += _digest_of_sources(Path(function.__code__.co_filename).parent)
+        cast(Any, compiled)._cache = cache  # what `njit(cache=True)` does with numba's own
     return cast(F, compiled)
+
+
+class _Cache(FunctionCache):
+    """Compiled functions on disk. None of its faults ends a run: what cannot be read or kept is compiled anew."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what was compiled before, or None."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception as error:  # noqa: BLE001 - what a damaged file raises depends on where it is damaged
+            _say(f"Compiled functions in {self.cache_path} cannot be read and are made anew ({error}).")
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled."""
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            _say(f"{_NOT_KEPT} ({error.strerror}: {self.cache_path}). {_WAY_OUT}")
+
+
+_NOT_KEPT = "Compiled functions cannot be kept, so every process spends a minute or more on them"
+_WAY_OUT = "Set NUMBA_CACHE_DIR to a folder that can be written to."
+
+
+def _new_cache(function: Callable[..., Any]) -> _Cache | None:
+    """Return the cache of a function, None where no folder can be written to."""
+    try:
+        return _Cache(function)
+    except RuntimeError as error:
+        if "no locator available" not in str(error):
+            raise
+        _say(f"{_NOT_KEPT} (neither the package nor the home folder can be written to). {_WAY_OUT}")
+        return None
+
+
+@functools.cache
+def _say(text: str) -> None:
+    """Say something once in a process; without settings of the user, loggers print one line on stderr."""
+    logging.getLogger("swarm_forage_env").warning(text)
 
 
 def is_compiled(function: Callable[..., Any]) -> bool:

@@ -18,6 +18,9 @@ from typing import Any, cast
 
 from swarm_forage_env._internal.spelling import suggestion
 
+MAX_NAME = 60
+"""Longest name that files are named by (our choice: with four bytes a character, endings still fit into 255 bytes)."""
+
 
 class ConfigError(ValueError):
     """A configuration that cannot describe a world; the message says what was expected and what came."""
@@ -108,6 +111,16 @@ def text(where: str, value: Any) -> None:
     """Refuse what is no text, or an empty one."""
     if not isinstance(value, str) or not value:
         raise ConfigError(f"Expected {where} to be a non-empty text, got {value!r}.")
+
+
+def file_name(where: str, value: Any) -> None:
+    """Refuse what is no text that can be a part of a file name: it would lead files of results to other folders."""
+    text(where, value)
+    if value.startswith(".") or len(value) > MAX_NAME or not value.isprintable() or any(c in value for c in "/\\:"):
+        raise ConfigError(
+            f"Expected {where} to be at most {MAX_NAME} characters that can be a part of a file name, without / \\ : "
+            f"and no dot first, got {value[: 2 * MAX_NAME]!r}."
+        )
 
 
 def pair(where: str, value: Any) -> None:

@@ -1,17 +1,67 @@
-"""Files that are there complete or not at all, whatever happens while they are written."""
+"""Files that are there complete or not at all, whatever happens while they are written; and whether they can be."""
 
-import os
+import re
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
+from uuid import uuid4
+
+_PROBE = bytes(1 << 16)
+"""What a folder must have room for, as large as a small record (our choice)."""
 
 
 @contextmanager
-def replacing(path: Path) -> Generator[Path]:
-    """Give a draft beside `path` to write to; it takes the place of `path` when all went well, else it is removed."""
-    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+def replacing(path: Path, *, ending: str = ".tmp") -> Generator[Path]:
+    """Give a draft beside `path` to write to; it takes the place of `path` when all went well, else it is removed.
+
+    No two drafts have the same name, whichever threads, processes or machines write to the folder.
+
+    Args:
+        path: File to create or replace.
+        ending: Of the draft's name, for libraries that choose a format by it.
+
+    Raises:
+        OSError: it cannot be written; the error names `path`.
+    """
+    draft = path.with_name(f".{path.name[:50]}.{uuid4().hex}{ending}")
     try:
         yield draft
         draft.replace(path)
+    except OSError as error:
+        if error.filename not in (None, str(draft)):  # it is about another file
+            raise
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
     finally:
         draft.unlink(missing_ok=True)
+
+
+def check_folder(folder: Path) -> None:
+    """Make a folder and write a file there, so that a full or read-only disk is told before hours of work.
+
+    Raises:
+        OSError: it cannot be made or written to; the error names the folder.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    probe = folder / f".{uuid4().hex}.tmp"
+    try:
+        probe.write_bytes(_PROBE)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(folder)) from error
+    finally:
+        probe.unlink(missing_ok=True)
+
+
+def check_file(path: Path) -> None:
+    """Refuse a file that cannot be written, before the work whose result it takes; see `check_folder`.
+
+    Raises:
+        OSError: there is a folder of that name, or its folder cannot be written to.
+    """
+    if path.is_dir():
+        raise IsADirectoryError(None, "Expected a file to write, got a folder", str(path))
+    check_folder(path.parent)
+
+
+def as_file_name(text: str) -> str:
+    """Return a text as a part of a file name: what is no letter, digit, dot, plus or hyphen becomes an underscore."""
+    return re.sub(r"[^\w.+-]", "_", text)

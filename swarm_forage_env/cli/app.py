@@ -15,7 +15,7 @@ from swarm_forage_env.cli.choose import choose
 from swarm_forage_env.cli.compare import compare
 from swarm_forage_env.cli.curves import curves
 from swarm_forage_env.cli.maps import maps
-from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE, complain
+from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_TERMINATED, EXIT_USAGE, complain
 from swarm_forage_env.cli.predict import predict
 from swarm_forage_env.cli.record import record
 from swarm_forage_env.cli.replay import replay
@@ -77,22 +77,35 @@ def _show_warning(message: Warning | str, category: type[Warning], *rest: Any) -
 
 def main() -> None:
     """Run the command line and exit; an error of the user is one line on stderr."""
+    from swarm_forage_env.cli.interrupts import terminated_as_interrupted
+
+    with terminated_as_interrupted() as came:
+        code = _outcome()
+    if came and code == EXIT_INTERRUPTED:
+        code = EXIT_TERMINATED
+    sys.exit(code)
+
+
+def _outcome() -> int | None:
+    """Carry out the command and return its exit code."""
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.study.record import RecordError
+    from swarm_forage_env.study.runner import WorkerError
 
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
-            code = app(standalone_mode=False)
+            return app(standalone_mode=False)
     except _USAGE_ERROR as error:
-        code = complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined] - see _USAGE_ERROR
+        return complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined] - see _USAGE_ERROR
     except (ConfigError, RecordError) as error:
-        code = complain(str(error), EXIT_USAGE)
+        return complain(str(error), EXIT_USAGE)
     except OSError as error:
         named = f"{error.strerror}: {error.filename}" if error.strerror and error.filename else str(error)
-        code = complain(named, EXIT_FAILURE)
-    except ImportError as error:
-        code = complain(str(error), EXIT_FAILURE)
+        return complain(named, EXIT_FAILURE)
+    except (ImportError, WorkerError) as error:
+        return complain(str(error), EXIT_FAILURE)
+    except MemoryError as error:
+        return complain(f"Memory ran out: {error or 'no more could be had'}.", EXIT_FAILURE)
     except (KeyboardInterrupt, typer.Abort):
-        code = complain("interrupted", EXIT_INTERRUPTED)
-    sys.exit(code)
+        return complain("interrupted", EXIT_INTERRUPTED)

@@ -1,5 +1,7 @@
-"""What commands that store runs do when they are interrupted."""
+"""What commands that store runs do when they are interrupted, by Ctrl-C or by SIGTERM."""
 
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,6 +10,33 @@ import typer
 
 from swarm_forage_env.cli.options import EXIT_INTERRUPTED, complain
 from swarm_forage_env.study.runner import StudyInterrupted
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, which batch systems and containers send: to be handled as Ctrl-C is."""
+
+
+@contextmanager
+def terminated_as_interrupted() -> Iterator[list[int]]:
+    """Let SIGTERM raise `Terminated`, so that what keeps finished runs at Ctrl-C keeps them then, too.
+
+    Yields:
+        A list that is empty until SIGTERM came, because on its way up the error may become an exit code.
+    """
+    came: list[int] = []
+    if threading.current_thread() is not threading.main_thread():  # handlers are set in the main thread only
+        yield came
+        return
+
+    def stop(number: int, _frame: object) -> None:
+        came.append(number)
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield came
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextmanager

@@ -25,6 +25,7 @@ def maps(
     One row per run of the page; then, for each run after the first, what is more in it than in the first. The arrays
     go to .npz files beside the picture.
     """
+    from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.study.maps import floor_maps
     from swarm_forage_env.study.replay.files import read_replays
     from swarm_forage_env.study.replay.frames import ReplayError
@@ -39,6 +40,7 @@ def maps(
     except ReplayError as error:
         raise typer.BadParameter(str(error)) from error
     picture = out or page.with_suffix(".maps.png")
+    check_file(picture)
     write_maps(with_differences(found), picture)
     typer.echo(f"wrote maps of {len(found)} run{'s' * (len(found) > 1)} to {picture} and .npz files beside it")
 
@@ -53,12 +55,13 @@ def write_maps(every: "Sequence[FloorMaps]", picture: Path, *, per: str = "") ->
 
     `per` is what everything is divided by, for the titles.
     """
+    from swarm_forage_env._internal.files import as_file_name
     from swarm_forage_env.rendering.plots import draw_maps
     from swarm_forage_env.study.maps import MEANINGS
 
     picture.parent.mkdir(parents=True, exist_ok=True)
     for one in every:
-        one.write(picture.with_suffix(f".{one.label.replace(' ', '_')}.npz"))
+        one.write(picture.with_suffix(f".{as_file_name(one.label)}.npz"))
     titles = {name: f"{meaning}, per {per}" if per else meaning for name, meaning in MEANINGS.items()}
     try:
         draw_maps(picture, [(one.label, one.arrays, one.is_difference, one.size_m) for one in every], titles)

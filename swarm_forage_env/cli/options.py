@@ -12,6 +12,8 @@ EXIT_FAILURE = 1
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130
 """Exit code that shells report for a program ended by Ctrl-C."""
+EXIT_TERMINATED = 143
+"""Exit code that shells report for a program ended by SIGTERM, as batch systems and containers send it."""
 
 NO_PICTURE = f"No picture without matplotlib: {install_command('plots')}."
 
@@ -81,6 +83,11 @@ Out = Annotated[Path | None, typer.Option("--out", help="Folder for records; def
 Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Processes; default one per core.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and an estimate, run nothing.")]
+
+
+def no_picture(path: Path, error: OSError) -> str:
+    """Return what is said of a picture that cannot be written, beside results that are there."""
+    return f"No picture {path}: {error.strerror or error}."
 
 
 def complain(message: str, code: int) -> int:

@@ -75,6 +75,7 @@ def replay(  # long: one parameter per option
 
     The file needs no network and works on phones, too. A stored run is made again for it.
     """
+    from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.cli.scenario_options import ScenarioOptions
 
     options = ScenarioOptions(
@@ -93,6 +94,7 @@ def replay(  # long: one parameter per option
         _refuse_scenario_options(context)
     with _complaints():
         runs = _planned([run, *(beside or ())], options, seed)
+        check_file(out or _default_file(runs[0][0]))
         replays = [_recorded(spec, record, seconds, frame) for spec, record in runs]
         _write(out or _default_file(runs[0][0]), replays)
 

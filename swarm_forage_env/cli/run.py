@@ -21,6 +21,7 @@ from swarm_forage_env.cli.options import (
     Settings,
     Side,
     Wrappers,
+    no_picture,
 )
 from swarm_forage_env.cli.terminal import notes, output
 
@@ -107,7 +108,6 @@ def _run_specs(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None
     from swarm_forage_env.cli.interrupts import resumable
     from swarm_forage_env.study.runner import run_all
 
-    store.folder.mkdir(parents=True, exist_ok=True)
     with resumable(store.folder):
         return run_all(specs, store=store, jobs=jobs, progress=True)
 
@@ -125,6 +125,9 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
         except ImportError:
             plot = None
             aside.print(NO_PICTURE, markup=False)
+        except OSError as error:  # the table is worth more than its picture
+            aside.print(no_picture(plot, error), markup=False)
+            plot = None
     if as_json:
         typer.echo(results_json(specs, result, store, plot))
     elif result.records:

@@ -13,7 +13,7 @@ from metrics.scoring.plots import draw_scores
 from metrics.scoring.table import ScoreTable
 from metrics.scoring.texts import aligned, counted
 from swarm_forage_env.cli.interrupts import resumable
-from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE
+from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, no_picture
 from swarm_forage_env.cli.report import estimate, estimated_seconds
 from swarm_forage_env.study.runner import available_cores
 from swarm_forage_env.study.store import RunStore
@@ -66,6 +66,8 @@ def show_scores(tables: Sequence[ScoreTable], picture: Path | None, *, as_json: 
             drawn = _draw(tables, picture, band=band)
         except ImportError:
             typer.echo(NO_PICTURE, err=True)
+        except OSError as error:  # the scores are worth more than their picture
+            typer.echo(no_picture(picture, error), err=True)
     if as_json:
         typer.echo(_json_text(tables, comparison, drawn))
     else:

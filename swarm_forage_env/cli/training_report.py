@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from metrics.scoring.texts import counted
-from swarm_forage_env.cli.options import NO_PICTURE
+from swarm_forage_env.cli.options import NO_PICTURE, no_picture
 from swarm_forage_env.rendering.plots import draw_trainings
 from swarm_forage_env.scenarios.performance import quantity
 from swarm_forage_env.study.progress import duration
@@ -70,6 +70,9 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
         )
     except ImportError:
         console.print(NO_PICTURE, markup=False)
+        return None
+    except OSError as error:  # the training is worth more than its picture
+        console.print(no_picture(path, error), markup=False)
         return None
     return path
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import number
+from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
     NEST_OPACITY,
@@ -81,15 +82,12 @@ def write_film(frames: Iterable[Frame], path: str | Path, *, fps: float, n_frame
     """
     path = check_film(path, fps, n_frames)
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f".{path.stem}.partial{path.suffix.lower()}")
-    try:
-        if path.suffix.lower() == ".gif":
-            _write_gif(frames, partial, fps, THEMES[theme])
+    suffix = path.suffix.lower()
+    with replacing(path, ending=suffix) as draft:
+        if suffix == ".gif":
+            _write_gif(frames, draft, fps, THEMES[theme])
         else:
-            _write_mp4(frames, partial, fps)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+            _write_mp4(frames, draft, fps)
     return path
 
 

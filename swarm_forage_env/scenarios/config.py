@@ -14,7 +14,7 @@ from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.performance import quantity
 from swarm_forage_env.scenarios.quirks import READINGS, Quirks
-from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, capacity, distributable_box
+from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, cache_centre_box, capacity, distributable_box
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, EAST_WALL_M, WALL_M, WHEEL_SCALE_MPS
 
 CACHE_KINDS = ("none", "static", "dynamic")
@@ -26,6 +26,8 @@ MAX_HANDLING_TICKS = 1_000_000
 MAX_CELLS = 200_000_000
 """Largest floor, 2.8 km square (our choice: its codes take 800 MB; the largest of the paper has 409,600 cells)."""
 
+MAX_SUBSTEPS = 100
+"""Most substeps of a tick (our choice: overlap stops shrinking long before, and every one takes time)."""
 MIN_SUBSTEPS = 4
 """Fewest substeps of a tick that settle a crowd. All must be equal: Chipmunk works out how fast to undo an overlap from
 the length of one substep and moves bodies by it in the next, so that a longer one after a shorter throws them too far.
@@ -238,13 +240,13 @@ class ScenarioConfig:
     """What moves the bodies and resolves contacts: "chipmunk" (`world.physics`) or "compiled" (`world.bodies`), which
     has the same model of contact and is faster. Runs agree until heaps of several robots part them."""
     physics_substeps: tuple[float, ...] = (0.25,) * 4
-    """Substeps of the engine as shares of a tick, at least `MIN_SUBSTEPS` and all equal. Free motion is exact for any
+    """Substeps of the engine as equal shares of a tick, `MIN_SUBSTEPS` to `MAX_SUBSTEPS`. Free motion is exact for any
     shares. A contact is resolved one substep late, so a substep limits how deep two robots are pushed into each other
     when a tick ends: 6 % of a diameter when they drive head-on (`tests/science/test_physics_convergence.py`)."""
     quirks: Quirks = field(default_factory=Quirks)
 
     def __post_init__(self) -> None:
-        fields.text("scenario.name", self.name)
+        fields.file_name("scenario.name", self.name)
         for section, section_class in SECTIONS.items():
             fields.instance(section, getattr(self, section), section_class)
         for name, value in dataclasses.asdict(self.quirks).items():
@@ -255,11 +257,13 @@ class ScenarioConfig:
         for name in ("dt_s", "horizon_s", "interval_s"):
             fields.number(f"scenario.{name}", getattr(self, name), above=0.0)
         fields.shares("scenario.physics_substeps", self.physics_substeps)
+        n_substeps = len(self.physics_substeps)
         _require(
-            len(self.physics_substeps) >= MIN_SUBSTEPS
+            MIN_SUBSTEPS <= n_substeps <= MAX_SUBSTEPS
             and max(self.physics_substeps) - min(self.physics_substeps) < 1e-6,
             f"Expected scenario.physics_substeps to be at least {MIN_SUBSTEPS} equal shares of a tick (others squeeze "
-            f"robots in a crowd through each other), got {self.physics_substeps!r}.",
+            f"robots in a crowd through each other) and at most {MAX_SUBSTEPS}, got "
+            f"{self.physics_substeps if n_substeps <= MAX_SUBSTEPS else n_substeps}.",
         )
         for name in ("horizon_s", "interval_s"):
             ticks = getattr(self, name) / self.dt_s
@@ -280,6 +284,8 @@ class ScenarioConfig:
         )
         self._check_room_for_robots()
         self._check_room_for_objects()
+        if self.caches == "dynamic":
+            self._check_room_for_caches()
 
     def _check_room_for_robots(self) -> None:
         margin, radius, n_robots = self.robots.start_margin_m, self.robots.radius_m, self.robots.n_robots
@@ -308,6 +314,17 @@ class ScenarioConfig:
             f"got {self.objects.n_objects}; ask for fewer objects or a larger arena.",
         )
 
+    def _check_room_for_caches(self) -> None:
+        if min(self.cache_centre_cells[2:]) > self.cache_half_side_cells:
+            return
+        longer, shorter = max(self.arena.n_cells), min(self.arena.n_cells)
+        most = max(side for side in range(1, shorter) if side + (side - 1) // 2 < shorter)
+        raise ConfigError(
+            f"Expected dynamic caches that fit into the arena of {self.arena.width_m:g} x {self.arena.height_m:g} m, "
+            f"got a side of {self.cache_side_cells * CELL_M:.1f} m, which their centres also keep from the border; "
+            f"lower cache.side_share to {math.floor(1000 * most / longer) / 1000:g}, or choose a wider arena."
+        )
+
     @property
     def horizon_ticks(self) -> int:
         """Length of a run in ticks."""
@@ -333,6 +350,11 @@ class ScenarioConfig:
     def cache_half_side_cells(self) -> int:
         """Cells of a cache on either side of its centre cell."""
         return self.cache_side_cells // 2
+
+    @property
+    def cache_centre_cells(self) -> Box:
+        """Cells for centres of dynamic caches, half-open (`regions.cache_centre_box`)."""
+        return cache_centre_box(*self.arena.n_cells, round(self.cache_side_nominal_m / CELL_M))
 
     @property
     def min_dist_m(self) -> float:

@@ -48,6 +48,15 @@ def square_box(centre_cell: tuple[int, int], side_cells: int) -> Box:
     return (x - half, y - half, x + half + 1, y + half + 1)
 
 
+def cache_centre_box(nx: int, ny: int, margin: int) -> Box:
+    """Cells for centres of dynamic caches: distributable, and at least `margin`, the nominal side, from the border.
+
+    In an arena narrower than two margins low is not below end; the last cell before the end is used.
+    """
+    x_low, y_low, x_end, y_end = distributable_box(nx, ny)
+    return max(margin, x_low), max(margin, y_low), min(nx - margin, x_end), min(ny - margin, y_end)
+
+
 def overlap_cells(a: Box, b: Box) -> int:
     """Number of cells that two boxes share."""
     return max(0, min(a[2], b[2]) - max(a[0], b[0])) * max(0, min(a[3], b[3]) - max(a[1], b[1]))

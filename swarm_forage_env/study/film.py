@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env._internal.fields import ConfigError, number
+from swarm_forage_env._internal.files import check_file
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import is_policy_file, load_policy
 from swarm_forage_env.rendering.frame import Trails, render_frame
@@ -66,6 +67,7 @@ def record_run(
     Raises:
         RenderError: a value out of range; then nothing has been run or written.
         ConfigError: `parameters` with a policy object.
+        OSError: the file cannot be written; then nothing has been run.
         ImportError: Pillow, or for .mp4 imageio with ffmpeg, is not installed.
         ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
     """
@@ -73,6 +75,7 @@ def record_run(
     with refusing():
         number("trail_s", trail_s, at_least=0.0)
     path = check_film(path, fps, len(ticks))
+    check_file(path)
     arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
     policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
     title = f"{scenario.name.replace('_', ' ')}, {name}, {scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from importlib import metadata
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_origin, get_type_hints
 
@@ -72,7 +73,7 @@ class RunRecord:
     free_pickups: Annotated[CountArray, Column("objects", "picked up from the floor")]
     cache_pickups: Annotated[CountArray, Column("objects", "picked up from a cache")]
     cache_drops: Annotated[CountArray, Column("objects", "dropped into a cache")]
-    floor_drops: Annotated[CountArray, Column("objects", "laid on the floor by a robot")]
+    floor_drops: Annotated[CountArray, Column("objects", "laid on the floor by a robot, displaced ones included")]
     displaced_drops: Annotated[CountArray, Column("objects", "dropped without a free cell and re-placed elsewhere")]
     objects_moved: Annotated[CountArray, Column("cells", "steps taken by randomly walking objects")]
     caches_created: Annotated[CountArray, Column("caches", "created")]
@@ -202,7 +203,10 @@ class RunRecord:
         provenance = json.dumps(dict(self.provenance), sort_keys=True)
         values = (str(SCHEMA_VERSION), self.spec, provenance, _digest(self, provenance))
         with replacing(Path(path)) as draft:
-            self.to_frame().write_parquet(draft, metadata=dict(zip(_FILE_KEYS, values, strict=True)))
+            # By way of memory: polars tells a full disk as an error of its own, among many others.
+            content = BytesIO()
+            self.to_frame().write_parquet(content, metadata=dict(zip(_FILE_KEYS, values, strict=True)))
+            draft.write_bytes(content.getvalue())
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> "RunRecord":
@@ -227,7 +231,7 @@ class RunRecord:
         version, spec, provenance, digest = (stamp[key] for key in _FILE_KEYS)
         try:
             record = _from_frame(frame, spec, json.loads(provenance))
-        except (pl.exceptions.PolarsError, TypeError, ValueError) as error:
+        except (pl.exceptions.PolarsError, LookupError, OverflowError, RecursionError, TypeError, ValueError) as error:
             raise RecordError(f"Cannot read {name}: its content does not match schema {version} ({error}).") from error
         if _digest(record, provenance) != digest:
             raise RecordError(f"Cannot read {name}: its content does not match its digest, so the file is damaged.")
@@ -349,6 +353,9 @@ def _check_stamp(name: str, stamp: Mapping[str, str]) -> None:
 
 
 def _from_frame(frame: "pl.DataFrame", spec: str, provenance: dict[str, str]) -> RunRecord:
+    missing = [name for name in (*_KEY_DTYPES, *_COLUMN_DTYPES) if name not in frame.columns]
+    if missing:
+        raise RecordError(f"it has no column {missing[0]}")
     first = frame.row(0, named=True)
     values: dict[str, Any] = {name: dtype(first[name]) for name, dtype in _KEY_DTYPES.items()}
     values |= {name: frame[name].to_numpy() for name in _COLUMN_DTYPES}

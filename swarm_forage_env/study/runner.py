@@ -26,6 +26,7 @@ from multiprocessing.connection import Connection
 from typing import Any, TypeAlias
 
 from swarm_forage_env._internal.fields import as_whole
+from swarm_forage_env._internal.files import check_folder
 from swarm_forage_env.study.progress import RunProgress
 from swarm_forage_env.study.record import RunRecord, software_versions
 from swarm_forage_env.study.run import run_one, warm_up
@@ -48,6 +49,11 @@ QUEUED_PER_WORKER = 2
 """Runs given to the pool per worker: enough that no worker waits, few enough that a crash loses little."""
 QUEUED_ELSEWHERE = 4096
 """Tasks given to the executor of the caller at a time: enough for the workers that may join it, few enough to watch."""
+KILLED = (
+    "The worker process that made the run was killed, most likely because memory ran out; try fewer processes at a "
+    "time (--jobs 1), or a smaller run."
+)
+"""What is said of a run whose worker died: the system gives no reason."""
 WAKE_UP_EVERY_S = 0.5
 """The driver never sleeps longer, because with the signal handler of a library (polars) Ctrl-C may not end a sleep."""
 
@@ -94,6 +100,7 @@ def run_all(
         progress: Show progress and an estimate on stderr.
 
     Raises:
+        OSError: the store cannot be written to; then nothing has been run, or what was stored before is kept.
         RecordError: a stored record is damaged or belongs to something else; then nothing has been run.
         StudyInterrupted: Ctrl-C; finished runs are kept, the others cancelled.
         WorkerError: no worker process could be started.
@@ -144,9 +151,12 @@ def run_each(
             it has so many robot-ticks; 0 = every run is a task of its own.
 
     Raises:
+        OSError: the store cannot be written to; then nothing has been run.
         WorkerError: no worker process could be started.
     """
     todo = deque((spec,) for spec in specs)
+    if store is not None and todo:
+        check_folder(store.folder)
     if jobs is not None:
         jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
     if executor is not None:
@@ -257,9 +267,13 @@ def _run_elsewhere(executor: Executor, todo: deque[Task]) -> Generator[Outcome]:
 
 def _failure(spec: RunSpec, error: BaseException) -> RunFailure:
     reason = str(error).splitlines()
+    kind = MemoryError if isinstance(error, MemoryError) else type(error)  # numpy has a kind of its own
+    told = f"{kind.__name__}: {reason[0] if reason else 'no message'}"
+    if isinstance(error, BrokenExecutor):
+        told = f"{type(error).__name__}: {KILLED}"
     return RunFailure(
         spec=spec,
-        error=f"{type(error).__name__}: {reason[0] if reason else 'no message'}",
+        error=told,
         traceback="".join(traceback.format_exception(error)).rstrip(),
     )
 
@@ -285,8 +299,9 @@ def _run_in_pool(todo: deque[Task], n_workers: int) -> Generator[Outcome]:
     """
     lost: deque[Task] = deque()
     with _process_pool(n_workers) as pool:
-        _warm_up_workers(pool, [spec for task in todo for spec in task])
-        yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers, lost=lost)
+        _check_workers_start(pool)
+        if _warm_up_workers(pool, [spec for task in todo for spec in task]):
+            yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers, lost=lost)
     while todo:
         with _process_pool(n_workers) as pool:
             yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers, lost=lost)
@@ -295,20 +310,29 @@ def _run_in_pool(todo: deque[Task], n_workers: int) -> Generator[Outcome]:
             yield from _run_on(pool, lost, limit=1)
 
 
-def _warm_up_workers(pool: Executor, specs: Iterable[RunSpec]) -> None:
+def _check_workers_start(pool: Executor) -> None:
+    if _is_broken_by(pool.submit(os.getpid)):
+        raise WorkerError(
+            "Worker processes could not be started. A script that starts runs must do so under "
+            "`if __name__ == '__main__':`; jobs=1 runs everything in this process."
+        )
+
+
+def _warm_up_workers(pool: Executor, specs: Iterable[RunSpec]) -> bool:
     """Have one run of each kind compile and cache its kernels before many processes need them.
 
-    Errors are ignored here: the same run raises them again later, and they are recorded then.
+    Errors are ignored here: the same run raises them again later, and they are recorded then. That holds for a worker
+    that is killed, too: False is returned, the pool is broken, and in the next one only runs that kill again fail.
     """
-    for spec in {_kernel_kind(spec): spec for spec in specs}.values():
-        future = pool.submit(warm_up, spec)
-        while not future.done():
-            wait((future,), timeout=WAKE_UP_EVERY_S)
-        if isinstance(future.exception(), BrokenExecutor):
-            raise WorkerError(
-                "Worker processes could not be started. A script that starts runs must do so under "
-                "`if __name__ == '__main__':`; jobs=1 runs everything in this process."
-            )
+    kinds = {_kernel_kind(spec): spec for spec in specs}
+    return not any(_is_broken_by(pool.submit(warm_up, spec)) for spec in kinds.values())
+
+
+def _is_broken_by(future: Future[Any]) -> bool:
+    """Wait for a task, and say whether the worker that did it died."""
+    while not future.done():
+        wait((future,), timeout=WAKE_UP_EVERY_S)
+    return isinstance(future.exception(), BrokenExecutor)
 
 
 def _kernel_kind(spec: RunSpec) -> tuple[Any, ...]:

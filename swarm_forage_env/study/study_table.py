@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -127,7 +128,9 @@ class StudyTable:
         study, versions = self.spec.to_json(), json.dumps(self.versions, sort_keys=True)
         values = (str(TABLE_VERSION), study, versions, _digest(self.frame, study, versions))
         with replacing(Path(path)) as draft:
-            self.frame.write_parquet(draft, metadata=dict(zip(_FILE_KEYS, values, strict=True)))
+            content = BytesIO()  # polars tells a full disk as an error of its own, among many others
+            self.frame.write_parquet(content, metadata=dict(zip(_FILE_KEYS, values, strict=True)))
+            draft.write_bytes(content.getvalue())
 
     @cached_property
     def _spans(self) -> dict[Cell, tuple[int, int]]:

@@ -167,14 +167,10 @@ def clear_centre(
     cells on which objects may lie, because the last object of a cache is left there (only caches with a side below
     15 % of the arena can come near those limits).
     """
-    nx, ny = config.arena.n_cells
-    margin = round(config.cache_side_nominal_m / CELL_M)
-    area = config.arena.distributable_cells
-    x_low, x_high = max(margin, area[0]), min(nx - margin, area[2]) - 1
-    y_low, y_high = max(margin, area[1]), min(ny - margin, area[3]) - 1
+    x_low, y_low, x_end, y_end = config.cache_centre_cells
     x, y = centre_cell
     for _ in range(MAX_PASSES):
-        x, y = min(max(x, x_low), x_high), min(max(y, y_low), y_high)
+        x, y = min(max(x, x_low), x_end - 1), min(max(y, y_low), y_end - 1)
         overlapped = 0
         for obstacle in obstacles:
             if overlap_cells(square_box((x, y), config.cache_side_cells), obstacle):

@@ -160,6 +160,11 @@ class SwarmWrapper(BaseParallelWrapper):
 
     def _before(self, actions: ActionArray, wheel_gain: FloatArray | None) -> tuple[ActionArray, FloatArray | None]:
         actions = self.unwrapped.checked_actions(actions)
+        if not hasattr(self, "_last_obs"):
+            raise RuntimeError(
+                f"Expected a reset of the outermost wrapper before its first step, got one of what is inside of "
+                f"{type(self).__name__} alone; call reset of what you step."
+            )
         self.before_step()
         return actions, self.gain(actions, wheel_gain)
 

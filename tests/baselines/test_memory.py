@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from baselines import memory
 from baselines.dpo import DPOPolicy
 from baselines.memory import density
 from tests.reference.controllers import ObjectDictionary, visible_objects
@@ -22,6 +23,18 @@ def look(policy: DPOPolicy, observations: Observations, x: float, y: float, obje
     observations.window(objects)
     policy.act(observations.array, ACTIVE)
     return policy.remembered(0)
+
+
+def test_memories_that_the_machine_cannot_hold_are_announced_with_the_figure(monkeypatch, caplog):
+    monkeypatch.setattr(memory, "memory_of_machine", lambda: 1_000)
+    memory.new_memory(5, 10)
+    assert caplog.text == ""
+    memory.new_memory(5, 11)
+    assert "5 robots that remember 11 objects may need 0.0 GB" in caplog.text
+
+
+def test_the_machine_tells_its_memory():
+    assert memory.memory_of_machine() > 100_000_000
 
 
 def test_density_of_an_object_seen_now_and_long_ago():

@@ -7,10 +7,13 @@ import pickle
 import re
 import subprocess
 import sys
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
+from numba.core.caching import CacheImpl
 
 from swarm_forage_env._internal import compiling
 from swarm_forage_env._internal.compiling import Callback, direct, kernel
@@ -198,3 +201,77 @@ def test_a_callback_can_be_called_from_python():
 def test_a_callback_is_not_taken_to_another_process(copied):
     with pytest.raises(TypeError, match="cannot be pickled; make it anew from its function"):
         copied(Callback(double, np.zeros(2)))
+
+
+# Caches that cannot be used
+
+
+@pytest.fixture
+def inner(tmp_path, monkeypatch, caplog):
+    """Load the module of a kernel anew, with a cache in `tmp_path`; returns its kernel."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
+    compiling._say.cache_clear()
+    file = tmp_path / "inner.py"
+    file.write_text(INNER.format(added=1.0))
+
+    def load():
+        caplog.clear()
+        spec = spec_from_file_location("inner", file)
+        module = module_from_spec(spec)
+        spec.loader.exec_module(module)
+        assert module.inner(1.0) == 2.0
+        return module.inner
+
+    return load
+
+
+def hits(function) -> int:
+    return sum(function.stats.cache_hits.values())
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", ["*.nbi", "*.nbc"])
+def test_damaged_files_of_the_cache_are_made_anew(inner, tmp_path, name, caplog):
+    assert hits(inner()) == 0
+    assert hits(inner()) == 1
+    (file,) = tmp_path.rglob(name)
+    file.write_bytes(file.read_bytes()[:20])
+    assert hits(inner()) == 0, "compiled again"
+    assert "cannot be read and are made anew" in caplog.text
+    assert hits(inner()) == 1, "and kept"
+    assert caplog.text == ""
+
+
+@pytest.mark.compiled
+def test_without_a_place_for_compiled_functions_they_are_compiled_in_every_process(inner, monkeypatch, caplog):
+    # Not by permissions: whoever runs the tests may be allowed to write everywhere.
+    monkeypatch.setattr(CacheImpl, "_locator_classes", [])
+    assert hits(inner()) == 0
+    (told,) = caplog.messages
+    assert "Compiled functions cannot be kept" in told
+    assert "Set NUMBA_CACHE_DIR" in told
+
+
+@pytest.mark.compiled
+def test_a_full_disk_keeps_no_compiled_functions_and_says_so(inner, full_disk, caplog):
+    assert hits(inner()) == 0
+    (told,) = caplog.messages
+    assert "cannot be kept" in told
+    assert "File too large" in told
+
+
+BEYOND = """
+from swarm_forage_env._internal.compiling import kernel
+
+@kernel
+def beyond(row: object) -> float:
+    return row[5]
+"""
+
+
+@pytest.mark.compiled
+def test_kernels_check_every_index_where_numba_is_told_to(package, monkeypatch):
+    (package / "beyond.py").write_text(BEYOND)
+    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
+    reading = "import numpy as np; from controllers.beyond import beyond\ntry: beyond(np.zeros(3))"
+    assert call(package, f"{reading}\nexcept IndexError: print('refused')") == "refused"

@@ -171,3 +171,18 @@ def test_unknown_names_are_refused_with_all_known_ones(name):
 
 def test_suggestion_is_empty_when_nothing_is_near():
     assert suggestion("zzz", ["robots", "objects"]) == ""
+
+
+@pytest.mark.parametrize(
+    "name", ["../x", "/etc/x", "a/b", "a\\b", "C:x", ".hidden", "..", "a\nb", "a\x00", "n" * 61, "", 7]
+)
+def test_names_that_would_lead_files_elsewhere_are_refused(name):
+    with pytest.raises(ConfigError, match="Expected the name to be"):
+        fields.file_name("the name", name)
+
+
+@pytest.mark.parametrize("name", ["warehouse_small", "S1a", "Große Halle 2.1", "倉庫", "n" * 60])
+def test_ordinary_names_are_accepted(name, tmp_path):
+    fields.file_name("the name", name)
+    (tmp_path / f"{name}.parquet").touch()
+    assert [file.stem for file in tmp_path.iterdir()] == [name]

@@ -4,7 +4,7 @@ import dtaidistance.dtw
 import numpy as np
 import pytest
 
-from metrics import CurveError, aligned_l1, dtw, noise_floor
+from metrics import CurveError, aligned_l1, distance, dtw, noise_floor
 from tests.reference.naive_dtw import dtw_by_enumeration, dtw_by_matrix
 
 
@@ -132,3 +132,25 @@ def test_noise_floor_pairs_different_runs():
     assert noise_floor([[0.0, 0.0], [1.0, 1.0], [4.0, 4.0]]).tolist() == [2.0, 8.0, 6.0]
     with pytest.raises(CurveError, match="two runs"):
         noise_floor([0.0, 1.0])
+
+
+def test_a_window_allows_few_cells_on_either_side_of_the_diagonal():
+    x, y = np.random.default_rng(3).normal(size=(2, 5, 12))
+    for n, m, window in ((12, 12, 0), (12, 12, 1), (12, 9, 3), (9, 12, 4)):
+        for one, other in zip(x[:, :n], y[:, :m], strict=True):
+            cost = lambda i, j, x=one, y=other, w=window: abs(x[i] - y[j]) if abs(i - j) <= w else np.inf  # noqa: E731 - as above
+            assert dtw(one, other, window=window) == dtw_by_matrix(n, m, cost)
+
+
+def test_tables_that_take_hours_are_refused_with_the_figure(caplog):
+    long = np.zeros(1_000_001)
+    with pytest.raises(CurveError, match=r"at most 1,000,000,000,000 cells in all, got 1 pairs.*25 min.*or a window"):
+        dtw(long, long)
+    assert dtw(long[:300_000], long[:300_000], window=1) == 0.0
+    assert caplog.text == ""
+
+
+def test_tables_that_take_minutes_are_announced(caplog, monkeypatch):
+    monkeypatch.setattr(distance, "TOLD_CELLS", 99)
+    dtw(np.zeros((2, 10)), np.zeros((2, 10)))
+    assert "2 pairs of curves with 10 and 10 samples" in caplog.text

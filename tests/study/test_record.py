@@ -62,6 +62,32 @@ def test_a_file_gives_back_the_record_bit_for_bit(record, file):
         assert again.columns()[name].tobytes() == column.tobytes(), name
 
 
+@pytest.mark.parametrize(
+    ("damage", "told"),
+    [
+        (lambda table: table.drop("collected"), "it has no column collected"),
+        (lambda table: table.select(a=1), "it has no column run_id"),
+        (lambda table: table.head(0), "does not match schema"),
+        (lambda table: table.with_columns(collected=pl.lit("many")), "does not match schema"),
+        (lambda table: table.with_columns(collected=pl.lit([1, 2])), "does not match schema"),
+        (lambda table: table.with_columns(seed=pl.lit(2**70, dtype=pl.Int128)), "damaged"),
+    ],
+)
+def test_a_table_with_our_stamp_that_is_no_record_is_told_as_damaged(file, damage, told):
+    stamp = {key: value for key, value in pl.read_parquet_metadata(file).items() if key.startswith("swarm_forage_env")}
+    damage(pl.read_parquet(file)).write_parquet(file, metadata=stamp)
+    with pytest.raises(RecordError, match=told):
+        RunRecord.read(file)
+
+
+def test_provenance_that_is_too_deep_is_told_as_damaged(file):
+    stamp = {key: value for key, value in pl.read_parquet_metadata(file).items() if key.startswith("swarm_forage_env")}
+    deep = stamp | {"swarm_forage_env.provenance": '{"a":' * 100_000 + "1" + "}" * 100_000}
+    pl.read_parquet(file).write_parquet(file, metadata=deep)
+    with pytest.raises(RecordError, match="does not match schema"):
+        RunRecord.read(file)
+
+
 def test_the_file_is_a_plain_table_with_keys_on_each_row(record, file):
     table = pl.read_parquet(file)
     assert table.height == 3

@@ -49,7 +49,7 @@ class Breaking(Executor):
     def submit(self, fn, /, *args, **kwargs):
         if self.broken:
             raise BrokenProcessPool("the pool is not usable any more")
-        (spec,) = args
+        spec = args[0] if args else None  # the check whether workers start has no arguments
         future = Future()
         if spec == self.deadly:
             self.broken = True
@@ -58,7 +58,7 @@ class Breaking(Executor):
         elif fn is run_one and self.n_workers > 1 and spec.seed == self.deadly.seed - 1:
             return self.doomed
         else:
-            future.set_result(fn(spec))
+            future.set_result(fn(*args))
         return future
 
 
@@ -267,10 +267,30 @@ def test_a_crashed_worker_costs_only_the_run_that_crashed_it(monkeypatch):
     assert set(pools[2:]) == {1}, "what was under way is tried again alone"
 
 
+def test_a_worker_that_is_killed_while_it_compiles_costs_only_its_run(monkeypatch):
+    @contextmanager
+    def breaking_pool(n_workers):
+        yield Breaking(SPECS[3], n_workers)
+
+    monkeypatch.setattr(runner, "_process_pool", breaking_pool)
+    outcomes = list(runner._run_in_pool(deque((spec,) for spec in SPECS), 2))
+    assert {outcome.seed for outcome in outcomes if isinstance(outcome, RunRecord)} == {0, 1, 2}
+    (failure,) = (outcome for outcome in outcomes if isinstance(outcome, RunFailure))
+    assert failure.spec == SPECS[3]
+    assert "was killed, most likely because memory ran out" in failure.error
+
+
+def test_a_store_that_cannot_be_written_to_is_told_before_the_first_run(full_disk, tmp_path):
+    with pytest.raises(OSError, match="File too large") as caught:
+        run_all(SPECS, store=RunStore(tmp_path / "runs"), executor=Refusing())
+    assert caught.value.filename == str(tmp_path / "runs")
+    assert list((tmp_path / "runs").iterdir()) == []
+
+
 def test_workers_that_cannot_start_are_an_error_with_a_hint(monkeypatch):
     @contextmanager
     def dead_pool(n_workers):
-        yield Breaking(SPECS[0])
+        yield Breaking(None)
 
     monkeypatch.setattr(runner, "_process_pool", dead_pool)
     with pytest.raises(WorkerError, match="if __name__ == '__main__'"):

@@ -158,7 +158,7 @@ def test_a_crowd_does_not_push_anybody_through_a_wall(at):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("sigma", [0.5, 10.0])
+@pytest.mark.parametrize("sigma", [0.5, 10.0, 1e9])
 def test_noise_on_the_wheels_drives_nobody_through_a_wall(sigma):
     env = tidy_world(n_robots=40)
     x_high = env.scenario.arena.interior_m[2]

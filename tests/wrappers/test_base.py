@@ -86,6 +86,17 @@ def test_actions_of_a_wrong_shape_are_refused_before_any_hook(stack, actions):
     assert stack.unwrapped.calls == []
 
 
+@pytest.mark.parametrize("of_the_inside", [False, True])
+def test_a_step_before_the_first_reset_is_refused(of_the_inside):
+    env = wrapper_at(2)(FakeArena(small_scenario()))
+    message = "Call reset before step"
+    if of_the_inside:
+        env.unwrapped.reset_batch(0)
+        message = "Expected a reset of the outermost wrapper"
+    with pytest.raises(RuntimeError, match=message):
+        env.step_batch(np.zeros((4, 3), np.float32))
+
+
 def test_a_reset_without_seed_hands_on_the_seed_that_was_drawn(stack):
     stack.reset_batch()
     assert Logging.log[0] == ("inner", "on_reset", 4711)

@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from stable_baselines3.common.logger import HParam
 from stable_baselines3.common.utils import safe_mean
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.files import check_folder, replacing
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.learned import LearnedPolicy
@@ -109,6 +110,7 @@ def train(
         raise ConfigError(f"Expected processes from 0 to n_arenas = {plan.n_arenas}, got {n_processes}.")
     _check_folder(folder, plan, resume=resume)
     _check_baseline(plan)
+    check_folder(folder)
     torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
     watch = _Watch(plan, folder, report or _keep_quiet)
     env = SwarmVecEnv(
@@ -293,7 +295,9 @@ class _Watch(BaseCallback):
             raise ValueError("Expected weights that are finite numbers.")
         self._write_plan()
         with replacing(self._folder / MODEL_FILE) as draft:
-            model.save(draft)
+            content = BytesIO()  # torch tells a full disk as an error of its own
+            model.save(content)
+            draft.write_bytes(content.getvalue())
 
     def lacks_evaluation(self, steps: int) -> bool:
         """Return whether an evaluation was due by so many decisions, and was not finished."""

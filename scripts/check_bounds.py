@@ -1,0 +1,59 @@
+"""Crowded runs in which compiled kernels of the world check every index, as the interpreter would.
+
+    python scripts/check_bounds.py
+
+Compiled code reads and writes beyond the end of an array without a word. Here numba compiles the checks in, into a
+cache of their own, and robots that grasp and let go all the time meet walls, objects, caches and each other under both
+engines and all wrappers. Exit code 1 if an index was wrong, or if a kernel was not reached.
+"""
+
+import ast
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDERS = ("swarm_forage_env/world/kernels", "swarm_forage_env/wrappers/kernels")
+TESTS = ("tests/promises/test_conservation.py", "tests/world/test_rack.py", "tests/wrappers/test_noise.py")
+CHOICE = "(test_objects_are_conserved and warehouse_small and busy) or together or gains_from_outside"
+"""Every kind of caches with Chipmunk; arenas together, wrapped and not, with the compiled engine; noise on wheels."""
+ELSEWHERE = {
+    "tick.run": "whole runs by one kernel need a compiled policy, which would be compiled, too",
+    "task_shares.add_task_shares": "a part of tick.run",
+}
+"""Kernel -> why these tests do not reach it."""
+
+
+def kernels() -> set[str]:
+    """Return the names of all kernels in `FOLDERS`, as file.function."""
+    return {
+        f"{file.stem}.{node.name}"
+        for folder in FOLDERS
+        for file in (ROOT / folder).glob("*.py")
+        for node in ast.parse(file.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.FunctionDef)
+        and any(isinstance(decorator, ast.Name) and decorator.id == "kernel" for decorator in node.decorator_list)
+    }
+
+
+def compiled(cache: Path) -> set[str]:
+    """Return the names of the kernels that a cache holds: its files are named file.function-line.version.nbi."""
+    return {file.name.rpartition("-")[0] for file in cache.rglob("*.nbi")}
+
+
+def main() -> int:
+    """Run the tests and say what they did not reach."""
+    with tempfile.TemporaryDirectory() as cache:
+        environ = os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": cache, "NUMBA_DISABLE_JIT": "0"}
+        words = [sys.executable, "-m", "pytest", "-q", "-x", *TESTS, "-k", CHOICE]
+        code = subprocess.run(words, cwd=ROOT, env=environ, check=False).returncode
+        missed = kernels() - compiled(Path(cache)) - set(ELSEWHERE)
+    if missed and not code:
+        print(f"Not reached: {', '.join(sorted(missed))}. Add a test of them to TESTS or CHOICE.")
+    return int(bool(code or missed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,104 @@
+"""What commands do when the machine fails them: full disks, too little memory, SIGTERM. One line, no traceback."""
+
+import os
+import resource
+import signal
+import time
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.registry import RandomPolicy
+from swarm_forage_env.study.record import RunRecord
+from swarm_forage_env.study.store import load
+
+RUN = ("run", "--policy", "random", "--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
+NO_SPACE = OSError(28, "No space left on device")
+needs_training = pytest.mark.skipif(
+    find_spec("stable_baselines3") is None or find_spec("torch") is None, reason="needs the train extra"
+)
+FILMED = ("--policy", "random", "--robots", "3")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        RUN,
+        ("score", "--policy", "random", "--budget", "quick", "--jobs", "1"),
+        ("compare", "--policy", "random,crw", "--budget", "quick", "--jobs", "1"),
+        ("ablate", "--policy", "random", "--seeds", "2", "--jobs", "1"),
+        ("study", "run", "S1a", "--budget", "smoke", "--workers", "1"),
+        ("record", *FILMED),
+        ("replay", "random", "--robots", "3"),
+        pytest.param(("train", "--robots", "3", "--steps", "1", "--arenas", "1"), marks=needs_training),
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_full_disk_is_told_before_anything_is_run(command, full_disk, monkeypatch, words):
+    monkeypatch.setattr(ForageEnv, "reset_batch", lambda *_, **__: pytest.fail("a run was started"))
+    code, out, err = command(*words)
+    assert (code, out) == (1, "")
+    assert err.splitlines()[-1].startswith("swarm-forage: File too large: results")
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("words", [("record", "--out", "taken.gif", *FILMED), ("replay", "random", "-o", "taken.gif")])
+def test_a_folder_in_the_place_of_the_file_is_told_before_anything_is_run(command, monkeypatch, words):
+    Path("taken.gif").mkdir()
+    monkeypatch.setattr(ForageEnv, "reset_batch", lambda *_, **__: pytest.fail("a run was started"))
+    assert command(*words) == (1, "", "swarm-forage: Expected a file to write, got a folder: taken.gif\n")
+
+
+def test_a_disk_that_fills_up_later_ends_the_command_with_one_line(command, monkeypatch):
+    def full(self, path):
+        raise OSError(*NO_SPACE.args, str(path))
+
+    monkeypatch.setattr(RunRecord, "write", full)
+    code, out, err = command(*RUN)
+    assert (code, out) == (1, "")
+    assert err.splitlines()[-1].startswith("swarm-forage: No space left on device: results/warehouse_small/")
+    assert "Traceback" not in err
+
+
+def test_results_are_shown_even_if_their_picture_cannot_be_written(command, monkeypatch):
+    def full(*_):
+        raise NO_SPACE
+
+    monkeypatch.setattr("swarm_forage_env.cli.report.draw_performance", full)
+    code, out, err = command(*RUN)
+    assert code == 0
+    assert "random" in out
+    assert "No picture results/warehouse_small/performance.png: No space left on device." in " ".join(err.split())
+
+
+def test_sigterm_keeps_finished_runs_as_ctrl_c_does(command, monkeypatch):
+    command(*RUN, "--seeds", "1")
+    before = signal.getsignal(signal.SIGTERM)
+
+    def terminated(self, task, rng):
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(60)
+
+    monkeypatch.setattr(RandomPolicy, "reset", terminated)
+    code, _, err = command(*RUN, "--seeds", "3")
+    assert code == 143
+    assert "Interrupted: 1 of 3 runs are finished and kept." in err.splitlines()[-1]
+    assert len(load("results/warehouse_small")) == 1
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+@pytest.mark.compiled
+def test_a_run_that_memory_does_not_suffice_for_fails_with_one_line(command):
+    swarm = ("run", "--scenario", "warehouse_medium", "--robots", "500", "--objects", "20000", "--horizon", "200")
+    taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (taken + 150_000_000, before[1]))  # memories of dpo would take 200 MB
+    try:
+        code, out, err = command(*swarm, "--policy", "dpo", "--jobs", "1", "--seeds", "1")
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+    assert (code, out) == (1, "")
+    assert "MemoryError: Unable to allocate" in " ".join(err.split())
+    assert "Traceback" not in err
