@@ -88,7 +88,7 @@ def recipe(
         scenario=config,
         wrappers=wrapper_configs(wrappers),
         algorithm=algorithm,
-        interface=chosen_interface(interface, _default_interface(algorithm)),
+        interface=chosen_interface(interface, _default_interface(algorithm)).for_scenario(config),
         n_arenas=n_arenas,
         hidden=hidden,
         options=_algorithm_options(algorithm, n_arenas * config.robots.n_robots, options or {}),
