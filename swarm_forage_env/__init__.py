@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.checks import CheckError, check_determinism, check_env, check_policy
     from swarm_forage_env.contract.codes import Event, Grip, Task
     from swarm_forage_env.contract.layout import ObservationLayout
+    from swarm_forage_env.contract.own import OwnSensor, register_reward, register_sensor
     from swarm_forage_env.contract.policy import Policy, SwarmSpec
     from swarm_forage_env.env import ForageEnv
     from swarm_forage_env.policies.registry import RandomPolicy, from_callable, load_policy, policy_names
@@ -58,6 +59,7 @@ __all__ = [
     "HandlingCost",
     "HandlingCostConfig",
     "ObservationLayout",
+    "OwnSensor",
     "Policy",
     "PopulationConfig",
     "PopulationDynamics",
@@ -94,6 +96,8 @@ __all__ = [
     "record_replay",
     "read_study",
     "record_run",
+    "register_reward",
+    "register_sensor",
     "run_all",
     "run_one",
     "run_policy",
@@ -115,6 +119,7 @@ _HOMES = {
     "HandlingCost": "wrappers.handling",
     "HandlingCostConfig": "wrappers.handling",
     "ObservationLayout": "contract.layout",
+    "OwnSensor": "contract.own",
     "Policy": "contract.policy",
     "PopulationConfig": "wrappers.population",
     "PopulationDynamics": "wrappers.population",
@@ -151,6 +156,8 @@ _HOMES = {
     "record_replay": "study.replay.capture",
     "read_study": "study.study_table",
     "record_run": "study.film",
+    "register_reward": "contract.own",
+    "register_sensor": "contract.own",
     "run_all": "study.runner",
     "run_one": "study.run",
     "run_policy": "study.run",

@@ -123,6 +123,15 @@ def file_name(where: str, value: Any) -> None:
         )
 
 
+def unique_names(where: str, value: Any) -> None:
+    """Check a tuple of names, none of them twice; raises ConfigError."""
+    parts = _parts(value)
+    if not isinstance(value, tuple) or not all(isinstance(name, str) and name for name in parts):
+        raise ConfigError(f"Expected {where} as a tuple of names, such as ('one', 'two'), got {value!r}.")
+    if len(set(parts)) < len(parts):
+        raise ConfigError(f"Expected each name once in {where}, got {value!r}.")
+
+
 def pair(where: str, value: Any) -> None:
     """Refuse what is no tuple (x, y) of numbers > 0."""
     parts = _parts(value)

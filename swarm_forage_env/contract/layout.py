@@ -110,10 +110,12 @@ def layout_of(rows: Iterable[LayoutRow]) -> ObservationLayout:
 
 
 @cache
-def observation_layout(width_m: float, height_m: float, n_objects: int) -> ObservationLayout:
+def observation_layout(
+    width_m: float, height_m: float, n_objects: int, own: tuple[LayoutRow, ...] = ()
+) -> ObservationLayout:
     """Build the layout of an arena of `width_m` x `height_m` metres with `n_objects` objects.
 
-    All columns lie in [-1, 1]; readings keep their natural [0, 1].
+    All columns lie in [-1, 1]; readings keep their natural [0, 1]. The slices `own` come last.
     """
     half_x, half_y, rows = width_m / 2.0, height_m / 2.0, float(n_objects)
     cache_scale = (SERIAL_SCALE, half_x, half_y, rows)
@@ -136,4 +138,8 @@ def observation_layout(width_m: float, height_m: float, n_objects: int) -> Obser
         ("los_object", (rows,) * window, "", "(row + 1) / M per cell of the 5 x 5 window, row-major from lower left"),
         ("los_cache", cache_scale * VISIBLE_CACHES, "", "up to 4 caches meeting the window, nearest first"),
     ]
-    return layout_of(table)
+    return layout_of((*table, *own))
+
+
+BUILT_IN_SLICES = observation_layout(1.0, 1.0, 1).names
+"""Names of the slices that every observation has."""

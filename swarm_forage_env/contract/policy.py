@@ -11,6 +11,7 @@ import numpy as np
 
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.layout import ObservationLayout, observation_layout
+from swarm_forage_env.contract.own import own_sensor
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.quirks import Quirks
@@ -87,7 +88,7 @@ class SwarmSpec:
             n_objects=scenario.objects.n_objects,
             dt_s=scenario.dt_s,
             horizon_s=scenario.horizon_ticks * scenario.dt_s if horizon_s is None else horizon_s,
-            layout=observation_layout(arena.width_m, arena.height_m, scenario.objects.n_objects),
+            layout=layout_for(scenario),
             max_speed_mps=robots.max_speed_mps,
             max_wheel_difference_mps=robots.max_wheel_difference_mps,
             wheel_scale_mps=WHEEL_SCALE_MPS,
@@ -106,6 +107,16 @@ class SwarmSpec:
             cache_proximity_m=scenario.cache_proximity_m,
             quirks=scenario.quirks,
         )
+
+
+def layout_for(scenario: ScenarioConfig) -> ObservationLayout:
+    """Return the layout of a scenario's observations, with its own sensors.
+
+    Raises:
+        ConfigError: a sensor that is not known here.
+    """
+    own = tuple(own_sensor(name).row for name in scenario.robots.own_sensors)
+    return observation_layout(scenario.arena.width_m, scenario.arena.height_m, scenario.objects.n_objects, own)
 
 
 class RobotStates(NamedTuple):

@@ -6,15 +6,15 @@ runs exactly as it was trained.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, whole
-from swarm_forage_env.contract.layout import LayoutRow, ObservationLayout, layout_of
+from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, unique_names, whole
+from swarm_forage_env.contract.layout import BUILT_IN_SLICES, LayoutRow, ObservationLayout, layout_of
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.kernels.commands import (
@@ -27,6 +27,7 @@ from swarm_forage_env.policies.kernels.commands import (
     numbered_actions,
 )
 from swarm_forage_env.policies.kernels.compact import COMPACT_COLUMNS, compact_view
+from swarm_forage_env.scenarios.config import ScenarioConfig
 
 OBSERVATIONS = ("full", "compact")
 ACTIONS = ("continuous", "discrete")
@@ -57,17 +58,25 @@ class InterfaceConfig:
     """Grasp when empty and over an object or a cache, deliver when carrying in the nest; the learner only drives."""
     decision_ticks: int = 1
     """Ticks for which an action is kept; rewards add up. An automatic gripper decides in every tick."""
+    own_sensors: tuple[str, ...] = ()
+    """Names of own sensors that the learner sees beside the columns of the package, in this order. Environments fill in
+    those of their scenario."""
 
     def __post_init__(self) -> None:
         one_of("interface.observation", self.observation, OBSERVATIONS)
         one_of("interface.actions", self.actions, ACTIONS)
         switch("interface.automatic_gripper", self.automatic_gripper)
         whole("interface.decision_ticks", self.decision_ticks, at_least=1)
+        unique_names("interface.own_sensors", self.own_sensors)
+
+    def for_scenario(self, scenario: ScenarioConfig) -> "InterfaceConfig":
+        """Return these choices with the scenario's own sensors, if no sensors were chosen."""
+        return self if self.own_sensors else replace(self, own_sensors=scenario.robots.own_sensors)
 
     @property
     def reads(self) -> tuple[str, ...] | None:
         """Observation slices that are used, None = all; the value for `ForageEnv(reads=...)`."""
-        return _COMPACT_READS if self.observation == "compact" else None
+        return (*_COMPACT_READS, *self.own_sensors) if self.observation == "compact" else None
 
 
 class LearnerInterface:
@@ -110,7 +119,10 @@ class LearnerInterface:
         self._wheels = np.array(list(MOTION_WHEELS.values()), np.float32)
         self._grips = np.array(list(GRIP_COMMANDS.values()), np.float32)
         self._commands = np.zeros((spec.n_robots, 3), np.float32)
-        self.layout = compact_layout(source) if self._is_compact else source
+        self.layout = learner_layout(source, config)
+        own = [source[name] for name in config.own_sensors]
+        self._own_columns = np.array([column for part in own for column in range(part.start, part.stop)], np.intp)
+        self._n_built_in = self.layout.size - len(self._own_columns)
         self.observation_space = self.new_observation_space()
         self.action_space = self.new_action_space()
         self._actions_shape = (spec.n_robots, *(self.action_space.shape or ()))
@@ -142,7 +154,9 @@ class LearnerInterface:
         if self._is_compact:
             compact_view(obs, self._view_starts, self._half_x, self._half_y, self._behind_counts, out)
         else:
-            np.copyto(out, obs)
+            np.copyto(out[:, : self._n_built_in], obs[:, : self._n_built_in])
+        if len(self._own_columns):
+            out[:, self._n_built_in :] = obs[:, self._own_columns]
         return out
 
     def command(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
@@ -202,6 +216,31 @@ class LearnerInterface:
 
 
 @lru_cache(maxsize=64)  # a curriculum may ask for a new size in every run
+def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> ObservationLayout:
+    """Return the layout of what a learner sees.
+
+    Args:
+        source: Layout of the environment's observations.
+        config: The learner's choices.
+
+    Raises:
+        ConfigError: the environment lacks a sensor that the learner wants.
+    """
+    missing = [name for name in config.own_sensors if name not in source.names]
+    if missing:
+        raise ConfigError(
+            f"Expected a scenario with the own sensors {', '.join(config.own_sensors)}, which the policy sees; "
+            f"{missing[0]!r} is missing. Give the scenario own_sensors={config.own_sensors!r}."
+        )
+    if config.observation == "compact":
+        built_in = [part.row for part in compact_layout(source)]
+    elif source.names == (*BUILT_IN_SLICES, *config.own_sensors):
+        return source
+    else:
+        built_in = [part.row for part in source if part.name in BUILT_IN_SLICES]
+    return layout_of([*built_in, *(source.part(name).row for name in config.own_sensors)])
+
+
 def compact_layout(source: ObservationLayout) -> ObservationLayout:
     """Build the layout of the compact view (our choice of what a driver needs); directions are forward and left.
 
@@ -259,4 +298,7 @@ def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
         ConfigError: an unknown key or value.
     """
     known_keys(mapping, InterfaceConfig.__dataclass_fields__, "interface option")
-    return InterfaceConfig(**mapping)
+    values = dict(mapping)
+    if isinstance(values.get("own_sensors"), list):  # JSON knows no tuples
+        values["own_sensors"] = tuple(values["own_sensors"])
+    return InterfaceConfig(**values)

@@ -139,6 +139,8 @@ class RobotConfig:
     """Limit of right minus left wheel speed."""
     start_margin_m: float = 2.8
     """Robots start at uniform positions at least this far from the arena border."""
+    own_sensors: tuple[str, ...] = ()
+    """Names of further slices of an observation, registered by `contract.own.register_sensor`."""
 
     def __post_init__(self) -> None:
         fields.whole("robots.n_robots", self.n_robots, at_least=1)
@@ -149,6 +151,7 @@ class RobotConfig:
             self.start_margin_m >= least,
             f"Expected robots.start_margin_m >= {least:.3f} (wall plus radius), got {self.start_margin_m}.",
         )
+        fields.unique_names("robots.own_sensors", self.own_sensors)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -209,11 +212,14 @@ class RewardConfig:
     """Per tick of an active robot; give a negative weight for a cost of living."""
     team: bool = False
     """Every active robot receives the mean over active robots instead of its own reward."""
+    own_reward: str = ""
+    """Name of a function that adds to these terms, registered by `contract.own.register_reward`; "" = none."""
 
     def __post_init__(self) -> None:
         for name in ("delivery", "first_pickup", "nest_progress", "interference", "tick"):
             fields.number(f"reward.{name}", getattr(self, name))
         fields.switch("reward.team", self.team)
+        fields.instance("reward.own_reward", self.own_reward, str)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -53,13 +53,16 @@ class LiveRun:
     def compiled_policy(self) -> CompiledPolicy | None:
         """The policy for a run without Python between ticks; None where anybody might have a say there.
 
-        That is a wrapper other than the recorder, a subclass, a method that was replaced, or Chipmunk.
+        That is a wrapper other than the recorder, a subclass, a method that was replaced, an own sensor that the policy
+        reads, or Chipmunk.
         """
         stack, env, policy = self._stack, self.forage_env, self._policy
         is_bare = type(stack) is RunRecorder and stack.env is env and type(env) is ForageEnv
         if not is_bare or env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
             return None
         if "after_step" in vars(stack) or "step_batch" in {*vars(stack), *vars(env)}:
+            return None
+        if env.arena.reads_own_sensors:
             return None
         return policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
 

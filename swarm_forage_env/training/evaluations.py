@@ -49,7 +49,7 @@ def write_evaluations(path: Path, evaluations: Sequence[Evaluation]) -> None:
     with replacing(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, [item.name for item in fields(Evaluation)])
         table.writeheader()
-        table.writerows(map(asdict, evaluations))
+        table.writerows(asdict(evaluation) for evaluation in evaluations)
 
 
 def read_evaluations(path: Path) -> list[Evaluation]:

@@ -210,7 +210,8 @@ class TrainingPlan:
         if "wrappers" in values:
             values["wrappers"] = wrappers_from_mapping(table("wrappers", values["wrappers"]))
         if "interface" in values:
-            values["interface"] = interface_from_mapping(dict(table("interface", values["interface"])))
+            interface = interface_from_mapping(dict(table("interface", values["interface"])))
+            values["interface"] = interface.for_scenario(values["scenario"])
         if "evaluation" in values:
             values["evaluation"] = EvaluationPlan(
                 **_known(EvaluationPlan, table("evaluation", values["evaluation"]), "evaluation.")

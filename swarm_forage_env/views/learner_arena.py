@@ -78,10 +78,11 @@ def plan_arena(
     Raises:
         ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
     """
+    world = chosen_scenario(scenario, overrides)
     return ArenaPlan(
-        scenario=chosen_scenario(scenario, overrides),
+        scenario=world,
         wrappers=wrapper_configs(wrappers),
-        interface=chosen_interface(interface),
+        interface=chosen_interface(interface).for_scenario(world),
         max_cycles=max_cycles,
         render_mode=render_mode,
         snapshots=snapshots,

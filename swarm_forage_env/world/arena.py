@@ -10,8 +10,8 @@ from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env._internal.fields import whole
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.contract.layout import observation_layout
-from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, refused_tasks
+from swarm_forage_env.contract.own import own_sensor
+from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, layout_for, refused_tasks
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
 from swarm_forage_env.scenarios.units import CELLS_PER_M
@@ -62,9 +62,9 @@ class ForagingArena:
             ConfigError: `reads` holds an unknown name.
         """
         self.config = config
-        arena = config.arena
-        self.layout = observation_layout(arena.width_m, arena.height_m, config.objects.n_objects)
+        self.layout = layout_for(config)
         self.reads = read_slices(reads, self.layout)
+        self._own_sensors = tuple(name for name in config.robots.own_sensors if name in self.reads)
         self._given_reads = reads
         self._snapshots = snapshots
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
@@ -124,7 +124,15 @@ class ForagingArena:
     def observe(self) -> ObsArray:
         """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
         self._compiled.observe(self._world)
+        if self._own_sensors:
+            self._sense_own()
         return self.obs
+
+    def _sense_own(self) -> None:
+        """Fill in the columns of the user's own sensors; robots that are not in the world sense nothing."""
+        for name in self._own_sensors:
+            values = own_sensor(name).read(self)
+            self.obs[:, self.layout[name]] = np.where(self.swarm.present[:, None], values, 0.0)
 
     def _furnish(self) -> None:
         """Place all objects and create static caches: before the clusters if placement is "power_law", else after."""
@@ -201,8 +209,13 @@ class ForagingArena:
                 f"{gain[outcome].tolist()} for robot_{outcome}; the world was not stepped."
             )
         self.tick, self.has_changed = self.tick + 1, False
-        if outcome == DONE:
-            return
+        if outcome != DONE:
+            self._finish(outcome, actions, tasks)
+        if self._own_sensors:
+            self._sense_own()
+
+    def _finish(self, outcome: int, actions: ActionArray, tasks: CodeArray | None) -> None:
+        """Do what of a tick compiled code cannot do: more room for pairs of robots, and placing objects."""
         picks, walks = self.draws(self.tick)
         if outcome == NO_ROOM:
             self._physics.advance(self.swarm)
@@ -256,6 +269,11 @@ class ForagingArena:
             if not tasks_counted:
                 raise refused_tasks(tasks, len(self.swarm.active))
             n_left -= n_done
+
+    @property
+    def reads_own_sensors(self) -> bool:
+        """Whether Python is needed in every tick, for sensors of the user."""
+        return bool(self._own_sensors)
 
     # For `world.rack`
 

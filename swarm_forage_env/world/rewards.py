@@ -1,4 +1,7 @@
-"""Rewards of a swarm: the terms of `kernels.reward`, weighted by `scenarios.config.RewardConfig`, for learners."""
+"""Rewards of a swarm for learners: the terms of `kernels.reward`, weighted by `scenarios.config.RewardConfig`.
+
+A function of the user may add to them (`contract.own.register_reward`).
+"""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -7,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.compiling import direct
+from swarm_forage_env.contract.own import own_reward
 from swarm_forage_env.scenarios.config import RewardConfig
 from swarm_forage_env.world.kernels.reward import Happenings, Weights, rewards
 from swarm_forage_env.world.state import StepEvents, SwarmState
@@ -16,11 +20,31 @@ class RewardModel:
     """Rewards of one run, tick by tick; made anew at reset."""
 
     def __init__(
-        self, config: RewardConfig, nest_centre_m: tuple[float, float], swarm: SwarmState, events: StepEvents
+        self,
+        config: RewardConfig,
+        nest_centre_m: tuple[float, float],
+        swarm: SwarmState,
+        events: StepEvents,
+        world: object = None,
     ) -> None:
-        """Bind the state; its arrays must not be replaced afterwards, only edited."""
+        """Bind the state; its arrays must not be replaced afterwards, only edited.
+
+        Args:
+            config: The weights.
+            nest_centre_m: x, y.
+            swarm: Robots.
+            events: Happenings of a tick.
+            world: What a function of the user is called with.
+
+        Raises:
+            ConfigError: `config` names a function that is not known here.
+        """
+        self._world = world
+        self._own = config.own_reward
+        if self._own:
+            own_reward(self._own)  # told now, not in the first step
         self._weights = Weights(*(float(getattr(config, name)) for name in Weights._fields))
-        self._is_dense = bool(config.nest_progress or config.interference or config.tick)
+        self._is_dense = bool(config.nest_progress or config.interference or config.tick or config.own_reward)
         self._is_progress_paid = bool(config.nest_progress)
         self._is_team = config.team
         self._events, self._swarm = events, swarm
@@ -59,7 +83,29 @@ class RewardModel:
             self._reward[:] = 0.0
             return self._reward
         self._rewards(self._happenings, self._weights, self._total, self._reward)
+        if self._own:
+            self._total += self._own_terms()
+            self._reward[:] = self._total
         if self._is_team:
             active = self._swarm.active
             self._reward[:] = self._total.sum() / max(1, np.count_nonzero(active)) * active
         return self._reward
+
+    def _own_terms(self) -> np.ndarray:
+        """Return what the user's function adds, (N,), zero for robots that are not at work.
+
+        Raises:
+            ValueError: it returned another shape, or numbers that are not finite.
+        """
+        active = self._swarm.active
+        values = np.asarray(own_reward(self._own)(self._world))
+        if values.shape != active.shape:
+            raise ValueError(
+                f"Expected reward {self._own!r} to return shape (n_robots,) = {active.shape}, got {values.shape}."
+            )
+        values = np.where(active, values, 0.0)
+        if not np.isfinite(values).all():
+            raise ValueError(
+                f"Expected reward {self._own!r} to return finite numbers, got {values[~np.isfinite(values)][0]}."
+            )
+        return values

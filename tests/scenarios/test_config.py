@@ -62,6 +62,8 @@ OTHER_VALUES: dict[str, Any] = {
     "interference": -0.1,
     "tick": -0.001,
     "team": True,
+    "own_sensors": ("nest_distance",),
+    "own_reward": "near_the_nest",
     **dict.fromkeys((item.name for item in dataclasses.fields(Quirks)), True),
 }
 

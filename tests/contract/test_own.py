@@ -1,0 +1,216 @@
+"""Sensors and rewards of users: names, errors, and where they arrive."""
+
+import copy
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from swarm_forage_env import (
+    ConfigError,
+    ForageEnv,
+    SwarmSpec,
+    load_policy,
+    parallel_env,
+    plan_run,
+    register_reward,
+    register_sensor,
+    run_one,
+    scenario,
+    with_overrides,
+)
+from swarm_forage_env.contract import own
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+
+
+def nest_distance(world):
+    return np.linalg.norm(world.swarm.position - world.config.arena.nest_centre_m, axis=1) / 50.0
+
+
+def heading_and_cargo(world):
+    return np.column_stack([np.sin(world.swarm.heading), world.swarm.carried_object >= 0])
+
+
+@pytest.fixture(autouse=True)
+def _registered(monkeypatch):
+    monkeypatch.setattr(own, "_SENSORS", {})
+    monkeypatch.setattr(own, "_REWARDS", {})
+    register_sensor("nest_distance", nest_distance, meaning="distance to the nest / 50 m")
+    register_sensor("both", heading_and_cargo, n_columns=2)
+    register_reward("row", lambda world: np.arange(len(world.swarm.active)) / 8.0)
+
+
+def made(**fields: Any) -> ForageEnv:
+    return ForageEnv(scenario("warehouse_small", n_robots=6, **fields))
+
+
+ACTIONS = np.tile(np.array([1.0, 0.5, 0.0], np.float32), (6, 1))
+
+
+@pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
+def test_own_columns_come_last_and_change_no_other(physics):
+    plain, env = made(physics=physics), made(physics=physics, own_sensors=("both", "nest_distance"))
+    assert env.layout.names == (*plain.layout.names, "both", "nest_distance")
+    assert env.layout.part("nest_distance").meaning == "distance to the nest / 50 m"
+    before = plain.reset_batch(seed=1).copy(), env.reset_batch(seed=1).copy()
+    after = plain.step_batch(ACTIONS)[0], env.step_batch(ACTIONS)[0]
+    for bare, rich in (before, after):
+        np.testing.assert_array_equal(rich[:, : plain.layout.size], bare)
+    world = env.arena
+    np.testing.assert_array_equal(after[1][:, env.layout["both"]], np.float32(heading_and_cargo(world)))
+    np.testing.assert_array_equal(after[1][:, -1], np.float32(nest_distance(world)))
+    assert (before[1][:, -1] != after[1][:, -1]).all(), "they are read in every tick"
+
+
+def test_a_robot_that_is_away_senses_nothing():
+    env = made(own_sensors=("nest_distance",))
+    env.reset(seed=1)
+    present = np.arange(6) != 2
+    env.set_population(active=present, present=present)
+    column = env.step_batch(ACTIONS)[0][:, -1]
+    assert ((column > 0.0) == present).all()
+
+
+def test_an_own_reward_is_added_for_robots_at_work():
+    env = made(own_reward="row", tick=-1.0)
+    env.reset(seed=1)
+    at_work = np.arange(6) != 5
+    env.set_population(active=at_work, present=np.ones(6, bool))
+    np.testing.assert_array_equal(env.step_batch(ACTIONS)[1], [-1.0, -0.875, -0.75, -0.625, -0.5, 0.0])
+    team = made(own_reward="row", team=True)
+    team.reset(seed=1)
+    np.testing.assert_array_equal(team.step_batch(ACTIONS)[1], np.full(6, np.float32(15.0 / 8.0 / 6.0)))
+
+
+def test_copies_go_on_alike():
+    env = made(own_sensors=("both",), own_reward="row", physics="compiled")
+    env.reset(seed=1)
+    twin = copy.deepcopy(env)
+    for one, other in zip(env.step_batch(ACTIONS)[:2], twin.step_batch(ACTIONS)[:2], strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("observation", ["full", "compact"])
+def test_learners_see_them_through_every_view(observation):
+    fields: dict[str, Any] = {"n_robots": 6, "own_sensors": ("both",), "interface": {"observation": observation}}
+    dicts = parallel_env("warehouse_small", **fields)
+    rows = gymnasium.make_vec("swarm_forage/warehouse_small-v1", **fields)
+    per_agent = np.stack(list(dicts.reset(seed=3)[0].values()))
+    np.testing.assert_array_equal(per_agent, rows.reset(seed=3)[0])
+    assert per_agent.shape[1] == {"full": 113, "compact": 25}[observation]
+    assert (np.abs(per_agent[:, -2]) > 0.0).all(), "sines of headings"
+
+
+def test_a_policy_that_was_trained_without_them_runs_where_they_are():
+    spec = SwarmSpec.of(scenario("warehouse_small", n_robots=6, own_sensors=("both",)))
+    obs = made(own_sensors=("both",)).reset_batch(seed=1)
+    plain = made().reset_batch(seed=1)
+    for observation in ("full", "compact"):
+        config = InterfaceConfig(observation=observation)
+        seen = LearnerInterface(config, spec).observe(obs)
+        bare = LearnerInterface(config, SwarmSpec.of(scenario("warehouse_small", n_robots=6))).observe(plain)
+        np.testing.assert_array_equal(seen, bare)
+    policy = load_policy("ppo_warehouse_small")
+    policy.reset(spec, np.random.default_rng(1))
+    assert policy.act(obs, np.ones(6, bool)).shape == (6, 3)
+
+
+def test_a_policy_that_sees_them_says_what_it_needs():
+    config = InterfaceConfig(own_sensors=("both",))
+    with pytest.raises(ConfigError, match=r"own_sensors=\('both',\)"):
+        LearnerInterface(config, SwarmSpec.of(scenario("warehouse_small")))
+
+
+@pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
+def test_runs_of_scripted_policies_stay_what_they_are(physics):
+    small = scenario("warehouse_small", n_robots=6, horizon_s=200.0, physics=physics)
+    own_fields: dict[str, Any] = {"own_sensors": ("both",), "own_reward": "row"}
+    plain = run_one(plan_run(small, "crw", seed=1)).columns()
+    rich = run_one(plan_run(with_overrides(small, **own_fields), "crw", seed=1)).columns()
+    for name, column in plain.items():
+        np.testing.assert_array_equal(column, rich[name])
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"own_sensors": ("booth",)}, r"Unknown own sensor 'booth'\. Did you mean 'both'\?.*register_sensor"),
+        ({"own_sensors": "both"}, "a tuple of names"),
+        ({"own_sensors": ("both", "both")}, "each name once"),
+        ({"own_reward": 3}, "reward.own_reward"),
+    ],
+)
+def test_what_a_scenario_cannot_name(fields, message):
+    with pytest.raises(ConfigError, match=message):
+        made(**fields)
+
+
+def test_an_unknown_reward_is_told_at_the_reset():
+    env = made(own_reward="rwo")
+    with pytest.raises(ConfigError, match=r"Unknown own reward 'rwo'.*row.*register_reward"):
+        env.reset(seed=1)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        (lambda world: np.zeros((6, 2)), r"shape .*\(6, 1\).* got \(6, 2\)"),
+        (lambda world: np.full(6, 1.5), r"in \[-1, 1\], got 1.5"),
+        (lambda world: np.full(6, np.nan), r"got nan"),
+    ],
+)
+def test_readings_that_no_observation_can_hold(values, message):
+    register_sensor("odd", values)
+    env = made(own_sensors=("odd",))
+    with pytest.raises(ValueError, match=message):
+        env.reset(seed=1)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [(lambda world: np.zeros(5), r"\(6,\), got \(5,\)"), (lambda world: np.full(6, np.inf), "finite numbers, got inf")],
+)
+def test_rewards_that_no_learner_can_take(values, message):
+    register_reward("odd", values)
+    env = made(own_reward="odd")
+    env.reset(seed=1)
+    with pytest.raises(ValueError, match=message):
+        env.step_batch(ACTIONS)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda: register_sensor("light", nest_distance),
+        lambda: register_sensor("two words", nest_distance),
+        lambda: register_sensor("wide", nest_distance, n_columns=0),
+        lambda: register_sensor("none", None),  # pyright: ignore[reportArgumentType] - users give anything
+        lambda: register_reward("", nest_distance),
+        lambda: register_reward("none", None),  # pyright: ignore[reportArgumentType] - likewise
+    ],
+)
+def test_what_cannot_be_registered(wrong):
+    with pytest.raises(ConfigError):
+        wrong()
+
+
+class Offered:
+    """An entry point of an installed package."""
+
+    def __init__(self, name, value):
+        self.name, self._value = name, value
+
+    def load(self):
+        return self._value
+
+
+def test_installed_packages_offer_them(monkeypatch):
+    sensor = own.OwnSensor(name="offered", function=nest_distance)
+    points = {own.SENSOR_ENTRY_POINTS: sensor, own.REWARD_ENTRY_POINTS: nest_distance}
+    monkeypatch.setattr(own, "_installed", lambda group: (Offered("offered", points[group]),))
+    assert own.own_sensor("offered") is sensor
+    assert own.own_reward("offered") is nest_distance
+    monkeypatch.setattr(own, "_installed", lambda group: (Offered("offered", nest_distance),))
+    with pytest.raises(ConfigError, match="to be an OwnSensor"):
+        own.own_sensor("offered")
