@@ -8,7 +8,7 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit, typeof, types
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -48,14 +48,35 @@ def kernel(function: F) -> F:
     """Compile a function that allocates nothing; the result is cached on disk until one of its sources changes."""
     # Left to itself the compiler calls all but the smallest kernels: rows and tuples then travel over the stack.
     compiled = njit(cache=True, forceinline=True, **_OPTIONS)(function)
-    cache = getattr(compiled, "_cache", None)
-    if isinstance(cache, FunctionCache):  # there is none with the compiler switched off
-        # By itself numba watches only the file of the function, and would keep what it has compiled into it from
-        # others. It offers no public way to watch more. The version is what it looks at first, before it opens an
-        # index that may name types which the sources no longer have.
-        cache_file = cache._cache_file
-        cache_file._version += _digest_of_sources(Path(function.__code__.co_filename).parent)
+    if not is_compiled(compiled):
+        return function
+    _watch_sources(compiled, "")
+    # What Python needs for a call, a conversion of every array of a world, takes longer to compile than most kernels
+    # themselves. Where a kernel calls another one it is not needed: there a second version stands in, without it.
+    called_by_kernels = njit(cache=True, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(
+        function
+    )
+    _watch_sources(called_by_kernels, "-called")
+    compiled.get_call_template = called_by_kernels.get_call_template
+    compiled.get_overload = called_by_kernels.get_overload
     return cast(F, compiled)
+
+
+def _watch_sources(compiled: Any, mark: str) -> None:
+    """Let what is kept of a function on disk be out of date when a source changes; `mark` goes into the file names."""
+    cache = compiled._cache
+    assert isinstance(cache, FunctionCache), "kernels are cached"
+    folder = Path(compiled.py_func.__code__.co_filename).parent
+    cache_file = IndexDataCacheFile(
+        cache_path=cache._cache_path,
+        filename_base=cache._impl.filename_base + mark,
+        source_stamp=cache._impl.locator.get_source_stamp(),
+    )
+    # By itself numba watches only the file of the function, and would keep what it has compiled into it from others. It
+    # offers no public way to watch more. The version is what it looks at first, before it opens an index that may name
+    # types which the sources no longer have.
+    cache_file._version += _digest_of_sources(folder)
+    cache._cache_file = cache_file
 
 
 def is_compiled(function: Callable[..., Any]) -> bool:
