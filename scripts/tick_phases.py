@@ -88,8 +88,8 @@ def phases(arena: ForagingArena, policy: Policy) -> Iterator[tuple[str, Callable
 def started_run(name: str, policy_name: str, physics: str) -> tuple[LiveRun, ForageEnv, Policy]:
     """Return a run that has gone on for some ticks."""
     policy = load_policy(policy_name)
-    fields = {"caches": policy.caches} if hasattr(policy, "caches") else {}
-    stack = build_stack(scenario(name, physics=physics, **fields), reads=getattr(policy, "reads", None))
+    world = scenario(name, physics=physics, caches=getattr(policy, "caches", "none"))
+    stack = build_stack(world, reads=getattr(policy, "reads", None))
     run = LiveRun(stack, policy, 0)
     run.advance(to_tick=RUN_IN_TICKS)
     return run, stack.unwrapped, policy

@@ -15,6 +15,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 # Without numba's memory runtime an allocation is a compile error, and arrays that are handed around, alone, in rows or
 # as fields of a named tuple, are not reference-counted. That halves the time of functions that call others often.
 _OPTIONS: dict[str, Any] = {"_nrt": False}
+_FOR_KERNELS_ONLY: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""What leaves out the ways into a function from Python and from C."""
 
 _PACKAGE = Path(__file__).parents[1]
 _COMPILED_IN_EVERYWHERE = tuple(
@@ -53,9 +55,7 @@ def kernel(function: F) -> F:
     _watch_sources(compiled, "")
     # What Python needs for a call, a conversion of every array of a world, takes longer to compile than most kernels
     # themselves. Where a kernel calls another one it is not needed: there a second version stands in, without it.
-    called_by_kernels = njit(cache=True, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(
-        function
-    )
+    called_by_kernels = njit(cache=True, forceinline=True, **_OPTIONS, **_FOR_KERNELS_ONLY)(function)
     _watch_sources(called_by_kernels, "-called")
     compiled.get_call_template = called_by_kernels.get_call_template
     compiled.get_overload = called_by_kernels.get_overload
