@@ -110,20 +110,17 @@ def vector_env(ticks: int, **options: Any) -> Case:
     return Case(ticks, spend)
 
 
-def large(n_robots: int, ticks: int) -> Case:
-    """CRW on 5 % of the floor, with 0.35 objects per square metre."""
+def large_world(n_robots: int) -> dict[str, Any]:
+    """Fields of a large `warehouse_medium`: a robot per 20 square metres, 0.35 objects per square metre."""
     side = 4.8 * round((n_robots / 0.05) ** 0.5 / 4.8)
-    return runs(
-        "crw",
-        "warehouse_medium",
-        ticks,
-        width_m=side,
-        height_m=side,
-        nest_centre_m=(side / 2, side / 2),
-        nest_size_m=(0.2 * side, 0.2 * side),
-        n_robots=n_robots,
-        n_objects=int(0.35 * side * side),
-    )
+    return {
+        "width_m": side,
+        "height_m": side,
+        "nest_centre_m": (side / 2, side / 2),
+        "nest_size_m": (0.2 * side, 0.2 * side),
+        "n_robots": n_robots,
+        "n_objects": int(0.35 * side * side),
+    }
 
 
 CASES = {
@@ -135,7 +132,7 @@ CASES = {
     "stochm-200": runs("stochm", "warehouse_medium", 4_000, caches="static"),
     "stochx-200": runs("stochx", "warehouse_medium", 4_000, caches="dynamic"),
     "stochx-200-whole": runs("stochx", "warehouse_medium", 50_000, caches="dynamic"),
-    "crw-16384": large(16_384, 300),
+    "crw-16384": runs("crw", "warehouse_medium", 300, **large_world(16_384)),
     "vec-50": vector_env(3_000),
     "vec-8x50": vector_env(500, n_arenas=8),
     "dict-200": dicts(500),

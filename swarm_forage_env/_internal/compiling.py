@@ -10,13 +10,15 @@ from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit, typeof, types
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 # Without numba's memory runtime an allocation is a compile error, and arrays that are handed around, alone, in rows or
 # as fields of a named tuple, are not reference-counted. That halves the time of functions that call others often.
 _OPTIONS: dict[str, Any] = {"_nrt": False}
+_FOR_KERNELS_ONLY: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""What leaves out the ways into a function from Python and from C."""
 
 _PACKAGE = Path(__file__).parents[1]
 _COMPILED_IN_EVERYWHERE = tuple(
@@ -50,15 +52,35 @@ def kernel(function: F) -> F:
     """Compile a function that allocates nothing; the result is cached on disk until one of its sources changes."""
     # Left to itself the compiler calls all but the smallest kernels: rows and tuples then travel over the stack.
     compiled = njit(forceinline=True, **_OPTIONS)(function)
-    cache = _new_cache(function) if is_compiled(compiled) else None
-    if cache is not None:
-        # By itself numba watches only the file of the function, and would keep what it has compiled into it from
-        # others. It offers no public way to watch more. The version is what it looks at first, before it opens an
-        # index that may name types which the sources no longer have.
-        cache_file = cache._cache_file
-        cache_file._version += _digest_of_sources(Path(function.__code__.co_filename).parent)
-        cast(Any, compiled)._cache = cache  # what `njit(cache=True)` does with numba's own
+    if not is_compiled(compiled):
+        return function
+    _keep_on_disk(compiled, "")
+    # What Python needs for a call, a conversion of every array of a world, takes longer to compile than most kernels
+    # themselves. Where a kernel calls another one it is not needed: there a second version stands in, without it.
+    called_by_kernels = njit(forceinline=True, **_OPTIONS, **_FOR_KERNELS_ONLY)(function)
+    _keep_on_disk(called_by_kernels, "-called")
+    compiled.get_call_template = called_by_kernels.get_call_template
+    compiled.get_overload = called_by_kernels.get_overload
     return cast(F, compiled)
+
+
+def _keep_on_disk(compiled: Any, mark: str) -> None:
+    """Do what `njit(cache=True)` does with a cache of numba's own; `mark` goes into the names of the files."""
+    function = compiled.py_func
+    cache = _new_cache(function)
+    if cache is None:
+        return
+    cache_file = IndexDataCacheFile(
+        cache_path=cache.cache_path,
+        filename_base=cache._impl.filename_base + mark,
+        source_stamp=cache._impl.locator.get_source_stamp(),
+    )
+    # By itself numba watches only the file of the function, and would keep what it has compiled into it from others. It
+    # offers no public way to watch more. The version is what it looks at first, before it opens an index that may name
+    # types which the sources no longer have.
+    cache_file._version += _digest_of_sources(Path(function.__code__.co_filename).parent)
+    cache._cache_file = cache_file
+    compiled._cache = cache
 
 
 class _Cache(FunctionCache):

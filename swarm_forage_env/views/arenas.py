@@ -11,16 +11,18 @@ Row `a * N + i` is always robot i of arena a. The life of a row:
   `ArenaStep.is_episode` is false for them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
 import numpy as np
 
+from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.kernels.rows import book_rows
 from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.rack import Rack, can_share_a_rack
@@ -157,7 +159,8 @@ class ArenaBatch:
         self._lengths = np.zeros((n_arenas, self.n_robots), np.int32)
         self._n_columns = self.interface.layout.size
         self._commands = np.zeros((n_arenas, self.n_robots, 3), np.float32)
-        self._racked: tuple[tuple[ForagingArena, ...], Rack | None] | None = None
+        self._racked: tuple[list[ForagingArena], Rack | None] | None = None
+        self._book: Callable[..., int] | None = None
         self._no_endings = _Endings().joined(self._n_columns)
 
     def reset(
@@ -211,22 +214,34 @@ class ArenaBatch:
         shape, columns = (self.n_arenas, self.n_robots), self._n_columns
         obs = np.empty((*shape, columns), np.float32)
         rewards = np.zeros(shape, np.float32)
-        terminated, truncated = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
-        endings = _Endings()
+        terminated, truncated, active = flags = np.zeros((3, *shape), np.bool_)
+        endings: _Endings | None = None
         ended = self._advance(actions.reshape(*shape, *actions.shape[1:]), rewards)
-        self._lengths += self._present  # as before the step: a robot that died in it had begun it
-        self._returns += rewards
         for number, (dead, all_dead, at_horizon) in enumerate(ended):
-            out = obs[number], terminated[number], truncated[number]
-            self._conclude(number, dead, all_dead or at_horizon, out, endings)
+            n_terminated = self._take_rows(number, dead, rewards[number], terminated[number], active[number])
+            self.arenas[number].observe(obs[number])
+            if n_terminated or all_dead or at_horizon:
+                endings = endings or _Endings()
+                out = obs[number], *flags[:, number]
+                self._conclude(number, dead, all_dead or at_horizon, out, endings)
+        obs = obs.reshape(self.n_rows, columns)
+        terminated, truncated, active = flags.reshape(3, self.n_rows)
+        ended = endings.joined(columns) if endings else self._no_endings
         return ArenaStep(
-            obs=obs.reshape(self.n_rows, columns),
-            rewards=rewards.ravel(),
-            terminated=terminated.ravel(),
-            truncated=truncated.ravel(),
-            active=self._active(),
-            **(endings.joined(columns) if endings.rows else self._no_endings),
+            obs=obs, rewards=rewards.ravel(), terminated=terminated, truncated=truncated, active=active, **ended
         )
+
+    def _take_rows(
+        self, number: int, dead: BoolArray, rewards: np.ndarray, terminated: BoolArray, active: BoolArray
+    ) -> int:
+        """Book a decision of one arena, see `book_rows`; returns how many rows terminate in it."""
+        swarm = self.arenas[number].forage_env.arena.swarm
+        absent, present = self._absent[number], self._present[number]
+        books = absent, present, self._returns[number], self._lengths[number], terminated, active
+        arguments = (dead, swarm.present, swarm.active, rewards, *books)
+        if self._book is None:
+            self._book = direct(book_rows, *arguments)
+        return self._book(*arguments)
 
     def _advance(self, actions: np.ndarray, rewards: np.ndarray) -> list[tuple[BoolArray, bool, bool]]:
         """Carry out a decision in every arena, together where they can be; see `LearnerArena.step`.
@@ -279,8 +294,8 @@ class ArenaBatch:
 
     def _rack(self) -> Rack | None:
         """Return what steps all arenas together, None where they have to be stepped one by one."""
-        worlds = tuple(arena.forage_env.arena for arena in self.arenas)
-        if self._racked is None or any(one is not other for one, other in zip(worlds, self._racked[0], strict=True)):
+        worlds = [arena.forage_env.arena for arena in self.arenas]
+        if self._racked is None or worlds != self._racked[0]:  # by identity
             together = len(worlds) > 1 and can_share_a_rack(worlds) and all(map(_steps_in_parts, self.arenas))
             self._racked = worlds, Rack(worlds) if together else None
         return self._racked[1]
@@ -290,22 +305,23 @@ class ArenaBatch:
         number: int,
         dead: BoolArray,
         over: bool,
-        out: tuple[ObsArray, BoolArray, BoolArray],
+        out: tuple[ObsArray, BoolArray, BoolArray, BoolArray],
         endings: _Endings,
     ) -> None:
-        """Book a decision of one arena; writes its rows of obs, terminated, truncated and appends to `endings`."""
-        obs, terminated, truncated = out
-        arena, absent = self.arenas[number], self._absent[number]
-        self._present[number] = arena.forage_env.swarm.present
-        arena.observe(obs)
-        np.greater(dead, absent, out=terminated)
+        """Conclude episodes of one arena; rewrites its rows of what `step` returns and appends to `endings`.
+
+        `out` is its observations, terminated, truncated, active.
+        """
+        obs, terminated, truncated, active = out
+        absent = self._absent[number]
         if over:
             terminated |= absent
             np.logical_not(terminated, out=truncated)
             self._note_endings(number, np.arange(self.n_robots), obs, endings)
             endings.outcomes.append(self._outcome(number))
             self._start(number, obs)
-        elif np.count_nonzero(terminated):  # a third of the time of any()
+            active[:] = self.arenas[number].forage_env.active
+        else:
             self._note_endings(number, np.flatnonzero(terminated), obs, endings)
             absent |= dead
 

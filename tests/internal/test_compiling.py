@@ -83,6 +83,16 @@ def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(package):
     assert call(package, program) == "3.0 0"
 
 
+def test_a_kernel_that_another_has_called_still_answers_python(package):
+    """Both versions of it are kept, apart from each other."""
+    (package / "outer.py").write_text(OUTER)
+    (package / "inner.py").write_text(INNER.format(added=1.0))
+    both = "from controllers.outer import outer, inner; print({}, sum(inner.stats.cache_hits.values()))"
+    assert call(package, both.format("outer(1.0)")) == "2.0 0"
+    assert call(package, both.format("inner(1.0)")) == "2.0 0", "what kernels call has no way in from Python"
+    assert call(package, both.format("inner(1.0), outer(3.0)")) == "2.0 4.0 1"
+
+
 def test_a_type_that_the_sources_no_longer_have_does_no_harm(package):
     program = "from controllers import pairs; print(pairs.total(pairs.{name}(1.0, 2.0)))"
     for name in ("Pair", "Couple"):

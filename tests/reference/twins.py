@@ -118,6 +118,8 @@ TWINS = {
 IN_ORDER = "only calls others, each with its twin; whole runs are in tests/promises/test_golden_runs.py"
 
 WITHOUT = {
+    "swarm_forage_env.policies.kernels.rows.book_rows": "sums row by row; the lives of rows are told by hand in "
+    "tests/views/test_arenas.py",
     "swarm_forage_env.world.kernels.bodies.tell_poses": "compared with `unpack_poses` in tests/world/test_bodies.py",
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "
     "tests/world/test_interactions_timing.py",

@@ -15,7 +15,7 @@ from swarm_forage_env.contract.layout import (
     VISIBLE_CACHES,
     WINDOW_CELLS,
 )
-from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray, Row
 from swarm_forage_env.scenarios.units import CELLS_PER_M
 
 _GROUND_X = np.array([0.063, 0.063, -0.063, -0.063])
@@ -28,6 +28,7 @@ _LIGHT_CUTOFF = 2.5
 """Scaled distance beyond which a light is not seen."""
 _FIRST_SENSOR_RAD = BEAM_ANGLES_RAD[0]
 _SENSOR_STEP_RAD = BEAM_ANGLES_RAD[1] - BEAM_ANGLES_RAD[0]
+_LAST_SENSOR = np.uint64(RING_SENSORS - 1)
 _HALF_WINDOW = WINDOW_CELLS // 2
 
 
@@ -83,8 +84,8 @@ def light(
     that carry nothing stay zero.
     """
     for i in range(position.shape[0]):
-        for k in range(start, start + RING_SENSORS):
-            obs[i, k] = 0.0
+        row = obs[i, start : start + RING_SENSORS]
+        row[:] = 0.0
         if not present[i] or (of_carriers_only and carried_object[i] < 0):
             continue
         for lamp in range(lights.shape[0]):
@@ -98,14 +99,30 @@ def light(
             cos = facing[i, 0]
             sin = facing[i, 1]
             bearing = math.atan2(dy * cos - dx * sin, dx * cos + dy * sin)
-            # Only the sensors within a quarter turn of the light: 12 or 13 in a row, counted round the ring.
+            # Only the sensors within a quarter turn of the light, counted round the ring: 12, or 13 by rounding. A
+            # known number of rounds and an index without a sign spare a tenth of the time.
             first = math.ceil((bearing - 0.5 * math.pi - _FIRST_SENSOR_RAD) / _SENSOR_STEP_RAD)
             away = _FIRST_SENSOR_RAD + first * _SENSOR_STEP_RAD - bearing
-            k = int(first) if first >= 0.0 else int(first) + RING_SENSORS  # less than a turn: no division is needed
-            while away < 0.5 * math.pi:
-                obs[i, start + k] = min(1.0, obs[i, start + k] + base * (1.0 - abs(away) / (0.5 * math.pi)))
+            k = np.uint64(first if first >= 0.0 else first + RING_SENSORS)  # less than a turn: no division is needed
+            for _ in range(RING_SENSORS // 2 - 1):
+                _shine(row, k, base, away)
                 away += _SENSOR_STEP_RAD
-                k = 0 if k == RING_SENSORS - 1 else k + 1
+                k = _next_in_ring(k)
+            while away < 0.5 * math.pi:
+                _shine(row, k, base, away)
+                away += _SENSOR_STEP_RAD
+                k = _next_in_ring(k)
+
+
+@kernel
+def _shine(row: Row, k: np.uint64, base: float, away: float) -> None:
+    """Add a light to the reading of sensor k, whose axis is `away` from it (rad); `base` is what it reads head-on."""
+    row[k] = min(1.0, row[k] + base * (1.0 - abs(away) / (0.5 * math.pi)))
+
+
+@kernel
+def _next_in_ring(k: np.uint64) -> np.uint64:
+    return np.uint64(0) if k == _LAST_SENSOR else k + np.uint64(1)
 
 
 @kernel
