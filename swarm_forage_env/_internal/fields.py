@@ -16,6 +16,7 @@ from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, cast
 
+from swarm_forage_env._internal.printable import shown
 from swarm_forage_env._internal.spelling import suggestion
 
 
@@ -48,7 +49,8 @@ def number(
     is_in_range = _is_number(value) and at_least <= value <= at_most and above < value < below
     if not is_in_range:
         wanted = _number_in_range(max(at_least, above), min(at_most, below), above >= at_least, below <= at_most)
-        raise ConfigError(f"Expected {where} to be {wanted}, got {value!r}{_conversion_hint(value, Real, 'float')}.")
+        hint = _conversion_hint(value, Real, "float")
+        raise ConfigError(f"Expected {where} to be {wanted}, got {shown(value)}{hint}.")
 
 
 def whole(
@@ -72,7 +74,7 @@ def whole(
     if not (is_whole and _is_between(value, at_least, at_most)):
         wanted = _whole_in_range(at_least, at_most, or_none)
         hint = _conversion_hint(value, Integral, "int")
-        raise ConfigError(f"Expected {where} to be {wanted}, got {value!r}{hint}.")
+        raise ConfigError(f"Expected {where} to be {wanted}, got {shown(value)}{hint}.")
 
 
 def as_whole(where: str, value: Any, *, at_least: int, at_most: int | None = None, or_none: bool = False) -> int:
@@ -90,27 +92,27 @@ def as_whole(where: str, value: Any, *, at_least: int, at_most: int | None = Non
     """
     is_whole = not isinstance(value, bool) and isinstance(value, Integral)
     if not (is_whole and _is_between(operator.index(value), at_least, at_most)):
-        raise ConfigError(f"Expected {where} to be {_whole_in_range(at_least, at_most, or_none)}, got {value!r}.")
+        raise ConfigError(f"Expected {where} to be {_whole_in_range(at_least, at_most, or_none)}, got {shown(value)}.")
     return operator.index(value)
 
 
 def switch(where: str, value: Any) -> None:
     """Refuse what is neither True nor False."""
     if not isinstance(value, bool):
-        raise ConfigError(f"Expected {where} to be True or False, got {value!r}.")
+        raise ConfigError(f"Expected {where} to be True or False, got {shown(value)}.")
 
 
 def text(where: str, value: Any) -> None:
     """Refuse what is no text, or an empty one."""
     if not isinstance(value, str) or not value:
-        raise ConfigError(f"Expected {where} to be a non-empty text, got {value!r}.")
+        raise ConfigError(f"Expected {where} to be a non-empty text, got {shown(value)}.")
 
 
 def pair(where: str, value: Any) -> None:
     """Refuse what is no tuple (x, y) of numbers > 0."""
     parts = _parts(value)
     if len(parts) != 2:
-        raise ConfigError(f"Expected {where} to be (x, y), got {value!r}.")
+        raise ConfigError(f"Expected {where} to be (x, y), got {shown(value)}.")
     for index, part in enumerate(parts):
         number(f"{where}[{index}]", part, above=0.0)
 
@@ -119,13 +121,13 @@ def shares(where: str, value: Any) -> None:
     """Refuse what is no tuple of positive numbers that sum to 1."""
     parts = _parts(value)
     if not all(_is_number(part) and part > 0 for part in parts) or abs(sum(parts) - 1.0) >= 1e-9:
-        raise ConfigError(f"Expected {where} to be positive shares that sum to 1, got {value!r}.")
+        raise ConfigError(f"Expected {where} to be positive shares that sum to 1, got {shown(value)}.")
 
 
 def several(where: str, value: Any, what: str) -> None:
     """Refuse what is no tuple, or an empty one; `what` names its members, for the message."""
     if not _parts(value):
-        raise ConfigError(f"Expected {where} to be one or more {what}, got {value!r}.")
+        raise ConfigError(f"Expected {where} to be one or more {what}, got {shown(value)}.")
 
 
 def one_of(where: str, value: Any, known: Iterable[str]) -> None:
@@ -133,20 +135,20 @@ def one_of(where: str, value: Any, known: Iterable[str]) -> None:
     words = tuple(known)
     if not isinstance(value, str) or value not in words:
         hint = suggestion(str(value).lower(), words)
-        raise ConfigError(f"Expected {where} to be one of {', '.join(words)}, got {value!r}.{hint}")
+        raise ConfigError(f"Expected {where} to be one of {', '.join(words)}, got {shown(value)}.{hint}")
 
 
 def instance(where: str, value: Any, kind: type, *, hint: str = "") -> None:
     """Refuse what is no instance of `kind`; `hint` follows what was given and says what to do."""
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        raise ConfigError(f"Expected {where} to be {article} {kind.__name__}, got {value!r}{hint}.")
+        raise ConfigError(f"Expected {where} to be {article} {kind.__name__}, got {shown(value)}{hint}.")
 
 
 def table(where: str, value: Any) -> Mapping[str, Any]:
     """Return a mapping as it is; anything else is refused."""
     if not isinstance(value, Mapping):
-        raise ConfigError(f"Expected {where} to be a table of values by name, got {value!r}.")
+        raise ConfigError(f"Expected {where} to be a table of values by name, got {shown(value)}.")
     return cast("Mapping[str, Any]", value)
 
 

@@ -4,6 +4,7 @@ A command has a file of its own and imports what it needs when it runs, so that 
 """
 
 import sys
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
@@ -12,8 +13,8 @@ from swarm_forage_env.cli.ablate import ablate
 from swarm_forage_env.cli.availability import availability
 from swarm_forage_env.cli.choose import choose
 from swarm_forage_env.cli.compare import compare
+from swarm_forage_env.cli.ending import end
 from swarm_forage_env.cli.maps import maps
-from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE, complain
 from swarm_forage_env.cli.predict import predict
 from swarm_forage_env.cli.record import record
 from swarm_forage_env.cli.replay import replay
@@ -23,11 +24,9 @@ from swarm_forage_env.cli.score import score
 from swarm_forage_env.cli.show import info, list_everything, schema
 from swarm_forage_env.cli.stuck import stuck
 from swarm_forage_env.cli.study import study
+from swarm_forage_env.cli.terminal import show_any_text
 from swarm_forage_env.cli.train import train
 from swarm_forage_env.cli.watch import watch
-
-_USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
-"""Base of typer's complaints about arguments; typer gives it no public name."""
 
 app = typer.Typer(
     help="Swarm foraging: run, film, train and score policies, inspect scenarios.",
@@ -62,21 +61,24 @@ for command in (info, schema, rerun, watch, record, replay, maps, stuck, ablate,
 
 
 def main() -> None:
-    """Run the command line and exit; an error of the user is one line on stderr."""
-    from swarm_forage_env._internal.fields import ConfigError
-    from swarm_forage_env.study.record import RecordError
-
+    """Run the command line and exit; an error is one line on stderr, and `ending` says which exit code it has."""
+    show_any_text()
     try:
+        _refuse_unreadable(sys.argv[1:])
         code = app(standalone_mode=False)
-    except _USAGE_ERROR as error:
-        code = complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined] - see _USAGE_ERROR
-    except (ConfigError, RecordError) as error:
-        code = complain(str(error), EXIT_USAGE)
-    except OSError as error:
-        named = f"{error.strerror}: {error.filename}" if error.strerror and error.filename else str(error)
-        code = complain(named, EXIT_FAILURE)
-    except ImportError as error:
-        code = complain(str(error), EXIT_FAILURE)
-    except (KeyboardInterrupt, typer.Abort):
-        code = complain("interrupted", EXIT_INTERRUPTED)
+    except SystemExit:
+        raise
+    except BaseException as error:  # noqa: BLE001 - the last guard: whatever happens ends in one line
+        code = end(error)
     sys.exit(code)
+
+
+def _refuse_unreadable(words: Sequence[str]) -> None:
+    """Refuse words that are no text: records, pages and pictures could not hold such a name."""
+    for word in words:
+        try:
+            word.encode("utf-8")
+        except UnicodeEncodeError as error:
+            raise typer.BadParameter(
+                f"Expected words in UTF-8, got {word!r}; rename the file, or check the locale of the terminal."
+            ) from error

@@ -38,5 +38,5 @@ def maps(
     try:
         draw_maps(picture, [(one.label, one.arrays, one.is_difference) for one in every], MEANINGS, every[0].size_m)
     except ImportError:
-        notes().print(NO_PICTURE, markup=False)
+        notes().print(NO_PICTURE)
     typer.echo(f"wrote maps of {len(found)} run{'s' * (len(found) > 1)} to {picture} and .npz files beside it")

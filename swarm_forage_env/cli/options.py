@@ -7,9 +7,12 @@ from typing import Annotated
 import typer
 
 from swarm_forage_env._internal.extras import install_command
+from swarm_forage_env._internal.printable import printable
 
 EXIT_FAILURE = 1
 EXIT_USAGE = 2
+EXIT_UNFORESEEN = 70
+"""What sysexits.h calls an internal software error."""
 EXIT_INTERRUPTED = 130
 """Exit code that shells report for a program ended by Ctrl-C."""
 
@@ -85,7 +88,7 @@ DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and an e
 
 def complain(message: str, code: int) -> int:
     """Print one line on stderr; returns `code`."""
-    typer.echo("swarm-forage: " + " ".join(message.split()), err=True)
+    typer.echo("swarm-forage: " + printable(" ".join(message.split())), err=True)
     return code
 
 

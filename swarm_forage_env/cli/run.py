@@ -121,7 +121,7 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
             draw_performance(specs, result.records, plot)
         except ImportError:
             plot = None
-            aside.print(NO_PICTURE, markup=False)
+            aside.print(NO_PICTURE)
     if as_json:
         typer.echo(results_json(specs, result, store, plot))
     elif result.records:
@@ -130,7 +130,7 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
             f"{counted(len(result.records), 'record')} in {store.folder}" + (f", picture {plot}" if plot else "")
         )
     for failure in result.failures:
-        aside.print(f"failed: {failure.spec.describe()}: {failure.error}", markup=False)
-        aside.print(f"  again, alone: swarm-forage rerun {store.failure_path(failure.run_id)}", markup=False)
+        aside.print(f"failed: {failure.spec.describe()}: {failure.error}")
+        aside.print(f"  again, alone: swarm-forage rerun {store.failure_path(failure.run_id)}")
     if result.failures:
         raise typer.Exit(EXIT_FAILURE)

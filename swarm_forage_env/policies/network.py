@@ -20,6 +20,7 @@ from gymnasium import spaces
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, table
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
@@ -74,8 +75,8 @@ class NetworkAbout:
             NetworkError: not a JSON object, unknown or missing keys, or values that make no sense.
         """
         try:
-            mapping = json.loads(text)
-        except json.JSONDecodeError as error:
+            mapping = parse_json(text)
+        except ValueError as error:
             raise NetworkError(f"Expected a description of a network as JSON, got {text[:80]!r}.") from error
         if not isinstance(mapping, dict) or not isinstance(mapping.get("interface"), dict):
             raise NetworkError(f"Expected a description of a network with its interface, got {text[:80]!r}.")

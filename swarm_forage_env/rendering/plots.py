@@ -48,11 +48,11 @@ def draw_curves(
     marker = "o" if len(t_end_s) == 1 else ""
     for index, curve in enumerate(curves):
         colour = COLOURS[index % len(COLOURS)]
-        axes.plot(t_end_s, curve.mean, color=colour, label=curve.label, marker=marker, clip_on=False)
+        axes.plot(t_end_s, curve.mean, color=colour, label=_unread(curve.label), marker=marker, clip_on=False)
         axes.fill_between(t_end_s, curve.low, curve.high, color=colour, alpha=0.2, linewidth=0)
     has_band = any(np.isfinite(curve.low).any() for curve in curves)
     xlabel = f"time [s] (bands: {band})" if has_band else "time [s]"
-    axes.set(title=title, xlabel=xlabel, ylabel=ylabel, xlim=(0, None), ylim=(0, None))
+    axes.set(title=_unread(title), xlabel=xlabel, ylabel=ylabel, xlim=(0, None), ylim=(0, None))
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)
     figure.savefig(path, dpi=150)
@@ -90,9 +90,9 @@ def draw_training(
     figure = Figure(figsize=(8.0, 5.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     upper.plot(millions, performance, color=COLOURS[0], marker="o", label="trained policy")
-    upper.axhline(baseline[1], color=COLOURS[1], linestyle="--", label=baseline[0])
+    upper.axhline(baseline[1], color=COLOURS[1], linestyle="--", label=_unread(baseline[0]))
     lower.plot(millions, interference, color=COLOURS[0], marker="o")
-    upper.set(title=title, ylabel=ylabel, ylim=(0, None))
+    upper.set(title=_unread(title), ylabel=ylabel, ylim=(0, None))
     lower.set(xlabel="million decisions of single robots (dotted: a new stage)", ylabel="interference", ylim=(0, 1))
     for axes in (upper, lower):
         axes.set_xlim(0, None)
@@ -162,7 +162,12 @@ def draw_maps(
             image = axes.imshow(
                 values, origin="lower", extent=(0, size_m[0], 0, size_m[1]), vmin=low, vmax=top, cmap=colours
             )
-            axes.set_title(f"{label}\n{title}", fontsize=9)
+            axes.set_title(f"{_unread(label)}\n{title}", fontsize=9)
             axes.tick_params(labelsize=7)
             figure.colorbar(image, ax=axes, shrink=bar).ax.tick_params(labelsize=7)
     figure.savefig(path, dpi=110)
+
+
+def _unread(text: str) -> str:
+    """Return a text that matplotlib shows as it is: without it, dollar signs in a name would begin a formula."""
+    return text.replace("$", r"\$")

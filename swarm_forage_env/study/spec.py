@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, whole
+from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.policies.registry import is_policy_file, load_policy, policy_class
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping, whole_intervals
 from swarm_forage_env.wrappers.registry import wrapper_config_class
@@ -125,7 +126,7 @@ class RunSpec:
             ConfigError: no JSON object, or one that describes no run.
         """
         try:
-            mapping = json.loads(text)
+            mapping = parse_json(text)
         except ValueError as error:
             raise ConfigError(f"Expected a run specification as JSON: {error}.") from error
         if not isinstance(mapping, dict):

@@ -26,13 +26,13 @@
 The files of the paper's sets are in the folder `sets`.
 """
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, known_name, several, table, whole
+from swarm_forage_env._internal.parsing import parse_toml
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.scenarios.presets import scenario
@@ -108,11 +108,10 @@ def load_study(
 
 def _read(file: Path) -> dict[str, Any]:
     try:
-        with file.open("rb") as opened:
-            return tomllib.load(opened)
+        return parse_toml(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"Cannot use {file}: {error.strerror or error}.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ConfigError(f"Cannot use {file}: {error}") from error
 
 

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, table, whole
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.parsing import parse_json, parse_toml
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
 from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.scenarios.config import ScenarioConfig, scenario_of_same_size, with_overrides
@@ -232,7 +232,7 @@ def read_plan(path: Path) -> TrainingPlan:
     """
     try:
         text = path.read_text(encoding="utf-8")
-        return TrainingPlan.from_mapping(json.loads(text) if path.suffix == ".json" else tomllib.loads(text))
+        return TrainingPlan.from_mapping(parse_json(text) if path.suffix == ".json" else parse_toml(text))
     except OSError as error:
         raise ConfigError(f"Cannot read the plan {path}: {error.strerror or error}.") from error
     except (ValueError, TypeError) as error:  # ConfigError, and what the two parsers raise
