@@ -16,8 +16,14 @@ from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, cast
 
-from swarm_forage_env._internal.printable import shown
+from swarm_forage_env._internal.printable import is_printable, shown
 from swarm_forage_env._internal.spelling import suggestion
+
+MOST = 1e15
+"""Largest number of a configuration, and 1 over it the smallest that has to be above 0; our choice. All that is
+computed of such numbers, ticks and cells and squares, stays far from the ends of float and of 64-bit whole numbers."""
+MOST_SEEDS = 100_000
+"""Runs of one kind that a command or a study may ask for; our choice: five hundred times those of the paper."""
 
 
 class ConfigError(ValueError):
@@ -47,8 +53,11 @@ def number(
         ConfigError: see above.
     """
     is_in_range = _is_number(value) and at_least <= value <= at_most and above < value < below
-    if not is_in_range:
+    is_too_small = above == 0.0 and is_in_range and value < 1.0 / MOST
+    if not is_in_range or is_too_small or abs(value) > MOST:
         wanted = _number_in_range(max(at_least, above), min(at_most, below), above >= at_least, below <= at_most)
+        if is_in_range:
+            wanted += f", no closer to 0 than {1.0 / MOST:g}" if is_too_small else f", at most {MOST:g} in size"
         hint = _conversion_hint(value, Real, "float")
         raise ConfigError(f"Expected {where} to be {wanted}, got {shown(value)}{hint}.")
 
@@ -70,9 +79,11 @@ def whole(
     """
     if or_none and value is None:
         return
-    is_whole = isinstance(value, int) and not isinstance(value, bool)
-    if not (is_whole and _is_between(value, at_least, at_most)):
+    is_whole = isinstance(value, int) and not isinstance(value, bool) and _is_between(value, at_least, at_most)
+    is_too_large = is_whole and at_most is None and abs(value) > MOST
+    if not is_whole or is_too_large:
         wanted = _whole_in_range(at_least, at_most, or_none)
+        wanted += f", at most {MOST:,.0f} in size" if is_too_large else ""
         hint = _conversion_hint(value, Integral, "int")
         raise ConfigError(f"Expected {where} to be {wanted}, got {shown(value)}{hint}.")
 
@@ -103,9 +114,9 @@ def switch(where: str, value: Any) -> None:
 
 
 def text(where: str, value: Any) -> None:
-    """Refuse what is no text, or an empty one."""
-    if not isinstance(value, str) or not value:
-        raise ConfigError(f"Expected {where} to be a non-empty text, got {shown(value)}.")
+    """Refuse what is no text, an empty one, or one that no terminal and no file shows as it is."""
+    if not isinstance(value, str) or not value or not is_printable(value):
+        raise ConfigError(f"Expected {where} to be a non-empty text without control characters, got {shown(value)}.")
 
 
 def pair(where: str, value: Any) -> None:

@@ -26,6 +26,7 @@ from swarm_forage_env.cli.stuck import stuck
 from swarm_forage_env.cli.study import study
 from swarm_forage_env.cli.terminal import show_any_text
 from swarm_forage_env.cli.train import train
+from swarm_forage_env.cli.trusting import trust_of
 from swarm_forage_env.cli.watch import watch
 
 app = typer.Typer(
@@ -41,7 +42,18 @@ app = typer.Typer(
 def _options(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+    trust_models: Annotated[
+        bool,
+        typer.Option(
+            "--trust-models",
+            help="Also open models (.zip) that files name: opening one runs code that it holds (SECURITY.md).",
+        ),
+    ] = False,
 ) -> None:
+    if trust_models:
+        from swarm_forage_env.policies.trust import trusting
+
+        context.with_resource(trusting())
     if version:
         from importlib.metadata import version as installed_version
 
@@ -65,7 +77,8 @@ def main() -> None:
     show_any_text()
     try:
         _refuse_unreadable(sys.argv[1:])
-        code = app(standalone_mode=False)
+        with trust_of(sys.argv[1:]):
+            code = app(standalone_mode=False)
     except SystemExit:
         raise
     except BaseException as error:  # noqa: BLE001 - the last guard: whatever happens ends in one line

@@ -26,6 +26,9 @@ DEBUG_VARIABLE = "SWARM_FORAGE_DEBUG"
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
 """Base of typer's complaints about arguments; typer gives it no public name."""
 
+_OURS = ("swarm_forage_env", "baselines", "metrics")
+"""Where the errors are defined that speak to users: subclasses of ValueError, such as ConfigError and ModelError."""
+
 
 def end(error: BaseException) -> int:
     """Say in one line on stderr why the command ends; returns the exit code.
@@ -33,12 +36,9 @@ def end(error: BaseException) -> int:
     Raises:
         BaseException: `error` again, if nobody foresaw it and `DEBUG_VARIABLE` is set.
     """
-    from swarm_forage_env._internal.fields import ConfigError
-    from swarm_forage_env.study.record import RecordError
-
     if isinstance(error, _USAGE_ERROR):
         return complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined] - see _USAGE_ERROR
-    if isinstance(error, ConfigError | RecordError):
+    if isinstance(error, ValueError) and type(error).__module__.partition(".")[0] in _OURS:
         return complain(str(error), EXIT_USAGE)
     if isinstance(error, KeyboardInterrupt | typer.Abort):
         return complain("interrupted", EXIT_INTERRUPTED)

@@ -45,7 +45,7 @@ def run_training(plan: TrainingPlan, folder: Path, *, n_processes: int, resume: 
 
 def _farewell(folder: Path, *, is_kept: bool) -> str:
     if is_kept:
-        return f"Stopped. To go on: swarm-forage train --out {folder} --resume"
+        return f"Stopped. To go on: swarm-forage --trust-models train --out {folder} --resume"
     return "Stopped before there was anything to keep; the same command starts again."
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import Policy, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.policies import trust
 
 POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
 """Entry-point group under which installed packages offer policies by name."""
@@ -95,10 +96,12 @@ def policy_class(name: str) -> Callable[..., Policy]:
 
     Raises:
         ValueError: no installed policy has that name; the message lists the known ones.
+        UntrustedModelError: a file that runs code, and the console command was not told to trust it.
     """
     if name in _LOCAL_POLICIES:
         return _LOCAL_POLICIES[name]
     if is_policy_file(name):
+        trust.check(name)
         (opener,) = _openers(name)
         return partial(opener.load(), name)
     for point in _installed(POLICY_ENTRY_POINTS):

@@ -228,7 +228,7 @@ class RunRecord:
         version, spec, provenance, digest = (stamp[key] for key in _FILE_KEYS)
         try:
             record = _from_frame(frame, spec, parse_json(provenance))
-        except (pl.exceptions.PolarsError, TypeError, ValueError) as error:
+        except (pl.exceptions.PolarsError, LookupError, TypeError, ValueError, OverflowError) as error:
             raise RecordError(f"Cannot read {name}: its content does not match schema {version} ({error}).") from error
         if _digest(record, provenance) != digest:
             raise RecordError(f"Cannot read {name}: its content does not match its digest, so the file is damaged.")

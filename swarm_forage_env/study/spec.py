@@ -8,8 +8,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, whole
+from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, number, table, text, whole
 from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.registry import is_policy_file, load_policy, policy_class
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping, whole_intervals
 from swarm_forage_env.wrappers.registry import wrapper_config_class
@@ -49,6 +50,10 @@ class RunSpec:
     def __post_init__(self) -> None:
         whole("seed", self.seed, at_least=0, at_most=_MAX_SEED)
         instance("scenario", self.scenario, ScenarioConfig)
+        text("policy", self.policy)
+        text("criterion", self.criterion)
+        number("criterion_value", self.criterion_value)
+        table("parameters", self.parameters)
         whole_intervals(self.scenario)
         try:
             plain = json.loads(json.dumps(dict(self.parameters), allow_nan=False))
@@ -212,12 +217,15 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
     """
     if not is_policy_file(str(policy)):
         return str(policy), dict(parameters), policy_class(str(policy))
-    from swarm_forage_env.policies.model_files import file_digest  # late: most runs open no model
+    from swarm_forage_env.policies.model_files import file_digest, look_at_model  # late: most runs open no model
 
     file = str(Path(policy).resolve())
     pinned = dict(parameters)
     if "digest" not in pinned:
         pinned["digest"] = file_digest(file)
+    if trust.only_looks() and trust.runs_code(file):
+        trust.check(file)
+        return file, pinned, look_at_model(file)
     return file, pinned, load_policy(file, pinned)
 
 

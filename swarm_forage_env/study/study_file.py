@@ -31,7 +31,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError, known_keys, known_name, several, table, whole
+from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, known_keys, known_name, several, table, whole
 from swarm_forage_env._internal.parsing import parse_toml
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.policies.registry import is_policy_file
@@ -166,7 +166,7 @@ def _seeds(given: Any) -> tuple[int, ...]:
     """The seeds of a budget, from how many or which."""
     if isinstance(given, list):
         return tuple(given)
-    whole("seeds", given, at_least=1)
+    whole("seeds", given, at_least=1, at_most=MOST_SEEDS)
     return tuple(range(given))
 
 
