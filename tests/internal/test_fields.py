@@ -20,9 +20,37 @@ def refusal(check, *given, **limits) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize("value", [0, 2, -1.5, 1e300, np.float64(0.5)])
+@pytest.mark.parametrize("value", [0, 2, -1.5, 1e15, np.float64(0.5)])
 def test_numbers(value):
     fields.number("box.side", value)
+
+
+@pytest.mark.parametrize("value", [1e300, -1e300, 10**20])
+def test_numbers_of_which_nothing_can_be_computed_are_refused(value):
+    assert (
+        refusal(fields.number, value)
+        == f"Expected box.side to be a finite number, at most 1e+15 in size, got {value!r}."
+    )
+
+
+def test_positive_numbers_are_no_closer_to_zero_than_can_be_divided_by():
+    assert "a finite number > 0, no closer to 0 than 1e-15, got 1e-320" in refusal(fields.number, 1e-320, above=0.0)
+    fields.number("box.side", 0.0, at_least=0.0)
+
+
+def test_whole_numbers_stay_within_what_arrays_hold():
+    assert "at most 1,000,000,000,000,000 in size" in refusal(fields.whole, 2**63, at_least=0)
+    fields.whole("box.side", 2**63, at_least=0, at_most=2**63)
+
+
+def test_messages_cut_what_is_too_long_to_read():
+    assert refusal(fields.switch, [0] * 1000).endswith("... (3,000 characters).")
+    assert "a value of type int that is too large to show" in refusal(fields.switch, 10**5000)
+
+
+def test_texts_that_no_terminal_shows_are_refused():
+    for name in ("\x1b[31m", "two\nlines", "\udcff", "\u202eright to left"):
+        assert "without control characters" in refusal(fields.text, name)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, None, "3", True, 1j, (1.0,), np.ones(1)])

@@ -14,6 +14,8 @@ import sys
 import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -160,7 +162,7 @@ def outcome(words: Sequence[str]) -> Outcome:
     out, err = _stream(), _stream()
     fault, code = "", 0
     with (
-        _beginnings_only(),
+        _beginnings_only(trains="train" in words),
         mock.patch.object(sys, "argv", ["swarm-forage", *words]),
         mock.patch.dict(os.environ, {DEBUG_VARIABLE: "1"}),
         contextlib.redirect_stdout(out),
@@ -350,7 +352,7 @@ def _table(random: Random, folder: Path) -> Path:
 
 
 @contextlib.contextmanager
-def _beginnings_only() -> Iterator[None]:
+def _beginnings_only(*, trains: bool) -> Iterator[None]:
     """While the context lasts, nothing runs: small worlds are built and reset, then `Started` ends the command."""
     build, begin = ForageEnv.__init__, run.LiveRun.__init__
 
@@ -390,8 +392,8 @@ def _beginnings_only() -> Iterator[None]:
             (study_run, "run_study", first_of_study),
         ):
             stack.enter_context(mock.patch.object(owner, name, stub))
-        training = sys.modules.get("swarm_forage_env.training.sb3.training")
-        if training is not None:
+        if trains and find_spec("stable_baselines3"):
+            training = import_module("swarm_forage_env.training.sb3.training")
             stack.enter_context(mock.patch.object(training, "SwarmVecEnv", stop))
         yield
 
