@@ -83,7 +83,7 @@ class NetworkAbout:
         try:
             mapping = parse_json(text)
         except ValueError as error:
-            raise NetworkError(f"Expected a description of a network as JSON, got {text[:80]!r}.") from error
+            raise NetworkError(f"Expected a description of a network as JSON, got {text[:80]!r}: {error}") from error
         if not isinstance(mapping, dict) or not isinstance(mapping.get("interface"), dict):
             raise NetworkError(f"Expected a description of a network with its interface, got {text[:80]!r}.")
         try:

@@ -63,7 +63,7 @@ def test_a_failure_that_names_a_model_is_refused(command, model, tmp_path):
     store.write_failure(RunFailure(spec=spec, error="e", traceback="t"))
     code, _, err = command("rerun", str(store.failure_path(spec.run_id)))
     assert code == 2
-    assert "a model that is named inside a file" in err
+    assert "a model that you did not name yourself" in err
     assert "swarm-forage --trust-models and the same words again" in err
     assert not Path("owned").exists()
 
@@ -76,7 +76,7 @@ def test_a_plan_that_names_a_model_is_refused_before_anything_starts(command, tm
     )
     code, _, err = command("train", "--plan", "plan.toml", "--out", "training")
     assert (code, Path("owned").exists()) == (2, False)
-    assert "a model that is named inside a file" in err
+    assert "a model that you did not name yourself" in err
 
 
 def test_a_study_that_names_a_model_is_refused(command, model, tmp_path):

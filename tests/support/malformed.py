@@ -30,6 +30,7 @@ from swarm_forage_env.cli import app as application
 from swarm_forage_env.cli.ending import DEBUG_VARIABLE
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.pretrained import network_file, plan_file
 from swarm_forage_env.study import ablation, run, runner, study_run
 from swarm_forage_env.study.study_file import find_study
@@ -86,7 +87,7 @@ GOOD_WORDS: dict[str, tuple[str, ...]] = {
     "seeds": ("2", "3"),
     "horizon": ("400", "4", "1000"),
     "caches": ("none", "static", "dynamic"),
-    "settings": ("interval_s=2", "n_objects=20", "physics=compiled", "team=true", "width_m=16", "quirks=none"),
+    "settings": ("interval_s=2", "n_objects=20", "team=true", "width_m=16", "quirks=none"),
     "wrappers": (
         "sensor_noise:sigma=0.03",
         "population:death_per_tick=0.0001",
@@ -363,8 +364,11 @@ def _beginnings_only(*, trains: bool) -> Iterator[None]:
             raise Started(0)
         build(env, config, *given, **named)
 
-    def begin_and_stop(live: run.LiveRun, *given: Any, **named: Any) -> None:
-        begin(live, *given, **named)
+    def begin_and_stop(live: run.LiveRun, stack: Any, policy: Any, seed: int) -> None:
+        if isinstance(policy, LearnedPolicy):
+            begin(live, stack, policy, seed)
+        else:  # a scripted controller refuses nothing then, and compiles for a minute
+            stack.reset_batch(seed)
         raise Started(0)
 
     def first_of(specs: Any, **_: Any) -> None:
