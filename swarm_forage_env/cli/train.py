@@ -72,7 +72,9 @@ def train(  # long: one parameter per option
     processes: Annotated[int, typer.Option(min=0, help="Processes for the arenas; 0 = all in this process.")] = 0,
     resume: Annotated[
         bool,
-        typer.Option("--resume", help="Continue from the checkpoint in --out by its plan (needs --trust-models); --steps adds to it."),
+        typer.Option(
+            "--resume", help="Continue from the checkpoint in --out (needs --trust-models); --steps makes it longer."
+        ),
     ] = False,
 ) -> None:
     """Train one policy that every robot shares, beside evaluations of it and of a scripted controller.

@@ -91,7 +91,7 @@ def check(file: str | Path) -> None:
     typed = _now[-1].typed
     if typed is not None and runs_code(file) and _whole(file) not in typed:
         raise UntrustedModelError(
-            f"Expected leave to open {file}, a model that you did not name yourself: opening it runs code that it holds. "
+            f"Expected leave to open {file}, a model that you did not name yourself: opening it runs code in it. "
             f"If you trust it: swarm-forage {TRUST_OPTION} and the same words again. A network (.npz) needs no trust."
         )
 

@@ -1,6 +1,6 @@
 """What files promise: those of an earlier day are read, and those of another version are refused, never guessed at.
 
-`tests/files` holds one small file of each kind, as it was written then. It is written anew only when a version is raised.
+`tests/files` holds one small file of each kind, as it was written then. It is made anew only when a version is raised.
 """
 
 import json
@@ -41,7 +41,7 @@ def test_a_failure_of_an_earlier_day_is_read(tmp_path):
     content = json.loads((FILES / "failure.json").read_text(encoding="utf-8"))
     content["spec"]["scenario"]["gravity"] = 1.0
     (tmp_path / "a.json").write_text(json.dumps(content), encoding="utf-8")
-    with pytest.raises(RecordError, match="Unknown key 'scenario.gravity'"):
+    with pytest.raises(RecordError, match=r"Unknown key .*gravity"):
         read_failure(tmp_path / "a.json")
 
 
