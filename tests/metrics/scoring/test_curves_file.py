@@ -280,7 +280,7 @@ def test_columns_of_types_that_no_curve_has_are_refused(tmp_path, column, kind):
 @pytest.mark.parametrize("kind", ["lists", "bytes", "dates", "escape sequences"])
 def test_names_of_types_that_no_name_has_are_refused(tmp_path, kind):
     odd = CROWDING.with_columns(COLUMNS_OF_ODD_TYPES[kind](len(CROWDING)).alias("controller"))
-    with pytest.raises(CurveError, match="Expected .*text.* in column controller of "):
+    with pytest.raises(CurveError, match=r"Expected .*text.* in column controller of "):
         score_curves(written(odd, tmp_path / "odd.parquet"))
 
 
