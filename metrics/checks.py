@@ -8,6 +8,9 @@ from collections.abc import Sequence
 from operator import index
 from typing import get_args
 
+MOST_SEEDS = 100_000
+"""Runs of one kind that may be asked for; our choice: five hundred times those of the paper."""
+
 
 class CurveError(ValueError):
     """A curve or a swarm size that a measure cannot work with."""
@@ -161,12 +164,14 @@ def chosen_seeds(seeds: int | Sequence[int] | None, default: int) -> tuple[int, 
     """Return seeds: the first `seeds` ones if it is a number, `seeds` itself if it is a list, `default` many for None.
 
     Raises:
-        ValueError: No seed, or the same seed twice.
+        ValueError: No seed, too many, or the same seed twice.
     """
     if seeds is None or isinstance(seeds, int):
         count = default if seeds is None else seeds
         if count < 1:
             raise ValueError(f"Expected one or more seeds, got {count}.")
+        if count > MOST_SEEDS:
+            raise ValueError(f"Expected at most {MOST_SEEDS:,} seeds, got {count}.")
         return tuple(range(count))
     if not seeds or len(set(seeds)) < len(seeds):
         raise ValueError(f"Expected different seeds, at least one, got {list(seeds)}.")

@@ -20,6 +20,13 @@ from .studies import RunCurves, StudyCurves
 if TYPE_CHECKING:
     import polars as pl
 
+MOST = 1e15
+"""Largest number in a table; our choice: sums of squares of such numbers are finite, and whole ones are exact."""
+MOST_ROBOTS = 10_000_000
+"""Largest swarm in a table; our choice: some measures need an array of this length."""
+_UNSEEN = r"[\p{Cc}\p{Cf}]"
+"""Characters that steer a terminal or the direction of writing, which a name must not."""
+
 
 def study_curves(frame: "pl.DataFrame", *, where: str = "the table", controller: str = "") -> tuple[StudyCurves, ...]:
     """Turn a table of curves into arrays, one study per policy in it.
@@ -75,14 +82,21 @@ def _checked_column(frame: "pl.DataFrame", name: str, where: str) -> "pl.Series"
     import polars as pl
 
     column, given = CURVE_COLUMNS[name], frame[name]
+    if not _is_plain(given.dtype):
+        wanted = "texts" if column.kind == "text" else "numbers"
+        raise CurveError(f"Expected {wanted} in column {name} of {where}, got values of type {given.dtype}.")
+    if isinstance(given.dtype, pl.Categorical | pl.Enum):
+        given = given.cast(pl.String)
     if column.kind == "text":
         values = given.cast(pl.String)
         _refuse(values, values.is_null(), name, where, "a text")
+        _refuse(values, values.str.contains(_UNSEEN), name, where, "a text without control characters")
         return values
     values = given.cast(pl.Float64, strict=False)
     unread = values.is_null() & (pl.repeat(True, len(given), eager=True) if column.is_required else given.is_not_null())
     _refuse(given, unread | values.is_nan().fill_null(False), name, where, "a number")
     _refuse(given, values.is_infinite().fill_null(False), name, where, "a finite number")
+    _refuse(given, (values.abs() > MOST).fill_null(False), name, where, f"a number of at most {MOST:g} in size")
     if column.kind == "whole":
         _refuse(given, (values != values.floor()) | (values < 0), name, where, "a whole number >= 0")
         return values.cast(pl.Int64)
@@ -91,6 +105,13 @@ def _checked_column(frame: "pl.DataFrame", name: str, where: str) -> "pl.Series"
     if column.kind == "fraction":
         _refuse(given, (values > 1 + FRACTION_TOLERANCE).fill_null(False), name, where, "a fraction in [0, 1]")
     return values
+
+
+def _is_plain(kind: "pl.DataType") -> bool:
+    """Whether a column holds one text or number per row, and no bytes, dates, lists or tables."""
+    import polars as pl
+
+    return kind.is_numeric() or isinstance(kind, pl.String | pl.Categorical | pl.Enum | pl.Boolean | pl.Null)
 
 
 def _refuse(given: "pl.Series", is_bad: "pl.Series", name: str, where: str, wanted: str) -> None:
@@ -126,8 +147,8 @@ def _runs(frame: "pl.DataFrame", whose: str) -> RunCurves:
     frame = frame.sort("seed", "interval")
     first = frame.row(0, named=True)
     criterion, value, n_robots = first["criterion"], float(first["criterion_value"]), int(first["n_robots"])
-    if n_robots < 1:
-        raise CurveError(f"Expected n_robots >= 1 in {whose}, got {n_robots}.")
+    if not 1 <= n_robots <= MOST_ROBOTS:
+        raise CurveError(f"Expected n_robots from 1 to {MOST_ROBOTS:,} in {whose}, got {n_robots}.")
     if criterion == SIZE and value not in (0.0, float(n_robots)):
         raise CurveError(
             f"Expected criterion_value = n_robots for criterion {SIZE} of {whose}, got {value:g} and {n_robots}."

@@ -12,6 +12,7 @@ from metrics.statistics import Summary
 from .columns import NOISE, POPULATION, SIZE, THROTTLE
 from .measures import MEASURE_CRITERIA
 from .table import Score, ScoreTable
+from .texts import unread
 
 Panel: TypeAlias = Any
 """An `Axes` of matplotlib, whose types leave too much open for strict checking."""
@@ -62,7 +63,7 @@ def draw_scores(tables: Sequence[ScoreTable], path: str | Path, *, band: bool = 
     figure.legend(handles, labels, loc="outside lower center", ncols=len(tables), frameon=False)
     where = next((table.scenario for table in tables if table.scenario), "")
     words = "mean and 95 % interval over seeds" + ("; shaded: mean ± 2 sd of runs" if band else "")
-    figure.suptitle(f"{where + ': ' if where else ''}{words}; dotted: noise floor; hollow: misleads")
+    figure.suptitle(f"{unread(where) + ': ' if where else ''}{words}; dotted: noise floor; hollow: misleads")
     figure.savefig(path, dpi=150)
 
 
@@ -110,7 +111,7 @@ def _draw_panel(panel: Panel, content: _Content, tables: Sequence[ScoreTable], *
         shift = 0.08 * (index - 0.5 * (len(tables) - 1))
         scores = content.scores(table)
         x = [places.index(score.x) + shift for score in scores]
-        _draw_policy(panel, content, scores, x, COLOURS[index % len(COLOURS)], table.policy, band=band)
+        _draw_policy(panel, content, scores, x, COLOURS[index % len(COLOURS)], unread(table.policy), band=band)
     if about.neutral is not None and not about.is_distance and first.variant == "corrected":
         panel.axhline(about.neutral, color="0.6", linewidth=0.8, zorder=0)
     arrow = "higher" if about.higher_is_better else "lower"

@@ -9,6 +9,7 @@ import numpy as np
 
 from .plots import COLOURS, PANELS_PER_ROW, Panel
 from .prediction import PredictionTable
+from .texts import unread
 
 
 def draw_predictions(tables: Sequence[PredictionTable], path: str | Path) -> None:
@@ -59,6 +60,6 @@ def _draw_table(panel: Panel, table: PredictionTable, colour: str) -> None:
     panel.set_ylim(bottom=0.0)
     panel.set_xlabel("robots", fontsize=8)
     panel.set_ylabel(table.unit, fontsize=8)
-    panel.set_title(f"{table.policy}{' in ' + table.scenario if table.scenario else ''}", fontsize=9)
+    panel.set_title(unread(f"{table.policy}{' in ' + table.scenario if table.scenario else ''}"), fontsize=9)
     panel.tick_params(labelsize=8)
     panel.grid(alpha=0.3)

@@ -15,7 +15,7 @@ from metrics.statistics import Summary, aggregate
 from .columns import SIZE
 from .figure_panels import StudyPanel, StudyPanels
 from .plots import COLOURS, PANELS_PER_ROW, X_LABELS, Panel
-from .texts import number
+from .texts import number, unread
 
 if TYPE_CHECKING:
     import polars as pl
@@ -111,7 +111,7 @@ def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci"
         place.set_axis_off()
     handles, labels = axes[0].get_legend_handles_labels()
     picture.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 8), frameon=False, fontsize=9)
-    picture.suptitle(f"{figure.title}\nshaded: {_BANDS[band]}; dots: runs", fontsize=10)
+    picture.suptitle(f"{unread(figure.title)}\nshaded: {_BANDS[band]}; dots: runs", fontsize=10)
     _save(picture, figure.name, paths)
 
 
@@ -144,15 +144,15 @@ def draw_map(figure: StudyFigure, paths: Sequence[Path]) -> None:
         for (row, column), value in np.ndenumerate(means[policy]):
             colour = "black" if value > (low + high) / 2.0 else "white"
             place.text(column, row, number(value), ha="center", va="center", fontsize=6, color=colour)
-        place.set_title(policy, fontsize=9)
+        place.set_title(unread(policy), fontsize=9)
         place.set_xticks(range(len(first.x)), [f"{value:.3g}" for value in first.levels], rotation=45)
         place.set_xlabel(_x_label(first), fontsize=8)
         place.tick_params(labelsize=7)
     ((axis, _),) = first.others.items()
-    axes[0].set_yticks(range(len(figure.panels)), [_words(panel.others[axis]) for panel in figure.panels])
+    axes[0].set_yticks(range(len(figure.panels)), [unread(_words(panel.others[axis])) for panel in figure.panels])
     axes[0].set_ylabel(axis.replace("_", " "), fontsize=8)
     picture.colorbar(image, ax=axes, label=first.unit).ax.tick_params(labelsize=7)
-    picture.suptitle(f"{figure.title}\nmeans of runs", fontsize=10)
+    picture.suptitle(f"{unread(figure.title)}\nmeans of runs", fontsize=10)
     _save(picture, f"{figure.name}_map", paths)
 
 
@@ -170,8 +170,8 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
         dots = np.repeat(2.0**beside if is_log else beside, scores.shape[1])
         (marks,) = place.plot(dots, scores.ravel(), ".", markersize=4, color=colour, alpha=0.35, zorder=2.5)
         marks.set_rasterized(are_many)
-        marker = MARKERS[index % len(MARKERS)]
-        place.plot(panel.levels, mean, color=colour, marker=marker, markersize=4, linewidth=1.6, label=policy, zorder=3)
+        marker, name = MARKERS[index % len(MARKERS)], unread(policy)
+        place.plot(panel.levels, mean, color=colour, marker=marker, markersize=4, linewidth=1.6, label=name, zorder=3)
         place.fill_between(panel.levels, lower, upper, color=colour, alpha=0.2, linewidth=0.0, zorder=2)
         if len(panel.levels) == 1:  # a band has no width there
             place.vlines(panel.levels, lower, upper, color=colour, linewidth=3.0, alpha=0.4, zorder=2)
@@ -184,7 +184,7 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
         place.minorticks_off()
     if panel.others:
         words = ", ".join(f"{name.replace('_', ' ')} {_words(value)}" for name, value in panel.others.items())
-        place.set_title(words, fontsize=9)
+        place.set_title(unread(words), fontsize=9)
     place.set_xlabel(_x_label(panel), fontsize=8)
     place.set_ylabel(panel.unit, fontsize=8)
     place.tick_params(labelsize=8)

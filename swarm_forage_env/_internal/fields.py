@@ -16,10 +16,16 @@ from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, cast
 
+from swarm_forage_env._internal.printable import is_printable, shown
 from swarm_forage_env._internal.spelling import suggestion
 
 MAX_NAME = 60
 """Longest name that files are named by (our choice: with four bytes a character, endings still fit into 255 bytes)."""
+MOST = 1e15
+"""Largest number of a configuration, and 1 over it the smallest that has to be above 0; our choice. All that is
+computed of such numbers, ticks and cells and squares, stays far from the ends of float and of 64-bit whole numbers."""
+MOST_SEEDS = 100_000
+"""Runs of one kind that a command or a study may ask for; our choice: five hundred times those of the paper."""
 
 
 class ConfigError(ValueError):
@@ -53,9 +59,13 @@ def number(
         ConfigError: see above.
     """
     is_in_range = _is_number(value) and at_least <= value <= at_most and above < value < below
-    if not is_in_range:
+    is_too_small = above == 0.0 and is_in_range and value < 1.0 / MOST
+    if not is_in_range or is_too_small or abs(value) > MOST:
         wanted = _number_in_range(max(at_least, above), min(at_most, below), above >= at_least, below <= at_most)
-        raise ConfigError(f"Expected {where} to be {wanted}, got {value!r}{_conversion_hint(value, Real, 'float')}.")
+        if is_in_range:
+            wanted += f", no closer to 0 than {1.0 / MOST:g}" if is_too_small else f", at most {MOST:g} in size"
+        hint = _conversion_hint(value, Real, "float")
+        raise ConfigError(f"Expected {where} to be {wanted}, got {shown(value)}{hint}.")
 
 
 def whole(
@@ -75,11 +85,13 @@ def whole(
     """
     if or_none and value is None:
         return
-    is_whole = isinstance(value, int) and not isinstance(value, bool)
-    if not (is_whole and _is_between(value, at_least, at_most)):
+    is_whole = isinstance(value, int) and not isinstance(value, bool) and _is_between(value, at_least, at_most)
+    is_too_large = is_whole and at_most is None and abs(value) > MOST
+    if not is_whole or is_too_large:
         wanted = _whole_in_range(at_least, at_most, or_none)
+        wanted += f", at most {MOST:,.0f} in size" if is_too_large else ""
         hint = _conversion_hint(value, Integral, "int")
-        raise ConfigError(f"Expected {where} to be {wanted}, got {value!r}{hint}.")
+        raise ConfigError(f"Expected {where} to be {wanted}, got {shown(value)}{hint}.")
 
 
 def as_whole(where: str, value: Any, *, at_least: int, at_most: int | None = None, or_none: bool = False) -> int:
@@ -97,20 +109,20 @@ def as_whole(where: str, value: Any, *, at_least: int, at_most: int | None = Non
     """
     is_whole = not isinstance(value, bool) and isinstance(value, Integral)
     if not (is_whole and _is_between(operator.index(value), at_least, at_most)):
-        raise ConfigError(f"Expected {where} to be {_whole_in_range(at_least, at_most, or_none)}, got {value!r}.")
+        raise ConfigError(f"Expected {where} to be {_whole_in_range(at_least, at_most, or_none)}, got {shown(value)}.")
     return operator.index(value)
 
 
 def switch(where: str, value: Any) -> None:
     """Refuse what is neither True nor False."""
     if not isinstance(value, bool):
-        raise ConfigError(f"Expected {where} to be True or False, got {value!r}.")
+        raise ConfigError(f"Expected {where} to be True or False, got {shown(value)}.")
 
 
 def text(where: str, value: Any) -> None:
-    """Refuse what is no text, or an empty one."""
-    if not isinstance(value, str) or not value:
-        raise ConfigError(f"Expected {where} to be a non-empty text, got {value!r}.")
+    """Refuse what is no text, an empty one, or one that no terminal and no file shows as it is."""
+    if not isinstance(value, str) or not value or not is_printable(value):
+        raise ConfigError(f"Expected {where} to be a non-empty text without control characters, got {shown(value)}.")
 
 
 def file_name(where: str, value: Any) -> None:
@@ -136,7 +148,7 @@ def pair(where: str, value: Any) -> None:
     """Refuse what is no tuple (x, y) of numbers > 0."""
     parts = _parts(value)
     if len(parts) != 2:
-        raise ConfigError(f"Expected {where} to be (x, y), got {value!r}.")
+        raise ConfigError(f"Expected {where} to be (x, y), got {shown(value)}.")
     for index, part in enumerate(parts):
         number(f"{where}[{index}]", part, above=0.0)
 
@@ -145,13 +157,13 @@ def shares(where: str, value: Any) -> None:
     """Refuse what is no tuple of positive numbers that sum to 1."""
     parts = _parts(value)
     if not all(_is_number(part) and part > 0 for part in parts) or abs(sum(parts) - 1.0) >= 1e-9:
-        raise ConfigError(f"Expected {where} to be positive shares that sum to 1, got {value!r}.")
+        raise ConfigError(f"Expected {where} to be positive shares that sum to 1, got {shown(value)}.")
 
 
 def several(where: str, value: Any, what: str) -> None:
     """Refuse what is no tuple, or an empty one; `what` names its members, for the message."""
     if not _parts(value):
-        raise ConfigError(f"Expected {where} to be one or more {what}, got {value!r}.")
+        raise ConfigError(f"Expected {where} to be one or more {what}, got {shown(value)}.")
 
 
 def one_of(where: str, value: Any, known: Iterable[str]) -> None:
@@ -159,20 +171,20 @@ def one_of(where: str, value: Any, known: Iterable[str]) -> None:
     words = tuple(known)
     if not isinstance(value, str) or value not in words:
         hint = suggestion(str(value).lower(), words)
-        raise ConfigError(f"Expected {where} to be one of {', '.join(words)}, got {value!r}.{hint}")
+        raise ConfigError(f"Expected {where} to be one of {', '.join(words)}, got {shown(value)}.{hint}")
 
 
 def instance(where: str, value: Any, kind: type, *, hint: str = "") -> None:
     """Refuse what is no instance of `kind`; `hint` follows what was given and says what to do."""
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        raise ConfigError(f"Expected {where} to be {article} {kind.__name__}, got {value!r}{hint}.")
+        raise ConfigError(f"Expected {where} to be {article} {kind.__name__}, got {shown(value)}{hint}.")
 
 
 def table(where: str, value: Any) -> Mapping[str, Any]:
     """Return a mapping as it is; anything else is refused."""
     if not isinstance(value, Mapping):
-        raise ConfigError(f"Expected {where} to be a table of values by name, got {value!r}.")
+        raise ConfigError(f"Expected {where} to be a table of values by name, got {shown(value)}.")
     return cast("Mapping[str, Any]", value)
 
 

@@ -46,7 +46,7 @@ def ablate(  # long: one parameter per option
     from dataclasses import replace
     from pathlib import Path
 
-    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
     from swarm_forage_env.cli.ablation_report import ablation_json, ablation_pages
     from swarm_forage_env.cli.interrupts import resumable
     from swarm_forage_env.cli.report import estimated_seconds, plan_note
@@ -57,6 +57,7 @@ def ablate(  # long: one parameter per option
     from swarm_forage_env.study.runner import available_cores
     from swarm_forage_env.study.store import RunStore
 
+    whole("--seeds", seeds, at_least=2, at_most=MOST_SEEDS)
     sizes = split_numbers("--robots", robots, int)
     told = ScenarioOptions(
         scenario="",

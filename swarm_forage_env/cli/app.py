@@ -5,6 +5,7 @@ A command has a file of its own and imports what it needs when it runs, so that 
 
 import sys
 import warnings
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import typer
@@ -14,8 +15,9 @@ from swarm_forage_env.cli.availability import availability
 from swarm_forage_env.cli.choose import choose
 from swarm_forage_env.cli.compare import compare
 from swarm_forage_env.cli.curves import curves
+from swarm_forage_env.cli.ending import end
 from swarm_forage_env.cli.maps import maps
-from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_TERMINATED, EXIT_USAGE, complain
+from swarm_forage_env.cli.options import EXIT_INTERRUPTED, EXIT_TERMINATED, complain
 from swarm_forage_env.cli.predict import predict
 from swarm_forage_env.cli.record import record
 from swarm_forage_env.cli.replay import replay
@@ -26,11 +28,10 @@ from swarm_forage_env.cli.score import score
 from swarm_forage_env.cli.show import info, list_everything, schema
 from swarm_forage_env.cli.stuck import stuck
 from swarm_forage_env.cli.study import study
+from swarm_forage_env.cli.terminal import show_any_text
 from swarm_forage_env.cli.train import train
+from swarm_forage_env.cli.trusting import trust_of
 from swarm_forage_env.cli.watch import watch
-
-_USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
-"""Base of typer's complaints about arguments; typer gives it no public name."""
 
 app = typer.Typer(
     help="Swarm foraging: run, film, train and score policies, inspect scenarios.",
@@ -45,7 +46,18 @@ app = typer.Typer(
 def _options(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+    trust_models: Annotated[
+        bool,
+        typer.Option(
+            "--trust-models",
+            help="Also open models (.zip) that files name: opening one runs code that it holds (SECURITY.md).",
+        ),
+    ] = False,
 ) -> None:
+    if trust_models:
+        from swarm_forage_env.policies.trust import trusting
+
+        context.with_resource(trusting())
     if version:
         from importlib.metadata import version as installed_version
 
@@ -76,9 +88,10 @@ def _show_warning(message: Warning | str, category: type[Warning], *rest: Any) -
 
 
 def main() -> None:
-    """Run the command line and exit; an error of the user is one line on stderr."""
+    """Run the command line and exit; an error is one line on stderr, and `ending` says which exit code it has."""
     from swarm_forage_env.cli.interrupts import terminated_as_interrupted
 
+    show_any_text()
     with terminated_as_interrupted() as came:
         code = _outcome()
     if came and code == EXIT_INTERRUPTED:
@@ -86,26 +99,25 @@ def main() -> None:
     sys.exit(code)
 
 
-def _outcome() -> int | None:
+def _outcome() -> int | str | None:
     """Carry out the command and return its exit code."""
-    from swarm_forage_env._internal.fields import ConfigError
-    from swarm_forage_env.study.record import RecordError
-    from swarm_forage_env.study.runner import WorkerError
-
     try:
-        with warnings.catch_warnings():
+        _refuse_unreadable(sys.argv[1:])
+        with trust_of(sys.argv[1:]), warnings.catch_warnings():
             warnings.showwarning = _show_warning
             return app(standalone_mode=False)
-    except _USAGE_ERROR as error:
-        return complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined] - see _USAGE_ERROR
-    except (ConfigError, RecordError) as error:
-        return complain(str(error), EXIT_USAGE)
-    except OSError as error:
-        named = f"{error.strerror}: {error.filename}" if error.strerror and error.filename else str(error)
-        return complain(named, EXIT_FAILURE)
-    except (ImportError, WorkerError) as error:
-        return complain(str(error), EXIT_FAILURE)
-    except MemoryError as error:
-        return complain(f"Memory ran out: {error or 'no more could be had'}.", EXIT_FAILURE)
-    except (KeyboardInterrupt, typer.Abort):
-        return complain("interrupted", EXIT_INTERRUPTED)
+    except SystemExit as ending:
+        return ending.code
+    except BaseException as error:  # noqa: BLE001 - the last guard: whatever happens ends in one line
+        return end(error)
+
+
+def _refuse_unreadable(words: Sequence[str]) -> None:
+    """Refuse words that are no text: records, pages and pictures could not hold such a name."""
+    for word in words:
+        try:
+            word.encode("utf-8")
+        except UnicodeEncodeError as error:
+            raise typer.BadParameter(
+                f"Expected words in UTF-8, got {word!r}; rename the file, or check the locale of the terminal."
+            ) from error

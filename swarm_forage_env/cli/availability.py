@@ -54,7 +54,7 @@ def availability(
             draw_availability(out, curves, means)
         except ImportError as error:
             raise ImportError(NO_PICTURE) from error
-        notes().print(f"picture {out}", markup=False)
+        notes().print(f"picture {out}")
 
 
 def _mean_at_work(n: int, team: float) -> float:

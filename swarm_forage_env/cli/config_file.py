@@ -1,10 +1,10 @@
 """What `--config FILE.toml` says: fields of the scenario and wrappers, one table each."""
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swarm_forage_env._internal.fields import ConfigError, table
+from swarm_forage_env._internal.parsing import parse_toml
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
 if TYPE_CHECKING:
@@ -24,12 +24,11 @@ def read_config(path: Path) -> "tuple[dict[str, Any], tuple[WrapperConfig, ...]]
         ConfigError: not readable, no TOML, or tables that no wrapper has or refuses; names the file.
     """
     try:
-        with path.open("rb") as file:
-            tables = tomllib.load(file)
+        tables = parse_toml(path.read_text(encoding="utf-8"))
         fields = table("scenario", tables.pop("scenario", {}))
         wrappers = wrappers_from_mapping(tables)
     except OSError as error:
         raise ConfigError(f"Cannot use {path}: {error.strerror or error}.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, ConfigError) as error:
+    except ValueError as error:
         raise ConfigError(f"Cannot use {path}: {error}") from error
     return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}, wrappers

@@ -66,4 +66,4 @@ def write_maps(every: "Sequence[FloorMaps]", picture: Path, *, per: str = "") ->
     try:
         draw_maps(picture, [(one.label, one.arrays, one.is_difference, one.size_m) for one in every], titles)
     except ImportError:
-        notes().print(NO_PICTURE, markup=False)
+        notes().print(NO_PICTURE)

@@ -7,9 +7,12 @@ from typing import Annotated
 import typer
 
 from swarm_forage_env._internal.extras import install_command
+from swarm_forage_env._internal.printable import printable
 
 EXIT_FAILURE = 1
 EXIT_USAGE = 2
+EXIT_UNFORESEEN = 70
+"""What sysexits.h calls an internal software error."""
 EXIT_INTERRUPTED = 130
 """Exit code that shells report for a program ended by Ctrl-C."""
 EXIT_TERMINATED = 143
@@ -92,7 +95,7 @@ def no_picture(path: Path, error: OSError) -> str:
 
 def complain(message: str, code: int) -> int:
     """Print one line on stderr; returns `code`."""
-    typer.echo("swarm-forage: " + " ".join(message.split()), err=True)
+    typer.echo("swarm-forage: " + printable(" ".join(message.split())), err=True)
     return code
 
 

@@ -166,7 +166,6 @@ def _recorded(spec: "RunSpec", stored: "RunRecord | None", seconds: float | None
         notes().print(
             f"The run {spec.run_id} comes out different from its record, which other versions made; "
             "the replay shows the run as it is now.",
-            markup=False,
         )
     return made
 
@@ -176,8 +175,8 @@ def _bar(text: str) -> "Iterator[Progress]":
     """Show how much of a run is done, and an estimate of how long the rest will take."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    screen = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    screen = Console(stderr=True, markup=False, emoji=False)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task(text)
         yield lambda done, total: bar.update(task, completed=done, total=total)

@@ -124,9 +124,9 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
             draw_performance(specs, result.records, plot)
         except ImportError:
             plot = None
-            aside.print(NO_PICTURE, markup=False)
+            aside.print(NO_PICTURE)
         except OSError as error:  # the table is worth more than its picture
-            aside.print(no_picture(plot, error), markup=False)
+            aside.print(no_picture(plot, error))
             plot = None
     if as_json:
         typer.echo(results_json(specs, result, store, plot))
@@ -136,7 +136,7 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
             f"{counted(len(result.records), 'record')} in {store.folder}" + (f", picture {plot}" if plot else "")
         )
     for failure in result.failures:
-        aside.print(f"failed: {failure.spec.describe()}: {failure.error}", markup=False)
-        aside.print(f"  again, alone: swarm-forage rerun {store.failure_path(failure.run_id)}", markup=False)
+        aside.print(f"failed: {failure.spec.describe()}: {failure.error}")
+        aside.print(f"  again, alone: swarm-forage rerun {store.failure_path(failure.run_id)}")
     if result.failures:
         raise typer.Exit(EXIT_FAILURE)

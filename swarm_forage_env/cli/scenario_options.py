@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.policies.registry import split_interface
@@ -200,6 +200,7 @@ def plan_runs(
         ConfigError: see `build_scenario` and `read_config`; an unknown policy or wrapper, or a policy file that
             cannot be opened.
     """
+    whole("--seeds", n_seeds, at_least=1, at_most=MOST_SEEDS)
     config, caches, wrappers = described_world(options)
     try:
         planned = [plan_run(config, name, caches=caches, wrappers=wrappers) for name in policies]

@@ -72,7 +72,7 @@ def stuck(
     if not found:
         typer.echo(f"nobody is stuck in {len(specs)} run{'s' * (len(specs) > 1)}")
         return
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False, emoji=False)
     if not console.is_terminal:
         console.width = 200
     console.print(_table(found))

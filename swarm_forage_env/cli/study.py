@@ -92,7 +92,7 @@ def run(  # long: one parameter per option
         raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None
     if part == (1, 1):
         packed = _pack(folder.folder, None)
-        notes().print(f"packed into {packed}", markup=False)
+        notes().print(f"packed into {packed}")
     typer.echo(state_report(state, folder))
     if state.count(FAILED):
         raise typer.Exit(EXIT_FAILURE)

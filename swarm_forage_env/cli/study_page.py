@@ -54,7 +54,7 @@ def report(
         raise ImportError(NO_REPORT) from error
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(text, encoding="utf-8")
-    notes().print(f"written {out}", markup=False)
+    notes().print(f"written {out}")
 
 
 class Verdicts(NamedTuple):

@@ -68,7 +68,7 @@ def plan_report(spec: StudySpec, folder: StudyFolder, part: tuple[int, int], wor
     states = folder.state(planned).states
     todo = {run_id: run for run_id, run in planned.items() if states[run_id] != DONE}
     aside = notes()
-    costs = calibrate(todo.values(), tell=lambda line: aside.print(line, markup=False))
+    costs = calibrate(todo.values(), tell=aside.print)
     labels = {run.run_id: cell.policy for cell in spec.cells for run in spec.specs_of(cell)}
     by_policy: dict[str, list[RunSpec]] = {}
     for run_id, run in todo.items():

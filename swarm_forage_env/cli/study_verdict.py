@@ -56,7 +56,7 @@ def verdict(
     if json_file is not None:
         json_file.parent.mkdir(parents=True, exist_ok=True)
         json_file.write_text(verdict_json(tables, judged, waiting, expected, expected_later) + "\n", encoding="utf-8")
-        notes().print(f"written {json_file}", markup=False)
+        notes().print(f"written {json_file}")
 
 
 def scored_studies(tables: "Sequence[StudyTable]", variants: "Sequence[Variant]") -> "list[StudyPanels]":
@@ -66,7 +66,7 @@ def scored_studies(tables: "Sequence[StudyTable]", variants: "Sequence[Variant]"
 
     scored: list[StudyPanels] = []
     for table in tables:
-        notes().print(f"scoring {table.spec.name}", markup=False)
+        notes().print(f"scoring {table.spec.name}")
         scored.append(study_panels(table, variants))
     return scored
 

@@ -80,14 +80,17 @@ def train(  # long: one parameter per option
     processes: Annotated[int, typer.Option(min=0, help="Processes for the arenas; 0 = all in this process.")] = 0,
     resume: Annotated[
         bool,
-        typer.Option("--resume", help="Continue from the checkpoint in --out by its plan; --steps makes it longer."),
+        typer.Option(
+            "--resume", help="Continue from the checkpoint in --out (needs --trust-models); --steps makes it longer."
+        ),
     ] = False,
 ) -> None:
     """Train one policy that every robot shares, beside evaluations of it and of a scripted controller.
 
     Rewards are fields of the scenario. Where deliveries count, training sets nest_progress=0.05 and first_pickup=1
     unless --set or --config do, and begins in a smaller arena: deliveries alone are too rare to learn from. plan.json
-    holds all that was chosen. Ctrl-C keeps a checkpoint; --out FOLDER --resume goes on.
+    holds all that was chosen. Ctrl-C keeps a checkpoint; swarm-forage --trust-models train --out
+    FOLDER --resume goes on.
     """
     from swarm_forage_env.cli.scenario_options import ScenarioOptions
     from swarm_forage_env.cli.training_plan import TrainOptions, build_plan, named_plan, resumed_plan

@@ -31,13 +31,13 @@ def run_training(plan: TrainingPlan, folder: Path, *, n_processes: int, resume: 
     """
     from swarm_forage_env.training.sb3.training import MODEL_FILE, train
 
-    console = Console(stderr=True, highlight=False)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    console = Console(stderr=True, highlight=False, markup=False, emoji=False)
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         try:
             result = train(plan, folder, n_processes=n_processes, resume=resume, report=_reporter(plan, bar))
         except KeyboardInterrupt:
-            bar.console.print(_farewell(folder, is_kept=(folder / MODEL_FILE).exists()), soft_wrap=True, markup=False)
+            bar.console.print(_farewell(folder, is_kept=(folder / MODEL_FILE).exists()), soft_wrap=True)
             raise
     if not result.steps:
         console.print(
@@ -51,7 +51,7 @@ def run_training(plan: TrainingPlan, folder: Path, *, n_processes: int, resume: 
 
 def _farewell(folder: Path, *, is_kept: bool) -> str:
     if is_kept:
-        return f"Stopped. To go on: swarm-forage train --out {folder} --resume"
+        return f"Stopped. To go on: swarm-forage --trust-models train --out {folder} --resume"
     return "Stopped before there was anything to keep; the same command starts again."
 
 
@@ -69,7 +69,7 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
             ylabel=f"{quantity(plan.scenario.performance).title} per 1,000 s",
         )
     except ImportError:
-        console.print(NO_PICTURE, markup=False)
+        console.print(NO_PICTURE)
         return None
     except OSError as error:  # the training is worth more than its picture
         console.print(no_picture(path, error), markup=False)

@@ -7,7 +7,9 @@ wherever the name of a policy may.
 import hashlib
 import pickle
 import warnings
+import zipfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -16,9 +18,11 @@ import numpy as np
 from gymnasium import spaces
 
 from swarm_forage_env._internal.extras import install_command
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, table
+from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
+from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.interface import (
     GivenInterface,
     InterfaceConfig,
@@ -26,12 +30,16 @@ from swarm_forage_env.policies.interface import (
     interface_from_mapping,
 )
 from swarm_forage_env.policies.learned import LearnedPolicy, Remember
-from swarm_forage_env.policies.network import Network, NetworkPolicy
+from swarm_forage_env.policies.network import BROKEN_ARCHIVE, Network, NetworkPolicy
 from swarm_forage_env.scenarios.config import CACHE_KINDS
 
 MODEL_NOTE = "swarm_forage_note"
 """Attribute of a model, saved with it: {"interface": fields, "caches": kind}, which its spaces do not show."""
 _DIGEST_DIGITS = 16
+_DESCRIPTION = "data"
+"""Part of a model file in which stable-baselines3 keeps all but the weights, as JSON with pickles in it."""
+_MOST_DESCRIPTION = 2**26
+"""Bytes; our choice, a model of ours has a thousandth of it."""
 MODEL_FAULTS = (
     ValueError,
     LookupError,
@@ -186,6 +194,36 @@ def open_network(path: str | Path, *, digest: str | None = None, interface: Give
     return NetworkPolicy(Network.load(path))
 
 
+@dataclass(frozen=True, slots=True)
+class ModelOutside:
+    """What a model file shows without being opened."""
+
+    caches: str | None
+    """Kind of caches that its note states; None without a note."""
+
+
+def look_at_model(path: str | Path) -> ModelOutside:
+    """Return what a model file shows without being opened: nothing in it is run.
+
+    Raises:
+        ModelError: the file is missing, holds no model, or a note that cannot be used.
+    """
+    file = Path(path)
+    try:
+        with zipfile.ZipFile(file) as archive:
+            size = archive.getinfo(_DESCRIPTION).file_size
+            if size > _MOST_DESCRIPTION:
+                raise ModelError(f"Expected {path} to describe itself in {_MOST_DESCRIPTION:,} bytes, got {size:,}.")
+            about = table("the description of the model", parse_json(archive.read(_DESCRIPTION).decode("utf-8")))
+    except OSError as error:
+        raise ModelError(f"Cannot read the policy file {path}: {error.strerror or error}.") from error
+    except (*BROKEN_ARCHIVE, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise ModelError(f"Expected {path} to be a model saved by stable-baselines3: {reason}.") from error
+    note = about.get(MODEL_NOTE)
+    return ModelOutside(caches=None if note is None else _read_note(note, file)[1])
+
+
 def file_digest(path: str | Path) -> str:
     """Return a short hash of a policy file, which makes its content part of a run's identity.
 
@@ -231,6 +269,7 @@ def _open_model(path: str, digest: str) -> tuple[Any, Any]:  # noqa: ARG001 - wi
     except ImportError as error:
         raise ImportError(f"The model {path} needs stable-baselines3: {install_command('train')}.") from error
 
+    trust.tell(path)
     try:
         data, parameters, _ = load_from_zip_file(path, device="cpu")
         if data is None:

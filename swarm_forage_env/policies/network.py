@@ -8,6 +8,8 @@ import dataclasses
 import io
 import itertools
 import json
+import math
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -20,6 +22,7 @@ from gymnasium import spaces
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, table
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
@@ -29,8 +32,12 @@ from swarm_forage_env.scenarios.config import CACHE_KINDS
 ACTIVATIONS = ("tanh", "relu")
 _ARCHIVE = b"PK\x03\x04"
 """First bytes of a zip file, which an `.npz` is."""
-_BROKEN = (ValueError, LookupError, TypeError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error)
-"""Errors that numpy and zipfile raise for a file that is damaged or not an archive."""
+BROKEN_ARCHIVE = (LookupError, TypeError, EOFError, OSError, RuntimeError, zipfile.BadZipFile, zlib.error)
+"""Errors that zipfile raises for a file that is damaged or not an archive, besides ValueError."""
+_BROKEN = (*BROKEN_ARCHIVE, ValueError, tokenize.TokenError, SyntaxError, OverflowError)
+"""The same, and those of numpy over the header of an array."""
+_MOST_BYTES = 2**28
+"""Bytes that a network may have, in the file and unpacked; our choice: a network of ours has a thousandth of it."""
 _LAYER_PARTS = ("weight", "bias")
 
 
@@ -74,9 +81,9 @@ class NetworkAbout:
             NetworkError: not a JSON object, unknown or missing keys, or values that make no sense.
         """
         try:
-            mapping = json.loads(text)
-        except json.JSONDecodeError as error:
-            raise NetworkError(f"Expected a description of a network as JSON, got {text[:80]!r}.") from error
+            mapping = parse_json(text)
+        except ValueError as error:
+            raise NetworkError(f"Expected a description of a network as JSON, got {text[:80]!r}: {error}") from error
         if not isinstance(mapping, dict) or not isinstance(mapping.get("interface"), dict):
             raise NetworkError(f"Expected a description of a network with its interface, got {text[:80]!r}.")
         try:
@@ -164,10 +171,9 @@ class Network:
             OSError: the file cannot be read.
             NetworkError: it does not hold a network.
         """
-        content = Path(path).read_bytes()
         try:
-            stored = _parts(content)
-            n_layers = sum(name.startswith("weight_") for name in stored)
+            stored = _parts(_content(Path(path)))
+            n_layers = sum(name.startswith("weight_") for name in stored.namelist())
             weights = tuple(_part(stored, f"weight_{k}") for k in range(n_layers))
             biases = tuple(_part(stored, f"bias_{k}") for k in range(n_layers))
             return cls(weights, biases, NetworkAbout.from_json(str(_part(stored, "about"))))
@@ -175,23 +181,44 @@ class Network:
             raise NetworkError(f"Expected {path} to hold a network: {error}") from error
 
 
-def _parts(content: bytes) -> Mapping[str, np.ndarray]:
-    """Return the parts of an archive by name, not read yet; `_part` reads one. Both raise NetworkError only."""
+def _content(path: Path) -> bytes:
+    size = path.stat().st_size
+    if size > _MOST_BYTES:
+        raise NetworkError(f"The file has {size:,} bytes; a network may have {_MOST_BYTES:,}.")
+    return path.read_bytes()
+
+
+def _parts(content: bytes) -> zipfile.ZipFile:
+    """Return the archive, its parts not read yet; `_part` reads one. Both raise NetworkError only."""
     if not content:
         raise NetworkError("The file is empty.")
     if not content.startswith(_ARCHIVE):
         raise NetworkError("The file is not an .npz archive.")
     try:
-        return np.load(io.BytesIO(content), allow_pickle=False)
+        archive = zipfile.ZipFile(io.BytesIO(content))
     except _BROKEN as error:
         raise NetworkError("The file is a damaged .npz archive; its table of contents cannot be read.") from error
+    size = sum(part.file_size for part in archive.infolist())
+    if size > _MOST_BYTES:
+        raise NetworkError(f"The archive has {size:,} bytes unpacked; a network may have {_MOST_BYTES:,}.")
+    return archive
 
 
-def _part(stored: Mapping[str, np.ndarray], name: str) -> np.ndarray:
-    if name not in stored:
-        raise NetworkError(f"The archive has no part {name!r}; it is damaged, or holds something else.")
+def _part(stored: zipfile.ZipFile, name: str) -> np.ndarray:
+    """Return an array; its header must agree with its bytes before memory is taken for it."""
     try:
-        return stored[name]
+        about = stored.getinfo(f"{name}.npy")
+    except KeyError as error:
+        raise NetworkError(f"The archive has no part {name!r}; it is damaged, or holds something else.") from error
+    try:
+        with stored.open(about) as file:
+            version = np.lib.format.read_magic(file)
+            readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+            shape, _, dtype = readers[version](file)
+            content = file.read(about.file_size)
+        if dtype.hasobject or math.prod(shape) * dtype.itemsize != len(content):
+            raise ValueError("the header tells of another array than the bytes that follow")
+        return np.load(io.BytesIO(stored.read(about)), allow_pickle=False)
     except _BROKEN as error:
         raise NetworkError(f"Its part {name!r} is damaged, or not a plain array of numbers or text.") from error
 

@@ -14,6 +14,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import Policy, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.policies import trust
 
 POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
 """Entry-point group under which installed packages offer policies by name."""
@@ -109,6 +110,12 @@ def split_interface(policy: str) -> tuple[str, dict[str, Any]]:
     return found["file"], fields
 
 
+def file_of(policy: str) -> str:
+    """Return a policy without the words that may stand behind its file; see `split_interface`. They are not read."""
+    found = _FILE_WITH_WORDS.fullmatch(policy)
+    return policy if found is None else found["file"]
+
+
 @cache  # every run asks, and the answer is in the files of all packages that are installed
 def _installed(group: str) -> tuple[EntryPoint, ...]:
     return tuple(entry_points(group=group))
@@ -125,11 +132,13 @@ def policy_class(name: str) -> Callable[..., Policy]:
 
     Raises:
         ValueError: no installed policy has that name; the message lists the known ones.
+        UntrustedModelError: a file that runs code, and the console command was not told to trust it.
     """
     if name in _LOCAL_POLICIES:
         return _LOCAL_POLICIES[name]
     file, interface = split_interface(name)
     for opener in _openers(file):
+        trust.check(file)
         return partial(opener.load(), file, **({"interface": interface} if interface else {}))
     for point in _installed(POLICY_ENTRY_POINTS):
         if point.name == name:

@@ -13,6 +13,8 @@ from importlib import resources
 from string import Template
 from typing import Any
 
+from swarm_forage_env._internal.parsing import parse_json
+
 SCRIPTS = (
     "theme.js",
     "decode.js",
@@ -69,7 +71,7 @@ def take_page_apart(text: str) -> tuple[dict[str, Any], list[bytes]]:
     if found is None or not text.rstrip().endswith("</html>"):
         raise PageError("it is no replay page or cut short")
     try:
-        header = json.loads(found[1])
+        header = parse_json(found[1])
         blocks = [base64.b64decode(block, validate=True) for block in _DATA.findall(text)]
     except ValueError as error:
         raise PageError(f"its content is damaged ({error})") from error

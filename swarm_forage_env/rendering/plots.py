@@ -48,11 +48,11 @@ def draw_curves(
     marker = "o" if len(t_end_s) == 1 else ""
     for index, curve in enumerate(curves):
         colour = COLOURS[index % len(COLOURS)]
-        axes.plot(t_end_s, curve.mean, color=colour, label=curve.label, marker=marker, clip_on=False)
+        axes.plot(t_end_s, curve.mean, color=colour, label=_unread(curve.label), marker=marker, clip_on=False)
         axes.fill_between(t_end_s, curve.low, curve.high, color=colour, alpha=0.2, linewidth=0)
     has_band = any(np.isfinite(curve.low).any() for curve in curves)
     xlabel = f"time [s] (bands: {band})" if has_band else "time [s]"
-    axes.set(title=title, xlabel=xlabel, ylabel=ylabel, xlim=(0, None), ylim=(0, None))
+    axes.set(title=_unread(title), xlabel=xlabel, ylabel=ylabel, xlim=(0, None), ylim=(0, None))
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)
     figure.savefig(path, dpi=150)
@@ -88,14 +88,14 @@ def draw_trainings(
     colours = iter(COLOURS * len((*trainings, *beside)))
     for label, (steps, performance, interference) in trainings.items():
         millions, colour = np.asarray(steps) / 1e6, next(colours)
-        upper.plot(millions, performance, color=colour, marker="o", label=label)
+        upper.plot(millions, performance, color=colour, marker="o", label=_unread(label))
         lower.plot(millions, interference, color=colour, marker="o")
     for (label, levels), dashes in zip(beside.items(), ("--", "-.", ":", (0, (6, 1))) * len(beside), strict=False):
         colour = next(colours)
         for axes, level in zip((upper, lower), levels, strict=True):
             if np.isfinite(level):
-                axes.axhline(level, color=colour, linestyle=dashes, label=label)
-    upper.set(title=title, ylabel=ylabel, ylim=(0, None))
+                axes.axhline(level, color=colour, linestyle=dashes, label=_unread(label))
+    upper.set(title=_unread(title), ylabel=ylabel, ylim=(0, None))
     lower.set(xlabel="million decisions of single robots (dotted: a new stage)", ylabel="interference", ylim=(0, 1))
     for axes in (upper, lower):
         axes.set_xlim(0, None)
@@ -165,7 +165,7 @@ def draw_maps(
             image = axes.imshow(
                 values, origin="lower", extent=(0, size_m[0], 0, size_m[1]), vmin=low, vmax=top, cmap=colours
             )
-            axes.set_title(f"{label}\n{title}", fontsize=9)
+            axes.set_title(f"{_unread(label)}\n{title}", fontsize=9)
             axes.tick_params(labelsize=7)
             figure.colorbar(image, ax=axes, shrink=bar).ax.tick_params(labelsize=7)
     figure.savefig(path, dpi=110)
@@ -196,7 +196,12 @@ def draw_saliency(
         places = np.arange(len(slices)) + (0.5 * (len(bars) - 1) - index) * height
         axes.barh(places, lengths[order], height, color=COLOURS[index], label=f"{group} robots")
     axes.set_yticks(np.arange(len(slices)), [slices[row].replace("_", " ") for row in map(int, order)])
-    axes.set(title=title, xlabel=xlabel, xlim=(0, None))
+    axes.set(title=_unread(title), xlabel=xlabel, xlim=(0, None))
     axes.grid(alpha=0.3, axis="x")
     axes.legend(frameon=False, loc="lower right")
     figure.savefig(path, dpi=110)
+
+
+def _unread(text: str) -> str:
+    """Return a text that matplotlib shows as it is: without it, dollar signs in a name would begin a formula."""
+    return text.replace("$", r"\$")

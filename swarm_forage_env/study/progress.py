@@ -36,7 +36,7 @@ class RunProgress:
         self._foreign = foreign
         self._done = done
         self._failed = 0
-        self._console = Console(stderr=True, highlight=False, soft_wrap=True)
+        self._console = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
         self._bar: Progress | None = None
 
     def __enter__(self) -> "RunProgress":
@@ -53,7 +53,7 @@ class RunProgress:
                 "give another folder to run them afresh."
             )
         for reason in self._damaged[:DAMAGED_SHOWN]:
-            self._console.print(f"Run again: {reason}", markup=False)
+            self._console.print(f"Run again: {reason}")
         if len(self._damaged) > DAMAGED_SHOWN:
             self._console.print(f"Run again: {len(self._damaged) - DAMAGED_SHOWN} more files like these.")
         if self._done == self._total:
@@ -62,7 +62,7 @@ class RunProgress:
             self._console.print(f"{self._done}/{self._total} runs, {self._remaining()}")
         else:
             columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-            self._bar = Progress(*columns, TextColumn("{task.description}"), console=self._console)
+            self._bar = Progress(*columns, TextColumn("{task.description}", markup=False), console=self._console)
             self._bar.add_task(self._remaining(), total=self._total, completed=self._done)
             self._bar.start()
         return self

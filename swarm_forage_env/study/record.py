@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.scenarios.performance import performance_curve
 
@@ -230,7 +231,7 @@ class RunRecord:
             raise RecordError(f"Cannot read {name}: it is no Parquet file or a damaged one ({error}).") from error
         version, spec, provenance, digest = (stamp[key] for key in _FILE_KEYS)
         try:
-            record = _from_frame(frame, spec, json.loads(provenance))
+            record = _from_frame(frame, spec, parse_json(provenance))
         except (pl.exceptions.PolarsError, LookupError, OverflowError, RecursionError, TypeError, ValueError) as error:
             raise RecordError(f"Cannot read {name}: its content does not match schema {version} ({error}).") from error
         if _digest(record, provenance) != digest:

@@ -8,7 +8,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, whole
+from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, number, table, text, whole
+from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.registry import is_policy_file, load_policy, policy_class, split_interface
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping, whole_intervals
 from swarm_forage_env.wrappers.registry import wrapper_config_class
@@ -48,6 +50,10 @@ class RunSpec:
     def __post_init__(self) -> None:
         whole("seed", self.seed, at_least=0, at_most=_MAX_SEED)
         instance("scenario", self.scenario, ScenarioConfig)
+        text("policy", self.policy)
+        text("criterion", self.criterion)
+        number("criterion_value", self.criterion_value)
+        table("parameters", self.parameters)
         whole_intervals(self.scenario)
         try:
             plain = json.loads(json.dumps(dict(self.parameters), allow_nan=False))
@@ -125,7 +131,7 @@ class RunSpec:
             ConfigError: no JSON object, or one that describes no run.
         """
         try:
-            mapping = json.loads(text)
+            mapping = parse_json(text)
         except ValueError as error:
             raise ConfigError(f"Expected a run specification as JSON: {error}.") from error
         if not isinstance(mapping, dict):
@@ -213,7 +219,7 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
     name, interface = split_interface(str(policy))
     if not is_policy_file(name):
         return name, dict(parameters), policy_class(name)
-    from swarm_forage_env.policies.model_files import file_digest  # late: most runs open no model
+    from swarm_forage_env.policies.model_files import file_digest, look_at_model  # late: most runs open no model
 
     file = str(Path(name).resolve())
     pinned = dict(parameters)
@@ -221,8 +227,15 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
         raise ConfigError(f"Expected the interface of {file} once, got it with the file and as a parameter.")
     if interface:
         pinned["interface"] = interface
-    opened = load_policy(file, pinned)  # without a digest it says what it has to guess, which runs do not repeat
-    return file, {"digest": file_digest(file), **pinned}, opened
+    planned = pinned if "digest" in pinned else {"digest": file_digest(file), **pinned}
+    if trust.only_looks() and trust.runs_code(file):
+        trust.check(file)
+        return file, planned, look_at_model(file)
+    return (
+        file,
+        planned,
+        load_policy(file, pinned),
+    )  # without a digest it says what it guesses, which runs do not repeat
 
 
 def wrappers_to_list(wrappers: "Iterable[WrapperConfig]") -> list[dict[str, Any]]:

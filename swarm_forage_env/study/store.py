@@ -14,6 +14,7 @@ from pathlib import Path
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.study.record import RecordError, RunRecord
 from swarm_forage_env.study.spec import RunSpec
 
@@ -123,7 +124,7 @@ def read_failure(path: str | os.PathLike[str]) -> RunFailure:
         RecordError: the file is missing or no failure.
     """
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        content = parse_json(Path(path).read_text(encoding="utf-8"))
         spec = RunSpec.from_mapping(content["spec"])
         return RunFailure(spec=spec, error=content["error"], traceback="\n".join(content["traceback"]))
     except OSError as error:

@@ -26,13 +26,13 @@
 The files of the paper's sets are in the folder `sets`.
 """
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError, known_keys, known_name, several, table, whole
+from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, known_keys, known_name, several, table, whole
+from swarm_forage_env._internal.parsing import parse_toml
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.scenarios.presets import scenario
@@ -117,11 +117,10 @@ def is_set_of_paper(spec: StudySpec) -> bool:
 
 def _read(file: Path) -> dict[str, Any]:
     try:
-        with file.open("rb") as opened:
-            return tomllib.load(opened)
+        return parse_toml(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"Cannot use {file}: {error.strerror or error}.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ConfigError(f"Cannot use {file}: {error}") from error
 
 
@@ -176,7 +175,7 @@ def _seeds(given: Any) -> tuple[int, ...]:
     """The seeds of a budget, from how many or which."""
     if isinstance(given, list):
         return tuple(given)
-    whole("seeds", given, at_least=1)
+    whole("seeds", given, at_least=1, at_most=MOST_SEEDS)
     return tuple(range(given))
 
 

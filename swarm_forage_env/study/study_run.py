@@ -17,6 +17,7 @@ from pathlib import Path
 
 from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.study.progress import RunProgress
 from swarm_forage_env.study.record import RecordError, software_versions
 from swarm_forage_env.study.runner import run_each
@@ -83,7 +84,7 @@ class StudyFolder:
             RecordError: it holds none, or its file is damaged.
         """
         try:
-            return StudySpec.from_mapping(json.loads(self.study_file.read_text(encoding="utf-8")))
+            return StudySpec.from_mapping(parse_json(self.study_file.read_text(encoding="utf-8")))
         except OSError as error:
             raise RecordError(
                 f"Expected the folder of a study, got {self.folder} without {self.study_file.name}."

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.study.record import PACKAGES, RecordError, RunRecord
 from swarm_forage_env.study.spec import RunSpec
@@ -214,7 +215,7 @@ def read_study(path: str | Path) -> StudyTable:
         )
     if _digest(frame, study, versions) != digest:
         raise RecordError(f"Cannot read {name}: its content does not match its digest, so the file is damaged.")
-    return StudyTable(spec=StudySpec.from_mapping(json.loads(study)), frame=frame, versions=tuple(json.loads(versions)))
+    return StudyTable(spec=StudySpec.from_mapping(parse_json(study)), frame=frame, versions=tuple(parse_json(versions)))
 
 
 def _record(store: RunStore, run: RunSpec) -> RunRecord | None:

@@ -2,14 +2,14 @@
 
 import dataclasses
 import json
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, table, whole
+from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, known_keys, number, one_of, table, text, whole
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.parsing import parse_json, parse_toml
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
 from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.scenarios.config import ScenarioConfig, scenario_of_same_size, with_overrides
@@ -22,6 +22,8 @@ from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
 ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
 """Algorithms of stable-baselines3 that train; the first two on rollouts, the others from replay."""
+MOST_ARENAS, MOST_LAYERS, MOST_UNITS = 10_000, 20, 10_000
+"""Sizes of a training that are far beyond sense and still fit into the memory of a machine; our choice."""
 _COUNTS = ("n_steps", "batch_size", "n_epochs", "buffer_size")
 _RANGES: dict[str, dict[str, float]] = {
     "gamma": {"above": 0.0, "at_most": 1.0},
@@ -38,6 +40,8 @@ def _check_options(name: str, options: Any) -> None:
     for key, value in table(name, options).items():
         if key in _COUNTS:
             whole(f"{name}.{key}", value, at_least=1)
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            number(f"{name}.{key}", value)
         if key in _RANGES:
             number(f"{name}.{key}", value, **_RANGES[key])
 
@@ -79,7 +83,10 @@ class EvaluationPlan:
 
     def __post_init__(self) -> None:
         whole("evaluation.every_steps", self.every_steps, at_least=1)
-        whole("evaluation.n_runs", self.n_runs, at_least=1)
+        whole("evaluation.n_runs", self.n_runs, at_least=1, at_most=MOST_SEEDS)
+        whole("evaluation.first_seed", self.first_seed, at_least=0)
+        number("evaluation.horizon_s", self.horizon_s, above=0.0)
+        text("evaluation.baseline", self.baseline)
         try:
             policy_class(self.baseline)
         except ValueError as error:
@@ -126,11 +133,13 @@ class TrainingPlan:
         unfit = {"dqn": "continuous", "sac": "discrete"}.get(self.algorithm)
         if self.interface.actions == unfit:
             raise ConfigError(f"Expected actions that {self.algorithm} can choose, got {unfit} ones.")
-        whole("n_arenas", self.n_arenas, at_least=1)
+        whole("n_arenas", self.n_arenas, at_least=1, at_most=MOST_ARENAS)
         if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything
             raise ConfigError(f"Expected hidden to be sizes of layers, for example [64, 64], got {self.hidden!r}.")
+        if len(self.hidden) > MOST_LAYERS:
+            raise ConfigError(f"Expected at most {MOST_LAYERS} hidden layers, got {len(self.hidden)}.")
         for size in self.hidden:
-            whole("hidden", size, at_least=1)
+            whole("hidden", size, at_least=1, at_most=MOST_UNITS)
         if not self.stages:
             raise ConfigError("Expected at least one stage, got none.")
         whole("seed", self.seed, at_least=0)
@@ -235,7 +244,7 @@ def read_plan(path: Path) -> TrainingPlan:
     """
     try:
         text = path.read_text(encoding="utf-8")
-        return TrainingPlan.from_mapping(json.loads(text) if path.suffix == ".json" else tomllib.loads(text))
+        return TrainingPlan.from_mapping(parse_json(text) if path.suffix == ".json" else parse_toml(text))
     except OSError as error:
         raise ConfigError(f"Cannot read the plan {path}: {error.strerror or error}.") from error
     except (ValueError, TypeError) as error:  # ConfigError, and what the two parsers raise

@@ -21,6 +21,7 @@ from swarm_forage_env.training.defaults import DEFAULT_REWARDS
 from swarm_forage_env.training.plan import EvaluationPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 
+TRUSTING = ("--trust-models", "train")
 TINY = ("--robots", "4", "--objects", "20", "--steps", "128", "--arenas", "2", "--arg", "n_steps=16", "--arg",
         "batch_size=64", "--evaluate-every", "128", "--evaluation-horizon", "200")  # fmt: skip
 
@@ -58,7 +59,7 @@ def test_trains_shows_evaluations_and_goes_on(command, painted, monkeypatch):
     code, _, err = command(*words)
     assert code == 2
     assert "resume it or go elsewhere" in err
-    code, _, err = command(*words, "--resume")
+    code, _, err = command("--trust-models", *words, "--resume")
     assert code == 0
     assert "This training was finished: 128 of 128 decisions" in err
 
@@ -78,18 +79,18 @@ def test_a_training_is_resumed_by_its_folder_alone(command):
     assert command("train", *TINY, "--out", "a")[0] == 0
     begun = read_plan(Path("a/plan.json"))
 
-    assert command("train", "--out", "a", "--resume", "--steps", "256")[0] == 0
+    assert command(*TRUSTING, "--out", "a", "--resume", "--steps", "256")[0] == 0
     assert read_plan(Path("a/plan.json")) == begun.longer(256)
     assert "256," in Path("a/evaluations.csv").read_text()
-    code, _, err = command("train", "--out", "a", "--resume")
+    code, _, err = command(*TRUSTING, "--out", "a", "--resume")
     assert (code, "finished: 256 of 256" in err) == (0, True)
-    code, _, err = command("train", "--out", "a", "--resume", "--steps", "255")
+    code, _, err = command(*TRUSTING, "--out", "a", "--resume", "--steps", "255")
     assert (code, "at least the 256 steps" in err) == (2, True)
 
     # The same options divide 384 steps into other stages; those that began stay.
-    assert command("train", *TINY, "--steps", "384", "--out", "a", "--resume")[0] == 0
+    assert command(*TRUSTING, *TINY, "--steps", "384", "--out", "a", "--resume")[0] == 0
     assert read_plan(Path("a/plan.json")) == begun.longer(384)
-    code, _, err = command("train", *TINY, "--steps", "400", "--seed", "3", "--out", "a", "--resume")
+    code, _, err = command(*TRUSTING, *TINY, "--steps", "400", "--seed", "3", "--out", "a", "--resume")
     assert (code, len(err.splitlines())) == (2, 1)
     assert "got others: seed: 0 before, 3 now. Without options" in err
 

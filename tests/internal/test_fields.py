@@ -20,9 +20,37 @@ def refusal(check, *given, **limits) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize("value", [0, 2, -1.5, 1e300, np.float64(0.5)])
+@pytest.mark.parametrize("value", [0, 2, -1.5, 1e15, np.float64(0.5)])
 def test_numbers(value):
     fields.number("box.side", value)
+
+
+@pytest.mark.parametrize("value", [1e300, -1e300, 10**20])
+def test_numbers_of_which_nothing_can_be_computed_are_refused(value):
+    assert (
+        refusal(fields.number, value)
+        == f"Expected box.side to be a finite number, at most 1e+15 in size, got {value!r}."
+    )
+
+
+def test_positive_numbers_are_no_closer_to_zero_than_can_be_divided_by():
+    assert "a finite number > 0, no closer to 0 than 1e-15, got 1e-320" in refusal(fields.number, 1e-320, above=0.0)
+    fields.number("box.side", 0.0, at_least=0.0)
+
+
+def test_whole_numbers_stay_within_what_arrays_hold():
+    assert "at most 1,000,000,000,000,000 in size" in refusal(fields.whole, 2**63, at_least=0)
+    fields.whole("box.side", 2**63, at_least=0, at_most=2**63)
+
+
+def test_messages_cut_what_is_too_long_to_read():
+    assert refusal(fields.switch, [0] * 1000).endswith("... (3,000 characters).")
+    assert "a value of type int that is too large to show" in refusal(fields.switch, 10**5000)
+
+
+def test_texts_that_no_terminal_shows_are_refused():
+    for name in ("\x1b[31m", "two\nlines", "\udcff", "\u202eright to left"):
+        assert "without control characters" in refusal(fields.text, name)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, None, "3", True, 1j, (1.0,), np.ones(1)])
@@ -57,7 +85,7 @@ def test_numbers_in_a_range(limits, inside, outside, wanted):
 @pytest.mark.parametrize(
     ("limits", "inside", "outside", "wanted"),
     [
-        ({}, (-3, 0, HUGE), (1.0, "1", None, True), "a whole number"),
+        ({}, (-3, 0, 10**15), (1.0, "1", None, True), "a whole number"),
         ({"at_least": 1}, (1, 5), (0, 1.5, None), "a whole number >= 1"),
         ({"at_most": 1}, (1, -5), (2, math.nan), "a whole number <= 1"),
         ({"at_least": 0, "at_most": 1000}, (0, 1000), (-1, 1001), "a whole number from 0 to 1,000"),
@@ -102,7 +130,7 @@ def test_arguments_that_are_no_whole_numbers_are_refused(value):
     ("check", "good", "bad", "wanted"),
     [
         (fields.switch, (True, False), (1, None, "yes", np.bool_(True)), "True or False"),
-        (fields.text, ("a",), ("", 3, None), "a non-empty text"),
+        (fields.text, ("a",), ("", 3, None), "a non-empty text without control characters"),
         (fields.pair, ((1.0, 2),), ((1.0,), (1.0, 2.0, 3.0), [1.0, 2.0], 4, "ab"), "(x, y)"),
         (
             fields.shares,

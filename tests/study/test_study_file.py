@@ -156,7 +156,7 @@ def test_a_policy_file_lies_beside_the_study(written, tmp_path):
         ("values = [0.0, 0.01]", "values = 3", "values of axis walk_probability to be a list"),
         ("values = [0.0, 0.01]", "values = [0.0]\nreference = 0.0", "reference on the last axis only"),
         ("seeds = 2", "seds = 2", "Did you mean 'budget.tiny.seeds'|Unknown key of a budget 'budget.tiny.seds'"),
-        ("seeds = 2", "seeds = 0", "seeds to be a whole number >= 1"),
+        ("seeds = 2", "seeds = 0", "seeds to be a whole number from 1 to 100,000"),
         ("noise = 2", "nose = 2", "Did you mean 'noise'"),
         ("noise = 2", "noise = [0.05]", "to be some of"),
         ("noise = 2", "noise = 0", "whole number >= 1"),

@@ -82,7 +82,7 @@ def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
         ('algorithm = "dqn"', 'algorithm = "dqm"', "Did you mean 'dqn'"),
         ('algorithm = "dqn"', 'algorithm = "sac"', "actions that sac can choose, got discrete"),
         ('actions = "discrete"', 'actions = "continuous"', "actions that dqn can choose, got continuous"),
-        ("n_arenas = 2", "n_arenas = 0", "n_arenas to be a whole number >= 1"),
+        ("n_arenas = 2", "n_arenas = 0", "n_arenas to be a whole number from 1 to 10,000"),
         ("n_arenas = 2", "arenas = 2", "Did you mean 'n_arenas'"),
         ("steps = 100", "steps = 0", "steps to be a whole number"),
         ("steps = 100", "step = 100", "Did you mean 'stages.steps'|stages.step"),

@@ -28,6 +28,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import check_folder, replacing
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_choice
 from swarm_forage_env.policies.registry import load_policy
@@ -199,6 +200,8 @@ def kept_plan(folder: Path) -> TrainingPlan:
 
 def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgorithm:
     path = folder / MODEL_FILE
+    trust.check(path)
+    trust.tell(path)
     try:
         return ALGORITHM_CLASSES[plan.algorithm].load(path, env=env, device="cpu")
     except MODEL_FAULTS as error:

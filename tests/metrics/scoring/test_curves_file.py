@@ -150,7 +150,7 @@ BAD_TABLES = {
     ),
     "interference above 1": (in_row(CROWDING, 3, interference_fraction=30.0), r"a fraction in \[0, 1\] .* got 30.0"),
     "half a robot": (edited(CROWDING, n_robots=2.5), "Expected a whole number >= 0 in column n_robots .* got 2.5"),
-    "no robots": (edited(CROWDING, n_robots=0), "Expected n_robots >= 1 .* got 0"),
+    "no robots": (edited(CROWDING, n_robots=0), "Expected n_robots from 1 to 10,000,000 .* got 0"),
     "missing columns": (CROWDING.drop("seed", "performance"), "Expected the columns seed, performance in"),
     "misspelt column": (
         CROWDING.rename({"performance": "performence"}),
@@ -254,3 +254,37 @@ def test_the_page_lists_every_column():
     listed = re.findall(r"^\| `(\w+)`( \\\*)? \|", section, re.MULTILINE)
     assert [name for name, _ in listed] == list(CURVE_COLUMNS)
     assert {name for name, star in listed if star} == {name for name, c in CURVE_COLUMNS.items() if c.is_required}
+
+
+COLUMNS_OF_ODD_TYPES = {
+    "lists": lambda n: pl.Series([[1]] * n),
+    "tables": lambda n: pl.Series([{"a": 1}] * n),
+    "bytes": lambda n: pl.Series([b"\xff"] * n),
+    "fixed lists": lambda n: pl.Series([[1, 2]] * n, dtype=pl.Array(pl.Int64, 2)),
+    "dates": lambda n: pl.Series([0] * n).cast(pl.Date),
+    "beyond 64 bits": lambda n: pl.Series([1e20] * n),
+    "unsigned": lambda n: pl.Series([2**63] * n, dtype=pl.UInt64),
+    "huge": lambda n: pl.Series([1e308] * n),
+    "escape sequences": lambda n: pl.Series(["\x1b[31m"] * n),
+}
+
+
+@pytest.mark.parametrize("column", ["n_robots", "seed", "interval", "performance", "interference_fraction"])
+@pytest.mark.parametrize("kind", COLUMNS_OF_ODD_TYPES)
+def test_columns_of_types_that_no_curve_has_are_refused(tmp_path, column, kind):
+    odd = CROWDING.with_columns(COLUMNS_OF_ODD_TYPES[kind](len(CROWDING)).alias(column))
+    with pytest.raises(CurveError, match=f"Expected .* in column {column} of "):
+        score_curves(written(odd, tmp_path / "odd.parquet"))
+
+
+@pytest.mark.parametrize("kind", ["lists", "bytes", "dates", "escape sequences"])
+def test_names_of_types_that_no_name_has_are_refused(tmp_path, kind):
+    odd = CROWDING.with_columns(COLUMNS_OF_ODD_TYPES[kind](len(CROWDING)).alias("controller"))
+    with pytest.raises(CurveError, match=r"Expected .*text.* in column controller of "):
+        score_curves(written(odd, tmp_path / "odd.parquet"))
+
+
+def test_categories_are_texts(tmp_path):
+    named = CROWDING.with_columns(pl.lit("crowd", dtype=pl.Categorical).alias("controller"))
+    (scored,) = score_curves(written(named, tmp_path / "named.parquet"))
+    assert scored.policy == "crowd"

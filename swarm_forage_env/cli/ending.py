@@ -1,0 +1,95 @@
+"""How a command ends: an error becomes one line on stderr and an exit code, also an error that nobody foresaw.
+
+An error that nobody foresaw is a fault of ours. Its traceback goes to a file, with the command and the versions, and
+the line says where the file is.
+"""
+
+import os
+import shlex
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+
+import typer
+
+from swarm_forage_env.cli.options import (
+    EXIT_FAILURE,
+    EXIT_INTERRUPTED,
+    EXIT_UNFORESEEN,
+    EXIT_USAGE,
+    complain,
+)
+
+DEBUG_VARIABLE = "SWARM_FORAGE_DEBUG"
+"""Environment variable; if it is set and not empty, an error that nobody foresaw shows its traceback at once."""
+_USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
+"""Base of typer's complaints about arguments; typer gives it no public name."""
+
+_OURS = ("swarm_forage_env", "baselines", "metrics")
+"""Where the errors are defined that speak to users: subclasses of ValueError, such as ConfigError and ModelError."""
+
+
+def end(error: BaseException) -> int:
+    """Say in one line on stderr why the command ends; returns the exit code.
+
+    Raises:
+        BaseException: `error` again, if nobody foresaw it and `DEBUG_VARIABLE` is set.
+    """
+    from swarm_forage_env.study.runner import WorkerError  # late: only a command that fails needs it
+
+    if isinstance(error, _USAGE_ERROR):
+        return complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined] - see _USAGE_ERROR
+    if isinstance(error, ValueError) and type(error).__module__.partition(".")[0] in _OURS:
+        return complain(str(error), EXIT_USAGE)
+    if isinstance(error, KeyboardInterrupt | typer.Abort):
+        return complain("interrupted", EXIT_INTERRUPTED)
+    if isinstance(error, BrokenPipeError):  # whoever read our output has enough, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the last flush fails again
+        return EXIT_FAILURE
+    if isinstance(error, OSError):
+        named = f"{error.strerror}: {error.filename}" if error.strerror and error.filename else str(error)
+        return complain(named, EXIT_FAILURE)
+    if isinstance(error, ImportError | WorkerError):
+        return complain(str(error), EXIT_FAILURE)
+    if isinstance(error, MemoryError):
+        return complain(
+            f"Not enough memory{f': {error}' if str(error) else ''}; ask for fewer robots, objects, runs or processes.",
+            EXIT_FAILURE,
+        )
+    if os.environ.get(DEBUG_VARIABLE):
+        raise error
+    return _end_unforeseen(error)
+
+
+def _end_unforeseen(error: BaseException) -> int:
+    summary = "".join(traceback.format_exception_only(error)).strip().splitlines()[-1]
+    try:
+        kept = f"Details: {_report(error)}; please send this file to us."
+    except OSError as problem:
+        kept = f"The details cannot be kept ({problem.strerror}); with {DEBUG_VARIABLE}=1 the command shows them."
+    return complain(f"an error that should not happen: {summary}. {kept}", EXIT_UNFORESEEN)
+
+
+def _report(error: BaseException) -> Path:
+    """Write what we need to find the fault to a file of its own; returns the file.
+
+    Raises:
+        OSError: there is no place for it.
+    """
+    import platform
+
+    from swarm_forage_env.study.record import software_versions
+
+    versions = {"python": platform.python_version(), "system": platform.platform(), **software_versions()}
+    lines = [
+        f"command: {shlex.join(['swarm-forage', *sys.argv[1:]])}",
+        f"folder: {Path.cwd()}",
+        *(f"{name}: {version}" for name, version in versions.items()),
+        "",
+        "".join(traceback.format_exception(error)),
+    ]
+    handle, name = tempfile.mkstemp(prefix="swarm-forage-error-", suffix=".txt")
+    with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
+        file.write("\n".join(lines))
+    return Path(name)

@@ -1,0 +1,99 @@
+"""How commands end: one line on stderr, whatever happens, and names are shown as they are."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env.cli import show
+from swarm_forage_env.cli.ending import DEBUG_VARIABLE, end
+from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_UNFORESEEN, EXIT_USAGE, complain
+from swarm_forage_env.policies.pretrained import network_file
+
+SHORT = ("--robots", "2", "--objects", "10", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
+
+
+@pytest.fixture
+def broken(monkeypatch):
+    """Let `swarm-forage schema` fail as nobody foresaw."""
+
+    def fail():
+        raise ZeroDivisionError("a fault of ours")
+
+    monkeypatch.setattr("swarm_forage_env.study.record.schema_table", fail)
+
+
+@pytest.mark.usefixtures("broken")
+def test_what_nobody_foresaw_is_one_line_and_a_file_with_the_details(command, tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    code, out, err = command("schema")
+    assert (code, out, err.count("\n")) == (EXIT_UNFORESEEN, "", 1)
+    assert "an error that should not happen: ZeroDivisionError: a fault of ours" in err
+    kept = Path(re.search(r"Details: (\S+);", err)[1]).read_text(encoding="utf-8")
+    for words in ("command: swarm-forage schema", "numpy: ", "Traceback", "show.py", "a fault of ours"):
+        assert words in kept
+
+
+@pytest.mark.usefixtures("broken")
+def test_the_line_says_so_where_the_details_cannot_be_kept(command, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", "/nowhere")
+    code, _, err = command("schema")
+    assert (code, err.count("\n")) == (EXIT_UNFORESEEN, 1)
+    assert f"with {DEBUG_VARIABLE}=1 the command shows them" in err
+
+
+@pytest.mark.usefixtures("broken")
+def test_the_debug_variable_shows_the_traceback(command, monkeypatch):
+    monkeypatch.setenv(DEBUG_VARIABLE, "1")
+    with pytest.raises(ZeroDivisionError):
+        command("schema")
+
+
+def test_too_little_memory_is_told(capsys):
+    assert end(MemoryError("Unable to allocate 9 GiB")) == EXIT_FAILURE
+    assert "Not enough memory: Unable to allocate 9 GiB; ask for fewer" in capsys.readouterr().err
+
+
+def test_complaints_hold_no_escape_sequences(capsys):
+    assert complain("a\x1b[31mred\nfile\udcff", EXIT_USAGE) == EXIT_USAGE
+    assert capsys.readouterr().err == "swarm-forage: a\\x1b[31mred file\\udcff\n"
+
+
+def test_words_that_are_no_text_are_refused(command):
+    code, out, err = command("run", "--policy", "\udcff.npz")
+    assert (code, out) == (EXIT_USAGE, "")
+    assert "Expected words in UTF-8, got '\\udcff.npz'" in err
+
+
+def test_names_are_shown_as_they_are_in_tables_and_pictures(command, tmp_path):
+    name = "p$x$[red]a[nope].npz"
+    shutil.copyfile(network_file("ppo_warehouse_small"), tmp_path / name)
+    code, out, err = command("run", "--policy", name, *SHORT, "--out", "[red]o[x]")
+    assert code == 0
+    assert name in out
+    assert "1 record in [red]o[x], picture [red]o[x]/performance.png" in err
+
+
+def test_a_terminal_that_knows_ascii_alone_shows_the_rest_as_escapes():
+    words = [sys.executable, "-m", "swarm_forage_env.cli", "availability", "--robots", "5", "--teams", "2"]
+    told = {**os.environ, "PYTHONIOENCODING": "ascii", "LANG": "C", "LC_ALL": "C"}
+    ended = subprocess.run(words, env=told, capture_output=True, timeout=120, check=False)
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout.isascii()
+
+
+def test_whoever_reads_the_output_may_stop(tmp_path):
+    words = f"{sys.executable} -m swarm_forage_env.cli info warehouse_small | head -1"
+    ended = subprocess.run(words, shell=True, capture_output=True, text=True, timeout=120, check=False, cwd=tmp_path)
+    assert ended.stdout.startswith("warehouse_small:")
+    assert ended.stderr == ""
+
+
+def test_the_guard_is_around_every_command(command, monkeypatch, tmp_path):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr(show, "output", lambda: [].pop())
+    assert command("list")[0] == EXIT_UNFORESEEN

@@ -1,0 +1,124 @@
+"""Models run code when they are opened: only those that somebody typed are, and stderr says so."""
+
+import json
+import pickle
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env.policies import trust
+from swarm_forage_env.policies.model_files import ModelError, look_at_model
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.study.store import RunFailure, RunStore
+
+TINY = ("--robots", "2", "--objects", "10", "--horizon", "200")
+NOTE = {"interface": {"observation": "compact"}, "caches": "static"}
+
+
+class Evil:
+    """What a pickle can hold: opening it writes a file."""
+
+    def __reduce__(self):
+        return Path.touch, (Path("owned"),)
+
+
+def evil_model(path: Path, **more: object) -> Path:
+    """A file like a model of stable-baselines3, of which one part writes the file `owned` when it is opened."""
+    import base64
+
+    payload = base64.b64encode(pickle.dumps(Evil())).decode()
+    about = {"policy_class": {":type:": "x", ":serialized:": payload}, **more}
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("data", json.dumps(about))
+    return path
+
+
+@pytest.fixture
+def model(tmp_path):
+    return evil_model(tmp_path / "evil.zip", swarm_forage_note=NOTE)
+
+
+def test_a_typed_model_is_opened_and_stderr_says_so(command, model):
+    pytest.importorskip("stable_baselines3")
+    code, _, err = command("run", "--policy", f"crw,{model.name}", *TINY)
+    assert code == 2
+    assert f"opening {model}, a model: this runs code that the file holds" in err
+    assert Path("owned").exists()
+
+
+@pytest.mark.parametrize("words", [("run", "--policy"), ("score", "--policy")])
+def test_a_dry_run_opens_no_model_and_knows_its_caches(command, model, words):
+    code, out, err = command(*words, model.name, "--robots", "2", "--objects", "10", "--dry-run", "--json")
+    assert code == 0, err
+    assert not Path("owned").exists()
+    assert '"caches": "static"' in out or words[0] == "score"
+
+
+def test_a_failure_that_names_a_model_is_refused(command, model, tmp_path):
+    spec = RunSpec(scenario=scenario("warehouse_small", n_robots=2, n_objects=10), policy=str(model))
+    store = RunStore(tmp_path / "store")
+    store.write_failure(RunFailure(spec=spec, error="e", traceback="t"))
+    code, _, err = command("rerun", str(store.failure_path(spec.run_id)))
+    assert code == 2
+    assert "a model that you did not name yourself" in err
+    assert "swarm-forage --trust-models and the same words again" in err
+    assert not Path("owned").exists()
+
+
+@pytest.mark.parametrize("suffix", ["zip", "ZIP"])
+def test_a_plan_that_names_a_model_is_refused_before_anything_starts(command, tmp_path, suffix):
+    evil_model(tmp_path / f"evil.{suffix}")
+    (tmp_path / "plan.toml").write_text(
+        f'[scenario]\npreset = "warehouse_small"\n[evaluation]\nbaseline = "evil.{suffix}"\n', encoding="utf-8"
+    )
+    code, _, err = command("train", "--plan", "plan.toml", "--out", "training")
+    assert (code, Path("owned").exists()) == (2, False)
+    assert "a model that you did not name yourself" in err
+
+
+def test_a_study_that_names_a_model_is_refused(command, model, tmp_path):
+    (tmp_path / "study.toml").write_text(
+        f'name = "s"\nscenario = "warehouse_small"\npolicies = ["{model.name}"]\n', encoding="utf-8"
+    )
+    for words in (("show",), ("run", "--dry-run")):
+        code, _, err = command("study", words[0], "study.toml", *words[1:])
+        assert (code, Path("owned").exists()) == (2, False), err
+
+
+def test_the_option_opens_what_a_file_names(command, model, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    spec = RunSpec(scenario=scenario("warehouse_small", n_robots=2, n_objects=10), policy=str(model))
+    store = RunStore(tmp_path / "store")
+    store.write_failure(RunFailure(spec=spec, error="e", traceback="t"))
+    code, _, err = command("--trust-models", "rerun", str(store.failure_path(spec.run_id)))
+    assert f"opening {model}" in err
+    assert (code, Path("owned").exists()) == (2, True)
+
+
+def test_networks_need_no_trust(tmp_path):
+    with trust.of_a_command(()):
+        load_policy("ppo_warehouse_small")
+        trust.check(tmp_path / "some.npz")
+        with pytest.raises(trust.UntrustedModelError):
+            trust.check(tmp_path / "some.zip")
+        with trust.trusting():
+            trust.check(tmp_path / "some.zip")
+    trust.check(tmp_path / "some.zip")  # a Python program decides for itself
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"no archive"])
+def test_looking_at_what_is_no_model(tmp_path, content):
+    file = tmp_path / "a.zip"
+    file.write_bytes(content)
+    with pytest.raises(ModelError):
+        look_at_model(file)
+
+
+def test_looking_at_a_model_whose_description_is_nested_too_deep(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("data", "[" * 5000)
+    with pytest.raises(ModelError, match="nested"):
+        look_at_model(tmp_path / "a.zip")

@@ -1,0 +1,81 @@
+"""What files promise: those of an earlier day are read, and those of another version are refused, never guessed at.
+
+`tests/files` holds one small file of each kind, as it was written then. It is made anew only when a version is raised.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swarm_forage_env.policies.network import Network, NetworkError
+from swarm_forage_env.study.record import SCHEMA_VERSION, RecordError, RunRecord
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.study.store import read_failure
+
+FILES = Path(__file__).parent.parent / "files"
+
+
+def test_a_record_of_an_earlier_day_is_read_as_it_was_written():
+    record = RunRecord.read(FILES / "record.parquet")
+    assert (record.controller, record.n_robots, record.n_intervals, record.horizon_s) == ("random", 3, 2, 4.0)
+    assert record.run_id == RunSpec.from_json(record.spec).run_id
+    assert record.provenance["swarm-forage-env"] == "0.1.0"
+
+
+@pytest.mark.parametrize("version", [SCHEMA_VERSION - 1, SCHEMA_VERSION + 1])
+def test_a_record_of_another_version_is_refused(tmp_path, version):
+    kept = FILES / "record.parquet"
+    stamp = {name: text for name, text in pl.read_parquet_metadata(kept).items() if name.startswith("swarm_forage")}
+    stamp["swarm_forage_env.schema_version"] = str(version)
+    pl.read_parquet(kept).write_parquet(tmp_path / "a.parquet", metadata=stamp)
+    with pytest.raises(RecordError, match=f"it has schema version {version}, .* reads {SCHEMA_VERSION}; read it with"):
+        RunRecord.read(tmp_path / "a.parquet")
+
+
+def test_a_failure_of_an_earlier_day_is_read(tmp_path):
+    failure = read_failure(FILES / "failure.json")
+    assert (failure.error, failure.spec.policy) == ("ValueError: too warm", "random")
+    content = json.loads((FILES / "failure.json").read_text(encoding="utf-8"))
+    content["spec"]["scenario"]["gravity"] = 1.0
+    (tmp_path / "a.json").write_text(json.dumps(content), encoding="utf-8")
+    with pytest.raises(RecordError, match=r"Unknown key .*gravity"):
+        read_failure(tmp_path / "a.json")
+
+
+def test_a_network_of_an_earlier_day_is_read():
+    network = Network.load(FILES / "network.npz")
+    rows = np.array([[1.0, 2.0, 3.0]], np.float32)
+    assert network.outputs(rows).tolist() == [[1.0, 2.0]]
+
+
+def parts() -> dict[str, np.ndarray]:
+    with np.load(FILES / "network.npz") as stored:
+        return dict(stored)
+
+
+@pytest.mark.parametrize(
+    ("changed", "reason"),
+    [
+        ({"gates": 1}, "Unknown key about a network 'gates'"),
+        ({"interface": {"colour": 1}}, "Unknown"),
+        ({"card": json.loads("[" * 60 + "]" * 60)}, "at most 50 nested levels"),
+    ],
+)
+def test_a_network_of_a_later_day_is_refused(tmp_path, changed, reason):
+    whole = parts()
+    whole["about"] = np.array(json.dumps(json.loads(str(whole["about"])) | changed))
+    np.savez(tmp_path / "a.npz", **whole)
+    with pytest.raises(NetworkError, match=reason):
+        Network.load(tmp_path / "a.npz")
+
+
+def test_a_header_that_tells_of_more_than_there_is_takes_no_memory(tmp_path):
+    np.savez(tmp_path / "a.npz", **parts())
+    content = (tmp_path / "a.npz").read_bytes()
+    assert content.count(b"'shape': (3, 2)") == 1
+    (tmp_path / "a.npz").write_bytes(content.replace(b"'shape': (3, 2), }    ", b"'shape': (99999, 2), }"))
+    with pytest.raises(NetworkError, match="'weight_0' is damaged"):
+        Network.load(tmp_path / "a.npz")
