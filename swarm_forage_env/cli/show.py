@@ -17,9 +17,10 @@ def list_everything() -> None:
 
 def info(name: Annotated[str, typer.Argument(help="A scenario, an environment id, a policy or its file.")]) -> None:
     """Show all fields and spaces of a scenario, or what a policy is."""
+    from swarm_forage_env._internal.printable import printable
     from swarm_forage_env.cli.descriptions import information
 
-    typer.echo(information(name))
+    typer.echo(printable(information(name)))  # a file may hold anything
 
 
 def schema() -> None:

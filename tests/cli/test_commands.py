@@ -1,5 +1,6 @@
 """The console command, as a person uses it: words in, text and exit code out."""
 
+import dataclasses
 import json
 import os
 import re
@@ -15,6 +16,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
+from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.registry import RandomPolicy, policy_names
 from swarm_forage_env.scenarios.config import field_sections
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
@@ -288,6 +290,15 @@ def test_info_describes_a_network_by_its_name_or_file(command, name):
     assert "a network of 23 x 64 x 64 x 6 units (tanh)" in out
     assert re.search(r"decision_ticks +5\n", out)
     assert re.search(r"stable-baselines3 +\d", out)
+
+
+def test_info_shows_escape_sequences_of_a_card_as_text(command, tmp_path):
+    network = Network.load(pretrained.network_file("ppo_warehouse_small"))
+    about = dataclasses.replace(network.about, card={"by": "\x1b]0;mine\x07"})
+    Network(network.weights, network.biases, about).save(tmp_path / "odd.npz")
+    code, out, _ = command("info", str(tmp_path / "odd.npz"))
+    assert code == 0
+    assert r"\x1b]0;mine\x07" in out
 
 
 @pytest.mark.parametrize(
