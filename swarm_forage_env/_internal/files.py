@@ -63,5 +63,5 @@ def check_file(path: Path) -> None:
 
 
 def as_file_name(text: str) -> str:
-    """Return a text as a part of a file name: what is no letter, digit, dot, plus or hyphen becomes an underscore."""
-    return re.sub(r"[^\w.+-]", "_", text)
+    """Return a text as a part of a file name: what is no letter, digit, dot, = + or - becomes an underscore."""
+    return re.sub(r"[^\w.=+-]", "_", text)

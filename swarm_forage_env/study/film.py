@@ -75,12 +75,12 @@ def record_run(
     with refusing():
         number("trail_s", trail_s, at_least=0.0)
     path = check_film(path, fps, len(ticks))
-    check_file(path)
     arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
     policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
     title = f"{scenario.name.replace('_', ' ')}, {name}, {scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
     stack = build_env(scenario, wrappers, reads=getattr(policy, "reads", None))
     n_samples = round(trail_s * fps / speedup) + 1
+    check_file(path)
     trails = Trails(scenario.robots.n_robots, n_samples) if n_samples > 1 else None
 
     def frames() -> Iterator[Frame]:

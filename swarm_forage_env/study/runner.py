@@ -119,7 +119,8 @@ def run_all(
     display = RunProgress(total=len(planned), done=n_stored, foreign=n_foreign) if progress else nullcontext()
     try:
         # Closing ends the workers at once, wherever the interrupt came.
-        with display as shown, closing(run_each(todo, store=store, executor=executor, jobs=jobs)) as fresh:
+        fresh = run_each(todo, store=store, executor=executor, jobs=jobs)
+        with display as shown, closing(fresh):
             for outcome in fresh:
                 outcomes[outcome.run_id] = outcome
                 if shown is not None:
@@ -165,6 +166,11 @@ def run_each(
         outcomes = _run_on(_InProcess(), todo, limit=1)
     else:
         outcomes = _run_in_pool(todo, min(jobs or available_cores(), max(1, len(todo))))
+    return _stored(outcomes, store)
+
+
+def _stored(outcomes: Generator[Outcome], store: RunStore | None) -> Generator[Outcome]:
+    """Yield outcomes after they are stored."""
     with closing(outcomes):
         for outcome in outcomes:
             if store is not None:

@@ -85,7 +85,8 @@ class EvaluationPlan:
         whole("evaluation.every_steps", self.every_steps, at_least=1)
         whole("evaluation.n_runs", self.n_runs, at_least=1, at_most=MOST_SEEDS)
         whole("evaluation.first_seed", self.first_seed, at_least=0)
-        number("evaluation.horizon_s", self.horizon_s, above=0.0)
+        if self.horizon_s is not None:
+            number("evaluation.horizon_s", self.horizon_s, above=0.0)
         text("evaluation.baseline", self.baseline)
         try:
             policy_class(self.baseline)

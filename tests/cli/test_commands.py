@@ -187,8 +187,10 @@ def test_a_failed_run_is_reported_with_the_way_to_run_it_again(command, monkeypa
         assert out == ""
         assert "RuntimeError: I would rather not" in err
         again = err.strip().splitlines()[-1].split("again, alone: swarm-forage ")[1].split()
-        with pytest.raises(RuntimeError, match="I would rather not"):
-            command(*again)
+        code, out, err = command(*again)
+        assert (code, out) == (1, "")
+        assert err.startswith("Traceback")
+        assert err.splitlines()[-2:] == ["RuntimeError: I would rather not", "swarm-forage: the run failed again"]
     code, out, _ = command(*again)
     assert code == 0
     assert "random in warehouse_small, 3 robots" in out

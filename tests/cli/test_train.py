@@ -121,7 +121,7 @@ def test_without_the_training_library_the_message_says_what_to_install(command, 
         (("--arg", "net_arch=64,64"), "Expected the network as --hidden 128,128"),
         (("--arg", "policy_kwargs=1"), "Expected the network as --hidden 128,128"),
         (("--hidden", "big"), "sizes of layers, such as 128,128, got 'big'"),
-        (("--hidden", "0"), "hidden to be a whole number >= 1, got 0"),
+        (("--hidden", "0"), "hidden to be a whole number from 1 to 10,000, got 0"),
         pytest.param(
             ("--arenas", "2", "--processes", "9"), "processes from 0 to n_arenas = 2, got 9", marks=needs_training
         ),
@@ -168,7 +168,7 @@ def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
     folder = Path("results/training/warehouse_small_ppo")
     folder.mkdir(parents=True)
     (folder / "model.zip").touch()
-    assert f"To go on: swarm-forage train --out {folder} --resume" in command("train", *TINY)[2]
+    assert f"To go on: swarm-forage --trust-models train --out {folder} --resume" in command("train", *TINY)[2]
 
 
 @pytest.mark.parametrize("name", ["warehouse_small", "search_and_rescue"])
