@@ -39,8 +39,11 @@ def kernels() -> set[str]:
 
 
 def compiled(cache: Path) -> set[str]:
-    """Return the names of the kernels that a cache holds: its files are named file.function-line.version.nbi."""
-    return {file.name.rpartition("-")[0] for file in cache.rglob("*.nbi")}
+    """Return the names of the kernels that a cache holds.
+
+    Its files are named file.function-line.python.nbi, or file.function-line.python-called.nbi where only kernels call.
+    """
+    return {file.name.partition("-")[0] for file in cache.rglob("*.nbi")}
 
 
 def main() -> int:

@@ -103,6 +103,17 @@ def test_other_packages_are_refused_with_what_was_expected(words, said, run):
     assert said in err
 
 
+def test_kernels_that_only_kernels_call_are_seen_as_reached(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    import check_bounds
+
+    names = ("floor._shine-111.py311-called.nbi", "floor.shine-130.py311.nbi", "floor.shine-130.py311-called.nbi")
+    for name in (*names, "floor.draw-3.py311-called.1.nbc"):
+        (tmp_path / name).touch()
+    assert check_bounds.compiled(tmp_path) == {"floor._shine", "floor.shine"}
+    assert {"tick.run", *check_bounds.ELSEWHERE} <= check_bounds.kernels()
+
+
 def test_a_package_beside_ours_has_a_row(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "scripts")
     import bench_peers
