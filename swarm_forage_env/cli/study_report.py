@@ -10,9 +10,9 @@ from swarm_forage_env.cli.terminal import notes
 from swarm_forage_env.study.calibration import calibrate, kind_of
 from swarm_forage_env.study.progress import duration
 from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.study.studies import StudySpec
+from swarm_forage_env.study.studies import StudySpec, value_words
 from swarm_forage_env.study.study_file import PAPER, load_study, set_names
-from swarm_forage_env.study.study_run import DONE, FAILED, MISSING, STATES, CellState, StudyFolder, StudyState, shard
+from swarm_forage_env.study.study_run import DONE, FAILED, MISSING, STATES, StudyFolder, StudyState, shard
 from swarm_forage_env.study.study_table import StudyTable
 
 FAILURES_SHOWN = 10
@@ -42,11 +42,10 @@ def table_of_sets() -> Table:
 
 def described(spec: StudySpec) -> str:
     """Return a study in words."""
-    axes = [
-        f"{axis.name}: {', '.join(_value(value) for value in axis.values)}"
-        + (f" (reference {_value(spec.reference)})" if axis is spec.axes[-1] and spec.reference is not None else "")
-        for axis in spec.axes
-    ]
+    words = [value_words(axis.values) for axis in spec.axes]
+    axes = [f"{axis.name}: {', '.join(of.values())}" for axis, of in zip(spec.axes, words, strict=True)]
+    if spec.reference is not None:
+        axes[-1] += f" (reference {words[-1][spec.reference]})"
     settings = ", ".join(f"{name} = {value}" for name, value in spec.settings.items())
     rows = [
         ("study", f"{spec.name}: {spec.title}" if spec.title else spec.name),
@@ -113,7 +112,9 @@ def status_report(table: StudyTable) -> str:
         lines.append(f"The runs were made by {len(table.versions)} versions or commits of the packages.")
     if open_cells:
         header = ("reading", "policy", *(axis.name for axis in spec.axes), *STATES)
-        lines += ["", *aligned([header, *(_cells(state) for state in open_cells)])]
+        places = spec.place_words()
+        rows = [(*places[state.cell], *(str(state.n_runs[name]) for name in STATES)) for state in open_cells]
+        lines += ["", *aligned([header, *rows])]
     failures = table.frame.filter(table.frame["state"] == FAILED)
     for row in failures.head(FAILURES_SHOWN).iter_rows(named=True):
         lines += ["", f"failed: {row['policy']}, seed {row['seed']}: {row['error']}", f"  again: {row['rerun']}"]
@@ -143,15 +144,6 @@ def _counts(numbers: Sequence[int]) -> str:
     words = [f"{done:,} of {counted(sum(numbers), 'run')} {DONE}"]
     words += [f"{number:,} {state}" for state, number in ((FAILED, failed), (MISSING, missing)) if number]
     return ", ".join(words)
-
-
-def _cells(state: CellState) -> tuple[str, ...]:
-    place = (state.cell.reading, state.cell.policy, *(_value(value) for value in state.cell.values))
-    return (*place, *(str(state.n_runs[name]) for name in STATES))
-
-
-def _value(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def _numbers(numbers: Sequence[int]) -> tuple[str, str, str]:

@@ -8,7 +8,7 @@ from swarm_forage_env._internal.fields import ConfigError, known_keys, whole
 from swarm_forage_env.study.maps import FloorMaps, floor_maps, mean_maps, same_proportions
 from swarm_forage_env.study.replay.capture import record_replay
 from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.study.studies import Cell, StudySpec, Value
+from swarm_forage_env.study.studies import Cell, StudySpec, Value, value_words
 from swarm_forage_env.study.study_run import DONE
 from swarm_forage_env.study.study_table import StudyTable
 
@@ -36,7 +36,9 @@ def choose_cells(spec: StudySpec, words: Sequence[str]) -> tuple[Cell, ...]:
     """
     found = dict.fromkeys(cell for word in words for cell in _named(spec, word)) if words else spec.cells
     if len(found) > MOST_CELLS:
-        example = ",".join(f"{key}={_word(values[0])}" for key, values in _values(spec).items() if len(values) > 1)
+        example = ",".join(
+            f"{key}={value_words(values)[values[0]]}" for key, values in _values(spec).items() if len(values) > 1
+        )
         raise ConfigError(
             f"Expected at most {MOST_CELLS} cells, got {len(found)} of study {spec.name}; choose some by their values, "
             f"such as --cell {example}. There are {_known(spec)}."
@@ -143,15 +145,20 @@ def _named(spec: StudySpec, word: str) -> list[Cell]:
     wanted = {key.strip(): text.strip() for key, _, text in pairs}
     values = _values(spec)
     known_keys(wanted, values, f"key of the cells of study {spec.name}")
+    meant: dict[str, list[Value]] = {}
     for key, text in wanted.items():
-        if not any(_is(value, text) for value in values[key]):
-            there = ", ".join(map(_word, values[key]))
+        words = value_words(values[key])
+        meant[key] = [value for value, word in words.items() if _is(value, word, text)]
+        if not meant[key]:
+            there = ", ".join(words.values())
             raise ConfigError(f"Expected {key} to be one of {there} in study {spec.name}, got {text!r}.")
-    return [cell for cell in spec.cells if all(_is(_place(spec, cell)[key], text) for key, text in wanted.items())]
+    return [cell for cell in spec.cells if all(_place(spec, cell)[key] in those for key, those in meant.items())]
 
 
-def _is(value: Value, text: str) -> bool:
-    """Whether a user means this value."""
+def _is(value: Value, word: str, text: str) -> bool:
+    """Whether a user means this value: as it is shown, or any other way to write it."""
+    if text == word:
+        return True
     if isinstance(value, str | bool):
         return str(value).lower() == text.lower()
     try:
@@ -160,18 +167,15 @@ def _is(value: Value, text: str) -> bool:
         return False
 
 
-def _word(value: Value) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return value if isinstance(value, str) else f"{value:g}"
-
-
 def _known(spec: StudySpec) -> str:
-    return "; ".join(f"{key} {', '.join(map(_word, values))}" for key, values in _values(spec).items())
+    return "; ".join(f"{key} {', '.join(value_words(values).values())}" for key, values in _values(spec).items())
 
 
 def _labels(spec: StudySpec, cells: Sequence[Cell]) -> list[str]:
     """Name each cell by its policy and what differs between them."""
     places = [_place(spec, cell) for cell in cells]
     differing = [key for key in _values(spec) if key != "policy" and len({place[key] for place in places}) > 1]
-    return [" ".join([str(place["policy"]), *(f"{key}={_word(place[key])}" for key in differing)]) for place in places]
+    words = {key: value_words(values) for key, values in _values(spec).items()}
+    return [
+        " ".join([str(place["policy"]), *(f"{key}={words[key][place[key]]}" for key in differing)]) for place in places
+    ]

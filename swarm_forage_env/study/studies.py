@@ -5,7 +5,8 @@ seeds. The last axis is the one that is plotted along x; each cell has its refer
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import product
@@ -200,6 +201,15 @@ class StudySpec:
         places = product(self.readings, labels, product(*(axis.values for axis in self.axes)))
         return tuple(Cell(*place) for place in places)
 
+    def place_words(self, *others: "StudySpec") -> dict[Cell, tuple[str, ...]]:
+        """Return how cells are shown, those of other studies with the same axes, too: reading, policy, values."""
+        cells = dict.fromkeys(cell for study in (self, *others) for cell in study.cells)
+        words = [value_words(values) for values in zip(*(cell.values for cell in cells), strict=True)]
+        return {
+            cell: (cell.reading, cell.policy, *(of[value] for of, value in zip(words, cell.values, strict=True)))
+            for cell in cells
+        }
+
     @property
     def n_runs(self) -> int:
         """How many runs there are."""
@@ -373,6 +383,19 @@ class StudySpec:
             criterion_value=experiment.value,
             seed=self.seeds[0],
         )
+
+
+def value_words(values: Iterable[Value]) -> dict[Value, str]:
+    """Return how the values of an axis are shown: 2/7 as 0.285714, but with all digits where two would look alike."""
+    short = {value: _short(value) for value in values}
+    shown = Counter(short.values())
+    return {value: word if shown[word] == 1 else str(value) for value, word in short.items()}
+
+
+def _short(value: Value) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _with_value(mapping: Mapping[str, Any], path: Sequence[str], value: Value) -> dict[str, Any]:

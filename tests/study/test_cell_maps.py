@@ -8,7 +8,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.study.cell_maps import MOST_CELLS, choose_cells, maps_of_cells, robot_ticks
 from swarm_forage_env.study.maps import floor_maps, mean_maps
 from swarm_forage_env.study.replay.capture import record_replay
-from swarm_forage_env.study.studies import Axis
+from swarm_forage_env.study.studies import Axis, value_words
 from swarm_forage_env.study.study_table import StudyTable
 from tests.support.tiny_study import NOBODY, RANDOM, tiny_study
 
@@ -31,6 +31,25 @@ def test_words_choose_cells_in_their_order():
     ]
     assert len(choose_cells(SPEC, ("policy=twin", "population_size=2"))) == 6, "a cell named twice counts once"
     assert choose_cells(SPEC, ()) == SPEC.cells
+
+
+def test_values_are_named_as_they_are_shown():
+    """Here the message that lists the values shows 0.00428571, which is not equal to 0.03 / 7."""
+    spec = tiny_study(axes=(Axis(name="noise", values=(0.0, 0.03 / 7, 0.03)),))
+    for text in ("0.00428571", "0.004285714285714286", "4.285714285714286e-3"):
+        assert {cell.values for cell in choose_cells(spec, (f"noise={text}",))} == {(0.03 / 7,)}
+    with pytest.raises(ConfigError, match=r"one of 0, 0\.00428571, 0\.03 in study"):
+        choose_cells(spec, ("noise=0.0042857",))
+
+
+def test_values_that_would_look_alike_are_shown_with_all_digits():
+    values = (0.0, 0.03 / 7, 0.00428571)
+    spec = tiny_study(axes=(Axis(name="noise", values=values),))
+    (cell, _) = choose_cells(spec, ("noise=0.00428571",))
+    assert cell.values == (0.00428571,)
+    assert value_words(values) == {0.0: "0", 0.03 / 7: "0.004285714285714286", 0.00428571: "0.00428571"}
+    assert value_words((True, False)) == {True: "true", False: "false"}
+    assert value_words((8, 1000001)) == {8: "8", 1000001: "1000001"}
 
 
 @pytest.mark.parametrize(
