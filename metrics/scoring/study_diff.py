@@ -90,11 +90,23 @@ class CellDiff:
     """A cell of both studies."""
 
     cell: "Cell"
+    place: tuple[str, ...]
+    """Reading, policy and the value on each axis, as they are shown."""
     state: State
     n_identical: int
     """Runs of the same seed with the same numbers in all columns of both studies."""
     shifts: tuple[Shift, ...]
     """One per column that was tested; none for an identical cell."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lacking:
+    """A cell that is not compared, since not both studies have finished runs of it."""
+
+    cell: "Cell"
+    place: tuple[str, ...]
+    """Reading, policy and the value on each axis, as they are shown."""
+    why: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,8 +117,8 @@ class StudyDiff:
     """Cells that both have, with runs in both."""
     lines: tuple[Shift, ...]
     """All cells of a policy in a reading together, per column; none where all of them are identical."""
-    lacking: "tuple[tuple[Cell, str], ...]"
-    """Cells that cannot be compared, and why."""
+    lacking: tuple[Lacking, ...]
+    """Cells that cannot be compared."""
     settings: tuple[str, ...]
     """What differs between the two studies apart from their runs, in words."""
 
@@ -116,9 +128,11 @@ class StudyDiff:
 
     @property
     def differs(self) -> bool:
-        """Whether a cell or a line differs significantly, or a cell is open."""
-        return any(cell.state in ("different", "open") for cell in self.cells) or any(
-            line.is_significant for line in self.lines
+        """Whether a cell or a line differs significantly, or a cell is open or not compared."""
+        return (
+            bool(self.lacking)
+            or any(cell.state in ("different", "open") for cell in self.cells)
+            or any(line.is_significant for line in self.lines)
         )
 
     @property
@@ -134,7 +148,7 @@ class StudyDiff:
             "settings": list(self.settings),
             "cells": [
                 {
-                    "place": list(place_of(cell.cell)),
+                    "place": list(cell.place),
                     "state": cell.state,
                     "n_identical": cell.n_identical,
                     "shifts": [shift.to_mapping() for shift in cell.shifts],
@@ -142,7 +156,7 @@ class StudyDiff:
                 for cell in self.cells
             ],
             "lines": [shift.to_mapping() for shift in self.lines],
-            "lacking": [{"place": list(place_of(cell)), "why": why} for cell, why in self.lacking],
+            "lacking": [{"place": list(one.place), "why": one.why} for one in self.lacking],
         }
 
 
@@ -164,14 +178,15 @@ def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[st
     if unknown:
         raise CurveError(f"Expected columns that both studies have, got {unknown[0]!r}; see 'swarm-forage schema'.")
     cells: list[tuple[Cell, int, list[tuple[Shift, _Sample]]]] = []
-    lacking: list[tuple[Cell, str]] = []
-    for cell in dict.fromkeys((*first.spec.cells, *second.spec.cells)):
+    lacking: list[Lacking] = []
+    places = first.spec.place_words(second.spec)
+    for cell, place in places.items():
         why = _why_not(cell, first, second)
         if why:
-            lacking.append((cell, why))
+            lacking.append(Lacking(cell=cell, place=place, why=why))
             continue
         n_identical, is_same = _identical(cell, first, second)
-        tests = [] if is_same else [_tested(cell, column, first, second) for column in columns]
+        tests = [] if is_same else [_tested(cell, place, column, first, second) for column in columns]
         cells.append((cell, n_identical, [test for test in tests if test is not None]))
     if not cells:
         raise CurveError("Expected two studies with finished runs of the same cells, got none that both have.")
@@ -181,18 +196,20 @@ def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[st
     lines = tuple(replace(line, p_holm=next(corrected)) for line in lines)
     return StudyDiff(
         cells=tuple(
-            _cell_diff(cell, n_identical, tuple(replace(shift, p_holm=next(corrected)) for shift, _ in found))
+            CellDiff(
+                cell=cell,
+                place=places[cell],
+                state=_state(shifts),
+                n_identical=n_identical,
+                shifts=shifts,
+            )
             for cell, n_identical, found in cells
+            for shifts in (tuple(replace(shift, p_holm=next(corrected)) for shift, _ in found),)
         ),
         lines=lines,
         lacking=tuple(lacking),
         settings=_settings(first, second),
     )
-
-
-def place_of(cell: "Cell") -> tuple[str, ...]:
-    """Return reading, policy and the value on each axis as texts."""
-    return (cell.reading, cell.policy, *(f"{v:.4g}" if isinstance(v, float) else str(v) for v in cell.values))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -218,12 +235,14 @@ def _check_alike(first: "StudyTable", second: "StudyTable") -> None:
 
 
 def _why_not(cell: "Cell", first: "StudyTable", second: "StudyTable") -> str:
-    for name, table in (("first", first), ("second", second)):
+    tables = {"first": first, "second": second}
+    for name, table in tables.items():
         if cell not in table.spec.cells:
             return f"the {name} study does not have it"
-        if not table.curves(cell, "performance")[0]:
-            return f"the {name} study has no finished run of it"
-    return ""
+    without = [name for name, table in tables.items() if not table.curves(cell, "performance")[0]]
+    if len(without) == 2:
+        return "neither study has a finished run of it"
+    return f"the {without[0]} study has no finished run of it" if without else ""
 
 
 def _identical(cell: "Cell", first: "StudyTable", second: "StudyTable") -> tuple[int, bool]:
@@ -242,7 +261,9 @@ def _identical(cell: "Cell", first: "StudyTable", second: "StudyTable") -> tuple
     return sum(same), seeds == others and all(same) and mine.keys() == theirs.keys()
 
 
-def _tested(cell: "Cell", column: str, first: "StudyTable", second: "StudyTable") -> "tuple[Shift, _Sample] | None":
+def _tested(
+    cell: "Cell", place: tuple[str, ...], column: str, first: "StudyTable", second: "StudyTable"
+) -> "tuple[Shift, _Sample] | None":
     """The test of one column; None where runs of this cell do not have it."""
     (seeds, mine), (others, theirs) = (table.curves(cell, column) for table in (first, second))
     if column not in mine or column not in theirs:
@@ -254,7 +275,7 @@ def _tested(cell: "Cell", column: str, first: "StudyTable", second: "StudyTable"
     p, half = _test(difference, variance, freedom, scale=float(np.abs([*a, *b]).max()), n_runs=len({*seeds, *others}))
     shift = Shift(
         column=column,
-        place=place_of(cell),
+        place=place,
         first=float(a.mean()),
         second=float(b.mean()),
         difference=difference,
@@ -345,15 +366,12 @@ def _line(
     )
 
 
-def _cell_diff(cell: "Cell", n_identical: int, shifts: tuple[Shift, ...]) -> CellDiff:
-    state: State = "alike"
+def _state(shifts: tuple[Shift, ...]) -> State:
     if not shifts:
-        state = "identical"
-    elif all(math.isnan(shift.p) for shift in shifts):
-        state = "open"
-    elif any(shift.is_significant for shift in shifts):
-        state = "different"
-    return CellDiff(cell=cell, state=state, n_identical=n_identical, shifts=shifts)
+        return "identical"
+    if all(math.isnan(shift.p) for shift in shifts):
+        return "open"
+    return "different" if any(shift.is_significant for shift in shifts) else "alike"
 
 
 def _settings(first: "StudyTable", second: "StudyTable") -> tuple[str, ...]:

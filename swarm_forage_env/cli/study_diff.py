@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from metrics.scoring.study_diff import Shift, StudyDiff
 
 ROWS_SHOWN = 20
-"""Differences that are listed; `--json` has all."""
+"""Differences that are listed, and cells that are not compared; `--json` has all."""
 
 
 def diff(
@@ -25,7 +25,10 @@ def diff(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say which cells of two studies differ beyond chance; exit code 0 if none does, 1 if one does or may."""
+    """Say which cells of two studies differ beyond chance.
+
+    Exit code 0 if no cell differs; 1 if one does or may, or if one has no finished runs in A or in B.
+    """
     from metrics.scoring.study_diff import COLUMNS, diff_studies
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.study.study_table import read_study
@@ -66,17 +69,21 @@ def diff_report(found: "StudyDiff", header: Sequence[str]) -> str:
     if shown:
         heads = (*header, "column", "A", "B", "B - A", "95 % interval", "runs", "p (Holm)")
         lines += ["", *aligned([heads, *map(_row, shown[:ROWS_SHOWN])])]
-        lines += [f"and {len(shown) - ROWS_SHOWN} more; --json has all"] if len(shown) > ROWS_SHOWN else []
+        lines += _more(len(shown))
     if found.lines:
         lines += ["", "all cells of a policy together, in shares of each cell's mean:"]
         lines += aligned(
             [("reading", "policy", "column", "B - A", "95 % interval", "p (Holm)"), *map(_line, found.lines)]
         )
     if found.lacking:
-        reasons = dict.fromkeys(why for _, why in found.lacking)
-        counted_reasons = (f"{sum(w == why for _, w in found.lacking)}: {why}" for why in reasons)
-        lines += ["", "cells not compared: " + "; ".join(counted_reasons)]
+        lines += ["", f"{counted(len(found.lacking), 'cell')} not compared:"]
+        lines += aligned([(*header, "why"), *((*one.place, one.why) for one in found.lacking[:ROWS_SHOWN])])
+        lines += _more(len(found.lacking))
     return "\n".join([*lines, *(["", TEST] if found.shifts else [])])
+
+
+def _more(n_rows: int) -> list[str]:
+    return [f"and {n_rows - ROWS_SHOWN:,} more; --json has all"] if n_rows > ROWS_SHOWN else []
 
 
 def _row(shift: "Shift") -> tuple[str, ...]:

@@ -10,6 +10,7 @@ import pytest
 
 from metrics.scoring import diff_studies
 from swarm_forage_env.cli.study_diff import diff_report
+from swarm_forage_env.study.studies import Axis
 from tests.support.made_tables import made_study, made_table
 
 FILE = """
@@ -183,6 +184,30 @@ def test_differences_are_listed_with_their_intervals():
         r"^described +dpo +2 +performance +19\.94 +29\.92 +9\.972 +9\.88 to 10\.06 +6 ", report, re.MULTILINE
     )
     assert re.search(r"^described +dpo +performance +40 % +39\.8 % to 40\.2 % .* \*$", report, re.MULTILINE)
+
+
+def test_cells_that_one_study_lacks_are_listed(command):
+    whole = made_study("S1a", Axis(name="noise", values=(0.0, 0.03 / 7)))
+    part = made_study("S1a", Axis(name="noise", values=(0.0,)))
+    for spec, name in ((whole, "whole"), (part, "part")):
+        made_table(spec, lambda cell: 10.0).write(f"{name}.parquet")
+    code, out, _ = command("study", "diff", "whole.parquet", "part.parquet", "--columns", "performance")
+    assert code == 1
+    assert out.splitlines()[:5] == [
+        "4 cells compared",
+        "  4  identical to the last bit",
+        "",
+        "4 cells not compared:",
+        "reading    policy  noise       why",
+    ]
+    assert "described  crw     0.00428571  the second study does not have it" in out
+    many = made_study("S1a", Axis(name="noise", values=tuple(0.01 * i for i in range(7))))
+    report = diff_report(
+        diff_studies(made_table(many, lambda cell: 10.0), made_table(part, lambda cell: 10.0), ("performance",)),
+        ("reading", "policy", "noise"),
+    )
+    assert "24 cells not compared" in report
+    assert "and 4 more; --json has all" in report
 
 
 def test_what_a_diff_refuses(ran):

@@ -9,7 +9,6 @@ from scipy import stats
 
 from metrics import CurveError
 from metrics.scoring import diff_studies
-from metrics.scoring.study_diff import place_of
 from swarm_forage_env.study.studies import Axis
 from swarm_forage_env.study.study_table import StudyTable
 from tests.support.made_tables import made_study, made_table
@@ -59,7 +58,7 @@ def test_a_cell_that_changed_is_found_and_the_others_are_not():
     found = diff_studies(noisy(spec), noisy(spec, of=2, shift=0.5, where=lambda cell: cell == changed), PERFORMANCE)
     assert [cell.cell for cell in found.cells if cell.state == "different"] == [changed]
     (shift,) = (shift for cell in found.cells for shift in cell.shifts if shift.is_significant)
-    assert shift.place == place_of(changed) == ("described", "dpo", "2")
+    assert shift.place == found.cells[4].place == ("described", "dpo", "2")
     assert shift.lower < 10.0 < shift.upper, "half of 20"
     assert found.differs
 
@@ -117,13 +116,42 @@ def test_what_is_not_compared_is_told():
     small, large = made_study(), made_study("S1a", Axis(name="population_size", values=(1, 2, 8)))
     lost = {(small.cells[0], seed) for seed in small.seeds}
     found = diff_studies(noisy(small, lost=lost), noisy(large), PERFORMANCE)
-    reasons = {cell.values[-1]: why for cell, why in found.lacking if cell.policy == "crw"}
+    reasons = {one.cell.values[-1]: one.why for one in found.lacking if one.cell.policy == "crw"}
     assert reasons == {
         1: "the first study has no finished run of it",
         4: "the second study does not have it",
         8: "the first study does not have it",
     }
     assert len(found.cells) == 7
+
+
+@pytest.mark.parametrize("sizes", [(1, 2), (1, 2, 4, 8)])
+def test_a_cell_that_one_study_lacks_is_a_difference(sizes):
+    """One cell of a hundred says nothing about the others."""
+    whole = made_study()
+    part = made_study("S1a", Axis(name="population_size", values=sizes))
+    found = diff_studies(made_table(whole, steady), made_table(part, steady), PERFORMANCE)
+    assert {cell.state for cell in found.cells} == {"identical"}
+    assert len(found.lacking) == 4
+    assert found.differs
+
+
+def test_a_cell_that_neither_study_has_run_is_not_compared():
+    spec = made_study()
+    table = noisy(spec, lost={(spec.cells[0], seed) for seed in spec.seeds})
+    found = diff_studies(table, table, PERFORMANCE)
+    assert [(one.cell, one.why) for one in found.lacking] == [(spec.cells[0], "neither study has a finished run of it")]
+    assert found.differs
+
+
+def test_two_cells_do_not_look_alike():
+    """Not even if one is of the first study, the other of the second."""
+    a, b = (made_study("S1e", Axis(name="noise", values=(0.0, value))) for value in (0.03 / 7, 0.00428571))
+    found = diff_studies(made_table(a, lambda cell: 1.0), made_table(b, lambda cell: 1.0), PERFORMANCE)
+    assert [one["place"][2] for one in found.to_mapping()["lacking"] if one["place"][1] == "crw"] == [
+        "0.004285714285714286",
+        "0.00428571",
+    ]
 
 
 def test_settings_and_versions_that_differ_are_told():
