@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -40,6 +42,20 @@ def test_marked_commands_of_the_readme_are_one_line_each(name):
 def test_relative_links_lead_to_files(page):
     targets = re.findall(r"\]\((?!https?://|#)([^)#]+)", page.read_text())
     assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+def test_what_pages_show_is_not_left_out_of_the_repository(tmp_path):
+    """What runs write is, such as the folder results in the root, but not docs/images/results."""
+    shutil.copy(ROOT / ".gitignore", tmp_path)
+    subprocess.run(["git", "init", "--quiet", "."], cwd=tmp_path, check=True)
+    shown = [
+        (page.parent.relative_to(ROOT) / target).as_posix()
+        for page in PAGES
+        for target in re.findall(r"!\[.*?\]\((?!https?://)(.+?)\)", page.read_text())
+    ]
+    asked = ["git", "check-ignore", "results/of_a_run", "docs/images/results/picture.png", *shown]
+    left_out = subprocess.run(asked, cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    assert left_out.split() == ["results/of_a_run"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
