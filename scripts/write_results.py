@@ -11,6 +11,7 @@ Needs the extra "plots". The interpreter is $PYTHON, else that of the active env
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,6 +24,8 @@ from metrics.scoring.verdicts import VARIANTS
 from swarm_forage_env import read_study
 from swarm_forage_env.cli.study_page import command_of
 from swarm_forage_env.cli.study_verdict import scored_studies, waiting_lines
+from swarm_forage_env.study.studies import StudySpec
+from swarm_forage_env.study.study_file import budget_names, is_set_of_paper, load_study, set_names
 from swarm_forage_env.study.study_run import DONE
 from swarm_forage_env.study.study_table import StudyTable
 
@@ -33,9 +36,7 @@ COLOURS = 64
 ANSWERS = ("supported", "contradicted", "undecided")
 SIGNS = {"supported": "✓", "contradicted": "✗", "undecided": "?"}
 
-INTRODUCTION = """# Results
-
-What runs of the paper's experiment sets say of its claims, under both [readings](readings.md) of its rules. This page
+INTRODUCTION = """What these runs say of the paper's claims, under both [readings](readings.md) of its rules. This page
 and its pictures are written by `scripts/write_results`; nothing in them is typed by hand, and no threshold was moved
 after the runs were seen. A claim that is contradicted is a result like any other. How claims are decided is in
 [metrics.md](metrics.md#the-papers-claims), how studies are run in [studies.md](studies.md)."""
@@ -72,6 +73,50 @@ def rows(header: Sequence[str], lines: Sequence[Sequence[Any]], right: Sequence[
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in (header, under, *lines))
 
 
+def what_is_there(results: Results) -> str:
+    """Return how many runs of the sets the page is of, and which sets and cells are not run yet, per budget."""
+    return "\n\n".join(_of_budget(results, budget) for budget in dict.fromkeys(t.spec.budget for t in results.tables))
+
+
+def plan_of(table: StudyTable) -> StudySpec:
+    """Return the whole study of which a table may hold fewer seeds or one reading."""
+    spec = table.spec
+    if not is_set_of_paper(spec):
+        return spec
+    plan = load_study(spec.name, spec.budget)
+    return plan if len(plan.seeds) >= len(spec.seeds) else replace(plan, seeds=spec.seeds)
+
+
+def _of_budget(results: Results, budget: str) -> str:
+    tables = {table.spec.name: table for table in results.tables if table.spec.budget == budget}
+    plans = {name: load_study(name, budget) for name in set_names() if budget in budget_names(name)}
+    plans |= {name: plan_of(table) for name, table in tables.items()}
+    n_there, n_planned = 0, 0
+    whole: list[str] = []
+    nothing: list[str] = []
+    in_part: list[str] = []
+    for name, plan in sorted(plans.items()):
+        done = [state.n_runs[DONE] for state in tables[name].cell_states()] if name in tables else []
+        n_cells, n_seeds = len(plan.cells), len(plan.seeds)
+        n_there += sum(done)
+        n_planned += plan.n_runs
+        n_whole, n_begun = (sum(count >= least for count in done) for least in (n_seeds, 1))
+        if n_begun == 0:
+            nothing.append(name)
+        elif n_whole == n_cells:
+            whole.append(name)
+        else:
+            in_part.append(
+                f"\n- {name}: {n_whole:,} of {counted(n_cells, 'cell')} whole, with {counted(n_seeds, 'run')} each; "
+                f"{n_begun - n_whole:,} begun, {n_cells - n_begun:,} not run"
+            )
+    of = f" of the paper's sets at budget `{budget}`" if budget else ""
+    text = f"**This page is of {n_there:,} of {counted(n_planned, 'run')}{of}.**"
+    for words, names in (("Sets with all runs", whole), ("Sets not run", nothing)):
+        text += f" {words}: {', '.join(names) or 'none'}."
+    return text + (" Sets of which runs are still to be made:\n" + "".join(in_part) if in_part else "")
+
+
 def what_ran(results: Results) -> str:
     """Return the part on runs and what they took."""
     lines: list[tuple[Any, ...]] = []
@@ -80,7 +125,7 @@ def what_ran(results: Results) -> str:
         took = "-" if table.wall_time_s is None else f"{table.wall_time_s / 3600.0:.2f}"
         where = (f"`{table.spec.name}`", table.spec.title, table.spec.budget, ", ".join(table.spec.readings))
         lines.append(
-            (*where, f"{sum(done):,} of {table.spec.n_runs:,}", min(done), f"{table.spec.horizon_s:,.0f}", took)
+            (*where, f"{sum(done):,} of {plan_of(table).n_runs:,}", min(done), f"{table.spec.horizon_s:,.0f}", took)
         )
     known = [table.wall_time_s for table in results.tables if table.wall_time_s is not None]
     total = f"\n\nAll runs together took {sum(known) / 3600.0:.1f} hours." if known else ""
@@ -233,12 +278,8 @@ def figures(results: Results, folder: Path) -> str:
 
 
 def left_out(results: Results) -> str:
-    """Return what is not there, and how all of it is made again."""
+    """Return which claims and measures are not there, and how all runs are made again."""
     lines = [f"- {line.strip()}" for line in waiting_lines((*results.waiting, *results.expected_later))[1:]]
-    for table in results.tables:
-        short = [state for state in table.cell_states() if not state.is_complete]
-        if short:
-            lines.append(f"- {table.spec.name}: {len(short)} of {counted(len(table.spec.cells), 'cell')} lack runs")
     for table, panels in zip(results.tables, results.scored, strict=True):
         missing = {f"{measure}, {variant}: {why}" for (measure, variant), why in panels.missing.items()}
         lines += [f"- {table.spec.name}, {words}" for words in sorted(missing)]
@@ -252,7 +293,7 @@ def left_out(results: Results) -> str:
     commands = "\n".join(command_of(table) for table in results.tables)
     return (
         f"## What is left out\n\n{budget}"
-        + ("\n".join(lines) or "Nothing waits, and no cell lacks a run.")
+        + ("\n".join(lines) or "Nothing waits.")
         + f"\n\n## To run it again\n\n```bash\n{commands}\nscripts/write_results results/studies/*_reduced\n```"
     )
 
@@ -269,7 +310,14 @@ def main(words: Sequence[str] | None = None) -> int:
         print(f"write_results: {error}", file=sys.stderr)
         return 2
     parts = [what_ran, in_short, claims_table, what_hangs_on_what, intuitions, reasons]
-    text = [INTRODUCTION, *(part(results) for part in parts), figures(results, arguments.out), left_out(results)]
+    text = [
+        "# Results",
+        what_is_there(results),
+        INTRODUCTION,
+        *(part(results) for part in parts),
+        figures(results, arguments.out),
+        left_out(results),
+    ]
     page = arguments.out / "results.md"
     page.write_text("\n\n".join(text) + "\n", encoding="utf-8")
     n_pictures = len(list((arguments.out / PICTURES).glob("*.png")))

@@ -1,5 +1,6 @@
 """Scripts of measurements run: short, to see that they still fit the packages."""
 
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -10,6 +11,8 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import plan_run
 from swarm_forage_env.study.store import RunStore
+from swarm_forage_env.study.study_file import load_study, set_names
+from tests.support.made_tables import made_table
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -62,6 +65,34 @@ def test_two_versions_are_drawn_beside_each_other(run):
     assert code == 0
     assert "| 4 | 0.0 → 0.0 |" in out
     assert Path("picture.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_results_say_which_sets_and_cells_they_are_of(run):
+    """One cell of S1a lacks one of its two runs, another both, and those of the other reading do; S1c is whole."""
+    pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
+    spec = load_study("S1a", "smoke", readings=("described",))
+    lost = {(spec.cells[0], 1), (spec.cells[1], 0), (spec.cells[1], 1)}
+    made_table(spec, lambda cell: 10.0 * cell.values[0], lost=lost).write("S1a.parquet")
+    whole = load_study("S1c", "smoke")
+    made_table(whole, lambda cell: 10.0, adversity=lambda cell: cell.values[0]).write("S1c.parquet")
+    Path("page").mkdir()
+    code, out, _ = run("write_results", "--out", "page", "S1a.parquet", "S1c.parquet")
+    assert code == 0
+    page = Path("page/results.md").read_text(encoding="utf-8")
+    n_planned = sum(load_study(name, "smoke").n_runs for name in set_names())
+    n_cells = len(spec.cells)
+    assert page.splitlines()[2:5] == [
+        f"**This page is of {spec.n_runs - 3 + whole.n_runs} of {n_planned} runs of the paper's sets at budget "
+        "`smoke`.** Sets with all runs: S1c. Sets not run: S1b, S1d, S1e, S1f, S1g, S1h, S2a, S2b, S2c, S2d. Sets of "
+        "which runs are still to be made:",
+        "",
+        f"- S1a: {n_cells - 2} of {2 * n_cells} cells whole, with 2 runs each; 1 begun, {n_cells + 1} not run",
+    ]
+    pictures = {path.relative_to("page").as_posix() for path in Path("page").rglob("*.png")}
+    assert pictures == set(re.findall(r"\]\((images/.+?)\)", page))
+    assert f"{len(pictures)} pictures" in out
+    assert pictures
+    assert "swarm-forage study run S1c --budget smoke --seeds 2 --reading both" in page
 
 
 @pytest.mark.parametrize(
