@@ -157,8 +157,8 @@ def _parse_value(name: str, text: str, kind: Any) -> Any:
     try:
         if get_origin(kind) is tuple:
             parts, kinds = text.split(","), get_args(kind)
-            if kinds[-1] is Ellipsis and not text:
-                return ()
+            if kinds[0] is str:
+                return tuple(name for part in parts if (name := part.strip()))
             if kinds[-1] is Ellipsis:
                 kinds = kinds[:1] * len(parts)
             return tuple(part_kind(part) for part_kind, part in zip(kinds, parts, strict=True))

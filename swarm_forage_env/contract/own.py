@@ -7,7 +7,8 @@
     env = parallel_env("warehouse_small", own_sensors=("nest_distance",))
 
 A scenario names them, so that every view, stored run and trained policy tells which it is about. Other processes find a
-name by the entry point of an installed package, as they find a policy; no file can name code that is not installed.
+name by the entry point of an installed package, as they find a policy. So a file can name nothing but what is installed
+or registered.
 """
 
 from collections.abc import Callable
@@ -31,6 +32,10 @@ MAX_COLUMNS = 1024
 
 OwnReward: TypeAlias = Callable[[Any], np.ndarray]
 """Takes the world (`world.arena.ForagingArena`), returns (N,) one number per robot."""
+
+
+class OwnFunctionError(ValueError):
+    """A function of the user that failed, or returned what no observation or reward can be."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -70,24 +75,39 @@ class OwnSensor:
         """Return the readings, (N, n_columns).
 
         Raises:
-            ValueError: another shape, or a value that is not in [-1, 1].
+            OwnFunctionError: the function failed, or returned another shape or a value that is not in [-1, 1].
         """
         n_robots = len(world.swarm.active)
-        values = np.asarray(self.function(world))
+        values = called(self.function, world, f"sensor {self.name!r}")
         if values.shape not in {(n_robots, self.n_columns), (n_robots,) if self.n_columns == 1 else ()}:
-            raise ValueError(
+            raise OwnFunctionError(
                 f"Expected sensor {self.name!r} to return shape (n_robots, n_columns) = {n_robots, self.n_columns}, "
                 f"got {values.shape}."
             )
         values = values.reshape(n_robots, self.n_columns)
-        at_work = values[world.swarm.present]
-        if not (np.abs(at_work) <= 1.0).all():
-            wrong = at_work[~(np.abs(at_work) <= 1.0)]
-            raise ValueError(
+        of_present = values[world.swarm.present]
+        if not (np.abs(of_present) <= 1.0).all():
+            wrong = of_present[~(np.abs(of_present) <= 1.0)]
+            raise OwnFunctionError(
                 f"Expected sensor {self.name!r} to return numbers in [-1, 1], got {wrong[0]}; divide by the largest "
                 "value that can occur, or clip."
             )
         return values
+
+
+def called(function: Callable[[Any], Any], world: Any, what: str) -> np.ndarray:
+    """Return the numbers that a function of the user says of the world; `what` names it in errors.
+
+    Raises:
+        OwnFunctionError: it failed, or returned no real numbers.
+    """
+    try:
+        values = np.asarray(function(world))
+    except Exception as error:
+        raise OwnFunctionError(f"The function of {what} failed with {type(error).__name__}: {error}") from error
+    if values.dtype.kind not in "biuf":
+        raise OwnFunctionError(f"Expected {what} to return real numbers, got an array of {values.dtype}.")
+    return values
 
 
 _SENSORS: dict[str, OwnSensor] = {}
@@ -100,8 +120,8 @@ def register_sensor(
 ) -> OwnSensor:
     """Make further columns of observations known under a name, in this process; the name may be given anew.
 
-    Scenarios then take it: `own_sensors=(name,)`. Worker processes know it if they are forked, or if the module that
-    registers it is imported there, or by an entry point (`SENSOR_ENTRY_POINTS`).
+    Scenarios then take it: `own_sensors=(name,)`. An environment looks the name up at each reset. Worker processes
+    start afresh and know only entry points (`SENSOR_ENTRY_POINTS`).
 
     Args:
         name: Name of the new slice.
@@ -127,8 +147,8 @@ def register_reward(name: str, function: OwnReward) -> None:
         ConfigError: an empty name, or no function.
     """
     text("the name of a reward", name)
-    if not name or not callable(function):
-        raise ConfigError(f"Expected a name and a function of the world, got {name!r} and {function!r}.")
+    if not callable(function):
+        raise ConfigError(f"Expected a function of the world for reward {name!r}, got {function!r}.")
     _REWARDS[name] = function
 
 

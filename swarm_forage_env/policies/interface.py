@@ -58,25 +58,31 @@ class InterfaceConfig:
     """Grasp when empty and over an object or a cache, deliver when carrying in the nest; the learner only drives."""
     decision_ticks: int = 1
     """Ticks for which an action is kept; rewards add up. An automatic gripper decides in every tick."""
-    own_sensors: tuple[str, ...] = ()
-    """Names of own sensors that the learner sees beside the columns of the package, in this order. Environments fill in
-    those of their scenario."""
+    own_sensors: tuple[str, ...] | None = None
+    """Names of own sensors that the learner sees beside the columns of the package, in this order. Where nothing is
+    said (None), environments and trainings fill in those of their scenario, and a policy sees none."""
 
     def __post_init__(self) -> None:
         one_of("interface.observation", self.observation, OBSERVATIONS)
         one_of("interface.actions", self.actions, ACTIONS)
         switch("interface.automatic_gripper", self.automatic_gripper)
         whole("interface.decision_ticks", self.decision_ticks, at_least=1)
-        unique_names("interface.own_sensors", self.own_sensors)
+        if self.own_sensors is not None:
+            unique_names("interface.own_sensors", self.own_sensors)
 
     def for_scenario(self, scenario: ScenarioConfig) -> "InterfaceConfig":
-        """Return these choices with the scenario's own sensors, if no sensors were chosen."""
-        return self if self.own_sensors else replace(self, own_sensors=scenario.robots.own_sensors)
+        """Return these choices with the scenario's own sensors, where nothing was said about them."""
+        return replace(self, own_sensors=scenario.robots.own_sensors) if self.own_sensors is None else self
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """The own sensors that are seen."""
+        return self.own_sensors or ()
 
     @property
     def reads(self) -> tuple[str, ...] | None:
         """Observation slices that are used, None = all; the value for `ForageEnv(reads=...)`."""
-        return (*_COMPACT_READS, *self.own_sensors) if self.observation == "compact" else None
+        return (*_COMPACT_READS, *self.sensors) if self.observation == "compact" else None
 
 
 class LearnerInterface:
@@ -120,7 +126,7 @@ class LearnerInterface:
         self._grips = np.array(list(GRIP_COMMANDS.values()), np.float32)
         self._commands = np.zeros((spec.n_robots, 3), np.float32)
         self.layout = learner_layout(source, config)
-        own = [source[name] for name in config.own_sensors]
+        own = [source[name] for name in config.sensors]
         self._own_columns = np.array([column for part in own for column in range(part.start, part.stop)], np.intp)
         self._n_built_in = self.layout.size - len(self._own_columns)
         self.observation_space = self.new_observation_space()
@@ -226,19 +232,19 @@ def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> Observ
     Raises:
         ConfigError: the environment lacks a sensor that the learner wants.
     """
-    missing = [name for name in config.own_sensors if name not in source.names]
+    missing = [name for name in config.sensors if name not in source.names]
     if missing:
         raise ConfigError(
-            f"Expected a scenario with the own sensors {', '.join(config.own_sensors)}, which the policy sees; "
-            f"{missing[0]!r} is missing. Give the scenario own_sensors={config.own_sensors!r}."
+            f"Expected a scenario with the own sensors {', '.join(config.sensors)}, which the policy sees; "
+            f"{missing[0]!r} is missing. Give the scenario own_sensors={config.sensors!r}."
         )
     if config.observation == "compact":
         built_in = [part.row for part in compact_layout(source)]
-    elif source.names == (*BUILT_IN_SLICES, *config.own_sensors):
+    elif source.names == (*BUILT_IN_SLICES, *config.sensors):
         return source
     else:
         built_in = [part.row for part in source if part.name in BUILT_IN_SLICES]
-    return layout_of([*built_in, *(source.part(name).row for name in config.own_sensors)])
+    return layout_of([*built_in, *(source.part(name).row for name in config.sensors)])
 
 
 def compact_layout(source: ObservationLayout) -> ObservationLayout:
@@ -299,6 +305,7 @@ def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
     """
     known_keys(mapping, InterfaceConfig.__dataclass_fields__, "interface option")
     values = dict(mapping)
-    if isinstance(values.get("own_sensors"), list):  # JSON knows no tuples
-        values["own_sensors"] = tuple(values["own_sensors"])
+    own = values.get("own_sensors")
+    if isinstance(own, str | list):  # a word of the command line, "one+two", or of JSON, which knows no tuples
+        values["own_sensors"] = tuple(own.split("+")) if isinstance(own, str) else tuple(own)
     return InterfaceConfig(**values)

@@ -455,7 +455,12 @@ def scenario_of_same_size(scenario: ScenarioConfig, overrides: Mapping[str, Any]
         ConfigError: unknown fields, values that do not fit together, or another number of robots.
     """
     changed = with_overrides(scenario, **overrides)
-    n_robots = scenario.robots.n_robots
+    n_robots, own = scenario.robots.n_robots, scenario.robots.own_sensors
+    if changed.robots.own_sensors != own:
+        raise ConfigError(
+            f"Expected own_sensors to stay {own!r}, the columns that spaces promise, got "
+            f"{changed.robots.own_sensors!r}; make another environment."
+        )
     if changed.robots.n_robots != n_robots:
         raise ConfigError(
             f"Expected n_robots to stay {n_robots}, the number of rows that spaces promise, got "

@@ -73,7 +73,8 @@ class RunSpec:
         """Short hexadecimal hash of all that can change a run; equal specifications have equal ids.
 
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
-        `physics` is left out where it is the default, so that runs in Chipmunk have the same ids with and without it.
+        `physics` is left out where it is the default, so that runs in Chipmunk have the same ids with and without it;
+        so are own sensors and an own reward where there are none.
         """
         return identity_of({**self._others(), "scenario": _identifying_fields(self.scenario)})
 
@@ -146,6 +147,9 @@ def _identifying_fields(scenario: ScenarioConfig) -> dict[str, Any]:
     del mapping["performance"]
     if mapping["physics"] == "chipmunk":
         del mapping["physics"]
+    for section, name in (("robots", "own_sensors"), ("reward", "own_reward")):
+        if not mapping[section][name]:  # runs without them are those of before there were any
+            del mapping[section][name]
     return mapping
 
 

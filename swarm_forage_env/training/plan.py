@@ -129,6 +129,7 @@ class TrainingPlan:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "interface", self.interface.for_scenario(self.scenario))
         one_of("algorithm", self.algorithm, ALGORITHMS)
         one_of("performance of a scenario to train in", self.scenario.performance, COUNTED)
         unfit = {"dqn": "continuous", "sac": "discrete"}.get(self.algorithm)
@@ -220,8 +221,7 @@ class TrainingPlan:
         if "wrappers" in values:
             values["wrappers"] = wrappers_from_mapping(table("wrappers", values["wrappers"]))
         if "interface" in values:
-            interface = interface_from_mapping(dict(table("interface", values["interface"])))
-            values["interface"] = interface.for_scenario(values["scenario"])
+            values["interface"] = interface_from_mapping(dict(table("interface", values["interface"])))
         if "evaluation" in values:
             values["evaluation"] = EvaluationPlan(
                 **_known(EvaluationPlan, table("evaluation", values["evaluation"]), "evaluation.")

@@ -98,7 +98,7 @@ def recipe(
     episodes = {} if isinstance(scenario, ScenarioConfig) else {"horizon_s": measured.episode_s}
     episodes |= {name: value for name, value in overrides.items() if name not in fields}
     with_overrides(config, **episodes)  # refuses an impossible length
-    chosen = chosen_interface(interface, _default_interface(algorithm)).for_scenario(config)
+    chosen = chosen_interface(interface, _default_interface(algorithm))
     counts_deliveries = config.performance == "collected"
     return TrainingPlan(
         scenario=config,

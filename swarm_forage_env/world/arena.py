@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.compiling import direct
-from swarm_forage_env._internal.fields import whole
+from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.contract.own import own_sensor
+from swarm_forage_env.contract.own import OwnSensor, own_sensor
 from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, layout_for, refused_tasks
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
@@ -32,6 +32,9 @@ from swarm_forage_env.world.placement import draw_source, place_all, place_objec
 from swarm_forage_env.world.sensors import new_sensors, read_slices
 from swarm_forage_env.world.start_poses import draw_start_poses
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
+
+_FUNCTIONS = ("_compiled", "_own_sensors")
+"""Attributes of an arena that hold functions: made when they are needed, for one run."""
 
 
 class ForagingArena:
@@ -64,7 +67,7 @@ class ForagingArena:
         self.config = config
         self.layout = layout_for(config)
         self.reads = read_slices(reads, self.layout)
-        self._own_sensors = tuple(name for name in config.robots.own_sensors if name in self.reads)
+        self._own_names = tuple(name for name in config.robots.own_sensors if name in self.reads)
         self._given_reads = reads
         self._snapshots = snapshots
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
@@ -106,7 +109,8 @@ class ForagingArena:
             self._physics.twist,
             self._static_caches,
         )
-        vars(self).pop("_compiled", None)  # that of the run before holds its world
+        for name in _FUNCTIONS:
+            vars(self).pop(name, None)  # those of the run before hold its world
         self.has_changed = False
         return self.observe()
 
@@ -115,8 +119,8 @@ class ForagingArena:
         return CompiledTick(self._world, self._physics.state if isinstance(self._physics, Bodies) else None)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
-        return {name: value for name, value in vars(self).items() if name != "_compiled"}
+        """Return what copies and snapshots are made of: everything but functions, which cannot all be stored."""
+        return {name: value for name, value in vars(self).items() if name not in _FUNCTIONS}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
@@ -124,15 +128,31 @@ class ForagingArena:
     def observe(self) -> ObsArray:
         """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
         self._compiled.observe(self._world)
-        if self._own_sensors:
+        if self._own_names:
             self._sense_own()
         return self.obs
 
+    @cached_property
+    def _own_sensors(self) -> tuple[OwnSensor, ...]:
+        """The user's own sensors of this run.
+
+        Raises:
+            ConfigError: one that has become unknown, or has other columns than when the environment was made.
+        """
+        found = tuple(own_sensor(name) for name in self._own_names)
+        for sensor in found:
+            if sensor.row != self.layout.part(sensor.name).row:
+                raise ConfigError(
+                    f"Expected sensor {sensor.name!r} with {self.layout.part(sensor.name).size} columns, as when the "
+                    f"environment was made, got {sensor.n_columns}; make the environment anew."
+                )
+        return found
+
     def _sense_own(self) -> None:
         """Fill in the columns of the user's own sensors; robots that are not in the world sense nothing."""
-        for name in self._own_sensors:
-            values = own_sensor(name).read(self)
-            self.obs[:, self.layout[name]] = np.where(self.swarm.present[:, None], values, 0.0)
+        for sensor in self._own_sensors:
+            values = sensor.read(self)
+            self.obs[:, self.layout[sensor.name]] = np.where(self.swarm.present[:, None], values, 0.0)
 
     def _furnish(self) -> None:
         """Place all objects and create static caches: before the clusters if placement is "power_law", else after."""
@@ -211,7 +231,7 @@ class ForagingArena:
         self.tick, self.has_changed = self.tick + 1, False
         if outcome != DONE:
             self._finish(outcome, actions, tasks)
-        if self._own_sensors:
+        if self._own_names:
             self._sense_own()
 
     def _finish(self, outcome: int, actions: ActionArray, tasks: CodeArray | None) -> None:
@@ -273,7 +293,7 @@ class ForagingArena:
     @property
     def reads_own_sensors(self) -> bool:
         """Whether Python is needed in every tick, for sensors of the user."""
-        return bool(self._own_sensors)
+        return bool(self._own_names)
 
     # For `world.rack`
 

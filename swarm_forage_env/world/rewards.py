@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.compiling import direct
-from swarm_forage_env.contract.own import own_reward
+from swarm_forage_env.contract.own import OwnFunctionError, OwnReward, called, own_reward
 from swarm_forage_env.scenarios.config import RewardConfig
 from swarm_forage_env.world.kernels.reward import Happenings, Weights, rewards
 from swarm_forage_env.world.state import StepEvents, SwarmState
@@ -25,7 +25,7 @@ class RewardModel:
         nest_centre_m: tuple[float, float],
         swarm: SwarmState,
         events: StepEvents,
-        world: object = None,
+        world: object,
     ) -> None:
         """Bind the state; its arrays must not be replaced afterwards, only edited.
 
@@ -40,9 +40,9 @@ class RewardModel:
             ConfigError: `config` names a function that is not known here.
         """
         self._world = world
-        self._own = config.own_reward
-        if self._own:
-            own_reward(self._own)  # told now, not in the first step
+        self._own_name = config.own_reward
+        if self._own_name:
+            assert self._own is not None, "an unknown name is told now, not in the first step"
         self._weights = Weights(*(float(getattr(config, name)) for name in Weights._fields))
         self._is_dense = bool(config.nest_progress or config.interference or config.tick or config.own_reward)
         self._is_progress_paid = bool(config.nest_progress)
@@ -66,8 +66,8 @@ class RewardModel:
         return direct(rewards, self._happenings, self._weights, self._total, self._reward)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and snapshots are made of: everything but compiled functions, which cannot be stored."""
-        return {name: value for name, value in vars(self).items() if name != "_rewards"}
+        """Return what copies and snapshots are made of: everything but functions, which cannot all be stored."""
+        return {name: value for name, value in vars(self).items() if name not in {"_rewards", "_own"}}
 
     def remember(self) -> None:
         """Keep the positions before a step, if a term needs them."""
@@ -83,29 +83,33 @@ class RewardModel:
             self._reward[:] = 0.0
             return self._reward
         self._rewards(self._happenings, self._weights, self._total, self._reward)
-        if self._own:
-            self._total += self._own_terms()
+        if self._own is not None:
+            self._total += self._own_terms(self._own)
             self._reward[:] = self._total
         if self._is_team:
             active = self._swarm.active
             self._reward[:] = self._total.sum() / max(1, np.count_nonzero(active)) * active
         return self._reward
 
-    def _own_terms(self) -> np.ndarray:
+    @cached_property
+    def _own(self) -> OwnReward | None:
+        return own_reward(self._own_name) if self._own_name else None
+
+    def _own_terms(self, function: OwnReward) -> np.ndarray:
         """Return what the user's function adds, (N,), zero for robots that are not at work.
 
         Raises:
-            ValueError: it returned another shape, or numbers that are not finite.
+            OwnFunctionError: it failed, or returned another shape or numbers that are not finite.
         """
         active = self._swarm.active
-        values = np.asarray(own_reward(self._own)(self._world))
+        values = called(function, self._world, f"reward {self._own_name!r}")
         if values.shape != active.shape:
-            raise ValueError(
-                f"Expected reward {self._own!r} to return shape (n_robots,) = {active.shape}, got {values.shape}."
+            raise OwnFunctionError(
+                f"Expected reward {self._own_name!r} to return shape (n_robots,) = {active.shape}, got {values.shape}."
             )
         values = np.where(active, values, 0.0)
         if not np.isfinite(values).all():
-            raise ValueError(
-                f"Expected reward {self._own!r} to return finite numbers, got {values[~np.isfinite(values)][0]}."
+            raise OwnFunctionError(
+                f"Expected reward {self._own_name!r} to return finite numbers, got {values[~np.isfinite(values)][0]}."
             )
         return values

@@ -1,6 +1,7 @@
 """Sensors and rewards of users: names, errors, and where they arrive."""
 
 import copy
+import json
 from typing import Any
 
 import gymnasium
@@ -21,7 +22,11 @@ from swarm_forage_env import (
     with_overrides,
 )
 from swarm_forage_env.contract import own
-from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.contract.own import OwnFunctionError
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
+from swarm_forage_env.training.plan import TrainingPlan
+from swarm_forage_env.views.gymnasium import SwarmVectorEnv
+from tests.support.branches import pickled
 
 
 def nest_distance(world):
@@ -158,12 +163,14 @@ def test_an_unknown_reward_is_told_at_the_reset():
         (lambda world: np.zeros((6, 2)), r"shape .*\(6, 1\).* got \(6, 2\)"),
         (lambda world: np.full(6, 1.5), r"in \[-1, 1\], got 1.5"),
         (lambda world: np.full(6, np.nan), r"got nan"),
+        (lambda world: np.full(6, 1j), "real numbers, got an array of complex128"),
+        (lambda world: world.swarm.colour, "sensor 'odd' failed with AttributeError"),
     ],
 )
 def test_readings_that_no_observation_can_hold(values, message):
     register_sensor("odd", values)
     env = made(own_sensors=("odd",))
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(OwnFunctionError, match=message):
         env.reset(seed=1)
 
 
@@ -175,7 +182,7 @@ def test_rewards_that_no_learner_can_take(values, message):
     register_reward("odd", values)
     env = made(own_reward="odd")
     env.reset(seed=1)
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(OwnFunctionError, match=message):
         env.step_batch(ACTIONS)
 
 
@@ -214,3 +221,56 @@ def test_installed_packages_offer_them(monkeypatch):
     monkeypatch.setattr(own, "_installed", lambda group: (Offered("offered", nest_distance),))
     with pytest.raises(ConfigError, match="to be an OwnSensor"):
         own.own_sensor("offered")
+
+
+def test_a_name_of_the_compact_view_is_taken_there():
+    register_sensor("obstacle", nest_distance)
+    with pytest.raises(ConfigError, match="got 'obstacle' twice"):
+        parallel_env("warehouse_small", own_sensors=("obstacle",), interface={"observation": "compact"})
+
+
+def test_a_sensor_that_changes_its_columns_is_told_at_the_reset():
+    env = made(own_sensors=("both",))
+    register_sensor("both", nest_distance)
+    with pytest.raises(ConfigError, match=r"'both' with 2 columns.* got 1; make the environment anew"):
+        env.reset(seed=1)
+
+
+def test_a_reset_cannot_change_what_the_spaces_promise():
+    env = parallel_env("warehouse_small", n_robots=6, interface={"observation": "full"})
+    with pytest.raises(ConfigError, match=r"own_sensors to stay \(\)"):
+        env.reset(options={"scenario": {"own_sensors": ("both",)}})
+
+
+@pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
+def test_arenas_together_and_noise_show_the_same_columns(physics):
+    fields: dict[str, Any] = {"n_robots": 6, "own_sensors": ("both",), "physics": physics}
+    alone, together = (SwarmVectorEnv("warehouse_small", n_arenas=n, **fields) for n in (1, 2))
+    one, both = alone.reset(seed=3)[0], together.reset(seed=3)[0]
+    np.testing.assert_array_equal(both[:6, -2:], one[:, -2:])
+    noisy = parallel_env("warehouse_small", wrappers=["sensor_noise:sigma=0.1"], interface={}, **fields)
+    np.testing.assert_array_equal(np.stack(list(noisy.reset(seed=3)[0].values()))[:, -2:], one[:, -2:])
+
+
+def test_a_snapshot_takes_functions_that_cannot_be_stored():
+    register_sensor("odd", lambda world: np.zeros(6))
+    register_reward("odd", lambda world: np.ones(6))
+    env = made(own_sensors=("odd",), own_reward="odd", physics="compiled")
+    env.reset(seed=1)
+    env.step_batch(ACTIONS)
+    snapshot = pickled(env.snapshot())
+    env.step_batch(ACTIONS)
+    env.restore(snapshot)
+    assert env.tick == 1
+    assert env.step_batch(ACTIONS)[1].tolist() == [1.0] * 6
+
+
+@pytest.mark.parametrize("own_sensors", ["both+nest_distance", ["both", "nest_distance"]])
+def test_an_interface_says_its_sensors_in_a_word_or_in_json(own_sensors):
+    assert interface_from_mapping({"own_sensors": own_sensors}).own_sensors == ("both", "nest_distance")
+
+
+def test_a_plan_of_a_training_says_them():
+    plan = TrainingPlan(scenario=scenario("warehouse_small", own_sensors=("both",)))
+    assert plan.interface.own_sensors == ("both",)
+    assert TrainingPlan.from_mapping(json.loads(json.dumps(plan.to_mapping()))) == plan

@@ -183,7 +183,7 @@ def test_unknown_studies_and_budgets_are_refused(written):
 
 def test_the_study_of_the_page_is_one(written, tmp_path):
     page = (Path(__file__).parents[2] / "docs/studies.md").read_text()
-    (text,) = re.findall(r"^```toml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    (text,) = re.findall(r"^```toml\n(name = .*?)^```", page, re.DOTALL | re.MULTILINE)
     policy = next(Path(pretrained.__file__).parent.glob("*.npz"))
     (tmp_path / "my_policy.npz").write_bytes(policy.read_bytes())
     file = written(text)

@@ -13,6 +13,7 @@ from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, C
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.caches import create_cache
+from swarm_forage_env.wrappers.base import SwarmWrapper
 from tests.support import engines
 
 NEST_CELL = (16, 40)
@@ -38,6 +39,12 @@ def tidy_world(*, n_robots: int = 4, n_objects: int = 8, caches: str = "none", *
     for robot in range(n_robots):
         put(env, robot, *cell_centre((30 + 3 * robot, 74)))
     return env
+
+
+def begin(wrapper: SwarmWrapper, seed: int = 0) -> None:
+    """Reset a wrapper alone: the world that it wraps was arranged by hand and stays."""
+    wrapper.on_reset(seed)
+    wrapper._last_obs = wrapper.unwrapped.arena.obs
 
 
 def clear(env: ForageEnv) -> None:

@@ -18,7 +18,7 @@ from swarm_forage_env.training.recipe import recipe, small_arena
 def test_defaults_are_what_a_driver_needs():
     plan = recipe()
     assert plan.interface == InterfaceConfig(
-        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5
+        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, own_sensors=()
     )
     assert (plan.algorithm, plan.n_arenas, plan.hidden, plan.seed) == ("ppo", 8, (64, 64), 0)
     assert plan.options == {
@@ -113,9 +113,9 @@ def test_a_complete_configuration_is_taken_as_it_is():
 
 def test_an_interface_is_given_whole_or_by_what_differs():
     assert recipe(interface={"decision_ticks": 2}).interface == InterfaceConfig(
-        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=2
+        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=2, own_sensors=()
     )
-    numbered = InterfaceConfig(actions="discrete")
+    numbered = InterfaceConfig(actions="discrete", own_sensors=())
     assert recipe(interface=numbered).interface is numbered
     with pytest.raises(ConfigError, match="Did you mean 'decision_ticks'"):
         recipe(interface={"decision_tick": 2})

@@ -18,7 +18,7 @@ from tests.reference.motion import WHEEL_BASE_M, WHEEL_SCALE_MPS, free_motion, h
 from tests.support import engines
 from tests.support.engines import drive_at, make_bodies
 from tests.support.heaps import DIAMETER_M, RADIUS_M
-from tests.support.stage import put, tidy_world
+from tests.support.stage import begin, put, tidy_world
 
 pytestmark = pytest.mark.usefixtures("each_engine")
 
@@ -165,7 +165,7 @@ def test_noise_on_the_wheels_drives_nobody_through_a_wall(sigma):
     for robot in range(40):
         put(env, robot, x_high - 0.1 - 0.2 * (robot % 2), 2.0 + 0.3 * (robot // 2), 0.0)
     stack = ActuatorNoise(env, ActuatorNoiseConfig(sigma=sigma))
-    stack.on_reset(0)
+    begin(stack)
     rng = np.random.default_rng(0)
     for _ in range(200):
         stack.step_batch(rng.uniform(0.0, 1.0, (40, 3)).astype(np.float32))

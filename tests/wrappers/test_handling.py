@@ -14,7 +14,7 @@ from swarm_forage_env.wrappers.registry import parse_wrapper
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 from tests.support.foraging import quick_world
-from tests.support.stage import NEST_CELL, OPEN_CELL, lay, load, stand, tidy_world
+from tests.support.stage import NEST_CELL, OPEN_CELL, begin, lay, load, stand, tidy_world
 
 
 def cost(values: tuple[float, ...]) -> HandlingCostConfig:
@@ -31,7 +31,7 @@ def ticks_until(event: Event, config: HandlingCostConfig, *, ask_from: int = 1, 
     """Ticks from the start of a pick-up or a delivery to its effect, when the robot first asks in tick `ask_from`."""
     env = tidy_world(**options)
     stack = HandlingCost(env, config)
-    stack.on_reset(0)
+    begin(stack)
     stand(env, 0, NEST_CELL if event == Event.DELIVERED else OPEN_CELL)
     if event == Event.DELIVERED:
         load(env, 0, 0)

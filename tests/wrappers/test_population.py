@@ -15,7 +15,7 @@ from swarm_forage_env.wrappers.population import (
 )
 from swarm_forage_env.wrappers.population_process import simulate_population
 from swarm_forage_env.wrappers.recorder import RunRecorder
-from tests.support.stage import assert_same_world, cell_centre, lay, load, put, snapshot, stand, tidy_world
+from tests.support.stage import assert_same_world, begin, cell_centre, lay, load, put, snapshot, stand, tidy_world
 
 
 def at_hand(env: ForageEnv, *, deaths: str = "terminate", **fields) -> PopulationDynamics:
@@ -23,7 +23,7 @@ def at_hand(env: ForageEnv, *, deaths: str = "terminate", **fields) -> Populatio
     rates = dict.fromkeys(("death_per_tick", "malfunction_per_tick", "repair_per_tick"), 1e-12)
     stack = PopulationDynamics(env, PopulationConfig(**{**rates, **fields}, deaths=deaths))
     if env.seed_value is not None:
-        stack.on_reset(0)  # a world arranged by hand is not reset again
+        begin(stack)  # a world arranged by hand is not reset again
     return stack
 
 

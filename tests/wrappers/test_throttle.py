@@ -15,7 +15,7 @@ from swarm_forage_env.wrappers.waveform import Waveform
 from tests.reference.adversity import throttle_gain
 from tests.reference.motion import limited_wheels, steered_wheels
 from tests.support.fake_arena import FakeArena
-from tests.support.stage import lay, load, put, stand, tidy_world
+from tests.support.stage import begin, lay, load, put, stand, tidy_world
 
 
 def constant(amplitude: float, *, carriers: bool = False) -> ThrottleConfig:
@@ -37,7 +37,7 @@ def gain_of(config: ThrottleConfig, commands, *, carrying=(), wheel_gain=None) -
 def wheels_after(env: ForageEnv, config: ThrottleConfig, wheels_mps) -> list[float]:
     """Wheel speeds in cm/s of robot 0 after one throttled step with these commanded speeds in m/s."""
     stack = Throttle(env, config)
-    stack.on_reset(0)
+    begin(stack)
     put(env, 0, 16.0, 8.0)
     actions = np.zeros((len(env.active), 3), np.float32)
     actions[:, 2] = Grip.RELEASE
@@ -117,7 +117,7 @@ def test_carriers_only():
 def test_whoever_carries_at_the_start_of_a_step_is_throttled_in_it():
     env = tidy_world(n_robots=2)
     stack = Throttle(env, constant(0.5, carriers=True))
-    stack.on_reset(0)
+    begin(stack)
     actions = np.array([[0.4, 0.4, Grip.GRASP]] * 2, np.float32)
     stand(env, 0, (60, 40))
     lay(env, 0, (60, 40))

@@ -89,7 +89,7 @@ def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
 def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
     """Refuse an interface with other observations or actions than the model has."""
     # Any scenario with these sensors will do: all have the same columns and actions.
-    spec = SwarmSpec.of(scenario("warehouse_small", own_sensors=interface.own_sensors))
+    spec = SwarmSpec.of(scenario("warehouse_small", own_sensors=interface.sensors))
     bound = LearnerInterface(interface, spec)
     wanted, found = describe_spaces(bound), describe_spaces(model)
     if wanted != found:
