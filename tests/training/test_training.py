@@ -28,7 +28,9 @@ from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
-NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
+NUMBERED = InterfaceConfig(
+    observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, own_sensors=()
+)
 DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True)
 
 
@@ -247,7 +249,7 @@ def test_what_cannot_begin_leaves_nothing_behind(tmp_path, changes, n_processes,
 
 
 def test_a_training_that_diverges_says_so(tmp_path):
-    plan = tiny_plan(options={"n_steps": 16, "batch_size": 64, "learning_rate": 1e30})
+    plan = tiny_plan(options={"n_steps": 16, "batch_size": 64, "learning_rate": 1e15})
     with pytest.raises(ConfigError, match=r"diverged in stage 1, .*lower the learning_rate") as refusal:
         train(plan, tmp_path)
     assert "\n" not in str(refusal.value)
@@ -257,7 +259,7 @@ def test_a_training_that_diverges_leaves_the_checkpoint_before(tmp_path):
     plan = tiny_plan(stages=(Stage(steps=128),))
     train(plan, tmp_path)
     sound = (tmp_path / "model.zip").read_bytes()
-    wild = {"learning_rate": 1e30, "batch_size": 128, "n_epochs": 1}  # one update, which only the end looks at
+    wild = {"learning_rate": 1e15, "batch_size": 128, "n_epochs": 1}  # one update, which only the end looks at
     longer = dataclasses.replace(plan, stages=(*plan.stages, Stage(steps=128, options=wild)))
     with pytest.raises(ConfigError, match="diverged"):
         train(longer, tmp_path, resume=True)

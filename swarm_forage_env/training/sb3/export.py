@@ -1,6 +1,6 @@
 """From a trained stable-baselines3 model to a network file that runs without torch, or a zip file that tells more."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from stable_baselines3.dqn.policies import DQNPolicy
 from torch import nn
 
 from swarm_forage_env.contract.policy import SwarmSpec
-from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.policies.model_files import MODEL_NOTE, describe_spaces
 from swarm_forage_env.policies.network import Network, NetworkAbout, NetworkError
 from swarm_forage_env.scenarios.presets import scenario
@@ -74,13 +74,15 @@ def note_interface(model: BaseAlgorithm, interface: InterfaceConfig, *, caches: 
         NetworkError: an interface that is not the model's.
     """
     _check_spaces(model, interface)
-    setattr(model, MODEL_NOTE, {"interface": asdict(interface), "caches": caches})
+    said = replace(interface, own_sensors=interface.sensors)
+    setattr(model, MODEL_NOTE, {"interface": asdict(said), "caches": caches})
 
 
 def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
     _check_spaces(model, interface)
     note = getattr(model, MODEL_NOTE, None)
-    if note is not None and note["interface"] != asdict(interface):
+    said = replace(interface, own_sensors=interface.sensors)
+    if note is not None and interface_from_mapping({"own_sensors": (), **note["interface"]}) != said:
         raise NetworkError(
             f"Expected the interface that the model was trained with, {note['interface']}, got {interface}."
         )
