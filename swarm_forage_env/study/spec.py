@@ -211,8 +211,8 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
 
     Returns:
         The registered name, or the whole path of the file; the parameters, with the file's digest; and the class of the
-        name or the opened policy, which may state `caches`; where nothing is to be run (`trust.only_looks`), what a
-        model shows from outside.
+        name or the opened policy, which may state `caches`; where nothing is to be run (`policies.trust.only_looks`),
+        what a model shows from outside.
 
     Raises:
         ValueError: no installed policy has that name, the file cannot be opened, or an interface is given twice.

@@ -72,7 +72,7 @@ def resolves(dotted: str, file: Path) -> bool:
     What begins with no module, old or new, is of another package or no name of a place at all.
     """
     first, *rest = dotted.split(".")
-    if first in FOREIGN or rest[0] in ("py", "md", "toml", "npz", "json", "zip"):
+    if first in FOREIGN or rest[0] in ("py", "md", "toml", "npz", "json", "zip", "csv"):
         return True
     if first in OBJECTS and rest[0].islower() and dotted not in OLD:
         return True
