@@ -24,7 +24,7 @@ MOST = 1e15
 """Largest number in a table; our choice: sums of squares of such numbers are finite, and whole ones are exact."""
 MOST_ROBOTS = 10_000_000
 """Largest swarm in a table; our choice: some measures need an array of this length."""
-_UNSEEN = r"[\p{Cc}\p{Cf}]"
+_STEERING = "[\\p{Cc}\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]"
 """Characters that steer a terminal or the direction of writing, which a name must not."""
 
 
@@ -90,7 +90,7 @@ def _checked_column(frame: "pl.DataFrame", name: str, where: str) -> "pl.Series"
     if column.kind == "text":
         values = given.cast(pl.String)
         _refuse(values, values.is_null(), name, where, "a text")
-        _refuse(values, values.str.contains(_UNSEEN), name, where, "a text without control characters")
+        _refuse(values, values.str.contains(_STEERING), name, where, "a text without control characters")
         return values
     values = given.cast(pl.Float64, strict=False)
     unread = values.is_null() & (pl.repeat(True, len(given), eager=True) if column.is_required else given.is_not_null())

@@ -28,6 +28,7 @@ def counted(count: int, noun: str) -> str:
 
 def unread(text: str) -> str:
     """Return a text that matplotlib shows as it is: without it, dollar signs in a name would begin a formula."""
+    # The twin of `swarm_forage_env.rendering.plots._unread`: measures import no rendering.
     return text.replace("$", r"\$")
 
 

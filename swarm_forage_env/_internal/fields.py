@@ -125,7 +125,7 @@ def text(where: str, value: Any) -> None:
         raise ConfigError(f"Expected {where} to be a non-empty text without control characters, got {shown(value)}.")
 
 
-def file_name(where: str, value: Any) -> None:
+def check_file_name(where: str, value: Any) -> None:
     """Refuse what is no text that can be a part of a file name: it would lead files of results to other folders."""
     text(where, value)
     if value.startswith(".") or len(value) > MAX_NAME or not value.isprintable() or any(c in value for c in "/\\:"):

@@ -1,12 +1,14 @@
 """The command `curves`."""
 
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, Jobs, complain
+from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, Jobs, complain, no_picture
 from swarm_forage_env.cli.terminal import output
 
 if TYPE_CHECKING:
@@ -34,13 +36,13 @@ def curves(
     The others make the runs of the trainings' evaluations: same world, same seeds, the caches that they are made for.
     """
     from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.cli.scenario_options import split_names
     from swarm_forage_env.cli.training_report import points_of, stage_ends
     from swarm_forage_env.rendering.plots import draw_trainings
     from swarm_forage_env.scenarios.performance import quantity
-    from swarm_forage_env.training.evaluations import read_training
 
-    found = [read_training(folder) for folder in folders]
+    found = _told_apart(folders)
     plan = found[0].plan
     for one in found[1:]:
         if _judged_by(one.plan) != _judged_by(plan):
@@ -48,10 +50,10 @@ def curves(
                 f"Expected trainings that are judged by the same runs, got {found[0].label} and {one.label}, whose "
                 "plans differ in scenario, wrappers or evaluation; draw them one by one."
             )
+    picture = out or folders[0] / PICTURE_FILE
+    check_file(picture)
     levels = _levels(plan, () if beside == "none" else split_names(beside), jobs)
     output().print(_table(found, levels))
-    picture = out or folders[0] / PICTURE_FILE
-    picture.parent.mkdir(parents=True, exist_ok=True)
     try:
         draw_trainings(
             picture,
@@ -63,7 +65,29 @@ def curves(
         )
     except ImportError:
         raise typer.Exit(complain(NO_PICTURE, EXIT_FAILURE)) from None
+    except OSError as error:  # the table was shown, but a picture was asked for
+        raise typer.Exit(complain(no_picture(picture, error), EXIT_FAILURE)) from None
     typer.echo(f"wrote {picture}")
+
+
+def _told_apart(folders: Sequence[Path]) -> "list[TrainingCurve]":
+    """Read trainings; those whose folders have the same name are named by their paths.
+
+    Raises:
+        ConfigError: see `read_training`, or a folder is given twice.
+    """
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.training.evaluations import read_training
+
+    twice = [folder for folder, count in Counter(folder.resolve() for folder in folders).items() if count > 1]
+    if twice:
+        raise ConfigError(f"Expected each training once, got {twice[0]} twice.")
+    found = [read_training(folder) for folder in folders]
+    counts = Counter(one.label for one in found)
+    return [
+        replace(one, label=str(folder)) if counts[one.label] > 1 else one
+        for folder, one in zip(folders, found, strict=True)
+    ]
 
 
 def _judged_by(plan: "TrainingPlan") -> tuple[str, ...]:

@@ -25,6 +25,7 @@ def maps(
     One row per run of the page; then, for each run after the first, what is more in it than in the first. The arrays
     go to .npz files beside the picture.
     """
+    from metrics.scoring.texts import counted
     from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.study.maps import floor_maps
     from swarm_forage_env.study.replay.files import read_replays
@@ -42,7 +43,7 @@ def maps(
     picture = out or page.with_suffix(".maps.png")
     check_file(picture)
     write_maps(with_differences(found), picture)
-    typer.echo(f"wrote maps of {len(found)} run{'s' * (len(found) > 1)} to {picture} and .npz files beside it")
+    typer.echo(f"wrote maps of {counted(len(found), 'run')} to {picture} and .npz files beside it")
 
 
 def with_differences(found: "Sequence[FloorMaps]") -> "list[FloorMaps]":

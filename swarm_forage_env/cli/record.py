@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from swarm_forage_env.cli.options import (
     Caches,
@@ -17,6 +16,7 @@ from swarm_forage_env.cli.options import (
     Side,
     Wrappers,
 )
+from swarm_forage_env.cli.terminal import progress_bar
 
 
 def record(  # long: one parameter per option
@@ -41,8 +41,6 @@ def record(  # long: one parameter per option
     config: ConfigFile = None,
 ) -> None:
     """Film a run."""
-    from rich.progress import Progress
-
     from swarm_forage_env.cli.scenario_options import ScenarioOptions, described_world
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
@@ -64,9 +62,7 @@ def record(  # long: one parameter per option
     _refuse_unknown(policy)
     film = out or Path("results", f"{scenario}_{Path(policy).stem}.gif")
     try:
-        screen = Console(stderr=True)
-        with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
-            task = bar.add_task("pictures")
+        with progress_bar("pictures") as progress:
             written = record_run(
                 world,
                 policy,
@@ -79,7 +75,7 @@ def record(  # long: one parameter per option
                 theme=theme,
                 caches=asked_caches,
                 wrappers=disturbances,
-                progress=lambda done, total: bar.update(task, completed=done, total=total),
+                progress=progress,
             )
     except (RenderError, ModelError, NetworkError) as error:
         raise typer.BadParameter(str(error)) from error

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from swarm_forage_env.cli.options import (
     Caches,
@@ -20,12 +19,11 @@ from swarm_forage_env.cli.options import (
     Side,
     Wrappers,
 )
-from swarm_forage_env.cli.terminal import notes
+from swarm_forage_env.cli.terminal import notes, progress_bar
 
 if TYPE_CHECKING:
     from swarm_forage_env.cli.scenario_options import ScenarioOptions
     from swarm_forage_env.study.record import RunRecord
-    from swarm_forage_env.study.replay.capture import Progress
     from swarm_forage_env.study.replay.frames import Replay
     from swarm_forage_env.study.spec import RunSpec
 
@@ -160,7 +158,7 @@ def _recorded(spec: "RunSpec", stored: "RunRecord | None", seconds: float | None
 
     with _refusing_policies():
         policy = load_policy(spec.policy, spec.parameters)
-    with _bar(f"{spec.policy}, seed {spec.seed}") as progress:
+    with progress_bar(f"{spec.policy}, seed {spec.seed}") as progress:
         made, record = record_replay(spec, policy=policy, seconds=seconds, frame_s=frame_s, progress=progress)
     if stored is not None and record is not None and not record.same_columns(stored):
         notes().print(
@@ -168,18 +166,6 @@ def _recorded(spec: "RunSpec", stored: "RunRecord | None", seconds: float | None
             "the replay shows the run as it is now.",
         )
     return made
-
-
-@contextmanager
-def _bar(text: str) -> "Iterator[Progress]":
-    """Show how much of a run is done, and an estimate of how long the rest will take."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    screen = Console(stderr=True, markup=False, emoji=False)
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
-        task = bar.add_task(text)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 @contextmanager

@@ -17,6 +17,7 @@ from swarm_forage_env.cli.options import (
     Settings,
     Side,
     Wrappers,
+    no_picture,
 )
 from swarm_forage_env.cli.terminal import notes, output
 
@@ -47,16 +48,13 @@ def saliency(  # long: one parameter per option
 
     A robot gets, for example, the light readings of another robot. How often does it then decide otherwise?
     """
+    from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs
-    from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.rendering.plots import draw_saliency
     from swarm_forage_env.study.saliency import GROUPS, open_network_of
     from swarm_forage_env.study.saliency import saliency as measured
 
-    try:
-        network = open_network_of(policy)
-    except NetworkError as error:
-        raise typer.BadParameter(str(error)) from error
+    network = open_network_of(policy)
     options = ScenarioOptions(
         scenario=scenario,
         robots=robots,
@@ -69,16 +67,19 @@ def saliency(  # long: one parameter per option
         config_file=config,
     )
     (spec,) = plan_runs(options, (policy,), n_seeds=1, first_seed=seed)
+    picture = out or Path("results", f"{spec.scenario.name}_{Path(policy).stem}.saliency.png")
+    check_file(picture)
     found = measured(network, spec, seconds=seconds)
     title = f"{Path(policy).stem} in {spec.scenario.name}, {spec.scenario.robots.n_robots} robots, seed {seed}"
     output().print(_table(found, title))
-    picture = out or Path("results", f"{spec.scenario.name}_{Path(policy).stem}.saliency.png")
-    picture.parent.mkdir(parents=True, exist_ok=True)
     bars = {group: found.changed[group] for group in GROUPS[1:] if found.n_rows[group]}
     try:
         draw_saliency(picture, found.slices, bars, title=title, xlabel=_words(found))
     except ImportError:
-        notes().print(NO_PICTURE, markup=False)
+        notes().print(NO_PICTURE)
+        return
+    except OSError as error:  # the table is worth more than its picture
+        notes().print(no_picture(picture, error))
         return
     typer.echo(f"wrote {picture}")
 

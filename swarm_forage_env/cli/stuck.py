@@ -49,6 +49,7 @@ def stuck(
     """Find robots that get stuck: active, hardly moved for minutes, not waiting by rule. Exits with 1 if any are."""
     from rich.console import Console
 
+    from metrics.scoring.texts import counted
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs, split_names
     from swarm_forage_env.study.stuck import find_stuck
@@ -70,7 +71,7 @@ def stuck(
     specs = plan_runs(options, split_names(policy), n_seeds=seeds, first_seed=first_seed)
     found = [(spec, one) for spec in specs for one in find_stuck(spec, window_s=window, moved_m=moved)]
     if not found:
-        typer.echo(f"nobody is stuck in {len(specs)} run{'s' * (len(specs) > 1)}")
+        typer.echo(f"nobody is stuck in {counted(len(specs), 'run')}")
         return
     console = Console(highlight=False, markup=False, emoji=False)
     if not console.is_terminal:

@@ -1,7 +1,5 @@
 """The command `study maps`: where robots of a study's cells were, and what they did there."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -34,35 +32,24 @@ def maps(
     One row per cell; then, for each cell after the first, what is more in it than in the first. The arrays go to .npz
     files beside the picture. Stored runs hold no positions, so they are made again.
     """
-    from swarm_forage_env.cli.terminal import notes
+    from metrics.scoring.texts import counted
+    from swarm_forage_env._internal.files import check_file
+    from swarm_forage_env.cli.terminal import notes, progress_bar
     from swarm_forage_env.study.cell_maps import choose_cells, maps_of_cells, robot_ticks
     from swarm_forage_env.study.study_table import read_study
 
     table = read_study(place)
     chosen = choose_cells(table.spec, cells or ())
-    with _bar(robot_ticks(table.spec, chosen, seeds)) as advance:
+    picture = (out or Path("results", "maps", table.spec.name)) / PICTURE_FILE
+    check_file(picture)
+    with progress_bar("making the runs again", robot_ticks(table.spec, chosen, seeds)) as advance:
         found, changed = maps_of_cells(table, chosen, n_seeds=seeds, side_m=side, advance=advance)
     if per_robot:
         found = [one.per_robot() for one in found]
     if changed:
         notes().print(
             f"Runs that come out different from their records, which other versions made: {', '.join(changed)}; "
-            "the maps show them as they are now.",
-            markup=False,
+            "the maps show them as they are now."
         )
-    picture = (out or Path("results", "maps", table.spec.name)) / PICTURE_FILE
     write_maps(with_differences(found), picture, per="robot" if per_robot else "")
-    typer.echo(f"wrote maps of {len(found)} cell{'s' * (len(found) > 1)} to {picture} and .npz files beside it")
-
-
-@contextmanager
-def _bar(total: int) -> Iterator[Callable[[float], None]]:
-    """Show how much is done, and an estimate of how long the rest will take."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    screen = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
-        task = bar.add_task("making the runs again", total=total)
-        yield lambda done: bar.update(task, completed=done)
+    typer.echo(f"wrote maps of {counted(len(found), 'cell')} to {picture} and .npz files beside it")

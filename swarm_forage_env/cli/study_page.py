@@ -32,6 +32,7 @@ def report(
     from metrics.claims import INTUITIONS
     from metrics.scoring.verdicts import VARIANTS, judge_claims, why_no_claims
     from swarm_forage_env._internal.fields import ConfigError, known_name
+    from swarm_forage_env._internal.files import check_file, replacing
     from swarm_forage_env.cli.terminal import notes
     from swarm_forage_env.study.study_table import read_study
 
@@ -39,6 +40,7 @@ def report(
     if out.suffix != ".html":
         raise ConfigError(f"Expected --out as a file ending in .html, got {str(out)!r}.")
     tables = [read_study(place) for place in places]
+    check_file(out)
     scored = scored_studies(tables, VARIANTS)
     about = [pair for pair in zip(tables, scored, strict=True) if not why_no_claims(pair[0])]
     try:
@@ -52,8 +54,8 @@ def report(
         text = page_of(tables, scored, verdicts, band)
     except ImportError as error:
         raise ImportError(NO_REPORT) from error
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(text, encoding="utf-8")
+    with replacing(out) as draft:
+        draft.write_text(text, encoding="utf-8")
     notes().print(f"written {out}")
 
 

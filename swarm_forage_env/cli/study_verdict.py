@@ -29,6 +29,7 @@ def verdict(
     from metrics.claims import INTUITIONS
     from metrics.scoring.verdicts import VARIANTS, judge_claims, why_no_claims
     from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env._internal.files import check_file, replacing
     from swarm_forage_env.cli.terminal import notes, output
     from swarm_forage_env.study.study_file import is_set_of_paper
     from swarm_forage_env.study.study_table import read_study
@@ -37,6 +38,8 @@ def verdict(
     refused = next(filter(None, map(why_no_claims, tables)), "")
     if refused:
         raise ConfigError(f"{refused} 'swarm-forage study plot' and 'report' take any study.")
+    if json_file is not None:
+        check_file(json_file)
     try:
         scored = scored_studies(tables, VARIANTS)
         judged, waiting = judge_claims(tables, scored)
@@ -46,7 +49,7 @@ def verdict(
     for table in tables:
         if not is_set_of_paper(table.spec):
             words = f"note: {table.spec.name} has the name of one of the paper's sets and other settings"
-            notes().print(words, markup=False)
+            notes().print(words)
     console = output()
     for key in dict.fromkeys((one.reading, one.variant) for one in judged):
         console.print(_table([one for one in judged if (one.reading, one.variant) == key]))
@@ -54,8 +57,9 @@ def verdict(
         console.print(_table([one for one in expected if one.reading == reading], "intuitions"))
     typer.echo("\n".join(waiting_lines((*waiting, *expected_later))))
     if json_file is not None:
-        json_file.parent.mkdir(parents=True, exist_ok=True)
-        json_file.write_text(verdict_json(tables, judged, waiting, expected, expected_later) + "\n", encoding="utf-8")
+        text = verdict_json(tables, judged, waiting, expected, expected_later) + "\n"
+        with replacing(json_file) as draft:
+            draft.write_text(text, encoding="utf-8")
         notes().print(f"written {json_file}")
 
 

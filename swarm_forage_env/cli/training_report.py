@@ -72,7 +72,7 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
         console.print(NO_PICTURE)
         return None
     except OSError as error:  # the training is worth more than its picture
-        console.print(no_picture(path, error), markup=False)
+        console.print(no_picture(path, error))
         return None
     return path
 

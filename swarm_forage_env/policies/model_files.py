@@ -196,17 +196,38 @@ def open_network(path: str | Path, *, digest: str | None = None, interface: Give
 
 @dataclass(frozen=True, slots=True)
 class ModelOutside:
-    """What a model file shows without being opened."""
+    """What a policy file shows without being opened."""
 
     caches: str | None
     """Kind of caches that its note states; None without a note."""
 
 
-def look_at_model(path: str | Path) -> ModelOutside:
+def look_at_file(path: str | Path, *, digest: str | None = None, **parameters: Any) -> ModelOutside:
+    """Return what a policy file shows without being opened: a model its note, a file of another package nothing.
+
+    Args:
+        path: The file.
+        digest: As in `ModelPolicy`.
+        parameters: Those that the file would be opened with; those of another package are its own.
+
+    Raises:
+        ModelError: the file is missing or has changed; see also `look_at_model`.
+        ConfigError: see `look_at_model`.
+    """
+    _checked_digest(path, digest)
+    return look_at_model(path, **parameters) if Path(path).suffix.lower() == ".zip" else ModelOutside(caches=None)
+
+
+def look_at_model(path: str | Path, *, interface: GivenInterface = None) -> ModelOutside:
     """Return what a model file shows without being opened: nothing in it is run.
+
+    Args:
+        path: The file.
+        interface: As in `ModelPolicy`; it is only checked.
 
     Raises:
         ModelError: the file is missing, holds no model, or a note that cannot be used.
+        ConfigError: an unknown field or value in `interface`.
     """
     file = Path(path)
     try:
@@ -221,7 +242,9 @@ def look_at_model(path: str | Path) -> ModelOutside:
         reason = " ".join(str(error).split())
         raise ModelError(f"Expected {path} to be a model saved by stable-baselines3: {reason}.") from error
     note = about.get(MODEL_NOTE)
-    return ModelOutside(caches=None if note is None else _read_note(note, file)[1])
+    noted, caches = (None, None) if note is None else _read_note(note, file)
+    chosen_interface(interface, noted)
+    return ModelOutside(caches=caches)
 
 
 def file_digest(path: str | Path) -> str:

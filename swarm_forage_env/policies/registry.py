@@ -110,6 +110,20 @@ def split_interface(policy: str) -> tuple[str, dict[str, Any]]:
     return found["file"], fields
 
 
+def named_interface(policy: str, parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Return a policy without the interface that is said with its file, and its parameters with that interface.
+
+    Raises:
+        ConfigError: see `split_interface`, or the interface is among the parameters, too.
+    """
+    file, interface = split_interface(policy)
+    if not interface:
+        return file, dict(parameters)
+    if "interface" in parameters:
+        raise ConfigError(f"Expected the interface of {file} once, got it with the file and as a parameter.")
+    return file, {**parameters, "interface": interface}
+
+
 def file_of(policy: str) -> str:
     """Return a policy without the words that may stand behind its file; see `split_interface`. They are not read."""
     found = _FILE_WITH_WORDS.fullmatch(policy)
@@ -133,13 +147,15 @@ def policy_class(name: str) -> Callable[..., Policy]:
     Raises:
         ValueError: no installed policy has that name; the message lists the known ones.
         UntrustedModelError: a file that runs code, and the console command was not told to trust it.
+
+    What opens a file takes no interface where one is said with the file: see `named_interface`.
     """
     if name in _LOCAL_POLICIES:
         return _LOCAL_POLICIES[name]
-    file, interface = split_interface(name)
+    file, _ = split_interface(name)
     for opener in _openers(file):
         trust.check(file)
-        return partial(opener.load(), file, **({"interface": interface} if interface else {}))
+        return partial(_opened, opener.load(), name)
     for point in _installed(POLICY_ENTRY_POINTS):
         if point.name == name:
             return point.load()
@@ -147,6 +163,11 @@ def policy_class(name: str) -> Callable[..., Policy]:
     raise ValueError(
         f"Unknown policy {name!r}.{suggestion(name, known)} Installed policies: {', '.join(known) or 'none'}."
     )
+
+
+def _opened(opener: Callable[..., Policy], name: str, **parameters: Any) -> Policy:
+    file, chosen = named_interface(name, parameters)
+    return opener(file, **chosen)
 
 
 @contextmanager
@@ -174,7 +195,7 @@ def load_policy(name: str | PurePath, parameters: Mapping[str, Any] | None = Non
 
     Raises:
         TypeError: `name` is neither text nor a path.
-        ValueError: no installed policy has that name; the message lists the known ones.
+        ValueError: no installed policy has that name; the message lists the known ones. Or an interface is given twice.
     """
     if not isinstance(name, str | PurePath):  # pyright: ignore[reportUnnecessaryIsInstance] - people pass None
         raise TypeError(f"Expected the name of a policy or of a policy file, got {name!r}.")

@@ -34,7 +34,8 @@ class _Command:
     typed: frozenset[Path] | None = None
     """Whole paths of the files that its user typed; None = any file."""
     looks_only: bool = False
-    """Whether nothing is to be run (--dry-run), so that no model is opened either."""
+    """Whether nothing is to be run (--dry-run), so that no model is opened to plan; `study run --dry-run` does run
+    policies, to measure them, and by that opens models."""
     tell: Callable[[str], None] = _keep_quiet
     """Told of each model that is opened."""
 
@@ -52,7 +53,8 @@ def of_a_command(
 
     Args:
         typed: Words that the user typed; those that are no files do no harm.
-        looks_only: Whether nothing is to be run, so that no model is opened.
+        looks_only: Whether nothing is to be run, so that no model is opened to plan. `study run --dry-run` measures
+            how long its policies take, and by that opens models.
         tell: Told, in one line, of each model that is opened.
     """
     _now.append(_Command(typed=frozenset(map(_whole, typed)), looks_only=looks_only, tell=tell))
@@ -78,7 +80,7 @@ def runs_code(file: str | Path) -> bool:
 
 
 def only_looks() -> bool:
-    """Return whether models are not to be opened now, because nothing will be run."""
+    """Return whether models are not to be opened to plan, because nothing will be run; see `of_a_command`."""
     return _now[-1].looks_only
 
 

@@ -204,4 +204,5 @@ def draw_saliency(
 
 def _unread(text: str) -> str:
     """Return a text that matplotlib shows as it is: without it, dollar signs in a name would begin a formula."""
+    # The twin of `metrics.scoring.texts.unread`: rendering imports no measures.
     return text.replace("$", r"\$")

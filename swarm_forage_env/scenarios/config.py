@@ -252,7 +252,7 @@ class ScenarioConfig:
     quirks: Quirks = field(default_factory=Quirks)
 
     def __post_init__(self) -> None:
-        fields.file_name("scenario.name", self.name)
+        fields.check_file_name("scenario.name", self.name)
         for section, section_class in SECTIONS.items():
             fields.instance(section, getattr(self, section), section_class)
         for name, value in dataclasses.asdict(self.quirks).items():

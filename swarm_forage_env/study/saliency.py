@@ -11,7 +11,7 @@ actions in place of the loss of accuracy.
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +29,10 @@ MOST_ROWS = 20_000
 """Observations that are kept of a run (our choice: shares of so many are exact to a percent)."""
 EXCHANGES = 8
 """How often each observation gets the slice of another."""
-GROUPS = ("all", "empty", "carrying")
-"""Which robots a number is about."""
 
-Group: TypeAlias = str
+Group: TypeAlias = Literal["all", "empty", "carrying"]
+"""Which robots a number is about."""
+GROUPS: tuple[Group, ...] = get_args(Group)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

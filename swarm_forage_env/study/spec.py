@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, number, table, text, whole
 from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.policies import trust
-from swarm_forage_env.policies.registry import is_policy_file, load_policy, policy_class, split_interface
+from swarm_forage_env.policies.registry import is_policy_file, load_policy, named_interface, policy_class
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping, whole_intervals
 from swarm_forage_env.wrappers.registry import wrapper_config_class
 
@@ -215,26 +215,22 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
 
     Returns:
         The registered name, or the whole path of the file; the parameters, with the file's digest; and the class of the
-        name or the opened policy, which may state `caches`.
+        name or the opened policy, which may state `caches`; where nothing is to be run (`policies.trust.only_looks`),
+        what a model shows from outside.
 
     Raises:
         ValueError: no installed policy has that name, the file cannot be opened, or an interface is given twice.
     """
-    name, interface = split_interface(str(policy))
+    name, pinned = named_interface(str(policy), parameters)
     if not is_policy_file(name):
-        return name, dict(parameters), policy_class(name)
-    from swarm_forage_env.policies.model_files import file_digest, look_at_model  # late: most runs open no model
+        return name, pinned, policy_class(name)
+    from swarm_forage_env.policies.model_files import file_digest, look_at_file  # late: most runs open no model
 
     file = str(Path(name).resolve())
-    pinned = dict(parameters)
-    if interface and "interface" in pinned:
-        raise ConfigError(f"Expected the interface of {file} once, got it with the file and as a parameter.")
-    if interface:
-        pinned["interface"] = interface
     planned = pinned if "digest" in pinned else {"digest": file_digest(file), **pinned}
     if trust.only_looks() and trust.runs_code(file):
         trust.check(file)
-        return file, planned, look_at_model(file)
+        return file, planned, look_at_file(file, **pinned)
     return (
         file,
         planned,

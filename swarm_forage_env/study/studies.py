@@ -13,7 +13,15 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-from swarm_forage_env._internal.fields import ConfigError, file_name, known_keys, known_name, several, table, whole
+from swarm_forage_env._internal.fields import (
+    ConfigError,
+    check_file_name,
+    known_keys,
+    known_name,
+    several,
+    table,
+    whole,
+)
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.scenarios.config import field_sections
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
@@ -167,7 +175,7 @@ class StudySpec:
     interval_s: float
 
     def __post_init__(self) -> None:
-        file_name("name of a study", self.name)
+        check_file_name("name of a study", self.name)
         known_name("scenario", self.scenario, SCENARIO_NAMES)
         for name in table("set", self.settings):
             if name in OF_THE_STUDY:

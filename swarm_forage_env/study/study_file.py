@@ -108,11 +108,13 @@ def load_study(
 
 def is_set_of_paper(spec: StudySpec) -> bool:
     """Return whether a study is one of the paper's sets at one of its budgets, with any seeds, or only has its name."""
+    if spec.name not in set_names():  # else a file of that name would be opened
+        return False
     try:
         same = load_study(spec.name, spec.budget, readings=spec.readings)
-    except ConfigError:  # no such set, or no such budget of it
+    except ConfigError:  # no such budget of it
         return False
-    return spec.name in set_names() and replace(same, seeds=spec.seeds).study_id == spec.study_id
+    return replace(same, seeds=spec.seeds).study_id == spec.study_id
 
 
 def _read(file: Path) -> dict[str, Any]:

@@ -19,7 +19,7 @@ PLAN = TrainingPlan(
 
 
 def training(folder: str, plan: TrainingPlan = PLAN, *, best: float = 40.0) -> None:
-    Path(folder).mkdir()
+    Path(folder).mkdir(parents=True)
     plan.write(Path(folder, PLAN_FILE))
     rows = [
         Evaluation(steps=steps, wall_time_s=1.0, performance=per, baseline=5.0, interference_fraction=0.25)
@@ -69,3 +69,48 @@ def test_what_curves_refuses(command):
         assert code == 2
         assert message in err
         assert err.count("\n") == 1
+
+
+def drawn(monkeypatch):
+    """Names of the trainings of each picture that is drawn."""
+    pictures = []
+    monkeypatch.setattr(
+        "swarm_forage_env.rendering.plots.draw_trainings", lambda _, trainings, **__: pictures.append([*trainings])
+    )
+    return pictures
+
+
+def test_trainings_in_folders_of_one_name_are_told_apart(command, monkeypatch):
+    pictures = drawn(monkeypatch)
+    training("a/ppo")
+    training("b/ppo", best=8.0)
+    training("b/a2c")
+    code, out, _ = command("curves", "a/ppo", "b/ppo", "b/a2c", "--beside", "none")
+    assert code == 0
+    assert pictures == [["a/ppo", "b/ppo", "a2c"]]
+    assert "b/ppo, at its best" in out
+    code, _, err = command("curves", "a/ppo", "b/../a/ppo", "--beside", "none")
+    assert code == 2
+    assert "Expected each training once" in err
+
+
+def test_the_place_of_the_picture_is_looked_at_before_anything_is_run(command, monkeypatch):
+    pictures = drawn(monkeypatch)
+    monkeypatch.setattr("swarm_forage_env.study.runner.run_all", lambda *_, **__: pytest.fail("a run was started"))
+    training("first")
+    Path("taken.png").mkdir()
+    told = "swarm-forage: Expected a file to write, got a folder: taken.png\n"
+    assert command("curves", "first", "-o", "taken.png") == (1, "", told)
+    assert pictures == []
+
+
+def test_curves_tell_of_a_picture_that_cannot_be_written(command, monkeypatch):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("swarm_forage_env.rendering.plots.draw_trainings", full)
+    training("first")
+    code, out, err = command("curves", "first", "--beside", "none")
+    assert code == 1
+    assert "first, at its best" in out
+    assert err == "swarm-forage: No picture first/curves.png: No space left on device.\n"

@@ -39,3 +39,22 @@ def test_saliency_refuses_what_is_no_network(command):
     code, _, err = command("saliency", "missing.npz")
     assert code == 1
     assert "missing.npz" in err
+
+
+@pytest.mark.compiled
+def test_saliency_is_shown_even_if_its_picture_cannot_be_written(command, monkeypatch):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("swarm_forage_env.rendering.plots.draw_saliency", full)
+    code, out, err = command("saliency", "ppo_warehouse_small", *WORDS, "-o", "a.png")
+    assert code == 0
+    assert "cos, sin of the heading" in out
+    assert err == "No picture a.png: No space left on device.\n"
+
+
+def test_the_place_of_the_picture_is_looked_at_before_anything_is_run(command, monkeypatch):
+    Path("taken.png").mkdir()
+    monkeypatch.setattr("swarm_forage_env.study.saliency.saliency", lambda *_, **__: pytest.fail("a run was started"))
+    told = "swarm-forage: Expected a file to write, got a folder: taken.png\n"
+    assert command("saliency", "ppo_warehouse_small", *WORDS, "-o", "taken.png") == (1, "", told)

@@ -215,3 +215,38 @@ def test_what_a_diff_refuses(ran):
     assert code == 2
     assert "Expected columns that both studies have, got 'sped'" in err
     assert ran("study", "diff", "done", "nowhere")[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "place", "work"),
+    [
+        (("maps", "--out", "there"), "there/maps.png", "swarm_forage_env.study.cell_maps.maps_of_cells"),
+        (("report", "--out", "page.html"), "page.html", "metrics.scoring.figure_panels.study_panels"),
+        (("verdict", "--json", "all.json"), "all.json", "metrics.scoring.figure_panels.study_panels"),
+    ],
+    ids=lambda given: given[0] if isinstance(given, tuple) else "",
+)
+def test_the_place_of_results_is_looked_at_before_the_work(ran, monkeypatch, words, place, work):
+    Path(place).mkdir(parents=True)
+    monkeypatch.setattr(work, lambda *_, **__: pytest.fail("work was done"))
+    name, *options = words
+    told = f"swarm-forage: Expected a file to write, got a folder: {place}\n"
+    assert ran("study", name, "done", *options) == (1, "", told)
+
+
+@pytest.mark.parametrize("words", [("report", "--out", "page.html"), ("verdict", "--json", "page.html")])
+def test_a_disk_that_fills_up_leaves_no_half_page(ran, monkeypatch, words):
+    def half(self, text, **_):
+        self.write_bytes(text.encode()[: len(text) // 2])
+        raise OSError(28, "No space left on device", str(self))
+
+    if words[0] == "report":
+        pytest.importorskip("jinja2")
+    Path("page.html").write_text("an earlier one")
+    before = set(Path().iterdir())
+    monkeypatch.setattr(Path, "write_text", half)
+    name, *options = words
+    code, _, err = ran("study", name, "done", *options)
+    assert (code, err.splitlines()[-1]) == (1, "swarm-forage: No space left on device: page.html")
+    assert Path("page.html").read_text() == "an earlier one"
+    assert set(Path().iterdir()) == before

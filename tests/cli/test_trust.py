@@ -3,15 +3,16 @@
 import json
 import pickle
 import zipfile
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
 
-from swarm_forage_env.policies import trust
+from swarm_forage_env.policies import registry, trust
 from swarm_forage_env.policies.model_files import ModelError, look_at_model
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.study.spec import RunSpec, pin_policy
 from swarm_forage_env.study.store import RunFailure, RunStore
 
 TINY = ("--robots", "2", "--objects", "10", "--horizon", "200")
@@ -54,7 +55,40 @@ def test_a_dry_run_opens_no_model_and_knows_its_caches(command, model, words):
     code, out, err = command(*words, model.name, "--robots", "2", "--objects", "10", "--dry-run", "--json")
     assert code == 0, err
     assert not Path("owned").exists()
-    assert '"caches": "static"' in out or words[0] == "score"
+    runs = json.loads(out)["runs"]
+    assert {run["spec"]["scenario"]["caches"] for run in runs} == {"static"}
+
+
+def test_a_dry_run_takes_the_files_of_other_packages(command, monkeypatch):
+    with_others = registry._installed
+
+    def installed(group):
+        offered = EntryPoint(name="foo", value="missing_package:open_foo", group=registry.POLICY_FILE_ENTRY_POINTS)
+        return (*with_others(group), offered)
+
+    monkeypatch.setattr(registry, "_installed", installed)
+    Path("mine.foo").write_bytes(b"in a format of their own")
+    code, out, err = command("run", "--policy", "mine.foo", *TINY, "--dry-run", "--json")
+    assert (code, err) == (0, "")
+    (run,) = json.loads(out)["runs"]
+    assert run["spec"]["scenario"]["caches"] == "none", "those of the scenario"
+    code, _, err = command("run", "--policy", "missing.foo", *TINY, "--dry-run")
+    assert (code, err.count("\n")) == (2, 1)
+
+
+def test_a_dry_run_refuses_words_about_a_model_that_the_run_would_refuse(command, model):
+    code, _, err = command("run", "--policy", f"{model.name}:decision_tick=5", *TINY, "--dry-run")
+    assert (code, Path("owned").exists()) == (2, False)
+    assert "Did you mean 'decision_ticks'" in err
+    assert command("run", "--policy", f"{model.name}:decision_ticks=5", *TINY, "--dry-run")[0] == 0
+
+
+def test_a_model_that_has_changed_is_refused_without_being_opened(model):
+    with trust.of_a_command([str(model)], looks_only=True):
+        file, pinned, _ = pin_policy(model, {})
+        assert pin_policy(file, pinned)[1] == pinned
+        with pytest.raises(ModelError, match="a file that has changed since"):
+            pin_policy(file, {"digest": "0" * 16})
 
 
 def test_a_failure_that_names_a_model_is_refused(command, model, tmp_path):

@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from metrics import checks
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
@@ -49,8 +50,17 @@ def test_messages_cut_what_is_too_long_to_read():
 
 
 def test_texts_that_no_terminal_shows_are_refused():
-    for name in ("\x1b[31m", "two\nlines", "\udcff", "\u202eright to left"):
+    for name in ("\x1b[31m", "two\nlines", "\udcff", "\u202eright to left", "\u2066isolated"):
         assert "without control characters" in refusal(fields.text, name)
+
+
+def test_texts_of_all_languages_are_taken():
+    for name in ("\u0645\u06cc\u200c\u062e\u0648", "\u0915\u094d\u200d\u0937", "naïve", "群れ"):
+        fields.text("box.name", name)
+
+
+def test_the_most_seeds_are_one_number():
+    assert fields.MOST_SEEDS == checks.MOST_SEEDS, "metrics import nothing from here, so each has its own"
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, None, "3", True, 1j, (1.0,), np.ones(1)])
@@ -206,11 +216,11 @@ def test_suggestion_is_empty_when_nothing_is_near():
 )
 def test_names_that_would_lead_files_elsewhere_are_refused(name):
     with pytest.raises(ConfigError, match="Expected the name to be"):
-        fields.file_name("the name", name)
+        fields.check_file_name("the name", name)
 
 
 @pytest.mark.parametrize("name", ["warehouse_small", "S1a", "Große Halle 2.1", "倉庫", "n" * 60])
 def test_ordinary_names_are_accepted(name, tmp_path):
-    fields.file_name("the name", name)
+    fields.check_file_name("the name", name)
     (tmp_path / f"{name}.parquet").touch()
     assert [file.stem for file in tmp_path.iterdir()] == [name]

@@ -35,7 +35,7 @@ from swarm_forage_env.policies.registry import (
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.experiments import Budget
 from swarm_forage_env.study.run import run_one
-from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.study.spec import RunSpec, pin_policy, plan_run
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.support.branches import pickled
 
@@ -199,6 +199,13 @@ def test_what_is_an_interface_and_what_is_a_path(policy, expected):
     assert split_interface(policy) == expected
     with pytest.raises(ConfigError, match=r"interface of a\.zip as field=value, got 'x'"):
         split_interface("a.zip:decision_ticks=2,x")
+
+
+@pytest.mark.parametrize("given", [load_policy, pin_policy])
+def test_an_interface_is_given_once(given, tmp_path):
+    words = f"{tmp_path / 'model.zip'}:decision_ticks=5"
+    with pytest.raises(ConfigError, match="once, got it with the file and as a parameter"):
+        given(words, {"interface": {"observation": "compact"}})
 
 
 def test_a_model_of_the_whole_swarm_sees_all_rows_at_once(tmp_path):

@@ -8,6 +8,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
+from swarm_forage_env.study import study_file
 from swarm_forage_env.study.experiments import BUDGETS
 from swarm_forage_env.study.studies import Cell, StudySpec
 from swarm_forage_env.study.study_file import budget_names, is_set_of_paper, load_study, set_names
@@ -200,3 +201,11 @@ def test_a_set_of_the_paper_is_known_by_more_than_its_name():
     assert not is_set_of_paper(replace(some, settings={"n_objects": 20}))
     assert not is_set_of_paper(replace(some, name="mine"))
     assert not is_set_of_paper(replace(some, budget="mine"))
+
+
+def test_no_file_is_opened_to_know_a_set_of_the_paper(monkeypatch, tmp_path):
+    mine = replace(load_study("S1a"), name="mine")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine").write_text("whatever lies here")
+    monkeypatch.setattr(study_file, "_read", lambda file: pytest.fail(f"{file} was opened"))
+    assert not is_set_of_paper(mine)

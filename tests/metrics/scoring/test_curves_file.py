@@ -259,6 +259,7 @@ COLUMNS_OF_ODD_TYPES = {
     "unsigned": lambda n: pl.Series([2**63] * n, dtype=pl.UInt64),
     "huge": lambda n: pl.Series([1e308] * n),
     "escape sequences": lambda n: pl.Series(["\x1b[31m"] * n),
+    "text from right to left": lambda n: pl.Series(["\u202ecrw"] * n),
 }
 
 
@@ -270,7 +271,13 @@ def test_columns_of_types_that_no_curve_has_are_refused(tmp_path, column, kind):
         score_curves(written(odd, tmp_path / "odd.parquet"))
 
 
-@pytest.mark.parametrize("kind", ["lists", "bytes", "dates", "escape sequences"])
+def test_names_in_all_languages_are_read(tmp_path):
+    name = "\u0645\u06cc\u200c\u062e\u0648"
+    (scored,) = score_curves(written(CROWDING.with_columns(controller=pl.lit(name)), tmp_path / "named.csv"))
+    assert scored.policy == name
+
+
+@pytest.mark.parametrize("kind", ["lists", "bytes", "dates", "escape sequences", "text from right to left"])
 def test_names_of_types_that_no_name_has_are_refused(tmp_path, kind):
     odd = CROWDING.with_columns(COLUMNS_OF_ODD_TYPES[kind](len(CROWDING)).alias("controller"))
     with pytest.raises(CurveError, match=r"Expected .*text.* in column controller of "):
