@@ -1,5 +1,7 @@
 """Files that are there complete or not at all, whatever happens while they are written; and whether they can be."""
 
+import errno
+import os
 import re
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -36,13 +38,15 @@ def replacing(path: Path, *, ending: str = ".tmp") -> Generator[Path]:
 
 
 def check_folder(folder: Path) -> None:
-    """Make a folder and write a file there, so that a full or read-only disk is told before hours of work.
+    """Try whether a folder, there or still to be made, can be written to, before hours of work; nothing of it stays.
 
     Raises:
         OSError: it cannot be made or written to; the error names the folder.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    probe = folder / f".{uuid4().hex}.tmp"
+    place = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not place.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
+    probe = place / f".{uuid4().hex}.tmp"
     try:
         probe.write_bytes(_PROBE)
     except OSError as error:

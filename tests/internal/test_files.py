@@ -36,9 +36,10 @@ def test_errors_about_other_files_keep_their_name(tmp_path):
     assert caught.value.filename == str(tmp_path / "missing")
 
 
-def test_a_folder_is_made_and_left_empty(tmp_path):
+def test_a_check_leaves_nothing_behind(tmp_path):
     check_folder(tmp_path / "a" / "b")
-    assert list((tmp_path / "a" / "b").iterdir()) == []
+    check_folder(tmp_path)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_full_disk_is_told_by_the_name_of_the_folder(full_disk, tmp_path):

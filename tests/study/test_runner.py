@@ -284,7 +284,7 @@ def test_a_store_that_cannot_be_written_to_is_told_before_the_first_run(full_dis
     with pytest.raises(OSError, match="File too large") as caught:
         run_all(SPECS, store=RunStore(tmp_path / "runs"), executor=Refusing())
     assert caught.value.filename == str(tmp_path / "runs")
-    assert list((tmp_path / "runs").iterdir()) == []
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_workers_that_cannot_start_are_an_error_with_a_hint(monkeypatch):

@@ -111,6 +111,7 @@ def train(
         raise ConfigError(f"Expected processes from 0 to n_arenas = {plan.n_arenas}, got {n_processes}.")
     _check_folder(folder, plan, resume=resume)
     _check_baseline(plan)
+    check_folder(folder)
     torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
     watch = _Watch(plan, folder, report or _keep_quiet)
     env = SwarmVecEnv(
@@ -129,7 +130,6 @@ def train(
             done = 0 if model is None else model.num_timesteps
             if done < ends:
                 model = _prepared(plan, stage, folder, env, done)
-                check_folder(folder)
                 _learn(model, ends - done, watch, f"stage {number}{_changes(stage)}")
         assert model is not None, "a plan has a stage"
         if watch.lacks_evaluation(model.num_timesteps):
