@@ -1,7 +1,7 @@
 """Settings shared by all tests, and rules for skipped tests."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -30,14 +30,23 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 @pytest.fixture
-def full_disk() -> Iterator[None]:
+def full_disk() -> None:
     """A disk on which no file can be longer than 1 kB, also for those who may write everywhere."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> Generator[None, object, object]:
+    """Fill the disk while a test runs that asks for it, and no longer: pytest itself may write to a file."""
+    if "full_disk" not in pyfuncitem.fixturenames:
+        return (yield)
     import resource
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1_000, before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    try:
+        return (yield)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def _note(report: pytest.TestReport | pytest.CollectReport) -> None:
