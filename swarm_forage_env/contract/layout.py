@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TypeAlias
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 
 RING_SENSORS = 24
@@ -101,16 +100,10 @@ class ObservationLayout:
 
 
 def layout_of(rows: Iterable[LayoutRow]) -> ObservationLayout:
-    """Lay out slices one after the other, from column 0.
-
-    Raises:
-        ConfigError: two slices of one name.
-    """
+    """Lay out slices one after the other, from column 0."""
     slices: list[ObservationSlice] = []
     start = 0
     for name, scale, noise_group, meaning in rows:
-        if name in {part.name for part in slices}:
-            raise ConfigError(f"Expected slices of different names, got {name!r} twice; rename the own sensor.")
         slices.append(ObservationSlice(name, start, len(scale), scale, noise_group, meaning))
         start += len(scale)
     return ObservationLayout(tuple(slices))

@@ -230,7 +230,7 @@ def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> Observ
         config: The learner's choices.
 
     Raises:
-        ConfigError: the environment lacks a sensor that the learner wants.
+        ConfigError: the environment lacks a sensor that the learner wants, or one has the name of another slice.
     """
     missing = [name for name in config.sensors if name not in source.names]
     if missing:
@@ -244,6 +244,9 @@ def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> Observ
         return source
     else:
         built_in = [part.row for part in source if part.name in BUILT_IN_SLICES]
+    taken = sorted({row[0] for row in built_in}.intersection(config.sensors))
+    if taken:
+        raise ConfigError(f"Expected slices of different names, got {taken[0]!r} twice; rename the own sensor.")
     return layout_of([*built_in, *(source.part(name).row for name in config.sensors)])
 
 
