@@ -16,7 +16,8 @@ _PROBE = bytes(1 << 16)
 def replacing(path: Path, *, ending: str = ".tmp") -> Generator[Path]:
     """Give a draft beside `path` to write to; it takes the place of `path` when all went well, else it is removed.
 
-    No two drafts have the same name, whichever threads, processes or machines write to the folder.
+    No two drafts have the same name, whichever threads, processes or machines write to the folder, which is made if it is
+    missing.
 
     Args:
         path: File to create or replace.
@@ -27,6 +28,7 @@ def replacing(path: Path, *, ending: str = ".tmp") -> Generator[Path]:
     """
     draft = path.with_name(f".{path.name[:50]}.{uuid4().hex}{ending}")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         yield draft
         draft.replace(path)
     except OSError as error:

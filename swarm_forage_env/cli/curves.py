@@ -55,6 +55,7 @@ def curves(
     levels = _levels(plan, () if beside == "none" else split_names(beside), jobs)
     output().print(_table(found, levels))
     try:
+        picture.parent.mkdir(parents=True, exist_ok=True)
         draw_trainings(
             picture,
             {one.label: points_of(one.evaluations) for one in found},

@@ -74,6 +74,7 @@ def saliency(  # long: one parameter per option
     output().print(_table(found, title))
     bars = {group: found.changed[group] for group in GROUPS[1:] if found.n_rows[group]}
     try:
+        picture.parent.mkdir(parents=True, exist_ok=True)
         draw_saliency(picture, found.slices, bars, title=title, xlabel=_words(found))
     except ImportError:
         notes().print(NO_PICTURE)
