@@ -16,7 +16,7 @@ _PROBE = bytes(1 << 16)
 def replacing(path: Path, *, ending: str = ".tmp") -> Generator[Path]:
     """Give a draft beside `path` to write to; it takes the place of `path` when all went well, else it is removed.
 
-    No two drafts have the same name, whichever threads, processes or machines write to the folder, which is made if it is
+    No two drafts have the same name, whichever threads, processes or machines write to the folder. It is made if it is
     missing.
 
     Args:
