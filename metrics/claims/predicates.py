@@ -155,19 +155,24 @@ def reaches_higher(panel: Panel, *, upper: Sequence[str], lower: Sequence[str], 
 
 
 def differs_more(few: Panel, many: Panel, *, pairs: Pairs, rule: Rule = "intervals") -> Outcome:
-    """Whether the second panel has more pairs and levels that differ than the first, by `MORE` of all comparisons."""
+    """Whether the second panel has more pairs and levels that differ than the first, by `MORE` of all comparisons.
+
+    Intervals narrow with the number of runs, so panels of unequal numbers leave it undecided by that rule.
+    """
     shares: list[float] = []
     for panel in (few, many):
         found = np.array([signs(panel, first, second, rule) for first, second in pairs])
         shares.append(float((np.abs(found) == 1.0).mean()))
     gain = shares[1] - shares[0]
     names = {name for pair in pairs for name in pair}
-    n_runs = min(few.n_runs(names), many.n_runs(names))
+    runs = few.n_runs(names), many.n_runs(names)
     answer: Answer = "supported" if gain >= MORE else "contradicted" if gain <= -MORE else "undecided"
-    if n_runs < 2:
-        answer = "undecided"
     why = f"{shares[1]:.0%} of the comparisons differ, {shares[0]:.0%} in the first panel"
-    return Outcome(answer=answer, statistic=gain, effect=np.nan, n_runs=n_runs, why=why)
+    if rule == "intervals" and runs[0] != runs[1]:
+        answer, why = "undecided", f"{why}, of {runs[1]} and {runs[0]} runs, which cannot be compared"
+    if min(runs) < 2:
+        answer = "undecided"
+    return Outcome(answer=answer, statistic=gain, effect=np.nan, n_runs=min(runs), why=why)
 
 
 def against_limit(resampled: FloatArray, limit: float) -> Answer:

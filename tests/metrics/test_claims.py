@@ -132,6 +132,14 @@ def test_which_panel_has_more_differences():
     assert answers(general.differs_more, alike, panel({"a": 1.0, "b": 2.0}, n_runs=1), **AB) == OPEN
 
 
+def test_differences_are_not_counted_in_panels_of_unequal_numbers_of_runs():
+    alike, apart = panel({"a": 1.0, "b": 1.0}, n_runs=8), panel({"a": 1.0, "b": 2.0}, n_runs=4)
+    by_intervals = general.differs_more(alike, apart, pairs=AB["pairs"])
+    assert by_intervals.answer == "undecided"
+    assert "4 and 8 runs" in by_intervals.why
+    assert general.differs_more(alike, apart, pairs=AB["pairs"], rule="bands").answer == "supported"
+
+
 def test_one_run_decides_nothing_by_either_rule():
     alone = panel({"a": SIX, "b": 2.0 * SIX}, n_runs=1)
     both = {"policies": ("a", "b")}
