@@ -5,62 +5,34 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import (
-    Caches,
-    ConfigFile,
-    Density,
-    Objects,
-    Robots,
-    Scenario,
-    Settings,
-    Side,
-    Wrappers,
-)
 from swarm_forage_env.cli.terminal import progress_bar
+from swarm_forage_env.cli.world_options import World, takes_world
 
 
-def record(  # long: one parameter per option
+@takes_world
+def record(
+    described: World,
     out: Annotated[
         Path | None, typer.Option(help="File to write, .gif or .mp4; default results/SCENARIO_POLICY.gif.")
     ] = None,
-    scenario: Scenario = "warehouse_small",
     policy: Annotated[str, typer.Option("--policy", "--controller", help="Name, or file of a trained policy.")] = "crw",
-    robots: Robots = None,
     seconds: Annotated[float, typer.Option(help="Simulated seconds to film.")] = 300.0,
     speedup: Annotated[float, typer.Option(help="Simulated seconds per second of film.")] = 20.0,
     fps: Annotated[float, typer.Option(help="Pictures per second.")] = 20.0,
     size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
     theme: Annotated[str, typer.Option(help="dark or light.")] = "dark",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
-    objects: Objects = None,
-    side: Side = None,
-    density: Density = None,
-    caches: Caches = None,
-    settings: Settings = None,
-    wrappers: Wrappers = None,
-    config: ConfigFile = None,
 ) -> None:
     """Film a run."""
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, described_world
+    from swarm_forage_env.cli.scenario_options import described_world
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.rendering.view import RenderError
     from swarm_forage_env.study.film import record_run
 
-    options = ScenarioOptions(
-        scenario=scenario,
-        robots=robots,
-        objects=objects,
-        side=side,
-        density=density,
-        caches=caches,
-        settings=tuple(settings or ()),
-        wrappers=tuple(wrappers or ()),
-        config_file=config,
-    )
-    world, asked_caches, disturbances = described_world(options)
+    world, asked_caches, disturbances = described_world(described)
     _refuse_unknown(policy)
-    film = out or Path("results", f"{scenario}_{Path(policy).stem}.gif")
+    film = out or Path("results", f"{described.scenario}_{Path(policy).stem}.gif")
     try:
         with progress_bar("pictures") as progress:
             written = record_run(

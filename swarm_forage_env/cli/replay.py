@@ -8,18 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import (
-    Caches,
-    ConfigFile,
-    Density,
-    Objects,
-    Robots,
-    Scenario,
-    Settings,
-    Side,
-    Wrappers,
-)
 from swarm_forage_env.cli.terminal import notes, progress_bar
+from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
     from swarm_forage_env.cli.scenario_options import ScenarioOptions
@@ -33,8 +23,10 @@ _RUN_ID = re.compile(r"[0-9a-f]{16}")
 _OPTIONS_OF_STORED_RUNS = ("run", "out", "beside", "seconds", "frame")
 
 
-def replay(  # long: one parameter per option
+@takes_world
+def replay(
     context: typer.Context,
+    described: World,
     run: Annotated[
         str,
         typer.Argument(
@@ -53,45 +45,24 @@ def replay(  # long: one parameter per option
             help="Another run to be seen beside it, a policy in the same world with the same seed; may be repeated.",
         ),
     ] = None,
-    scenario: Scenario = "warehouse_small",
-    robots: Robots = None,
     seconds: Annotated[float | None, typer.Option(help="Simulated seconds to keep; default the whole run.")] = None,
     frame: Annotated[
         float | None,
         typer.Option(help="Simulated seconds between frames; default 1, or more for large swarms."),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
-    objects: Objects = None,
-    side: Side = None,
-    density: Density = None,
-    caches: Caches = None,
-    settings: Settings = None,
-    wrappers: Wrappers = None,
-    config: ConfigFile = None,
 ) -> None:
     """Look into a run: write it as one HTML file, with play, zoom, every robot's state, and curves.
 
     The file needs no network and works on phones, too. A stored run is made again for it.
     """
     from swarm_forage_env._internal.files import check_file
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions
 
-    options = ScenarioOptions(
-        scenario=scenario,
-        robots=robots,
-        objects=objects,
-        side=side,
-        density=density,
-        caches=caches,
-        settings=tuple(settings or ()),
-        wrappers=tuple(wrappers or ()),
-        config_file=config,
-    )
     stored = _stored_run(run)
     if stored is not None:
         _refuse_scenario_options(context)
     with _complaints():
-        runs = _planned([run, *(beside or ())], options, seed)
+        runs = _planned([run, *(beside or ())], described, seed)
         check_file(out or _default_file(runs[0][0]))
         replays = [_recorded(spec, record, seconds, frame) for spec, record in runs]
         _write(out or _default_file(runs[0][0]), replays)

@@ -1,29 +1,13 @@
 """The command `run`."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import (
-    EXIT_FAILURE,
-    NO_PICTURE,
-    AsJson,
-    Caches,
-    ConfigFile,
-    Density,
-    DryRun,
-    Jobs,
-    Objects,
-    Out,
-    Performance,
-    Robots,
-    Scenario,
-    Settings,
-    Side,
-    Wrappers,
-    no_picture,
-)
+from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, AsJson, DryRun, Jobs, Out, Performance, no_picture
 from swarm_forage_env.cli.terminal import notes, output
+from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
     from swarm_forage_env.study.runner import StudyResult
@@ -31,8 +15,9 @@ if TYPE_CHECKING:
     from swarm_forage_env.study.store import RunStore
 
 
+@takes_world
 def run(
-    scenario: Scenario = "warehouse_small",
+    described: World,
     policy: Annotated[
         str,
         typer.Option(
@@ -42,18 +27,10 @@ def run(
             "interface can be told it: model.zip:decision_ticks=5.",
         ),
     ] = "crw",
-    robots: Robots = None,
     seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,
     first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first run.")] = 0,
     horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
-    objects: Objects = None,
-    side: Side = None,
-    density: Density = None,
-    caches: Caches = None,
     performance: Performance = None,
-    settings: Settings = None,
-    wrappers: Wrappers = None,
-    config: ConfigFile = None,
     out: Out = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -64,24 +41,12 @@ def run(
     Runs in parallel, shows a table, stores one record per run and draws performance over time. Runs that the folder
     holds already are not repeated, so an interrupted command can simply be given again.
     """
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder, plan_runs, split_names
+    from swarm_forage_env.cli.scenario_options import default_folder, plan_runs, split_names
     from swarm_forage_env.study.store import RunStore
 
-    options = ScenarioOptions(
-        scenario=scenario,
-        robots=robots,
-        objects=objects,
-        side=side,
-        density=density,
-        caches=caches,
-        horizon=horizon,
-        performance=performance,
-        settings=tuple(settings or ()),
-        wrappers=tuple(wrappers or ()),
-        config_file=config,
-    )
+    options = replace(described, horizon=horizon, performance=performance)
     specs = plan_runs(options, split_names(policy), n_seeds=seeds, first_seed=first_seed)
-    store = RunStore(out or default_folder(scenario))
+    store = RunStore(out or default_folder(described.scenario))
     if dry_run:
         _show_plan(specs, store, jobs, as_json=as_json)
     else:

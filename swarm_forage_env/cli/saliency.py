@@ -6,20 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import (
-    NO_PICTURE,
-    Caches,
-    ConfigFile,
-    Density,
-    Objects,
-    Robots,
-    Scenario,
-    Settings,
-    Side,
-    Wrappers,
-    no_picture,
-)
+from swarm_forage_env.cli.options import NO_PICTURE, no_picture
 from swarm_forage_env.cli.terminal import notes, output
+from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -27,46 +16,28 @@ if TYPE_CHECKING:
     from swarm_forage_env.study.saliency import Saliency
 
 
-def saliency(  # long: one parameter per option
+@takes_world
+def saliency(
+    described: World,
     policy: Annotated[str, typer.Argument(metavar="POLICY", help="A shipped network, or an .npz file of a training.")],
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Picture; default results/SCENARIO_POLICY.saliency.png.")
     ] = None,
-    scenario: Scenario = "warehouse_small",
-    robots: Robots = None,
     seconds: Annotated[float | None, typer.Option(help="Simulated seconds to look at; default the whole run.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
-    objects: Objects = None,
-    side: Side = None,
-    density: Density = None,
-    caches: Caches = None,
-    settings: Settings = None,
-    wrappers: Wrappers = None,
-    config: ConfigFile = None,
 ) -> None:
     """Show what a trained network looks at: how much it acts otherwise when one part of what it sees is exchanged.
 
     A robot gets, for example, the light readings of another robot. How often does it then decide otherwise?
     """
     from swarm_forage_env._internal.files import check_file
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs
+    from swarm_forage_env.cli.scenario_options import plan_runs
     from swarm_forage_env.rendering.plots import draw_saliency
     from swarm_forage_env.study.saliency import GROUPS, open_network_of
     from swarm_forage_env.study.saliency import saliency as measured
 
     network = open_network_of(policy)
-    options = ScenarioOptions(
-        scenario=scenario,
-        robots=robots,
-        objects=objects,
-        side=side,
-        density=density,
-        caches=caches,
-        settings=tuple(settings or ()),
-        wrappers=tuple(wrappers or ()),
-        config_file=config,
-    )
-    (spec,) = plan_runs(options, (policy,), n_seeds=1, first_seed=seed)
+    (spec,) = plan_runs(described, (policy,), n_seeds=1, first_seed=seed)
     picture = out or Path("results", f"{spec.scenario.name}_{Path(policy).stem}.saliency.png")
     check_file(picture)
     found = measured(network, spec, seconds=seconds)

@@ -1,21 +1,12 @@
 """The command `stuck`."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import (
-    EXIT_FAILURE,
-    Caches,
-    ConfigFile,
-    Density,
-    Objects,
-    Robots,
-    Scenario,
-    Settings,
-    Side,
-    Wrappers,
-)
+from swarm_forage_env.cli.options import EXIT_FAILURE
+from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -24,50 +15,32 @@ if TYPE_CHECKING:
     from swarm_forage_env.study.stuck import StuckRobot
 
 
+@takes_world
 def stuck(
-    scenario: Scenario = "warehouse_small",
+    described: World,
     policy: Annotated[
         str,
         typer.Option(
             "--policy", "--controller", help="One or more, separated by commas: names, or files of trained ones."
         ),
     ] = "crw",
-    robots: Robots = None,
     seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,
     first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first of them.")] = 0,
     horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
     window: Annotated[float, typer.Option(help="Seconds in which every robot should get away.")] = 600.0,
     moved: Annotated[float, typer.Option(help="How far that is, in m.")] = 0.05,
-    objects: Objects = None,
-    side: Side = None,
-    density: Density = None,
-    caches: Caches = None,
-    settings: Settings = None,
-    wrappers: Wrappers = None,
-    config: ConfigFile = None,
 ) -> None:
     """Find robots that get stuck: active, hardly moved for minutes, not waiting by rule. Exits with 1 if any are."""
     from rich.console import Console
 
     from metrics.scoring.texts import counted
     from swarm_forage_env._internal.fields import ConfigError
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs, split_names
+    from swarm_forage_env.cli.scenario_options import plan_runs, split_names
     from swarm_forage_env.study.stuck import find_stuck
 
     if not (window > 0.0 and moved > 0.0):
         raise ConfigError(f"Expected --window and --moved above 0, got {window:g} and {moved:g}.")
-    options = ScenarioOptions(
-        scenario=scenario,
-        robots=robots,
-        objects=objects,
-        side=side,
-        density=density,
-        caches=caches,
-        horizon=horizon,
-        settings=tuple(settings or ()),
-        wrappers=tuple(wrappers or ()),
-        config_file=config,
-    )
+    options = replace(described, horizon=horizon)
     specs = plan_runs(options, split_names(policy), n_seeds=seeds, first_seed=first_seed)
     found = [(spec, one) for spec in specs for one in find_stuck(spec, window_s=window, moved_m=moved)]
     if not found:

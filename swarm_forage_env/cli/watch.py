@@ -4,57 +4,29 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import (
-    Caches,
-    ConfigFile,
-    Density,
-    Objects,
-    Robots,
-    Scenario,
-    Settings,
-    Side,
-    Wrappers,
-)
+from swarm_forage_env.cli.world_options import World, takes_world
 
 
-def watch(  # long: one parameter per option
+@takes_world
+def watch(
+    described: World,
     policy: Annotated[str, typer.Argument(metavar="POLICY", help="Name, or file of a trained policy.")],
-    scenario: Scenario = "warehouse_small",
-    robots: Robots = None,
     speed: Annotated[float, typer.Option(help="Simulated seconds per second at first; arrow keys change it.")] = 10.0,
     size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
-    objects: Objects = None,
-    side: Side = None,
-    density: Density = None,
-    caches: Caches = None,
-    settings: Settings = None,
-    wrappers: Wrappers = None,
-    config: ConfigFile = None,
 ) -> None:
     """Watch a run in a window: pause, choose robots, raise noise, kill.
 
     The window shows the keys. Needs a display; without one, see record and replay.
     """
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, described_world
+    from swarm_forage_env.cli.scenario_options import described_world
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.policies.registry import policy_class
     from swarm_forage_env.rendering.view import RenderError
     from swarm_forage_env.study.watch import watch_run
 
-    options = ScenarioOptions(
-        scenario=scenario,
-        robots=robots,
-        objects=objects,
-        side=side,
-        density=density,
-        caches=caches,
-        settings=tuple(settings or ()),
-        wrappers=tuple(wrappers or ()),
-        config_file=config,
-    )
-    world, asked_caches, disturbances = described_world(options)
+    world, asked_caches, disturbances = described_world(described)
     try:
         policy_class(policy)
     except ValueError as error:  # an unknown name is a mistake in the words; a ValueError of the run is not
