@@ -33,7 +33,8 @@ myst_fence_as_directive = ["math"]
 myst_heading_anchors = 4
 # A notebook that fails, or takes longer, ends the build.
 nb_execution_mode = "force"
-nb_execution_raise_on_error = True
+nb_execution_in_temp = True
+nb_execution_show_tb = True
 nb_execution_timeout = 120
 nb_merge_streams = True
 
