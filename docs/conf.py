@@ -68,6 +68,7 @@ html_css_files = ["site.css"]
 html_title = f"swarm_forage_env {release}"
 html_copy_source = False
 html_show_sphinx = False
+html_show_copyright = False
 html_math_renderer = "mathml"
 
 
