@@ -1,4 +1,4 @@
-"""A short part of the tests under every supported Python, with the oldest and the newest dependencies.
+"""A run and a short part of the tests under every supported Python, with the oldest and the newest dependencies.
 
     scripts/matrix                    all that is installed here; prints a table and writes it into docs/versions.md
     scripts/matrix --python 3.12      one Python only; others keep their rows in the page
@@ -6,7 +6,7 @@
 
 A Python is found as python3.X on PATH. "oldest" takes numpy, gymnasium and pettingzoo at the lowest version that
 pyproject.toml allows and that has a wheel for this Python, all three at once; "newest" takes what pip finds. Each pair
-gets a fresh environment in a temporary folder. Some minutes each, most of it for compiling kernels.
+gets a fresh environment in a temporary folder. A minute or two each, most of it for installing and compiling.
 """
 
 import argparse
@@ -27,9 +27,10 @@ PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 VARIED = ("numpy", "gymnasium", "pettingzoo")
 SHOWN = (*VARIED, "numba")
 ENDS = ("oldest", "newest")
-TESTS = ("tests/contract", "tests/scenarios", "tests/promises/test_packaging.py", "tests/promises/test_determinism.py")
+TESTS = ("tests/contract", "tests/scenarios", "tests/promises/test_packaging.py")
+RUN = ("run", "--scenario", "warehouse_small", "--policy", "crw", "--robots", "10", "--horizon", "200", "--seeds", "1")
 BLOCK = re.compile(r"(<!-- table by scripts/matrix -->\n).*?(<!-- end of table -->)", re.DOTALL)
-HEADINGS = ("Python", "dependencies", *SHOWN, "tests", "on")
+HEADINGS = ("Python", "dependencies", *SHOWN, "a run", "tests", "on")
 
 
 def lower_bounds() -> dict[str, str]:
@@ -60,6 +61,15 @@ def oldest(pip: Sequence[str], name: str, bound: str) -> str:
     )
 
 
+def call(words: Sequence[str], folder: Path, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command with a cache of kernels of its own; shows what it said if it failed."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "kernels")}
+    done = subprocess.run(words, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode:
+        print(done.stdout, done.stderr, sep="\n", file=sys.stderr)
+    return done
+
+
 def run_pair(python: str, end: str, folder: Path) -> list[str]:
     """Install and test in a fresh environment; returns the cells of the row behind the first two."""
     subprocess.run([f"python{python}", "-m", "venv", str(folder)], check=True)
@@ -70,31 +80,16 @@ def run_pair(python: str, end: str, folder: Path) -> list[str]:
         pins = [f"{name}=={oldest(pip, name, bound)}" for name, bound in lower_bounds().items()]
     constraints = folder / "constraints.txt"
     constraints.write_text("\n".join(pins), encoding="utf-8")
-    install = [
-        *pip,
-        "install",
-        "--quiet",
-        "--only-binary=:all:",
-        "--constraint",
-        str(constraints),
-        "-e",
-        f"{ROOT}[test]",
-    ]
-    installed = subprocess.run(install, capture_output=True, text=True, check=False)
-    if installed.returncode:
-        print(installed.stderr, file=sys.stderr)
-        return [*(pin.split("==")[1] for pin in pins or VARIED), "", "cannot be installed"]
+    words = ["--only-binary=:all:", "--constraint", str(constraints), "-e", f"{ROOT}[test]"]
+    if call([*pip, "install", "--quiet", *words], folder, folder).returncode:
+        asked = [pin.split("==")[1] for pin in pins] or ["newest"] * len(VARIED)
+        return [*asked, "-", "-", "cannot be installed"]
     code = f"from importlib.metadata import version; print(*map(version, {SHOWN}))"
-    versions = subprocess.run([interpreter, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    tested = subprocess.run(
-        [interpreter, "-m", "pytest", "-q", "-p", "no:cacheprovider", *TESTS],
-        cwd=ROOT, env=os.environ | {"NUMBA_CACHE_DIR": str(folder / "kernels")},
-        stdout=subprocess.PIPE, text=True, check=False,
-    )  # fmt: skip
-    last = tested.stdout.strip().splitlines()[-1]
-    if tested.returncode:
-        print(tested.stdout, file=sys.stderr)
-    return [*versions, re.sub(r" in [\d.]+s.*|=", "", last).strip()]
+    versions = call([interpreter, "-c", code], folder, folder).stdout.split()
+    ran = call([str(folder / "bin/swarm-forage"), *RUN], folder, folder)
+    tested = call([interpreter, "-m", "pytest", "-q", "-p", "no:cacheprovider", *TESTS], folder, ROOT)
+    summary = re.sub(r" in [\d.]+s.*|=", "", tested.stdout.strip().splitlines()[-1]).strip()
+    return [*versions, "failed" if ran.returncode else "done", summary]
 
 
 def rows_of_page(text: str) -> dict[tuple[str, str], list[str]]:
@@ -140,7 +135,7 @@ def main(words: Sequence[str] | None = None) -> int:
                 continue
             with tempfile.TemporaryDirectory() as folder:
                 cells = run_pair(python, end, Path(folder))
-            failed |= not re.fullmatch(r"\d+ passed(, \d+ (skipped|deselected))*", cells[-1])
+            failed |= cells[-2] != "done" or not re.fullmatch(r"\d+ passed(, \d+ (skipped|deselected))*", cells[-1])
             write_row((python, end), [*cells, f"{datetime.now(UTC):%Y-%m-%d}"])
     if not arguments.dry_run:
         print(table(rows_of_page(PAGE.read_text(encoding="utf-8"))))

@@ -31,10 +31,12 @@ def test_every_package_that_is_varied_has_a_bound():
 def test_a_row_comes_into_the_page_and_others_stay(tmp_path, monkeypatch):
     monkeypatch.setattr(matrix, "PAGE", tmp_path / "versions.md")
     matrix.PAGE.write_text(PAGE)
-    matrix.write_row(("3.12", "newest"), ["1", "2", "3", "4", "5 passed", "2026-01-02"])
-    matrix.write_row(("3.11", "oldest"), ["1", "2", "3", "4", "1 failed", "2026-01-01"])
+    matrix.write_row(("3.12", "newest"), ["1", "2", "3", "4", "done", "5 passed", "2026-01-02"])
+    matrix.write_row(("3.11", "oldest"), ["1", "2", "3", "4", "done", "1 failed", "2026-01-01"])
     text = matrix.PAGE.read_text()
-    assert text.index("| 3.11 | oldest | 1 | 2 | 3 | 4 | 1 failed | 2026-01-01 |") < text.index("| 3.12 | newest |")
+    assert text.index("| 3.11 | oldest | 1 | 2 | 3 | 4 | done | 1 failed | 2026-01-01 |") < text.index(
+        "| 3.12 | newest |"
+    )
     assert "Not run yet: Python 3.11, newest; Python 3.12, oldest; Python 3.13, oldest;" in text
     assert text.startswith("before\n")
     assert text.endswith("<!-- end of table -->\n\nafter\n")
