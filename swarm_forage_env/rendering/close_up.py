@@ -1,6 +1,7 @@
 """A close-up of one robot: its surroundings in true size, its beams, and its line-of-sight window."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +12,14 @@ from swarm_forage_env.contract.layout import WINDOW_CELLS, ObservationLayout
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.rendering.paint import (
     Canvas,
+    Canvases,
     paint_box,
     paint_discs,
     paint_frame,
     paint_needles,
     paint_rings,
     paint_squares,
+    plain,
 )
 from swarm_forage_env.rendering.view import CACHE_OPACITY, NEST_OPACITY, PALETTE
 from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -84,22 +87,28 @@ def render_close_up(
         (size_px, size_px, 3) uint8 picture.
     """
     lens = _Lens(swarm.position[robot].copy(), size_px / side_m, size_px)
-    canvas = np.empty((size_px, size_px, 3), np.float32)
+    canvases = _canvases(size_px)
+    canvas = canvases.borrow()
     _draw_ground(canvas, lens, scenario, caches)
     _draw_objects(canvas, lens, objects, obs[layout["los_object"]])
     _draw_window(canvas, lens, swarm.position[robot])
     _draw_beams(canvas, lens, scenario, swarm, robot, obs[layout["proximity"]])
     _draw_robots(canvas, lens, scenario, swarm, robot)
-    return np.rint(canvas, out=canvas).astype(np.uint8)
+    picture = canvas.take_picture()
+    canvases.give_back(canvas)
+    return picture
+
+
+@lru_cache(maxsize=2)
+def _canvases(size_px: int) -> Canvases:
+    return Canvases(plain(size_px, size_px, PALETTE.floor))
 
 
 def _draw_ground(canvas: Canvas, lens: _Lens, scenario: ScenarioConfig, caches: CacheState) -> None:
     arena = scenario.arena
     left, top, right, bottom = lens.box(arena.interior_m)
-    if max(left, top) <= 0.0 and min(right, bottom) >= lens.size_px:
-        canvas[:] = PALETTE.floor
-    else:
-        canvas[:] = PALETTE.page
+    if max(left, top) > 0.0 or min(right, bottom) < lens.size_px:  # more is to be seen than the floor
+        paint_box(canvas, (0.0, 0.0, lens.size_px, lens.size_px), PALETTE.page)
         paint_box(canvas, lens.box((-WALL_M, -WALL_M, arena.width_m + WALL_M, arena.height_m + WALL_M)), PALETTE.wall)
         paint_box(canvas, (left, top, right, bottom), PALETTE.floor)
     paint_box(canvas, lens.box(arena.nest_box_m), PALETTE.nest, NEST_OPACITY)
