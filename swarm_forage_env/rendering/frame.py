@@ -129,7 +129,8 @@ def render_frame(
     _draw_robots(canvas, view, swarm, events)
     picture = canvas.take_picture()
     canvases.give_back(canvas)
-    _write_text(picture, view, scenario, swarm, caches, events, tick, title)
+    _write_header(picture, view, scenario, swarm, events, tick, title)
+    _write_counts(picture, view, caches)
     return picture
 
 
@@ -273,24 +274,22 @@ def _draw_symbol(canvas: Canvas, palette: Palette, name: str, x: float, y: float
         paint_frame(canvas, box, 1.0, palette.cache)
 
 
-def _write_text(
-    done_picture: NDArray[np.uint8],
+def _write_header(
+    picture: NDArray[np.uint8],
     view: View,
     scenario: ScenarioConfig,
     swarm: SwarmState,
-    caches: CacheState,
     events: StepEvents,
     tick: int,
     title: str | None,
 ) -> None:
-    """Add headline, clock, figures and cache counts."""
+    """Write headline, clock and figures above the arena."""
     from PIL import Image, ImageDraw
 
     top = view.bottom - (scenario.arena.height_m + WALL_M) * view.scale
-    # Pillow works on copies, so it gets no more than the rows that have text in them.
-    written = done_picture if caches.alive.any() else done_picture[: int(top)]
-    picture = Image.fromarray(written)
-    pen = ImageDraw.Draw(picture)
+    header = picture[: int(top)]
+    written = Image.fromarray(header)  # a copy, so it is of no more than the rows that have text in them
+    pen = ImageDraw.Draw(written)
     margin = text_height(view.unit)
     arena, count = scenario.arena, events.counters
     headline = title or f"{scenario.name.replace('_', ' ')}, {arena.width_m:g} x {arena.height_m:g} m"
@@ -303,18 +302,31 @@ def _write_text(
     room = view.width - 2 * margin
     _write_line(pen, 0.33 * top, headline, f"{seconds:,.0f} s", 1.35 * margin, margin, room, view.palette.text)
     _write_line(pen, 0.72 * top, done, now, margin, margin, room, view.palette.faint_text)
+    header[:] = np.asarray(written)
+
+
+def _write_counts(picture: NDArray[np.uint8], view: View, caches: CacheState) -> None:
+    """Write into each cache how many objects it has."""
+    from PIL import Image, ImageDraw
+
+    font, line_px = text_font(1.5 * text_height(view.unit)), 2
     for (x, y), n_objects in zip(caches.cell[caches.alive], caches.count[caches.alive], strict=True):
-        column, row = view.pixels(((x + 0.5) * CELL_M, (y + 0.5) * CELL_M))
-        pen.text(
-            (column, row),
-            str(n_objects),
+        column, row = view.pixels(((x + 0.5) * CELL_M, (y + 0.5) * CELL_M)).tolist()
+        text = str(n_objects)
+        wide, high = int(font.getlength(text) / 2) + 2 * line_px, int(font.size) + 2 * line_px
+        left, top = max(0, int(column) - wide), max(0, int(row) - high)
+        place = picture[top : int(row) + high, left : int(column) + wide]
+        written = Image.fromarray(place)
+        ImageDraw.Draw(written).text(
+            (column - left, row - top),
+            text,
             fill=view.palette.text,
-            font=text_font(1.5 * margin),
+            font=font,
             anchor="mm",
-            stroke_width=2,
+            stroke_width=line_px,
             stroke_fill=view.palette.floor,
         )
-    written[:] = np.asarray(picture)
+        place[:] = np.asarray(written)
 
 
 def _write_line(
