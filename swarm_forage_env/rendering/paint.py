@@ -165,7 +165,7 @@ def _paint_round(
     colour: Colour,
     opacity: float | NDArray[np.floating] = 1.0,
 ) -> None:
-    """Call `shapes.paint_round`, which see, with numbers of the types that are stored."""
+    """Call `kernels.shapes.paint_round`, which see, with numbers of the types that are stored."""
     places = _places(middle)
     shapes.paint_round(
         canvas.sheet,
