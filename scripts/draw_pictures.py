@@ -75,7 +75,9 @@ def draw_window(file: str, theme: str) -> None:
     for key in ("t", "t", "space"):
         watch.handle(Pressed(key))
     window.show(watch.scene())
-    pixels = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
+    screen = pygame.display.get_surface()
+    assert screen is not None, "a window was shown"
+    pixels = pygame.surfarray.array3d(screen).swapaxes(0, 1)
     Image.fromarray(pixels).save(IMAGES / file, optimize=True)
     window.close()
     print(IMAGES / file)
