@@ -132,12 +132,23 @@ def test_which_panel_has_more_differences():
     assert answers(general.differs_more, alike, panel({"a": 1.0, "b": 2.0}, n_runs=1), **AB) == OPEN
 
 
-def test_differences_are_not_counted_in_panels_of_unequal_numbers_of_runs():
-    alike, apart = panel({"a": 1.0, "b": 1.0}, n_runs=8), panel({"a": 1.0, "b": 2.0}, n_runs=4)
-    by_intervals = general.differs_more(alike, apart, pairs=AB["pairs"])
-    assert by_intervals.answer == "undecided"
-    assert "4 and 8 runs" in by_intervals.why
-    assert general.differs_more(alike, apart, pairs=AB["pairs"], rule="bands").answer == "supported"
+def test_differences_are_counted_in_equally_many_runs():
+    few, many = panel({"a": 1.0, "b": 2.0}, n_runs=4), panel({"a": 1.0, "b": 2.0}, n_runs=8)
+    outcome = general.differs_more(few, many, pairs=AB["pairs"])
+    assert (outcome.answer, outcome.n_runs) == ("undecided", 4)
+    assert "of 4 runs each" in outcome.why
+    alike = panel({"a": 1.0, "b": 1.0}, n_runs=8)
+    assert answers(general.differs_more, alike, few, **AB) == BOTH
+
+
+def test_more_runs_alone_do_not_make_more_differences():
+    """A difference that eight runs tell and four do not."""
+    runs = np.array([1.0, -0.6, 1.0, -0.6, 1.2, 1.2, 1.2, 1.2])
+    close = Panel(levels=[1.0], scores={"a": np.full((1, 8), 5.0), "b": [5.0 + runs]})
+    assert general.differ(close, pairs=AB["pairs"]).answer == "supported"
+    four = Panel(levels=[1.0], scores={name: scores[:, :4] for name, scores in close.scores.items()})
+    outcome = general.differs_more(four, close, pairs=AB["pairs"])
+    assert (outcome.answer, outcome.statistic) == ("undecided", 0.0)
 
 
 def test_one_run_decides_nothing_by_either_rule():
