@@ -107,6 +107,7 @@ def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci"
     axes: list[Panel] = picture.subplots(n_rows, n_columns, squeeze=False, sharey=True).ravel().tolist()
     for panel, place in zip(figure.panels, axes, strict=False):
         _draw_panel(place, panel, band)
+    limit_height(axes[0], figure)
     for place in axes[len(figure.panels) :]:
         place.set_axis_off()
     handles, labels = axes[0].get_legend_handles_labels()
@@ -189,6 +190,15 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
     place.set_ylabel(panel.unit, fontsize=8)
     place.tick_params(labelsize=8)
     place.grid(alpha=0.25)
+
+
+def limit_height(place: Panel, figure: StudyFigure) -> None:
+    """Let bands reach beyond the runs by half of their range at most: the interval of two runs is of any size."""
+    known = np.concatenate([scores[np.isfinite(scores)] for panel in figure.panels for scores in panel.scores.values()])
+    low, high = float(known.min()), float(known.max())
+    reach = 0.5 * (high - low) or abs(high) or 1.0
+    bottom, top = place.get_ylim()
+    place.set_ylim(max(bottom, low - reach), min(top, high + reach))
 
 
 def _x_label(panel: StudyPanel) -> str:

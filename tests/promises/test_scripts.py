@@ -105,6 +105,14 @@ def test_results_say_which_sets_and_cells_they_are_of(run):
     assert f"| `S1c` | {len(whole.cells)} | 0 | 0 | - |" in page, "four intervals are too short for breakdowns"
 
 
+def test_sketches_of_theory_are_those_of_the_docs(run):
+    pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
+    assert run("draw_theory", ".")[0] == 0
+    for name in ("self_organisation.png", "task_graph.png"):
+        assert Path(name).read_bytes().startswith(b"\x89PNG")
+        assert (ROOT / "docs/images" / name).is_file()
+
+
 @pytest.mark.parametrize(
     ("script", "words", "fault"),
     [
