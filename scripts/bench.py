@@ -32,7 +32,8 @@ from rich.table import Table
 from speed_cases import WRAPPERS, large_world
 
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import warehouse_medium, warehouse_small
 from swarm_forage_env.study.run import LiveRun, build_stack, run_one
 from swarm_forage_env.study.spec import RunSpec, plan_run

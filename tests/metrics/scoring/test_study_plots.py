@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from metrics.scoring import study_panels
-from metrics.scoring.study_plots import limit_height, draw_figure, draw_map, study_figures
+from metrics.scoring.study_plots import draw_figure, draw_map, limit_height, study_figures
 from metrics.statistics import aggregate
 from swarm_forage_env.study.studies import Axis
 from tests.support.made_tables import FOUR, made_study, made_table
