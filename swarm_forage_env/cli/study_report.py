@@ -94,7 +94,7 @@ def plan_report(spec: StudySpec, folder: StudyFolder, part: tuple[int, int], wor
 def _hours(seconds: float) -> str:
     """Hours with two digits behind the point; nobody plans with fewer than 36 s."""
     hours = seconds / 3600.0
-    return f"{hours:,.2f}" if hours >= 0.01 or hours == 0.0 else "< 0.01"
+    return f"{hours:,.2f}" if hours >= 0.01 or seconds == 0.0 else "<0.01"
 
 
 def state_report(state: StudyState, folder: StudyFolder) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args, get_origin
 
 from swarm_forage_env._internal.fields import (
     ConfigError,
@@ -23,8 +23,7 @@ from swarm_forage_env._internal.fields import (
     whole,
 )
 from swarm_forage_env.policies.registry import is_policy_file
-from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
-from swarm_forage_env.scenarios.overrides import field_sections
+from swarm_forage_env.scenarios.overrides import field_sections, field_types
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import READINGS
 from swarm_forage_env.study.experiments import CRITERIA, UNDISTURBED, Experiment, swarms_of_sizes, wrappers_at
@@ -39,6 +38,7 @@ from swarm_forage_env.study.spec import (
 from swarm_forage_env.wrappers.registry import wrapper_config_class
 
 if TYPE_CHECKING:
+    from swarm_forage_env.scenarios.config import ScenarioConfig
     from swarm_forage_env.wrappers.base import WrapperConfig
 
 Value: TypeAlias = float | str | bool
@@ -111,9 +111,7 @@ def list_word(entries: Sequence[Any]) -> str:
 @cache
 def _list_fields() -> dict[str, type]:
     """Scenario fields that hold a list -> the type of its entries."""
-    hints = {section: get_type_hints(of) for section, of in (("", ScenarioConfig), *SECTIONS.items())}
-    kinds = {name: hints[section][name] for name, section in field_sections().items()}
-    return {name: get_args(kind)[0] for name, kind in kinds.items() if get_origin(kind) is tuple}
+    return {name: get_args(kind)[0] for name, kind in field_types().items() if get_origin(kind) is tuple}
 
 
 def _field_value(name: str, value: Value) -> Any:
