@@ -153,7 +153,7 @@ class _Cache(FunctionCache):
             _say(f"{_NOT_KEPT} ({error.strerror}: {self.cache_path}). {_WAY_OUT}")
 
 
-_NOT_KEPT = "Compiled functions cannot be kept, so every process spends a minute or more on them"
+_NOT_KEPT = "Compiled functions cannot be kept, so every process spends half a minute or more on them"
 _WAY_OUT = "Set NUMBA_CACHE_DIR to a folder that can be written to."
 
 
