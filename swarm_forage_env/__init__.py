@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from swarm_forage_env.contract.policy import Policy, SwarmSpec
     from swarm_forage_env.env import ForageEnv
     from swarm_forage_env.policies.registry import RandomPolicy, from_callable, load_policy, policy_names
-    from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+    from swarm_forage_env.scenarios.config import ScenarioConfig
+    from swarm_forage_env.scenarios.overrides import with_overrides
     from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
     from swarm_forage_env.study.film import record_run
     from swarm_forage_env.study.record import RunRecord

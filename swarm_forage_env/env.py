@@ -8,7 +8,8 @@ import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
-from swarm_forage_env._internal.fields import ConfigError, as_whole, instance, switch
+from swarm_forage_env._internal.fields import as_whole, instance, switch
+from swarm_forage_env.contract.calls import is_over, no_options
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, SwarmSpec
@@ -28,46 +29,6 @@ BatchStep: TypeAlias = tuple[ObsArray, np.ndarray, BoolArray, bool]
 
 _STATE = ("_last_obs", "_rewards", "_seeds", "_terminated", "agents", "seed_value")
 """Attributes of a ForageEnv that are state; the arena holds the rest."""
-
-
-OPTION_OF_TESTS = "options"
-"""A reset option without a meaning: PettingZoo's own `parallel_api_test` gives it to every environment."""
-
-
-def no_options(options: Mapping[str, Any] | None) -> None:
-    """Refuse reset options, for environments that take none.
-
-    Raises:
-        ConfigError: there is one; the message names it.
-    """
-    for name in options or ():
-        if name != OPTION_OF_TESTS:
-            raise ConfigError(
-                f"Expected no reset options, got {name!r}. An environment with an interface changes its scenario at a "
-                "reset: parallel_env(..., interface={}), then reset(options={'scenario': {'n_objects': 50}})."
-            )
-
-
-def is_over(agents_left: Collection[str], actions: Any, *, is_reset: bool) -> bool:
-    """Return whether a step has nothing to do, because no agent is left and no action was given.
-
-    Libraries that step many environments side by side ask for it until all of them are done.
-
-    Args:
-        agents_left: Agents of the environment.
-        actions: What its `step` was given.
-        is_reset: Whether it was reset.
-
-    Raises:
-        RuntimeError: no agent is left, but there are actions, or it was never reset.
-    """
-    if agents_left:
-        return False
-    if not is_reset:
-        raise RuntimeError("Call reset before step.")
-    if actions:
-        raise RuntimeError("All agents are done; call reset first.")
-    return True
 
 
 class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):

@@ -14,7 +14,8 @@ from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, ObservationLayou
 from swarm_forage_env.contract.policy import Policy, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.overrides import with_overrides
 
 from .faults import CheckError, summary
 from .runs import INTERVAL_TICKS, check_compiled

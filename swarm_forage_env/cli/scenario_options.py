@@ -10,7 +10,8 @@ from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.policies.registry import split_interface
-from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig, field_sections
+from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
+from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.sizing import checked_density
 from swarm_forage_env.study.spec import RunSpec, plan_run

@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.performance import quantity
-from swarm_forage_env.scenarios.quirks import READINGS, Quirks
+from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, cache_centre_box, capacity, distributable_box
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, EAST_WALL_M, WALL_M, WHEEL_SCALE_MPS
 
@@ -408,66 +408,6 @@ SECTIONS: dict[str, type] = {
 """Sections of a ScenarioConfig and their classes."""
 
 _C = TypeVar("_C")
-
-
-def field_sections() -> dict[str, str]:
-    """Map every overridable field name to the section that holds it ("" = the scenario itself)."""
-    table = {item.name: "" for item in dataclasses.fields(ScenarioConfig) if item.name not in SECTIONS}
-    for section, section_class in SECTIONS.items():
-        table.update({item.name: section for item in dataclasses.fields(section_class)})
-    return table
-
-
-def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
-    """Return `config` with single fields replaced by name, wherever they live.
-
-    Example: `with_overrides(config, n_robots=20, width_m=48.0)`. A section may be replaced whole
-    (`quirks=AUTHORS_PROGRAM`), the quirks also by the name of a reading (`quirks="AUTHORS_PROGRAM"`).
-
-    Raises:
-        ConfigError: unknown name (with the nearest known one), or values that do not fit together.
-    """
-    table = field_sections()
-    fields.known_keys(overrides, (*table, *SECTIONS), "scenario field")
-    per_section: dict[str, dict[str, Any]] = {}
-    top: dict[str, Any] = {}
-    for name, value in overrides.items():
-        if name == "quirks" and isinstance(value, str):
-            fields.known_name("reading", value, READINGS)
-            top[name] = READINGS[value]
-        elif name in SECTIONS:
-            own = ", ".join(item.name for item in dataclasses.fields(SECTIONS[name]))
-            fields.instance(name, value, SECTIONS[name], hint=f"; single fields of it are given by their names: {own}")
-            top[name] = value
-        elif table[name]:
-            per_section.setdefault(table[name], {})[name] = value
-        else:
-            top[name] = value
-    for section, values in per_section.items():
-        top[section] = dataclasses.replace(top.get(section, getattr(config, section)), **values)
-    return dataclasses.replace(config, **top)
-
-
-def scenario_of_same_size(scenario: ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
-    """Return the scenario with fields overridden by name; the number of robots must stay the same.
-
-    Raises:
-        ConfigError: unknown fields, values that do not fit together, or another number of robots.
-    """
-    changed = with_overrides(scenario, **overrides)
-    n_robots, own = scenario.robots.n_robots, scenario.robots.own_sensors
-    if changed.robots.own_sensors != own:
-        raise ConfigError(
-            f"Expected own_sensors to stay {own!r}, the columns that spaces promise, got "
-            f"{changed.robots.own_sensors!r}; make another environment."
-        )
-    if changed.robots.n_robots != n_robots:
-        raise ConfigError(
-            f"Expected n_robots to stay {n_robots}, the number of rows that spaces promise, got "
-            f"{changed.robots.n_robots}; make another environment, or let robots be born during the run (the "
-            "population wrapper with initial_robots)."
-        )
-    return changed
 
 
 def to_mapping(config: Any) -> dict[str, Any]:

@@ -7,7 +7,8 @@ import math
 from typing import Any
 
 from swarm_forage_env._internal import fields
-from swarm_forage_env.scenarios.config import ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M
 
 ARENA_FIELDS = ("width_m", "height_m", "nest_centre_m", "nest_size_m")

@@ -23,7 +23,7 @@ from swarm_forage_env._internal.fields import (
     whole,
 )
 from swarm_forage_env.policies.registry import is_policy_file
-from swarm_forage_env.scenarios.config import field_sections
+from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import READINGS
 from swarm_forage_env.study.experiments import CRITERIA, UNDISTURBED, Experiment, swarms_of_sizes, wrappers_at

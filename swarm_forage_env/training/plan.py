@@ -12,8 +12,9 @@ from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json, parse_toml
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
 from swarm_forage_env.policies.registry import policy_class
-from swarm_forage_env.scenarios.config import ScenarioConfig, scenario_of_same_size, with_overrides
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.config import from_mapping as config_from_mapping
+from swarm_forage_env.scenarios.overrides import scenario_of_same_size, with_overrides
 from swarm_forage_env.scenarios.presets import scenario as preset
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.training.defaults import DEFAULT_ARENAS, DEFAULT_HIDDEN, DEFAULT_STEPS, EVALUATE_EVERY

@@ -9,10 +9,12 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.contract.calls import OPTION_OF_TESTS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
-from swarm_forage_env.env import OPTION_OF_TESTS, BatchStep, ForageEnv
+from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, LearnerInterface, chosen_interface
-from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig, field_sections, scenario_of_same_size
+from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
+from swarm_forage_env.scenarios.overrides import field_sections, scenario_of_same_size
 from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order

@@ -8,7 +8,8 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
-from swarm_forage_env.env import ForageEnv, is_over
+from swarm_forage_env.contract.calls import is_over
+from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot, plan_arena

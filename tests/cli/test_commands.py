@@ -18,7 +18,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.registry import RandomPolicy, policy_names
-from swarm_forage_env.scenarios.config import field_sections
+from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.spec import RunSpec

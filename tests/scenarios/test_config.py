@@ -16,11 +16,10 @@ from swarm_forage_env.scenarios.config import (
     ObjectConfig,
     RobotConfig,
     ScenarioConfig,
-    field_sections,
     from_mapping,
     to_mapping,
-    with_overrides,
 )
+from swarm_forage_env.scenarios.overrides import field_sections, with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, SEARCH_AND_RESCUE_OBJECTS, scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.scenarios.config import with_overrides
+from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import (
     DENSITY,
     SCENARIO_NAMES,

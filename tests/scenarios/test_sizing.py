@@ -5,7 +5,7 @@ import math
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.scenarios.config import with_overrides
+from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, at_density, chosen_scenario, scenario
 from swarm_forage_env.scenarios.regions import source_boxes
 from swarm_forage_env.scenarios.sizing import robots_at_density

@@ -13,7 +13,8 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist
 
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig, with_overrides
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
+from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.state import SwarmState
 from tests.support.engines import drive_at, make_bodies

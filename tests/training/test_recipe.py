@@ -8,7 +8,8 @@ import pytest
 from swarm_forage_env import training
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
-from swarm_forage_env.scenarios.config import RewardConfig, with_overrides
+from swarm_forage_env.scenarios.config import RewardConfig
+from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario, warehouse_small
 from swarm_forage_env.training.defaults import EVALUATE_EVERY
 from swarm_forage_env.training.plan import ALGORITHMS, EvaluationPlan, Stage

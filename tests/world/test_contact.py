@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.config import with_overrides
+from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.contact import TOUCH_SLACK_M
 from swarm_forage_env.world.kernels.contact import press

@@ -5,7 +5,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Event, Grip
-from swarm_forage_env.scenarios.config import with_overrides
+from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import plan_run
 from swarm_forage_env.wrappers.handling import HandlingCost, HandlingCostConfig
