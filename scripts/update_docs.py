@@ -1,4 +1,4 @@
-"""Numbers of runs in README.md and docs/: made by commands, stored once, written between markers.
+"""Numbers of runs in README.md, docs/ and the paper: made by commands, stored once, written between markers.
 
     scripts/update_docs                  write the stored numbers into all pages
     scripts/update_docs --check          say which pages differ from what is stored; exit 1 if any does
@@ -27,7 +27,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 STORE = ROOT / "docs/results.json"
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")),
+PAGES = [ROOT / "README.md", ROOT / "paper/paper.md", *sorted((ROOT / "docs").rglob("*.md")),
          *sorted((ROOT / "swarm_forage_env/policies/pretrained").glob("*.md"))]  # fmt: skip
 BLOCK = re.compile(
     r"(<!-- generated: (?P<source>\w+)\.(?P<field>\w+) by scripts/update_docs -->)(?P<text>.*?)(<!-- end -->)",

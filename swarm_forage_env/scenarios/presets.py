@@ -21,6 +21,7 @@ from swarm_forage_env.scenarios.sizing import (
 )
 
 SCENARIO_NAMES = ("warehouse_small", "warehouse_medium", "warehouse_dual", "warehouse_quad", "search_and_rescue")
+"""What `scenario` takes: the presets below."""
 
 SEARCH_AND_RESCUE_OBJECTS = {16: 80, 32: 272, 48: 368, 64: 448, 80: 544, 96: 1248, 112: 1408, 128: 1568}
 """Side in metres -> objects: what the clusters of the authors' program always hold, so that both readings have the same

@@ -66,8 +66,11 @@ def test_version_comes_from_the_installed_package():
     assert swarm_forage_env.__version__ == version("swarm-forage-env") == PROJECT["version"]
 
 
-def test_changelog_has_a_section_for_this_version():
-    assert f"## {PROJECT['version']}" in (ROOT / "CHANGELOG.md").read_text()
+def test_changelog_and_citation_have_this_version_and_its_date():
+    citation = (ROOT / "CITATION.cff").read_text()
+    dates = re.findall(r"^date-released: (.+)$", citation, re.MULTILINE)
+    assert f"\nversion: {PROJECT['version']}\n" in citation
+    assert f"## {PROJECT['version']} ({dates[0]})\n" in (ROOT / "CHANGELOG.md").read_text()
 
 
 @pytest.mark.parametrize("name", swarm_forage_env.SCENARIO_NAMES)
