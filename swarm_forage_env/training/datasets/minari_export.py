@@ -51,18 +51,14 @@ def export_minari(folder: str | Path, dataset_id: str, **about: Any) -> "MinariD
         ended = np.zeros(len(steps), np.bool_)
         ended[-1] = True
         all_dead = bool(steps.terminated.any(axis=0).all())
-        episodes.append(
-            EpisodeBuffer(
-                id=number,
-                seed=run.seed,
-                observations=steps.observations,
-                actions=steps.actions,
-                rewards=steps.rewards.sum(axis=1),
-                terminations=ended & all_dead,
-                truncations=ended & run.truncated,
-                infos={"active": steps.active},
-            )
-        )
+        arrays: dict[str, Any] = {  # it takes arrays, but declares lists
+            "observations": steps.observations,
+            "actions": steps.actions,
+            "rewards": steps.rewards.sum(axis=1),
+            "terminations": ended & all_dead,
+            "truncations": ended & run.truncated,
+        }
+        episodes.append(EpisodeBuffer(id=number, seed=run.seed, infos={"active": steps.active}, **arrays))
     told: dict[str, Any] = {
         "algorithm_name": spec.policy,
         "description": f"{spec.scenario.name}, {n_robots} robots, policy {spec.policy}",
