@@ -314,35 +314,52 @@ def start_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a c
 
 
 def frame_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a case like the others; ticks are few
-    """Pictures of a large swarm, and the window of a smaller one with a robot chosen, on a display that is none."""
+    """Pictures of a large swarm that moves, and the window of a smaller one: a robot is chosen, with beams and memory.
+
+    The window's display is none, so the time in which a real one shows the picture is not in it.
+    """
     from swarm_forage_env.rendering.window import Pressed, Window
     from swarm_forage_env.study.watch import Watch
 
     env = parallel_env("search_and_rescue", n_robots=819, physics="compiled", render_mode="rgb_array")
     env.reset(seed=0)
-    rate = pictures_per_second(env.render, 10 * repeats)
+    actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+    rate = pictures_per_second(env.render, 10 * repeats, before=lambda: env.step(actions))
     yield Row("rgb_array, N = 819, 900 pixels", rate, "pictures/s", ">= 60", rate >= 60)
 
     os.environ["SDL_VIDEODRIVER"] = "dummy"
-    window, watch = Window(), Watch(warehouse_medium(physics="compiled"), "dpo", speed=6.0)
-    watch.handle(Pressed("tab"))
+    for policy, caches in (("dpo", "none"), ("stochx", "dynamic")):
+        window = Window()
+        watch = Watch(warehouse_medium(physics="compiled", caches=caches), policy, speed=6.0)
+        watch.handle(Pressed("tab"))
+        for _ in range(WARM_TICKS):
+            watch.step()
 
-    def show() -> None:
-        watch.advance(1.0 / 30.0)
-        window.show(watch.scene())
-        window.events()
+        def show(window: Window = window, watch: Watch = watch) -> None:
+            watch.advance(1.0 / 30.0)
+            window.show(watch.scene())
+            window.events()
 
-    rate = pictures_per_second(show, 10 * repeats)
-    window.close()
-    yield Row("window, N = 200, DPO, one tick a picture", rate, "pictures/s", ">= 30", rate >= 30)
+        rate = pictures_per_second(show, 10 * repeats)
+        window.close()
+        name = f"window, N = 200, {policy.upper()}, one tick a picture"
+        yield Row(name, rate, "pictures/s", ">= 30", rate >= 30)
 
 
-def pictures_per_second(draw: Callable[[], object], n_pictures: int) -> float:
-    """Median rate of a function that draws one picture, without its first calls."""
+WARM_TICKS = 600
+"""Ticks before pictures are timed, so that robots have spread and remember something."""
+
+
+def pictures_per_second(
+    draw: Callable[[], object], n_pictures: int, before: Callable[[], object] = lambda: None
+) -> float:
+    """Median rate of a function that draws one picture, without its first calls; `before` each, time stands still."""
     for _ in range(3):
+        before()
         draw()
     seconds = []
     for _ in range(n_pictures):
+        before()
         started = time.process_time()
         draw()
         seconds.append(time.process_time() - started)

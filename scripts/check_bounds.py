@@ -1,10 +1,11 @@
-"""Crowded runs in which compiled kernels of the world check every index, as the interpreter would.
+"""Crowded runs and pictures in which compiled kernels check every index, as the interpreter would.
 
     python scripts/check_bounds.py
 
 Compiled code reads and writes beyond the end of an array without a word. Here numba compiles the checks in, into a
 cache of their own, and robots that grasp and let go all the time meet walls, objects, caches and each other under both
-engines and all wrappers. Exit code 1 if an index was wrong, or if a kernel was not reached.
+engines and all wrappers; shapes are painted beyond the edge of a picture. Exit code 1 if an index was wrong, or if a
+kernel was not reached.
 """
 
 import ast
@@ -15,10 +16,16 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-FOLDERS = ("swarm_forage_env/world/kernels", "swarm_forage_env/wrappers/kernels")
-TESTS = ("tests/promises/test_conservation.py", "tests/world/test_rack.py", "tests/wrappers/test_noise.py")
-CHOICE = "(test_objects_are_conserved and warehouse_small and busy) or together or gains_from_outside"
-"""Every kind of caches with Chipmunk; arenas together, wrapped and not, with the compiled engine; noise on wheels."""
+FOLDERS = ("swarm_forage_env/rendering/kernels", "swarm_forage_env/world/kernels", "swarm_forage_env/wrappers/kernels")
+TESTS = (
+    "tests/promises/test_conservation.py",
+    "tests/rendering/test_paint.py",
+    "tests/world/test_rack.py",
+    "tests/wrappers/test_noise.py",
+)
+CHOICE = "(test_objects_are_conserved and warehouse_small and busy) or test_paint or together or gains_from_outside"
+"""Every kind of caches with Chipmunk; shapes beyond the edge; arenas together, wrapped and not, with the compiled
+engine; noise on wheels."""
 ELSEWHERE = {
     "tick.run": "whole runs by one kernel need a compiled policy, which would be compiled, too",
     "task_shares.add_task_shares": "a part of tick.run",

@@ -1,18 +1,22 @@
-"""Draw the pictures of robots at work that README and docs show.
+"""Draw the pictures of robots at work, and of the window, that README and docs show.
 
     python scripts/draw_pictures.py [FILE ...]
 
-Each shows a warehouse with trails of 40 s. Needs the render extra.
+Robots have trails of 40 s. The window needs no display. Needs the render extra.
 """
 
+import os
 import sys
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 from swarm_forage_env import load_policy, plan_run, scenario
 from swarm_forage_env.rendering.frame import Trails, render_frame
+from swarm_forage_env.rendering.window import Pressed, Window
 from swarm_forage_env.study.run import LiveRun, build_env
+from swarm_forage_env.study.watch import Watch
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 PICTURES = {
@@ -22,6 +26,9 @@ PICTURES = {
     "warehouse_small_light.png": ("warehouse_small", "stochm", 300.0, 900, "light"),
 }
 """File -> scenario, policy, the time in s at which the picture is taken, its width in pixels, and its theme."""
+WINDOWS = {"window.png": "dark", "window_light.png": "light"}
+"""File -> theme of the window."""
+WINDOW_S = 600.0
 TRAIL_S = 40.0
 SAMPLE_S = 1.0
 
@@ -53,7 +60,33 @@ def draw(file: str, scenario_name: str, policy_name: str, time_s: float, size_px
     print(IMAGES / file)
 
 
+def draw_window(file: str, theme: str) -> None:
+    """Watch DPO with seed 0 until a robot near objects meets another one; raise the throttle and choose the robot."""
+    import pygame
+
+    os.environ["SDL_VIDEODRIVER"] = "dummy"
+    window, watch = Window(), Watch(scenario("warehouse_small"), "dpo", theme=theme)
+    world, interesting = watch.world, np.zeros(0, np.bool_)
+    while not interesting.any():
+        watch.step()
+        near_objects = world.arena.obs[:, world.layout["los_object"]].any(axis=1)
+        interesting = world.events.interfering & near_objects & (world.tick * world.scenario.dt_s >= WINDOW_S)
+    watch.robot = int(np.flatnonzero(interesting)[0])
+    for key in ("t", "t", "space"):
+        watch.handle(Pressed(key))
+    window.show(watch.scene())
+    screen = pygame.display.get_surface()
+    assert screen is not None, "a window was shown"
+    pixels = pygame.surfarray.array3d(screen).swapaxes(0, 1)
+    Image.fromarray(pixels).save(IMAGES / file, optimize=True)
+    window.close()
+    print(IMAGES / file)
+
+
 if __name__ == "__main__":
     for name, about in PICTURES.items():
         if name in sys.argv[1:] or not sys.argv[1:]:
             draw(name, *about)
+    for name, about in WINDOWS.items():
+        if name in sys.argv[1:] or not sys.argv[1:]:
+            draw_window(name, about)

@@ -13,6 +13,7 @@ def watch(
     policy: Annotated[str, typer.Argument(metavar="POLICY", help="Name, or file of a trained policy.")],
     speed: Annotated[float, typer.Option(help="Simulated seconds per second at first; arrow keys change it.")] = 10.0,
     size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
+    theme: Annotated[str, typer.Option(help="dark or light.")] = "dark",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
 ) -> None:
     """Watch a run in a window: pause, choose robots, raise noise, kill.
@@ -33,7 +34,14 @@ def watch(
         raise typer.BadParameter(str(error)) from error
     try:
         watched = watch_run(
-            world, policy, seed=seed, speed=speed, size_px=size, caches=asked_caches, wrappers=disturbances
+            world,
+            policy,
+            seed=seed,
+            speed=speed,
+            size_px=size,
+            theme=theme,
+            caches=asked_caches,
+            wrappers=disturbances,
         )
     except (RenderError, ModelError, NetworkError) as error:
         raise typer.BadParameter(str(error)) from error

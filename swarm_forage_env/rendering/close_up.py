@@ -1,6 +1,7 @@
 """A close-up of one robot: its surroundings in true size, its beams, and its line-of-sight window."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,14 +12,17 @@ from swarm_forage_env.contract.layout import WINDOW_CELLS, ObservationLayout
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.rendering.paint import (
     Canvas,
+    Canvases,
+    Colour,
     paint_box,
     paint_discs,
     paint_frame,
     paint_needles,
     paint_rings,
     paint_squares,
+    plain,
 )
-from swarm_forage_env.rendering.view import CACHE_OPACITY, NEST_OPACITY, PALETTE
+from swarm_forage_env.rendering.view import CACHE_OPACITY, NEST_OPACITY, THEMES, Palette
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.units import CELL_M, WALL_M
 from swarm_forage_env.world.sensors import PROXIMITY_RANGE_M
@@ -31,11 +35,12 @@ _FAINT = 0.35
 
 @dataclass(frozen=True, slots=True)
 class _Lens:
-    """Metres to pixels of a square picture around a place."""
+    """Metres to pixels of a square picture around a place, and its colours."""
 
     centre: FloatArray
     scale: float
     size_px: int
+    palette: Palette
 
     def pixels(self, position_m: NDArray[np.floating]) -> FloatArray:
         middle = self.size_px / 2.0
@@ -62,6 +67,7 @@ def render_close_up(
     layout: ObservationLayout,
     side_m: float = 1.6,
     size_px: int = 300,
+    theme: str = "dark",
 ) -> NDArray[np.uint8]:
     """Draw the surroundings of one robot. Reads the state, never writes it.
 
@@ -79,35 +85,44 @@ def render_close_up(
         layout: Columns of `obs`.
         side_m: Side of the square that is shown.
         size_px: Side of the picture.
+        theme: "dark" or "light".
 
     Returns:
         (size_px, size_px, 3) uint8 picture.
     """
-    lens = _Lens(swarm.position[robot].copy(), size_px / side_m, size_px)
-    canvas = np.empty((size_px, size_px, 3), np.float32)
+    lens = _Lens(swarm.position[robot].copy(), size_px / side_m, size_px, THEMES[theme])
+    canvases = _canvases(size_px, lens.palette.floor)
+    canvas = canvases.borrow()
     _draw_ground(canvas, lens, scenario, caches)
     _draw_objects(canvas, lens, objects, obs[layout["los_object"]])
     _draw_window(canvas, lens, swarm.position[robot])
     _draw_beams(canvas, lens, scenario, swarm, robot, obs[layout["proximity"]])
     _draw_robots(canvas, lens, scenario, swarm, robot)
-    return np.rint(canvas, out=canvas).astype(np.uint8)
+    picture = canvas.take_picture()
+    canvases.give_back(canvas)
+    return picture
+
+
+@lru_cache(maxsize=2)
+def _canvases(size_px: int, floor: Colour) -> Canvases:
+    return Canvases(plain(size_px, size_px, floor))
 
 
 def _draw_ground(canvas: Canvas, lens: _Lens, scenario: ScenarioConfig, caches: CacheState) -> None:
     arena = scenario.arena
     left, top, right, bottom = lens.box(arena.interior_m)
-    if max(left, top) <= 0.0 and min(right, bottom) >= lens.size_px:
-        canvas[:] = PALETTE.floor
-    else:
-        canvas[:] = PALETTE.page
-        paint_box(canvas, lens.box((-WALL_M, -WALL_M, arena.width_m + WALL_M, arena.height_m + WALL_M)), PALETTE.wall)
-        paint_box(canvas, (left, top, right, bottom), PALETTE.floor)
-    paint_box(canvas, lens.box(arena.nest_box_m), PALETTE.nest, NEST_OPACITY)
+    if max(left, top) > 0.0 or min(right, bottom) < lens.size_px:  # more is to be seen than the floor
+        paint_box(canvas, (0.0, 0.0, lens.size_px, lens.size_px), lens.palette.page)
+        paint_box(
+            canvas, lens.box((-WALL_M, -WALL_M, arena.width_m + WALL_M, arena.height_m + WALL_M)), lens.palette.wall
+        )
+        paint_box(canvas, (left, top, right, bottom), lens.palette.floor)
+    paint_box(canvas, lens.box(arena.nest_box_m), lens.palette.nest, NEST_OPACITY)
     half = scenario.cache_side_cells * CELL_M / 2
     for x, y in (caches.cell[caches.alive] + 0.5) * CELL_M:
         box = lens.box((x - half, y - half, x + half, y + half))
-        paint_box(canvas, box, PALETTE.cache, CACHE_OPACITY)
-        paint_frame(canvas, box, 2.0, PALETTE.cache)
+        paint_box(canvas, box, lens.palette.cache, CACHE_OPACITY)
+        paint_frame(canvas, box, 2.0, lens.palette.cache)
 
 
 def _draw_objects(canvas: Canvas, lens: _Lens, objects: ObjectState, los_object: ObsArray) -> None:
@@ -115,15 +130,15 @@ def _draw_objects(canvas: Canvas, lens: _Lens, objects: ObjectState, los_object:
     side = 0.8 * CELL_M * lens.scale
     place = lens.pixels((objects.cell + 0.5) * CELL_M)
     lying = (objects.status == ObjectStatus.FREE) & lens.shows(place, side)
-    paint_squares(canvas, place[lying], side, PALETTE.object, _FAINT)
-    paint_squares(canvas, place[seen], side, PALETTE.object)
+    paint_squares(canvas, place[lying], side, lens.palette.object, _FAINT)
+    paint_squares(canvas, place[seen], side, lens.palette.object)
 
 
 def _draw_window(canvas: Canvas, lens: _Lens, position: FloatArray) -> None:
     low = (np.floor(position / CELL_M) - WINDOW_CELLS // 2) * CELL_M
     side = WINDOW_CELLS * CELL_M
     x, y = low.tolist()
-    paint_frame(canvas, lens.box((x, y, x + side, y + side)), 2.0, PALETTE.light, 0.6)
+    paint_frame(canvas, lens.box((x, y, x + side, y + side)), 2.0, lens.palette.light, 0.6)
 
 
 def _draw_beams(
@@ -137,11 +152,11 @@ def _draw_beams(
     reach_px = PROXIMITY_RANGE_M * lens.scale
     line = max(1.0, 0.008 * lens.scale)
     near = readings > 0
-    paint_needles(canvas, start[~near], direction[~near], reach_px, line, PALETTE.wall)
+    paint_needles(canvas, start[~near], direction[~near], reach_px, line, lens.palette.wall)
     for beam in np.flatnonzero(near):  # each has a length of its own
         length = min(reach_px, _GAP_AT_FULL_READING_M / float(readings[beam]) * lens.scale)
         rows = slice(beam, beam + 1)
-        paint_needles(canvas, start[rows], direction[rows], length, 2.0 * line, PALETTE.interference)
+        paint_needles(canvas, start[rows], direction[rows], length, 2.0 * line, lens.palette.interference)
 
 
 def _draw_robots(canvas: Canvas, lens: _Lens, scenario: ScenarioConfig, swarm: SwarmState, robot: int) -> None:
@@ -150,10 +165,10 @@ def _draw_robots(canvas: Canvas, lens: _Lens, scenario: ScenarioConfig, swarm: S
     shown = swarm.present & lens.shows(centre, 2.0 * radius)
     carrying = swarm.carried_object >= 0
     direction = np.column_stack([np.cos(swarm.heading), -np.sin(swarm.heading)])
-    paint_rings(canvas, centre[shown & ~swarm.active], 0.8 * radius, 0.4 * radius, PALETTE.repair)
-    for is_loaded, colour in ((False, PALETTE.empty), (True, PALETTE.carrying)):
+    paint_rings(canvas, centre[shown & ~swarm.active], 0.8 * radius, 0.4 * radius, lens.palette.repair)
+    for is_loaded, colour in ((False, lens.palette.empty), (True, lens.palette.carrying)):
         rows = shown & swarm.active & (carrying == is_loaded)
         paint_discs(canvas, centre[rows], radius, colour)
-        paint_needles(canvas, centre[rows], direction[rows], radius, 0.15 * radius, PALETTE.page)
-    paint_squares(canvas, centre[shown & carrying], 0.85 * radius, PALETTE.object)
-    paint_rings(canvas, centre[robot : robot + 1], radius + 2.0, 2.0, PALETTE.text)
+        paint_needles(canvas, centre[rows], direction[rows], radius, 0.15 * radius, lens.palette.page)
+    paint_squares(canvas, centre[shown & carrying], 0.85 * radius, lens.palette.object)
+    paint_rings(canvas, centre[robot : robot + 1], radius + 2.0, 2.0, lens.palette.text)

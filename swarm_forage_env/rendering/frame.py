@@ -10,6 +10,7 @@ from swarm_forage_env.contract.codes import Counter, ObjectStatus
 from swarm_forage_env.contract.types import BoolArray, FloatArray
 from swarm_forage_env.rendering.paint import (
     Canvas,
+    Canvases,
     Colour,
     paint_box,
     paint_discs,
@@ -18,6 +19,7 @@ from swarm_forage_env.rendering.paint import (
     paint_needles,
     paint_rings,
     paint_squares,
+    plain,
 )
 from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
@@ -43,10 +45,6 @@ if TYPE_CHECKING:
 _SMALLEST_TEXT_PX = 6.0
 _SMALLEST_DETAILED_PX = 2.0
 """Robots below this radius are plain discs."""
-_BLOCK_ROWS = 32
-_MOST_SPARE = 4
-_spare_canvases: dict[tuple[int, ...], Canvas] = {}
-"""Shape -> a canvas that nobody uses now."""
 
 
 class Trails:
@@ -121,45 +119,27 @@ def render_frame(
         ImportError: Pillow is not installed.
     """
     view = arena_view(scenario, size_px, theme)
-    canvas = _borrow_canvas(_background(scenario, size_px, theme))
+    canvases = _canvases(scenario, size_px, theme)
+    canvas = canvases.borrow()
     if trails is not None:
         _draw_trails(canvas, view, trails, len(swarm.heading))
     _draw_caches(canvas, view, scenario, caches)
     lying = objects.cell[objects.status == ObjectStatus.FREE]
     paint_squares(canvas, view.pixels((lying + 0.5) * CELL_M), view.object_px, view.palette.object)
     _draw_robots(canvas, view, swarm, events)
-    picture = _write_text(canvas, view, scenario, swarm, caches, events, tick, title)
-    _spare_canvases[canvas.shape] = canvas
-    return picture
-
-
-def _borrow_canvas(background: Canvas) -> Canvas:
-    """Return a copy of the background, in the memory of an earlier frame's canvas if one is spare."""
-    if len(_spare_canvases) > _MOST_SPARE:
-        _spare_canvases.clear()
-    canvas = _spare_canvases.pop(background.shape, None)
-    if canvas is None:
-        return background.copy()
-    np.copyto(canvas, background)
-    return canvas
-
-
-def _whole_numbers(canvas: Canvas) -> NDArray[np.uint8]:
-    """Round colours to bytes; changes the canvas. In blocks that stay in the processor's cache it is faster."""
-    picture = np.empty(canvas.shape, np.uint8)
-    for top in range(0, len(canvas), _BLOCK_ROWS):
-        block = canvas[top : top + _BLOCK_ROWS]
-        picture[top : top + _BLOCK_ROWS] = np.rint(block, out=block)
+    picture = canvas.take_picture()
+    canvases.give_back(canvas)
+    _write_header(picture, view, scenario, swarm, events, tick, title)
+    _write_counts(picture, view, caches)
     return picture
 
 
 @lru_cache(maxsize=4)
-def _background(scenario: ScenarioConfig, size_px: int, theme: str) -> Canvas:
-    """All parts that never change during a run, painted once."""
+def _canvases(scenario: ScenarioConfig, size_px: int, theme: str) -> Canvases:
+    """Canvases that show all parts that never change during a run; these are painted once."""
     view = arena_view(scenario, size_px, theme)
     arena = scenario.arena
-    canvas = np.empty((view.height, view.width, 3), np.float32)
-    canvas[:] = view.palette.page
+    canvas = Canvas(plain(view.height, view.width, view.palette.page))
     left, top, right, bottom = view.box((-WALL_M, -WALL_M, arena.width_m + WALL_M, arena.height_m + WALL_M))
     paint_box(canvas, (left, top, right, bottom), view.palette.wall)
     inner = view.box(arena.interior_m)
@@ -185,9 +165,7 @@ def _background(scenario: ScenarioConfig, size_px: int, theme: str) -> Canvas:
     lights = view.pixels(np.asarray(arena.lights_m)[:, :2])
     paint_glows(canvas, lights, 26.0 * view.unit, view.palette.light, 0.5)
     paint_discs(canvas, lights, max(1.5, 3.0 * view.unit), view.palette.light)
-    _draw_legend(canvas, view, scenario)
-    canvas.flags.writeable = False
-    return canvas
+    return Canvases(_draw_legend(canvas, view, scenario))
 
 
 def _draw_trails(canvas: Canvas, view: View, trails: Trails, n_robots: int) -> None:
@@ -245,7 +223,8 @@ def _draw_bodies(
         paint_needles(canvas, centre, direction, 2.1 * radius, 0.4 * radius, colour)
 
 
-def _draw_legend(canvas: Canvas, view: View, scenario: ScenarioConfig) -> None:
+def _draw_legend(canvas: Canvas, view: View, scenario: ScenarioConfig) -> NDArray[np.uint8]:
+    """Paint the legend's symbols and write its text; returns the finished picture."""
     from PIL import Image, ImageDraw
 
     text_px = text_height(view.unit)
@@ -260,14 +239,14 @@ def _draw_legend(canvas: Canvas, view: View, scenario: ScenarioConfig) -> None:
     paint_box(canvas, (start, middle - 1, right, middle + 1), view.palette.faint_text)
     for x in (start, right - 1.5):
         paint_box(canvas, (x, middle - 4, x + 1.5, middle + 4), view.palette.faint_text)
-    picture = Image.fromarray(canvas.round().astype(np.uint8))
+    picture = Image.fromarray(canvas.take_picture())
     pen = ImageDraw.Draw(picture)
     font = text_font(text_px)
     for row in rows:
         for name, x, y in row:
             pen.text((x + 1.45 * text_px, top + y), name, fill=view.palette.faint_text, font=font, anchor="lm")
     pen.text((start - 0.5 * text_px, middle), f"{bar_m} m", fill=view.palette.faint_text, font=font, anchor="rm")
-    canvas[:] = np.asarray(picture, np.float32)
+    return np.array(picture)
 
 
 def _draw_symbol(canvas: Canvas, palette: Palette, name: str, x: float, y: float, radius: float) -> None:
@@ -295,25 +274,22 @@ def _draw_symbol(canvas: Canvas, palette: Palette, name: str, x: float, y: float
         paint_frame(canvas, box, 1.0, palette.cache)
 
 
-def _write_text(
-    canvas: Canvas,
+def _write_header(
+    picture: NDArray[np.uint8],
     view: View,
     scenario: ScenarioConfig,
     swarm: SwarmState,
-    caches: CacheState,
     events: StepEvents,
     tick: int,
     title: str | None,
-) -> NDArray[np.uint8]:
-    """Add headline, clock, figures and cache counts; returns the finished picture."""
+) -> None:
+    """Write headline, clock and figures above the arena."""
     from PIL import Image, ImageDraw
 
-    done_picture = _whole_numbers(canvas)
     top = view.bottom - (scenario.arena.height_m + WALL_M) * view.scale
-    # Pillow works on copies, so it gets no more than the rows that have text in them.
-    written = done_picture if caches.alive.any() else done_picture[: int(top)]
-    picture = Image.fromarray(written)
-    pen = ImageDraw.Draw(picture)
+    header = picture[: int(top)]
+    written = Image.fromarray(header)  # a copy, so it is of no more than the rows that have text in them
+    pen = ImageDraw.Draw(written)
     margin = text_height(view.unit)
     arena, count = scenario.arena, events.counters
     headline = title or f"{scenario.name.replace('_', ' ')}, {arena.width_m:g} x {arena.height_m:g} m"
@@ -326,19 +302,31 @@ def _write_text(
     room = view.width - 2 * margin
     _write_line(pen, 0.33 * top, headline, f"{seconds:,.0f} s", 1.35 * margin, margin, room, view.palette.text)
     _write_line(pen, 0.72 * top, done, now, margin, margin, room, view.palette.faint_text)
+    header[:] = np.asarray(written)
+
+
+def _write_counts(picture: NDArray[np.uint8], view: View, caches: CacheState) -> None:
+    """Write into each cache how many objects it has."""
+    from PIL import Image, ImageDraw
+
+    font, line_px = text_font(1.5 * text_height(view.unit)), 2
     for (x, y), n_objects in zip(caches.cell[caches.alive], caches.count[caches.alive], strict=True):
-        column, row = view.pixels(((x + 0.5) * CELL_M, (y + 0.5) * CELL_M))
-        pen.text(
-            (column, row),
-            str(n_objects),
+        column, row = view.pixels(((x + 0.5) * CELL_M, (y + 0.5) * CELL_M)).tolist()
+        text = str(n_objects)
+        wide, high = int(font.getlength(text) / 2) + 2 * line_px, int(font.size) + 2 * line_px
+        left, top = max(0, int(column) - wide), max(0, int(row) - high)
+        place = picture[top : int(row) + high, left : int(column) + wide]
+        written = Image.fromarray(place)
+        ImageDraw.Draw(written).text(
+            (column - left, row - top),
+            text,
             fill=view.palette.text,
-            font=text_font(1.5 * margin),
+            font=font,
             anchor="mm",
-            stroke_width=2,
+            stroke_width=line_px,
             stroke_fill=view.palette.floor,
         )
-    written[:] = np.asarray(picture)
-    return done_picture
+        place[:] = np.asarray(written)
 
 
 def _write_line(

@@ -1,46 +1,100 @@
-"""Antialiased painting of many small shapes at once on a numpy canvas.
+"""Antialiased painting of many small shapes at once.
 
-A canvas is an (H, W, 3) float32 array of colour values in [0, 255]. Coordinates are pixels from the upper left corner,
-with x to the right and y down; pixel (column 0, row 0) covers [0, 1] x [0, 1]. Every function paints in place. A
-function of the distance says how much of a pixel a shape covers, and all shapes of a call are computed together. So
-thousands of robots take milliseconds and move smoothly between pixels. Shapes of one call share one colour and do not
-add up where they overlap.
+Coordinates are pixels from the upper left corner, with x to the right and y down; pixel (column 0, row 0) covers
+[0, 1] x [0, 1]. Every function paints in place. How much of a pixel a shape covers decides its colour there, so robots
+move smoothly between pixels. Shapes of one call share one colour and do not add up where they overlap.
 """
 
-from collections.abc import Callable, Iterator
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Canvas: TypeAlias = NDArray[np.float32]
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.rendering.kernels import shapes
+
 Colour: TypeAlias = tuple[int, int, int]
 """Red, green, blue in 0..255."""
+_NOWHERE = np.zeros((0, 2), np.float32)
 
-_STAMP_BUDGET = 2_000_000
-"""Pixels computed at once: this limits the memory of a call for any number of shapes."""
 
-_WHOLE_PIXEL = np.dtype((np.void, 12))
-_MOST_SPARE = 4
-_spare_zeros: dict[int, NDArray[np.float32]] = {}
-"""Size -> zeros that nobody uses now: making megabytes of them for each call took longer than the painting itself."""
+class Canvas:
+    """Something to paint on. It shows its ground at first, and again after every picture that was taken.
 
-_Coverage: TypeAlias = Callable[[NDArray[np.float32], NDArray[np.float32], slice], NDArray[np.floating]]
+    Colours are kept with fractions until a picture is taken. Only pixels that were painted are then rounded and
+    cleaned: a frame with a thousand robots takes milliseconds.
+
+    Args:
+        ground: (H, W, 3) uint8 picture; it is kept and must not change.
+    """
+
+    def __init__(self, ground: NDArray[np.uint8]) -> None:
+        n_pixels = ground.shape[0] * ground.shape[1]
+        self._ground = ground
+        self.sheet = shapes.Sheet(
+            height=ground.shape[0],
+            width=ground.shape[1],
+            colours=ground.reshape(-1, 3).astype(np.float32),
+            share=np.zeros(n_pixels, np.float32),
+            touched=np.empty(n_pixels, np.int32),
+            is_changed=np.zeros(n_pixels, np.bool_),
+            changed=np.empty(n_pixels, np.int32),
+            n_changed=np.zeros(1, np.int64),
+        )
+
+    @property
+    def colours(self) -> NDArray[np.float32]:
+        """(H, W, 3) what has been painted so far, in 0..255."""
+        return self.sheet.colours.reshape(self._ground.shape)
+
+    def take_picture(self) -> NDArray[np.uint8]:
+        """Return what has been painted, (H, W, 3), and clean the canvas."""
+        picture = self._ground.copy()
+        shapes.take_picture(self.sheet, self._ground.reshape(-1, 3), picture.reshape(-1, 3))
+        return picture
+
+
+class Canvases:
+    """Canvases of one ground, made when they are needed and used again; making them takes longer than painting.
+
+    Args:
+        ground: See `Canvas`.
+    """
+
+    def __init__(self, ground: NDArray[np.uint8]) -> None:
+        self._ground = ground
+        self._spare: list[Canvas] = []
+
+    def borrow(self) -> Canvas:
+        """Return a clean canvas that nobody else has."""
+        try:
+            return self._spare.pop()
+        except IndexError:
+            return Canvas(self._ground)
+
+    def give_back(self, canvas: Canvas) -> None:
+        """Take a clean canvas back; one that is not given back is forgotten."""
+        self._spare.append(canvas)
+
+
+def plain(height: int, width: int, colour: Colour) -> NDArray[np.uint8]:
+    """Return a ground of one colour."""
+    ground = np.empty((height, width, 3), np.uint8)
+    ground[:] = colour
+    return ground
 
 
 def paint_box(canvas: Canvas, box: tuple[float, float, float, float], colour: Colour, opacity: float = 1.0) -> None:
     """Fill one axis-aligned rectangle (left, top, right, bottom); partly covered edge pixels are blended."""
-    height, width = canvas.shape[:2]
+    height, width = canvas.sheet.height, canvas.sheet.width
     left, top, right, bottom = box
     columns, rows = np.arange(width), np.arange(height)
     across = np.clip(np.minimum(columns + 1, right) - np.maximum(columns, left), 0.0, 1.0)
     down = np.clip(np.minimum(rows + 1, bottom) - np.maximum(rows, top), 0.0, 1.0)
     x, y = np.flatnonzero(across), np.flatnonzero(down)
-    if x.size == 0 or y.size == 0:
-        return
-    window = canvas[y[0] : y[-1] + 1, x[0] : x[-1] + 1]
-    share = (opacity * down[y, None] * across[x])[..., None].astype(np.float32)
-    window += (np.asarray(colour, np.float32) - window) * share
+    if x.size and y.size:
+        share = (opacity * down[y, None] * across[x]).astype(np.float32)
+        shapes.paint_share(canvas.sheet, int(y[0]), int(x[0]), share, _stored(colour))
 
 
 def paint_frame(
@@ -58,131 +112,76 @@ def paint_discs(
     canvas: Canvas, centre: ArrayLike, radius: float, colour: Colour, opacity: float | NDArray[np.floating] = 1.0
 ) -> None:
     """Fill discs at `centre` (n, 2); `opacity` is one number or (n,)."""
-
-    def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], _: slice) -> NDArray[np.floating]:
-        return np.clip(radius + 0.5 - _length(dx, dy), 0.0, 1.0)
-
-    _paint(canvas, centre, radius + 0.5, coverage, colour, opacity)
+    _paint_round(canvas, centre, _NOWHERE, 0.0, 0.0, radius + 0.5, colour, opacity)
 
 
 def paint_rings(canvas: Canvas, centre: ArrayLike, radius: float, line: float, colour: Colour) -> None:
     """Draw circles of mean radius `radius` and line width `line` around `centre` (n, 2)."""
-
-    def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], _: slice) -> NDArray[np.floating]:
-        return np.clip((line + 1.0) / 2.0 - np.abs(_length(dx, dy) - radius), 0.0, 1.0)
-
-    _paint(canvas, centre, radius + (line + 1.0) / 2.0, coverage, colour, 1.0)
-
-
-def paint_squares(canvas: Canvas, centre: ArrayLike, side: float, colour: Colour, opacity: float = 1.0) -> None:
-    """Fill axis-aligned squares of side `side` at `centre` (n, 2)."""
-    half = side / 2.0
-
-    def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], _: slice) -> NDArray[np.floating]:
-        across = np.minimum(dx + 0.5, half) - np.maximum(dx - 0.5, -half)
-        down = np.minimum(dy + 0.5, half) - np.maximum(dy - 0.5, -half)
-        return np.clip(across, 0.0, 1.0) * np.clip(down, 0.0, 1.0)
-
-    _paint(canvas, centre, half + 0.5, coverage, colour, opacity)
+    _paint_round(canvas, centre, _NOWHERE, 0.0, radius, (line + 1.0) / 2.0, colour)
 
 
 def paint_needles(
     canvas: Canvas, start: ArrayLike, direction: NDArray[np.floating], length: float, line: float, colour: Colour
 ) -> None:
     """Draw round-ended lines of `length` from `start` (n, 2) along the unit vectors `direction` (n, 2)."""
-    along = np.asarray(direction, np.float32)
+    along = np.ascontiguousarray(direction, np.float32)
     middle = np.asarray(start, np.float64) + 0.5 * length * along
+    _paint_round(canvas, middle, along, length / 2.0, 0.0, (line + 1.0) / 2.0, colour)
 
-    def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], rows: slice) -> NDArray[np.floating]:
-        ux, uy = along[rows, 0, None, None], along[rows, 1, None, None]
-        forward = np.clip(dx * ux + dy * uy, -length / 2.0, length / 2.0)
-        return np.clip((line + 1.0) / 2.0 - _length(dx - forward * ux, dy - forward * uy), 0.0, 1.0)
 
-    _paint(canvas, middle, (length + line + 1.0) / 2.0, coverage, colour, 1.0)
+def paint_squares(canvas: Canvas, centre: ArrayLike, side: float, colour: Colour, opacity: float = 1.0) -> None:
+    """Fill axis-aligned squares of side `side` at `centre` (n, 2)."""
+    half = side / 2.0
+    shapes.paint_square(
+        canvas.sheet,
+        _places(centre),
+        np.float32(opacity),
+        np.float32(half),
+        _stored(colour),
+    )
 
 
 def paint_glows(canvas: Canvas, centre: ArrayLike, radius: float, colour: Colour, opacity: float) -> None:
     """Paint soft spots that fade from `opacity` in the middle to nothing at `radius`."""
-
-    def coverage(dx: NDArray[np.float32], dy: NDArray[np.float32], _: slice) -> NDArray[np.floating]:
-        return np.clip(1.0 - (dx * dx + dy * dy) / (radius * radius), 0.0, 1.0) ** 3
-
-    _paint(canvas, centre, radius, coverage, colour, opacity)
-
-
-def _length(dx: NDArray[np.floating], dy: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Length of vectors, broadcast: what `np.hypot` returns, in a third of its time."""
-    x, y = dx.astype(np.float64), dy.astype(np.float64)  # squares of these cannot overflow or lose digits
-    total = x * x + y * y
-    return np.sqrt(total, out=total).astype(np.float32)
+    height, width = canvas.sheet.height, canvas.sheet.width
+    share = np.zeros((height, width), np.float32)
+    for x, y in _places(centre):
+        rows = slice(max(0, int(y - radius)), max(0, int(y + radius) + 1))
+        columns = slice(max(0, int(x - radius)), max(0, int(x + radius) + 1))
+        dx = (np.arange(width)[columns] + 0.5 - x).astype(np.float32)
+        dy = (np.arange(height)[rows] + 0.5 - y).astype(np.float32)[:, None]
+        spot = np.clip(1.0 - (dx * dx + dy * dy) / (radius * radius), 0.0, 1.0) ** 3
+        share[rows, columns] = np.maximum(share[rows, columns], np.float32(opacity) * spot)
+    shapes.paint_share(canvas.sheet, 0, 0, share, _stored(colour))
 
 
-def _paint(
+def _paint_round(
     canvas: Canvas,
-    centre: ArrayLike,
+    middle: ArrayLike,
+    along: NDArray[np.float32],
+    half_length: float,
+    radius: float,
     reach: float,
-    coverage: _Coverage,
     colour: Colour,
-    opacity: float | NDArray[np.floating],
+    opacity: float | NDArray[np.floating] = 1.0,
 ) -> None:
-    """Blend `colour` over the largest coverage that any shape gives each pixel.
-
-    Args:
-        canvas: Painted in place.
-        centre: (n, 2) pixel coordinates of the shapes' middles.
-        reach: Distance from the middle, along an axis, from which on coverage is zero, pixels.
-        coverage: A function of the offsets from the middles to pixel centres, (k, 1, P) and (k, P, 1), and of the
-            slice of the k shapes; returns shares in [0, 1], (k, P, P).
-        colour: Colour of all shapes.
-        opacity: One number or (n,).
-    """
-    assert canvas.flags.c_contiguous, "painting goes through a flat view"
-    height, width = canvas.shape[:2]
-    middle = np.asarray(centre, np.float64).reshape(-1, 2)
-    if len(middle) == 0:
-        return
-    strength = np.broadcast_to(np.asarray(opacity, np.float32), (len(middle),))
-    share = _borrow_zeros(height * width)
-    reached = int(np.ceil(reach + 0.5)) - 1  # the centre of a pixel farther away is beyond reach
-    offset = np.arange(-reached, reached + 1)
-    around = width * offset[:, None] + offset
-    touched = []
-    for rows in _chunks(len(middle), offset.size**2):
-        corner = np.floor(middle[rows]).astype(np.int64)
-        column = corner[:, 0, None, None] + offset[None, None, :]
-        row = corner[:, 1, None, None] + offset[None, :, None]
-        dx = (column + 0.5 - middle[rows, 0, None, None]).astype(np.float32)
-        dy = (row + 0.5 - middle[rows, 1, None, None]).astype(np.float32)
-        covered = coverage(dx, dy, rows) * strength[rows, None, None]
-        seen = covered > 0
-        if corner.min() < reached or (corner >= (width - reached, height - reached)).any():
-            seen &= (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        place = np.flatnonzero(seen)
-        pixel = ((width * corner[:, 1] + corner[:, 0])[:, None, None] + around).reshape(-1)[place]
-        np.maximum.at(share, pixel, covered.reshape(-1)[place])
-        touched.append(pixel)
-    # A pixel that several shapes touch stands here several times; it gets the same value each time.
-    pixel = np.concatenate(touched)
-    pixels = canvas.reshape(-1, 3)
-    ground = pixels.take(pixel, axis=0)
-    mixed = np.asarray(colour, np.float32) - ground
-    mixed *= share.take(pixel)[:, None]
-    mixed += ground
-    # As one item of twelve bytes a pixel is stored three times faster than as a row of three numbers.
-    pixels.view(_WHOLE_PIXEL)[:, 0][pixel] = mixed.view(_WHOLE_PIXEL)[:, 0]
-    share[pixel] = 0.0
-    _spare_zeros[share.size] = share
+    """Call `kernels.shapes.paint_round`, which see, with numbers of the types that are stored."""
+    places = _places(middle)
+    shapes.paint_round(
+        canvas.sheet,
+        places,
+        along,
+        np.ascontiguousarray(np.broadcast_to(np.asarray(opacity, np.float32), (len(places),))),
+        np.float32(half_length),
+        np.float32(radius),
+        np.float32(reach),
+        _stored(colour),
+    )
 
 
-def _borrow_zeros(size: int) -> NDArray[np.float32]:
-    """Return an array of zeros; one that is put back into `_spare_zeros`, all zero again, need not be made anew."""
-    if len(_spare_zeros) > _MOST_SPARE:
-        _spare_zeros.clear()
-    spare = _spare_zeros.pop(size, None)
-    return np.zeros(size, np.float32) if spare is None else spare
+def _places(centre: ArrayLike) -> FloatArray:
+    return np.ascontiguousarray(np.asarray(centre, np.float64).reshape(-1, 2))
 
 
-def _chunks(n_shapes: int, stamp_pixels: int) -> Iterator[slice]:
-    size = max(1, _STAMP_BUDGET // stamp_pixels)
-    for start in range(0, n_shapes, size):
-        yield slice(start, start + size)
+def _stored(colour: Colour) -> NDArray[np.float32]:
+    return np.asarray(colour, np.float32)

@@ -83,26 +83,28 @@ def draw_trainings(
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(8.0, 5.0), layout="constrained")
+    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     colours = iter(COLOURS * len((*trainings, *beside)))
     for label, (steps, performance, interference) in trainings.items():
         millions, colour = np.asarray(steps) / 1e6, next(colours)
-        upper.plot(millions, performance, color=colour, marker="o", label=_unread(label))
-        lower.plot(millions, interference, color=colour, marker="o")
+        upper.plot(millions, performance, color=colour, marker="o", label=_unread(label), clip_on=False)
+        lower.plot(millions, interference, color=colour, marker="o", clip_on=False)
     for (label, levels), dashes in zip(beside.items(), ("--", "-.", ":", (0, (6, 1))) * len(beside), strict=False):
         colour = next(colours)
         for axes, level in zip((upper, lower), levels, strict=True):
             if np.isfinite(level):
                 axes.axhline(level, color=colour, linestyle=dashes, label=_unread(label))
     upper.set(title=_unread(title), ylabel=ylabel, ylim=(0, None))
-    lower.set(xlabel="million decisions of single robots (dotted: a new stage)", ylabel="interference", ylim=(0, 1))
+    xlabel = "million decisions of single robots" + (" (dotted: a new stage)" if stage_ends[:-1] else "")
+    lower.set(xlabel=xlabel, ylabel="interference", ylim=(0, 1))
     for axes in (upper, lower):
         axes.set_xlim(0, None)
         axes.grid(alpha=0.3)
         for end in stage_ends[:-1]:
             axes.axvline(end / 1e6, color="black", linestyle=":", linewidth=1)
-    upper.legend(frameon=False)
+    # Beside the axes: levels of others may lie anywhere in them.
+    figure.legend(*upper.get_legend_handles_labels(), loc="outside right upper", frameon=False)
     figure.savefig(path, dpi=150)
 
 

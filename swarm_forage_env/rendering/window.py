@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_forage_env._internal.extras import install_command
-from swarm_forage_env.rendering.view import PALETTE, RenderError, text_font
+from swarm_forage_env.rendering.view import PALETTE, Palette, RenderError, text_font
 
 PANEL_PX = 320
 """Width of the panel on the right, with its margins."""
@@ -69,6 +69,8 @@ class Scene:
     """Text of the panel; a scene without lines and help has no panel."""
     help: str = ""
     """Text below the frame; it is broken into lines where there are three spaces."""
+    palette: Palette = PALETTE
+    """Colours of all that is around the pictures."""
 
 
 class Window:
@@ -105,15 +107,15 @@ class Window:
         self._open(size)
         pygame.display.set_caption(scene.title)
         surface = self._surface
-        surface.fill(PALETTE.page)
+        surface.fill(scene.palette.page)
         _put(pygame, surface, scene.frame, (0, 0))
         if scene.ring is not None:
             column, row, radius = scene.ring
-            pygame.draw.circle(surface, PALETTE.text, (column, row), radius, width=2)
+            pygame.draw.circle(surface, scene.palette.text, (column, row), radius, width=2)
         if has_panel:
             self._fill_panel(scene)
         for number, line in enumerate(help_lines):
-            self._put_text(line, (_MARGIN_PX, height + _LINE_PX * number), PALETTE.faint_text)
+            self._put_text(line, (_MARGIN_PX, height + _LINE_PX * number), scene.palette.faint_text)
         pygame.display.flip()
 
     def show_picture(self, picture: NDArray[np.uint8], title: str) -> None:
@@ -183,7 +185,7 @@ class Window:
             top += scene.close_up.shape[0] + _MARGIN_PX
         for text in scene.lines:
             for line in self._wrapped(text, PANEL_PX - 2 * _MARGIN_PX, between=" ") or [""]:
-                self._put_text(line, (left, top), PALETTE.text)
+                self._put_text(line, (left, top), scene.palette.text)
                 top += _LINE_PX
 
     def _put_text(self, text: str, place: tuple[int, int], colour: tuple[int, int, int]) -> None:

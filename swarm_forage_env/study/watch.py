@@ -60,6 +60,7 @@ class Watch:
         seed: int = 0,
         speed: float = 10.0,
         size_px: int = 900,
+        theme: str = "dark",
         caches: str | None = None,
         parameters: Mapping[str, Any] | None = None,
         wrappers: Iterable[WrapperConfig] = (),
@@ -67,15 +68,15 @@ class Watch:
         """Start the run; arguments and errors are those of `watch_run`."""
         with refusing():
             number("speed", speed, above=0.0)
-        arena_view(scenario, size_px)  # refuses a bad size before the run starts
+        arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
         self._policy, self._name, self.scenario = cast_policy(policy, scenario, caches, parameters)
         reads = getattr(self._policy, "reads", None)
         stack = build_env(
             self.scenario, with_idle(wrappers), reads=None if reads is None else tuple({*reads, *_SHOWN_SLICES})
         )
         self.levels = Levels(stack)
-        self._size_px, self._seed = size_px, seed
-        self._view = arena_view(self.scenario, size_px)
+        self._size_px, self._theme, self._seed = size_px, theme, seed
+        self._view = arena_view(self.scenario, size_px, theme)
         self.run = LiveRun(stack, self._policy, seed)
         self.world = self.run.forage_env
         self.paused, self.speed, self.note = False, speed, ""
@@ -172,7 +173,13 @@ class Watch:
         world = self.world
         state = (world.swarm, world.objects, world.caches)
         frame = render_frame(
-            self.scenario, *state, world.events, tick=world.tick, size_px=self._size_px, title=self._headline()
+            self.scenario,
+            *state,
+            world.events,
+            tick=world.tick,
+            size_px=self._size_px,
+            title=self._headline(),
+            theme=self._theme,
         )
         ring = close_up = None
         if self.robot is not None and world.swarm.present[self.robot]:
@@ -186,9 +193,16 @@ class Watch:
                 layout=world.layout,
                 side_m=_SIDES_M[self._side],
                 size_px=CLOSE_UP_PX,
+                theme=self._theme,
             )
         return Scene(
-            frame=frame, title=self.title(), ring=ring, close_up=close_up, lines=tuple(self._lines()), help=HELP
+            frame=frame,
+            title=self.title(),
+            ring=ring,
+            close_up=close_up,
+            lines=tuple(self._lines()),
+            help=HELP,
+            palette=self._view.palette,
         )
 
     def title(self) -> str:
@@ -281,6 +295,7 @@ def watch_run(
     seed: int = 0,
     speed: float = 10.0,
     size_px: int = 900,
+    theme: str = "dark",
     caches: str | None = None,
     parameters: Mapping[str, Any] | None = None,
     wrappers: Iterable[WrapperConfig] = (),
@@ -293,6 +308,7 @@ def watch_run(
         seed: Seed of the run; without changes by hand, `run_one` with the same seed makes the same run.
         speed: Simulated seconds per second at first, above 0.
         size_px: Longer side of the drawn arena.
+        theme: "dark" or "light".
         caches: As in `study.film.record_run`.
         parameters: Keyword arguments of a policy that is given by name or path.
         wrappers: Configurations of noise, throttling and population dynamics, in any order.
@@ -301,7 +317,7 @@ def watch_run(
         What was watched, as it was when the window was closed.
 
     Raises:
-        RenderError: `size_px` or `speed` out of range, or there is no display.
+        RenderError: `size_px` or `speed` out of range, no such theme, or there is no display.
         ConfigError: `parameters` with a policy object.
         ImportError: Pillow or pygame is not installed.
         ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
@@ -313,6 +329,7 @@ def watch_run(
         seed=seed,
         speed=speed,
         size_px=size_px,
+        theme=theme,
         caches=caches,
         parameters=parameters,
         wrappers=wrappers,

@@ -21,7 +21,7 @@ def test_watch_ends_when_the_window_is_closed(command, monkeypatch):
         pygame.event.post(pygame.event.Event(pygame.QUIT))
 
     monkeypatch.setattr(Window, "show", close_it)
-    code, out, err = command("watch", "random", *WORDS, "--wrapper", "sensor_noise:sigma=0.03")
+    code, out, err = command("watch", "random", *WORDS, "--wrapper", "sensor_noise:sigma=0.03", "--theme", "light")
     assert (code, err) == (0, "")
     assert out.endswith("0 delivered; changed by hand: throttle 0.05\n")
 
@@ -30,6 +30,9 @@ def test_watch_complains_in_one_line(command, monkeypatch):
     code, _, err = command("watch", "nobody", *WORDS)
     assert (code, err.count("\n")) == (2, 1)
     assert "nobody" in err
+    code, _, err = command("watch", "random", *WORDS, "--theme", "pink")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "theme" in err
     monkeypatch.setitem(sys.modules, "pygame", None)
     code, _, err = command("watch", "random", *WORDS)
     assert (code, err.count("\n")) == (1, 1)

@@ -68,6 +68,12 @@ TWINS = {
         "swarm_forage_env.policies.interface.LearnerInterface.command",
     ),
     "swarm_forage_env.policies.kernels.compact.compact_view": COMPACT_VIEW,
+    "swarm_forage_env.rendering.kernels.shapes.paint_round": Twin(
+        "painting.round_share", "rendering/test_paint.py", "swarm_forage_env.rendering.paint.paint_discs"
+    ),
+    "swarm_forage_env.rendering.kernels.shapes.paint_square": Twin(
+        "painting.square_share", "rendering/test_paint.py", "swarm_forage_env.rendering.paint.paint_squares"
+    ),
     "swarm_forage_env.world.kernels.beams.proximity": OBSERVED,
     "swarm_forage_env.world.kernels.bodies.move_bodies": Twin(
         "bodies.moved", "world/test_bodies.py", "swarm_forage_env.world.kernels.bodies.move_bodies"
@@ -120,6 +126,10 @@ IN_ORDER = "only calls others, each with its twin; whole runs are in tests/promi
 WITHOUT = {
     "swarm_forage_env.policies.kernels.rows.book_rows": "sums row by row; the lives of rows are told by hand in "
     "tests/views/test_arenas.py",
+    "swarm_forage_env.rendering.kernels.shapes.paint_share": "one product per colour; by hand in "
+    "tests/rendering/test_paint.py",
+    "swarm_forage_env.rendering.kernels.shapes.take_picture": "compared with `numpy.rint` in "
+    "tests/rendering/test_paint.py",
     "swarm_forage_env.world.kernels.bodies.tell_poses": "compared with `unpack_poses` in tests/world/test_bodies.py",
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "
     "tests/world/test_interactions_timing.py",

@@ -6,7 +6,7 @@ import pytest
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import observation_layout
 from swarm_forage_env.rendering.close_up import render_close_up
-from swarm_forage_env.rendering.view import PALETTE
+from swarm_forage_env.rendering.view import PALETTE, THEMES
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.state import CacheState, ObjectState, SwarmState
 
@@ -25,9 +25,9 @@ class Place:
         self.objects = ObjectState.empty(CONFIG)
         self.obs = np.zeros(LAYOUT.size, np.float32)
 
-    def draw(self):
+    def draw(self, **options):
         state = (self.swarm, self.objects, CacheState.empty(2))
-        return render_close_up(CONFIG, *state, robot=0, obs=self.obs, layout=LAYOUT)
+        return render_close_up(CONFIG, *state, robot=0, obs=self.obs, layout=LAYOUT, **options)
 
     @staticmethod
     def pixel(picture, right_m, up_m):
@@ -81,3 +81,11 @@ def test_the_window_goes_around_five_cells(place):
     inner, beyond = place.pixel(picture, 0.5 - 0.006, 0.3), place.pixel(picture, 0.5 + 0.03, 0.3)
     assert inner[0] > 100
     assert beyond == PALETTE.floor
+
+
+def test_a_light_close_up_has_the_light_colours(place):
+    light = THEMES["light"]
+    picture = place.draw(theme="light")
+    assert place.pixel(picture, -0.05, 0.0) == light.empty
+    assert place.pixel(picture, 0.0, 0.35) == light.floor
+    assert place.pixel(place.draw(), 0.0, 0.35) == PALETTE.floor, "the dark one is as before"

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.contract.codes import Counter, ObjectStatus
-from swarm_forage_env.rendering import paint, view
+from swarm_forage_env.rendering import view
 from swarm_forage_env.rendering.frame import Trails, render_frame
-from swarm_forage_env.rendering.paint import paint_box, paint_discs, paint_needles, paint_rings, paint_squares
 from swarm_forage_env.rendering.view import (
     CACHE_OPACITY,
     NEST_OPACITY,
@@ -357,76 +356,3 @@ def test_a_light_picture_shows_the_same_in_other_colours(world):
     assert world.pixel(picture, *world.swarm.position[0]) == light.empty
     with pytest.raises(RenderError, match="Expected theme to be one of dark, light, got 'lite'"):
         world.draw(theme="lite")
-
-
-# The painter
-
-
-def blank(size: int = 40) -> np.ndarray:
-    return np.zeros((size, size, 3), np.float32)
-
-
-@pytest.mark.parametrize("centre", [(20.0, 20.0), (20.5, 20.5), (20.3, 19.8)])
-@pytest.mark.parametrize(
-    ("paint", "area"),
-    [
-        (lambda canvas, centre: paint_discs(canvas, centre, 5.0, (255, 0, 0)), np.pi * 25.0),
-        (lambda canvas, centre: paint_rings(canvas, centre, 8.0, 2.0, (255, 0, 0)), 2.0 * np.pi * 8.0 * 2.0),
-        (lambda canvas, centre: paint_squares(canvas, centre, 3.4, (255, 0, 0)), 3.4**2),
-        (
-            lambda canvas, centre: paint_needles(canvas, centre, np.array([[0.6, -0.8]]), 9.0, 2.0, (255, 0, 0)),
-            9.0 * 2.0 + np.pi,
-        ),
-    ],
-    ids=["disc", "ring", "square", "needle"],
-)
-def test_shapes_cover_their_area_wherever_they_are(paint, area, centre):
-    canvas = blank()
-    paint(canvas, [centre])
-    assert canvas[..., 0].sum() / 255.0 == pytest.approx(area, rel=0.03)
-    assert not canvas[..., 1:].any()
-
-
-def test_a_disc_is_centred_where_it_was_asked_for():
-    canvas = blank()
-    paint_discs(canvas, [(12.3, 25.8)], 4.0, (255, 255, 255))
-    rows, columns = np.mgrid[0:40, 0:40] + 0.5
-    weight = canvas[..., 0]
-    assert (columns * weight).sum() / weight.sum() == pytest.approx(12.3, abs=0.02)
-    assert (rows * weight).sum() / weight.sum() == pytest.approx(25.8, abs=0.02)
-
-
-def test_a_box_shares_its_edge_pixels():
-    canvas = blank(8)
-    paint_box(canvas, (1.25, 2.0, 4.5, 3.5), (100, 0, 0), opacity=0.5)
-    expected = np.zeros((8, 8))
-    expected[2, 1:5] = 50.0 * np.array([0.75, 1.0, 1.0, 0.5])
-    expected[3, 1:5] = 0.5 * expected[2, 1:5]
-    np.testing.assert_allclose(canvas[..., 0], expected)
-
-
-def test_shapes_may_stick_out_of_the_canvas_or_be_absent():
-    canvas = blank(10)
-    paint_discs(canvas, [(0.0, 5.0), (-30.0, 4.0), (5.0, 100.0)], 3.0, (255, 0, 0))
-    assert canvas[5, 0, 0] == pytest.approx(255.0)
-    assert not canvas[:, 4:].any()
-    before = canvas.copy()
-    paint_discs(canvas, np.empty((0, 2)), 3.0, (0, 255, 0))
-    paint_box(canvas, (20.0, 0.0, 30.0, 5.0), (0, 255, 0))
-    np.testing.assert_array_equal(canvas, before)
-
-
-def test_shapes_of_one_call_do_not_add_up():
-    canvas = blank()
-    paint_discs(canvas, [(20.0, 20.0)] * 3, 5.0, (200, 0, 0), opacity=0.5)
-    assert canvas.max() == pytest.approx(100.0)
-
-
-def test_painting_in_portions_gives_the_same_picture(monkeypatch):
-    centre = np.random.default_rng(2).uniform(-2.0, 42.0, (300, 2))
-    opacity = np.linspace(0.1, 1.0, 300)
-    whole, portions = blank(), blank()
-    paint_discs(whole, centre, 2.2, (255, 10, 0), opacity)
-    monkeypatch.setattr(paint, "_STAMP_BUDGET", 500)
-    paint_discs(portions, centre, 2.2, (255, 10, 0), opacity)
-    np.testing.assert_array_equal(whole, portions)

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from swarm_forage_env.rendering.view import PALETTE, RenderError
+from swarm_forage_env.rendering.view import PALETTE, THEMES, RenderError
 from swarm_forage_env.rendering.window import PANEL_PX, Clicked, Closed, Pressed, Scene, Window
 
 pygame = pytest.importorskip("pygame")
@@ -48,6 +48,15 @@ def test_a_scene_with_text_has_a_panel_and_help_below(window):
     assert (picture[:100, 200:] != page).any(), "the line of the panel"
     assert (picture[-40:, :200] != page).any(), "the help"
     assert (picture[130:-40, :200] == page).all()
+
+
+def test_around_the_frame_are_the_colours_of_the_scene(window):
+    light = THEMES["light"]
+    window.show(Scene(frame=FRAME, title="", lines=("tick 5",), help="q: quit", palette=light))
+    picture = shown()
+    assert (picture[130:-40, :200] == light.page).all()
+    assert (picture[:100, 200:] == light.text).all(axis=2).any(), "the line of the panel"
+    assert (picture[-40:] == light.faint_text).all(axis=2).any(), "the help"
 
 
 def test_a_long_text_is_broken_where_it_may_be(window):

@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import tracemalloc
+import zlib
 
 import numpy as np
 import pytest
@@ -350,8 +352,32 @@ def test_straight_drives_take_little_room():
 
 @pytest.mark.parametrize(
     ("dtype", "shape", "expected"),
-    [("f8", (3,), "types u1, u2, i4, f4"), ("u1", (4,), "Expected 4 bytes"), ("u2", (3,), "Expected 6 bytes")],
+    [
+        ("f8", (3,), "types u1, u2, i4, f4"),
+        ("u1", (4,), "Expected 4 bytes"),
+        ("u2", (3,), "Expected 6 bytes"),
+        ("u1", (2,), "Expected 2 bytes .* got more"),
+        ("f4", (2**30,), "at most 2,147,483,648 bytes, got one of shape .1073741824,"),
+    ],
 )
 def test_arrays_of_another_kind_are_refused(dtype, shape, expected):
     with pytest.raises(ReplayError, match=expected):
         unpack(pack(np.zeros(3, np.uint8)), dtype, shape)
+
+
+def test_no_more_is_unpacked_than_the_shape_says():
+    bomb = zlib.compress(bytes(10_000_000), 9)
+    assert len(bomb) < 10_000
+    tracemalloc.start()
+    with pytest.raises(ReplayError, match=r"Expected 3 bytes .* got more"):
+        unpack(bomb, "u1", (3,))
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 1_000_000
+
+
+def test_bytes_that_are_cut_short_are_refused():
+    packed = pack(np.arange(50, dtype=np.uint8))
+    for end in (-1, 8):
+        with pytest.raises(ReplayError, match="cut short"):
+            unpack(packed[:end], "u1", (50,))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.rendering.view import RenderError
+from swarm_forage_env.rendering.view import THEMES, RenderError
 from swarm_forage_env.rendering.window import Clicked, Closed, Pressed, Window
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study import watch as watching
@@ -131,6 +131,18 @@ def test_the_scene_tells_of_the_chosen_robot(watch):
     assert watch._policy.describe_robot(4) in text
     assert "remembers: 0" in text
     assert scene.help == HELP
+
+
+def test_a_light_scene_is_light_all_over(watch):
+    bright, dark = Watch(SMALL, "dpo", seed=3, size_px=400, theme="light"), watch
+    for one in (bright, dark):
+        press(one, "tab")
+    light, scene, other = THEMES["light"], bright.scene(), dark.scene()
+    assert tuple(scene.frame[0, 0]) == light.page
+    assert (scene.close_up == light.floor).all(axis=2).any()
+    assert scene.palette == light
+    assert other.palette == THEMES["dark"]
+    assert not (other.close_up == light.floor).all(axis=2).any()
 
 
 def test_tasks_are_told_where_there_are_some():
@@ -268,7 +280,7 @@ def test_watch_run_lasts_until_the_window_is_closed(monkeypatch):
     assert not pygame.display.get_init()
 
 
-@pytest.mark.parametrize(("name", "value"), [("size_px", 10), ("speed", 0.0)])
+@pytest.mark.parametrize(("name", "value"), [("size_px", 10), ("speed", 0.0), ("theme", "pink")])
 def test_impossible_values_are_refused(name, value):
     with pytest.raises(RenderError, match=name):
         Watch(SMALL, "crw", **{name: value})

@@ -30,6 +30,7 @@ class Painter {
     if (shown.objects) this.objects(pen);
     this.flashes(pen, speed);
     this.robots(pen);
+    this.counts(pen);
     for (const robot of new Set([hovered, chosen])) if (robot >= 0) this.halo(pen, robot, robot === chosen);
     this.scaleBar(pen);
   }
@@ -121,27 +122,41 @@ class Painter {
     pen.lineTo(view.px(run.x[robot]), view.py(run.y[robot]));
   }
 
-  caches(pen) {
+  /** Caches that have objects: pixels of the middle and of a side, and how many objects. */
+  *cachesNow() {
     const { run, view } = this;
     const { cell_m, cache_side_m, caches } = run.header.world;
     if (caches === "none") return;
     const values = run.caches.at(run.frame);
     const side = Math.max(cache_side_m * view.scale, 10);
-    pen.font = `600 ${Math.max(10, Math.min(22, 0.4 * side))}px system-ui, sans-serif`;
-    pen.textAlign = "center";
-    pen.textBaseline = "middle";
     for (let slot = 0; slot < run.header.n_cache_slots; slot++) {
-      const count = values[3 * slot];
-      if (count <= 0) continue;
-      const x = view.px((values[3 * slot + 1] + 0.5) * cell_m);
-      const y = view.py((values[3 * slot + 2] + 0.5) * cell_m);
-      pen.fillStyle = pen.strokeStyle = theme.colours.cache;
+      const [count, column, row] = values.slice(3 * slot, 3 * slot + 3);
+      if (count > 0) yield [view.px((column + 0.5) * cell_m), view.py((row + 0.5) * cell_m), side, count];
+    }
+  }
+
+  caches(pen) {
+    pen.fillStyle = pen.strokeStyle = theme.colours.cache;
+    pen.lineWidth = 1.5;
+    for (const [x, y, side] of this.cachesNow()) {
       pen.globalAlpha = 0.22;
       pen.fillRect(x - side / 2, y - side / 2, side, side);
       pen.globalAlpha = 1;
-      pen.lineWidth = 1.5;
       pen.strokeRect(x - side / 2, y - side / 2, side, side);
-      pen.fillStyle = theme.colours.text;
+    }
+  }
+
+  /** How many objects caches have, above the robots that stand in them. */
+  counts(pen) {
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    pen.lineJoin = "round";
+    pen.lineWidth = 4;
+    pen.strokeStyle = theme.colours.floor;
+    pen.fillStyle = theme.colours.text;
+    for (const [x, y, side, count] of this.cachesNow()) {
+      pen.font = `600 ${Math.max(10, Math.min(22, 0.4 * side))}px system-ui, sans-serif`;
+      pen.strokeText(String(count), x, y);
       pen.fillText(String(count), x, y);
     }
   }
