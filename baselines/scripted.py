@@ -1,6 +1,7 @@
 """What the scripted controllers have in common: checked inputs, draws for every robot, one kernel for all robots."""
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -86,11 +87,12 @@ class ScriptedPolicy:
         self._state = (constants, robots, *memory, self._actions)
         self.n_ticks = 0
         self._script = None
-        self._bind()
+        self.__dict__.pop("_step", None)
 
-    def _bind(self) -> None:
-        """Find the compiled version of the kernel once, and not in every tick."""
-        self._step = direct(self._kernel, *example_of(self._state))
+    @cached_property
+    def _step(self) -> Callable[..., None]:
+        """The compiled version of the kernel, found once and not in every tick."""
+        return direct(self._kernel, *example_of(self._state))
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
@@ -117,8 +119,6 @@ class ScriptedPolicy:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._script = None
-        if self._spec is not None:
-            self._bind()
 
     @property
     def activity(self) -> CodeArray:

@@ -1,4 +1,4 @@
-"""docs/results.md with its pictures: what runs of the paper's sets say of its claims.
+"""docs/results.md with its pictures, and docs/results_in_detail.md: what runs of the paper's sets say of its claims.
 
     scripts/write_results DIR|FILE ...               from folders of studies, or from their packed files
     scripts/write_results --out FOLDER DIR|FILE ...  the same into another folder than docs
@@ -9,8 +9,9 @@ Needs the extra "plots". The interpreter is $PYTHON, else that of the active env
 """
 
 import argparse
+import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +20,9 @@ from PIL import Image
 
 from metrics.claims import CLAIMS, INTUITIONS
 from metrics.scoring import Judged, StudyFigure, StudyPanels, Waiting, draw_figure, judge_claims, study_figures
+from metrics.scoring.cell_distributions import cell_distributions
+from metrics.scoring.model_plots import draw_models
+from metrics.scoring.study_models import model_figures
 from metrics.scoring.texts import counted, number, percent
 from metrics.scoring.verdicts import VARIANTS
 from swarm_forage_env import read_study
@@ -31,15 +35,17 @@ from swarm_forage_env.study.study_table import StudyTable
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PICTURES = Path("images/results")
+PAGE, DETAILS = "results.md", "results_in_detail.md"
 COLOURS = 64
 """Of a picture; with more, its file is several times as large and looks the same."""
 ANSWERS = ("supported", "contradicted", "undecided")
 SIGNS = {"supported": "✓", "contradicted": "✗", "undecided": "?"}
 
-INTRODUCTION = """What these runs say of the paper's claims, under both [readings](readings.md) of its rules. This page
-and its pictures are written by `scripts/write_results`; nothing in them is typed by hand, and no threshold was moved
-after the runs were seen. A claim that is contradicted is a result like any other. How claims are decided is in
-[metrics.md](metrics.md#the-papers-claims), how studies are run in [studies.md](studies.md)."""
+INTRODUCTION = f"""Each claim of the paper is held against these runs, under both [readings](readings.md) of its rules.
+A claim that is contradicted is a result like any other: no threshold was moved after the runs were seen. How claims are
+decided is in [metrics.md](metrics.md#the-papers-claims), how studies are run in [studies.md](studies.md); statistics,
+effects and numbers of runs are in [{DETAILS}]({DETAILS}). `scripts/write_results` writes both pages and their pictures;
+nothing in them is typed by hand."""
 
 
 class Results(NamedTuple):
@@ -138,8 +144,47 @@ def what_ran(results: Results) -> str:
     )
 
 
+def answers(results: Results) -> str:
+    """Return how many claims have which answer, and the answer to each, measures corrected."""
+    formulas = [one.verdict.answer for one in results.judged if not one.reading]
+    counts: list[tuple[Any, ...]] = []
+    for reading in results.readings:
+        mine = [one.verdict.answer for one in results.judged if (one.reading, one.variant) == (reading, "corrected")]
+        waiting = sum((one.reading, one.variant) == (reading, "corrected") for one in results.waiting)
+        counts.append((reading, *((mine + formulas).count(word) for word in ANSWERS), waiting))
+    found = {(one.claim.name, one.reading): one.verdict for one in results.judged if one.variant == "corrected"}
+    lines: list[tuple[str, ...]] = []
+    for name, claim in CLAIMS.items():
+        cells = [_answer(found.get((name, reading if claim.panels else ""))) for reading in results.readings]
+        lines.append((f"[{name}]({DETAILS}#{name.lower()})", claim.text, *cells))
+    return (
+        "## The answers\n\n"
+        f"{rows(('reading', *ANSWERS, 'waiting for runs'), counts, right=range(1, 5))}\n\n"
+        "An answer is by intervals of paired runs, our rule, with the measures corrected. In brackets stands the "
+        "answer by the paper's rule, overlapping bands of two standard deviations, where it is another."
+        f"{_otherwise(results)}\n\n{rows(('claim', 'text', *results.readings), lines)}"
+    )
+
+
+def _otherwise(results: Results) -> str:
+    """A sentence on the claims to which another form of the measures gives another answer; empty if there are none."""
+    given: dict[tuple[str, str], set[str]] = {}
+    for one in results.judged:
+        given.setdefault((one.claim.name, one.reading), set()).add(one.verdict.answer)
+    names = [name for name in CLAIMS if any(len(given.get((name, reading), ())) > 1 for reading in results.readings)]
+    words = f"[those of the paper or its program]({DETAILS}#answers-that-hang-on-a-slip) give another answer"
+    return f" With other forms of the measures, {words} to {', '.join(names)}." if names else ""
+
+
+def _answer(verdict: Any) -> str:
+    if verdict is None:
+        return "waits"
+    words = f"{SIGNS[verdict.answer]} {verdict.answer}"
+    return words if verdict.by_bands == verdict.answer else f"{words} ({verdict.by_bands})"
+
+
 def in_short(results: Results) -> str:
-    """Return how many claims have which answer."""
+    """Return how many claims have which answer, with each form of the measures and by each rule."""
     lines: list[tuple[Any, ...]] = []
     for reading in results.readings:
         for variant in VARIANTS:
@@ -150,50 +195,49 @@ def in_short(results: Results) -> str:
             lines.append((reading, variant, *counts, *by_bands, waiting))
     header = ("reading", "measures", *ANSWERS, *(f"{word} by bands" for word in ANSWERS), "waiting")
     return (
-        f"## In short\n\n{rows(header, lines, right=range(2, 9))}\n\n"
-        "By intervals, our rule, and by the paper's, overlapping bands of two standard deviations of runs. Two more "
-        "claims, V1 and V2, follow from formulas alone; both rules are in the table below."
+        f"## How many\n\n{rows(header, lines, right=range(2, 9))}\n\n"
+        "Claims that follow from formulas alone, V1 and V2, are not counted."
     )
 
 
-def claims_table(results: Results) -> str:
-    """Return all claims with their answers in each reading, measures corrected."""
-    found = {(one.claim.name, one.reading): one.verdict for one in results.judged if one.variant == "corrected"}
-    lines: list[tuple[str, ...]] = []
-    for name, claim in CLAIMS.items():
-        cells = [_answer(found.get((name, reading if claim.panels else ""))) for reading in results.readings]
-        lines.append((name, claim.text, claim.figure, *cells))
-    return (
-        "## Claims\n\nMeasures corrected. In each cell: the answer by intervals, by the paper's bands in brackets; the "
-        "statistic that it was decided on; the effect, as a share of the largest mean in the figure; the smallest "
-        "number of runs behind a number.\n\n" + rows(("claim", "text", "figure", *results.readings), lines)
-    )
-
-
-def _answer(verdict: Any) -> str:
-    if verdict is None:
-        return "waits"
-    parts = [f"{SIGNS[verdict.answer]} **{verdict.answer}** ({verdict.by_bands})", number(verdict.statistic)]
-    return "<br>".join([*parts, percent(verdict.effect), counted(verdict.n_runs, "run")])
-
-
-def reasons(results: Results) -> str:
-    """Return why each answer is what it is."""
-    lines: list[str] = []
-    for name in CLAIMS:
-        mine = [one for one in results.judged if one.claim.name == name and one.variant == "corrected"]
-        lines += [
-            f"- **{name}**" + (f", {one.reading}" if one.reading else "") + f": {one.verdict.why}" for one in mine
+def every_verdict(results: Results) -> str:
+    """Return each claim with all its verdicts: readings, forms of the measures, both rules."""
+    parts = [
+        "## Claim by claim\n\nMeasures are as corrected, as printed in the paper, and as in the authors' program "
+        "(`sierra`). The statistic is what was decided on, in words in the last column; the effect is a share of the "
+        "largest mean in the figure; runs are the fewest behind any number."
+    ]
+    header = ("reading", "measures", "by intervals", "by bands", "statistic", "effect", "runs", "why")
+    for name, claim in {**CLAIMS, **INTUITIONS}.items():
+        here = [one for one in (*results.judged, *results.expected) if one.claim.name == name]
+        lines = [
+            (
+                one.reading or "-",
+                one.variant if one.reading else "-",
+                one.verdict.answer,
+                one.verdict.by_bands,
+                number(one.verdict.statistic),
+                percent(one.verdict.effect),
+                one.verdict.n_runs,
+                one.verdict.why,
+            )
+            for one in here
         ]
-    return "## Why\n\nWhat the statistic of each claim is, in words.\n\n" + "\n".join(lines)
+        later = {one.lacks for one in (*results.waiting, *results.expected_later) if one.claim.name == name}
+        waits = sorted({experiment for lacks in later for experiment, _ in lacks})
+        words = f"{claim.text} ({claim.figure})"
+        parts.append(f"### {name}\n\n{words}" + (f"\n\n{rows(header, lines, right=(4, 5, 6))}" if lines else ""))
+        if waits:
+            parts.append(f"Waits for runs of {', '.join(waits)}.")
+    return "\n\n".join(parts)
 
 
 def what_hangs_on_what(results: Results) -> str:
     """Return the claims whose answer depends on the reading, on the form of the measures or on the rule."""
-    answers = {(one.claim.name, one.reading, one.variant): one.verdict for one in results.judged if one.reading}
+    found = {(one.claim.name, one.reading, one.variant): one.verdict for one in results.judged if one.reading}
     lines: list[tuple[str, ...]] = []
     for name in CLAIMS:
-        here = {key[1:]: verdict.answer for key, verdict in answers.items() if key[0] == name}
+        here = {key[1:]: verdict.answer for key, verdict in found.items() if key[0] == name}
         by_reading = {
             reading: here[reading, "corrected"] for reading in results.readings if (reading, "corrected") in here
         }
@@ -205,7 +249,7 @@ def what_hangs_on_what(results: Results) -> str:
             if others:
                 words = ", ".join(f"{variant}: {answer}" for variant, answer in {"corrected": base, **others}.items())
                 lines.append((name, f"the form of the measure ({reading})", words))
-            by_bands = answers[name, reading, "corrected"].by_bands
+            by_bands = found[name, reading, "corrected"].by_bands
             if by_bands != base:
                 lines.append((name, f"the rule ({reading})", f"intervals: {base}, bands: {by_bands}"))
     text = rows(("claim", "hangs on", "answers"), lines) if lines else "No answer does."
@@ -220,7 +264,12 @@ def intuitions(results: Results) -> str:
     """Return what the paper expected, with the answers."""
     found = {(one.claim.name, one.reading): one.verdict for one in results.expected}
     lines = [
-        (name, claim.figure.split(",")[0], claim.text, *(_answer(found.get((name, r))) for r in results.readings))
+        (
+            f"[{name}]({DETAILS}#{name.lower()})",
+            claim.figure.split(",")[0],
+            claim.text,
+            *(_answer(found.get((name, r))) for r in results.readings),
+        )
         for name, claim in INTUITIONS.items()
     ]
     return (
@@ -259,22 +308,61 @@ def figures(results: Results, folder: Path) -> str:
         old.unlink()
     parts = [
         "## Figures",
-        "Those that claims are about, measures corrected. The second reading is shown where the answer to one of the "
-        "claims differs. All others: `swarm-forage study plot`.",
+        "Those that claims are about, measures corrected, and models beside runs ([laws.md](laws.md)). The second "
+        "reading is shown where the answer to one of the claims differs. All others: `swarm-forage study plot`.",
     ]
+    found = {(one.claim.name, one.reading): one.verdict for one in results.judged if one.variant == "corrected"}
     for table, shown in pictured(results):
         parts += [f"### {table.spec.name}: {table.spec.title}"] if shown else []
         for figure in shown:
-            path = PICTURES / f"{figure.name}.png"
-            draw_figure(figure, [folder / path])
-            with Image.open(folder / path) as picture:
-                fewer = picture.convert("RGB").quantize(COLOURS)
-            fewer.save(folder / path, optimize=True)
+            parts.append(_pictured(figure.name, figure.title, folder, lambda path, it=figure: draw_figure(it, [path])))
             here = {(panel.experiment or "", panel.measure) for panel in figure.panels}
+            reading = figure.panels[0].reading
             names = [name for name, claim in CLAIMS.items() if not here.isdisjoint(claim.panels)]
-            parts.append(f"![{figure.title}]({path.as_posix()})")
-            parts.append(f"Claims: {', '.join(names)}.")
+            words = ", ".join(f"{name} {_answer(found.get((name, reading)))}" for name in names)
+            parts.append(f"Claims: {words}.")
+        for model in model_figures(table):
+            if model.reading == table.spec.readings[0]:
+                parts.append(_pictured(model.name, model.title, folder, lambda path, it=model: draw_models(it, [path])))
     return "\n\n".join(parts)
+
+
+def _pictured(name: str, title: str, folder: Path, draw: Callable[[Path], None]) -> str:
+    """Draw a picture, make its file small, and return what shows it."""
+    path = PICTURES / f"{name}.png"
+    draw(folder / path)
+    with Image.open(folder / path) as picture:
+        fewer = picture.convert("RGB").quantize(COLOURS)
+    fewer.save(folder / path, optimize=True)
+    return f"![{title}]({path.as_posix()})"
+
+
+def breakdowns(results: Results) -> str:
+    """Return in how many cells of each set runs broke down, and where most often."""
+    lines: list[tuple[Any, ...]] = []
+    for table in results.tables:
+        cells = cell_distributions(table)
+        judged = cells.filter(cells["broken"].is_not_null())
+        broken = judged.filter(judged["broken"] > 0.0).sort("broken", descending=True, maintain_order=True)
+        axis = [item.name for item in table.spec.axes]
+        worst = ""
+        if len(broken):
+            row = broken.row(0, named=True)
+            place = ", ".join(f"{name.replace('_', ' ')} {_value(row[name])}" for name in axis)
+            half = "" if math.isinf(row["half_broken_s"]) else f", half by {row['half_broken_s']:,.0f} s"
+            share = f"{round(row['broken'] * row['n_runs'])} of {counted(row['n_runs'], 'run')}"
+            worst = f"{row['policy']}, {row['reading']}, {place}: {share}{half}"
+        lines.append((f"`{table.spec.name}`", len(cells), len(judged), len(broken), worst or "-"))
+    header = ("set", "cells", "judged", "with a breakdown", "most often")
+    return (
+        "## Breakdowns\n\nA mean hides runs that broke down: they end below half of the reference and stay there "
+        "([metrics.md](metrics.md#all-runs-not-means-alone)). The reference is the undisturbed swarm; where sizes "
+        "vary, it is the best size, and only swarms as large are judged.\n\n" + rows(header, lines, right=(1, 2, 3))
+    )
+
+
+def _value(value: Any) -> str:
+    return number(float(value)) if isinstance(value, int | float) and not isinstance(value, bool) else str(value)
 
 
 def left_out(results: Results) -> str:
@@ -309,19 +397,28 @@ def main(words: Sequence[str] | None = None) -> int:
     except ValueError as error:  # no study, or one that no claim is about
         print(f"write_results: {error}", file=sys.stderr)
         return 2
-    parts = [what_ran, in_short, claims_table, what_hangs_on_what, intuitions, reasons]
-    text = [
+    parts = [
         "# Results",
         what_is_there(results),
         INTRODUCTION,
-        *(part(results) for part in parts),
+        answers(results),
         figures(results, arguments.out),
+        breakdowns(results),
+        what_ran(results),
         left_out(results),
     ]
-    page = arguments.out / "results.md"
-    page.write_text("\n\n".join(text) + "\n", encoding="utf-8")
+    details = [
+        "# Results in detail",
+        f"The numbers behind [{PAGE}]({PAGE}).",
+        in_short(results),
+        what_hangs_on_what(results),
+        intuitions(results),
+        every_verdict(results),
+    ]
+    for name, texts in ((PAGE, parts), (DETAILS, details)):
+        (arguments.out / name).write_text("\n\n".join(texts) + "\n", encoding="utf-8")
     n_pictures = len(list((arguments.out / PICTURES).glob("*.png")))
-    print(f"written {page}, {counted(n_pictures, 'picture')}")
+    print(f"written {arguments.out / PAGE}, {DETAILS} beside it, {counted(n_pictures, 'picture')}")
     return 0
 
 

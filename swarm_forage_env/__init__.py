@@ -163,7 +163,7 @@ _HOMES = {
     "run_one": "study.run",
     "run_policy": "study.run",
     "run_study": "study.study_run",
-    "with_overrides": "scenarios.config",
+    "with_overrides": "scenarios.overrides",
     "write_replays": "study.replay.files",
 }
 """Public name -> submodule that defines it, loaded when the name is first used."""

@@ -95,6 +95,21 @@ class Panel:
         return int(np.isfinite(self.of(policies)).sum(axis=-1).min())
 
 
+def of_equal_runs(first: Panel, second: Panel, policies: Iterable[str]) -> tuple[Panel, Panel]:
+    """Return two panels with equally many runs, the first ones that have all scores of these policies.
+
+    Intervals narrow with the number of runs, so a panel of more runs would show more differences for that alone.
+    """
+    names = list(policies)
+    complete = [np.flatnonzero(np.isfinite(panel.of(names)).all(axis=(0, 1))) for panel in (first, second)]
+    n_runs = min(map(len, complete))
+    a, b = (
+        Panel(levels=panel.levels, scores={name: panel.scores[name][:, runs[:n_runs]] for name in names})
+        for panel, runs in zip((first, second), complete, strict=True)
+    )
+    return a, b
+
+
 def mean_over_runs(values: FloatArray) -> FloatArray:
     """Mean over the last axis without NaN; NaN where nothing is left."""
     known = np.isfinite(values)

@@ -286,6 +286,14 @@ _FLEXIBILITY_2 = (
         figure="scenario 2, adaptability, 320 robots",
         statements=(better("S2b 320", A, ("crw",), UNSTEADY, "high"),),
     ),
+    Claim(
+        name="A7",
+        text="What is not shown, the other of the two larger swarms, has the same order of algorithms.",
+        figure="scenario 2, reactivity and adaptability, 115 and 320 robots",
+        statements=tuple(
+            states(same_order, ("S2b 115", measure), ("S2b 320", measure), policies=POLICIES) for measure in (R, A)
+        ),
+    ),
 )
 
 _NOISE = (

@@ -16,11 +16,13 @@ from metrics.checks import check_option
 from metrics.curves import FloatArray
 
 from .panel import (
+    MIN_PAIRS,
     Levels,
     Panel,
     Rule,
     bounds,
     mean_over_runs,
+    of_equal_runs,
     resampled_runs,
     signs,
     std_over_runs,
@@ -157,22 +159,20 @@ def reaches_higher(panel: Panel, *, upper: Sequence[str], lower: Sequence[str], 
 def differs_more(few: Panel, many: Panel, *, pairs: Pairs, rule: Rule = "intervals") -> Outcome:
     """Whether the second panel has more pairs and levels that differ than the first, by `MORE` of all comparisons.
 
-    Intervals narrow with the number of runs, so panels of unequal numbers leave it undecided by that rule.
+    Of both, equally many runs are looked at: as many as the panel with fewer of them has.
     """
+    names = {name for pair in pairs for name in pair}
     shares: list[float] = []
-    for panel in (few, many):
+    equal = of_equal_runs(few, many, names)
+    for panel in equal:
         found = np.array([signs(panel, first, second, rule) for first, second in pairs])
         shares.append(float((np.abs(found) == 1.0).mean()))
-    gain = shares[1] - shares[0]
-    names = {name for pair in pairs for name in pair}
-    runs = few.n_runs(names), many.n_runs(names)
+    gain, n_runs = shares[1] - shares[0], equal[0].n_runs(names)
     answer: Answer = "supported" if gain >= MORE else "contradicted" if gain <= -MORE else "undecided"
-    why = f"{shares[1]:.0%} of the comparisons differ, {shares[0]:.0%} in the first panel"
-    if rule == "intervals" and runs[0] != runs[1]:
-        answer, why = "undecided", f"{why}, of {runs[1]} and {runs[0]} runs, which cannot be compared"
-    if min(runs) < 2:
+    if n_runs < (2 if rule == "bands" else MIN_PAIRS):
         answer = "undecided"
-    return Outcome(answer=answer, statistic=gain, effect=np.nan, n_runs=min(runs), why=why)
+    why = f"{shares[1]:.0%} of the comparisons differ, {shares[0]:.0%} in the first panel, of {n_runs} runs each"
+    return Outcome(answer=answer, statistic=gain, effect=np.nan, n_runs=n_runs, why=why)
 
 
 def against_limit(resampled: FloatArray, limit: float) -> Answer:

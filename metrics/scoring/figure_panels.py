@@ -61,6 +61,8 @@ class StudyPanel:
     """Which rules: "described" or "program"."""
     others: "Mapping[str, Value]"
     """Value on each axis but the last, by its name."""
+    words: Mapping[str, str]
+    """How these values are shown."""
     measure: str
     """Name in `METRICS`."""
     variant: Variant
@@ -178,6 +180,7 @@ def _panel(table: "StudyTable", line: StudyLine, variant: Variant, found: Mappin
         study=table.spec.name,
         reading=line.reading,
         others=line.others,
+        words=line.words,
         measure=scores[0].measure,
         variant=variant,
         criterion=scores[0].criterion,
@@ -212,6 +215,7 @@ def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine
                 study=table.spec.name,
                 reading=first.reading,
                 others=first.others,
+                words=first.words,
                 measure="raw_performance",
                 variant="corrected",
                 criterion=table.spec.axes[-1].name,

@@ -101,18 +101,19 @@ def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci"
     """
     from matplotlib.figure import Figure  # not pyplot: no global state, no window system
 
-    n_columns = min(PANELS_PER_ROW, len(figure.panels))
+    n_columns = columns_of(len(figure.panels))
     n_rows = math.ceil(len(figure.panels) / n_columns)
     picture: Any = Figure(figsize=(max(5.2, 3.6 * n_columns + 0.6), 3.2 * n_rows + 0.9), layout="constrained")
     axes: list[Panel] = picture.subplots(n_rows, n_columns, squeeze=False, sharey=True).ravel().tolist()
     for panel, place in zip(figure.panels, axes, strict=False):
         _draw_panel(place, panel, band)
+    limit_height(axes[0], figure)
     for place in axes[len(figure.panels) :]:
         place.set_axis_off()
     handles, labels = axes[0].get_legend_handles_labels()
     picture.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 8), frameon=False, fontsize=9)
     picture.suptitle(f"{unread(figure.title)}\nshaded: {_BANDS[band]}; dots: runs", fontsize=10)
-    _save(picture, figure.name, paths)
+    save_picture(picture, figure.name, paths)
 
 
 def draw_map(figure: StudyFigure, paths: Sequence[Path]) -> None:
@@ -145,15 +146,15 @@ def draw_map(figure: StudyFigure, paths: Sequence[Path]) -> None:
             colour = "black" if value > (low + high) / 2.0 else "white"
             place.text(column, row, number(value), ha="center", va="center", fontsize=6, color=colour)
         place.set_title(unread(policy), fontsize=9)
-        place.set_xticks(range(len(first.x)), [f"{value:.3g}" for value in first.levels], rotation=45)
+        place.set_xticks(range(len(first.x)), [number(value) for value in first.levels], rotation=45)
         place.set_xlabel(_x_label(first), fontsize=8)
         place.tick_params(labelsize=7)
     ((axis, _),) = first.others.items()
-    axes[0].set_yticks(range(len(figure.panels)), [unread(_words(panel.others[axis])) for panel in figure.panels])
+    axes[0].set_yticks(range(len(figure.panels)), [unread(panel.words[axis]) for panel in figure.panels])
     axes[0].set_ylabel(axis.replace("_", " "), fontsize=8)
     picture.colorbar(image, ax=axes, label=first.unit).ax.tick_params(labelsize=7)
     picture.suptitle(f"{unread(figure.title)}\nmeans of runs", fontsize=10)
-    _save(picture, f"{figure.name}_map", paths)
+    save_picture(picture, f"{figure.name}_map", paths)
 
 
 def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
@@ -183,12 +184,21 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
         place.set_xticks(panel.levels, [f"{size:g}" for size in panel.levels])
         place.minorticks_off()
     if panel.others:
-        words = ", ".join(f"{name.replace('_', ' ')} {_words(value)}" for name, value in panel.others.items())
+        words = ", ".join(f"{name.replace('_', ' ')} {word}" for name, word in panel.words.items())
         place.set_title(unread(words), fontsize=9)
     place.set_xlabel(_x_label(panel), fontsize=8)
     place.set_ylabel(panel.unit, fontsize=8)
     place.tick_params(labelsize=8)
     place.grid(alpha=0.25)
+
+
+def limit_height(place: Panel, figure: StudyFigure) -> None:
+    """Let bands reach beyond the runs by half of their range at most: the interval of two runs is of any size."""
+    known = np.concatenate([scores[np.isfinite(scores)] for panel in figure.panels for scores in panel.scores.values()])
+    low, high = float(known.min()), float(known.max())
+    reach = 0.5 * (high - low) or abs(high) or 1.0
+    bottom, top = place.get_ylim()
+    place.set_ylim(max(bottom, low - reach), min(top, high + reach))
 
 
 def _x_label(panel: StudyPanel) -> str:
@@ -210,11 +220,12 @@ def _summaries(scores: FloatArray) -> list[Summary]:
     return [aggregate(known) if known.size else _NOTHING for known in (runs[np.isfinite(runs)] for runs in scores)]
 
 
-def _words(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+def columns_of(n_panels: int) -> int:
+    """Return how many panels stand side by side: two can be read on a phone, many would be a tower."""
+    return min(n_panels, 2 if n_panels <= 2 * PANELS_PER_ROW else PANELS_PER_ROW)
 
 
-def _save(picture: Any, name: str, paths: Sequence[Path]) -> None:
+def save_picture(picture: Any, name: str, paths: Sequence[Path]) -> None:
     """Write a picture; the same numbers give the same bytes."""
     from matplotlib import rc_context  # pyright: ignore[reportUnknownVariableType]  (its own types leave it open)
 

@@ -29,6 +29,8 @@ class StudyLine:
     """Label of the policy."""
     others: "Mapping[str, Value]"
     """Value on each axis but the last, by its name."""
+    words: Mapping[str, str]
+    """How these values are shown."""
     cells: "tuple[Cell, ...]"
     """In the order of the last axis."""
     curves: StudyCurves
@@ -46,9 +48,11 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
         ValueError: no such performance.
     """
     from swarm_forage_env.scenarios.performance import quantity
+    from swarm_forage_env.study.studies import value_words
 
     spec = table.spec
     names = [axis.name for axis in spec.axes[:-1]]
+    words = [value_words(axis.values) for axis in spec.axes[:-1]]
     cells_of: dict[tuple[object, ...], list[Cell]] = {}
     for cell in spec.cells:
         cells_of.setdefault((cell.reading, cell.policy, cell.values[:-1]), []).append(cell)
@@ -63,6 +67,7 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
                 reading=first.reading,
                 policy=first.policy,
                 others=dict(zip(names, first.values, strict=False)),
+                words={name: of[value] for name, of, value in zip(names, words, first.values, strict=False)},
                 cells=tuple(cells),
                 curves=StudyCurves(
                     controller=first.policy,

@@ -1,29 +1,34 @@
 """How functions on arrays are compiled, and when what was compiled before is out of date; for world and controllers."""
 
 import functools
+import gc
 import hashlib
 import logging
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from numba import njit, typeof, types
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+
+from swarm_forage_env._internal.compiled_parts import PartCacheImpl, PartCompiler
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 # Without numba's memory runtime an allocation is a compile error, and arrays that are handed around, alone, in rows or
 # as fields of a named tuple, are not reference-counted. That halves the time of functions that call others often.
 _OPTIONS: dict[str, Any] = {"_nrt": False}
-_FOR_KERNELS_ONLY: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-"""What leaves out the ways into a function from Python and from C."""
+_NOT_FROM_PYTHON: dict[str, Any] = {"no_cpython_wrapper": True}
+_NOT_FROM_C: dict[str, Any] = {"no_cfunc_wrapper": True}
+"""What leaves out ways into a function."""
 
 _PACKAGE = Path(__file__).parents[1]
 _COMPILED_IN_EVERYWHERE = tuple(
     _PACKAGE / f"{name}.py"
     for name in (
+        "_internal/compiled_parts",
         "_internal/compiling",
         "contract/codes",
         "contract/detection",
@@ -49,23 +54,65 @@ def sources_of(folder: Path) -> tuple[Path, ...]:
 
 
 def kernel(function: F) -> F:
-    """Compile a function that allocates nothing; the result is cached on disk until one of its sources changes."""
-    # Left to itself the compiler calls all but the smallest kernels: rows and tuples then travel over the stack.
-    compiled = njit(forceinline=True, **_OPTIONS)(function)
+    """Compile a function that allocates nothing; the result is cached on disk until one of its sources changes.
+
+    There are up to three versions, each made when it is needed: one for calls from Python, a part for calls from other
+    kernels (see `compiled_parts`), and one for a `Callback`. What leads from Python to a function, a conversion of
+    every array of a world, takes longer to compile than most functions themselves.
+    """
+    compiled = njit(**_NOT_FROM_C, **_OPTIONS)(function)
     if not is_compiled(compiled):
         return function
     _keep_on_disk(compiled, "")
-    # What Python needs for a call, a conversion of every array of a world, takes longer to compile than most kernels
-    # themselves. Where a kernel calls another one it is not needed: there a second version stands in, without it.
-    called_by_kernels = njit(forceinline=True, **_OPTIONS, **_FOR_KERNELS_ONLY)(function)
-    _keep_on_disk(called_by_kernels, "-called")
-    compiled.get_call_template = called_by_kernels.get_call_template
-    compiled.get_overload = called_by_kernels.get_overload
+    # Left to itself the compiler calls all but the smallest kernels: rows and tuples then travel over the stack.
+    part = njit(forceinline=True, pipeline_class=PartCompiler, **_NOT_FROM_PYTHON, **_NOT_FROM_C, **_OPTIONS)(function)
+    _keep_on_disk(part, "-called", PartCacheImpl)
+
+    def get_call_template(args: Any, kws: Any) -> Any:
+        return part.get_call_template(tuple(map(_widened, args)), {name: _widened(kind) for name, kind in kws.items()})
+
+    compiled.get_call_template = get_call_template
+    compiled.get_overload = part.get_overload
     return cast(F, compiled)
 
 
-def _keep_on_disk(compiled: Any, mark: str) -> None:
-    """Do what `njit(cache=True)` does with a cache of numba's own; `mark` goes into the names of the files."""
+def _widened(kind: Any) -> Any:
+    """Return the type as which a kernel takes an argument from another kernel: signed whole numbers all as int64.
+
+    So it is compiled once, and not for every width and every constant that it is called with.
+    """
+    plain = types.unliteral(kind)
+    return types.int64 if plain in types.signed_domain else plain
+
+
+@functools.cache
+def _for_callbacks(function: Callable[..., Any]) -> Any:
+    """Return the version of a kernel that compiled code calls by its address."""
+    compiled = njit(**_NOT_FROM_PYTHON, **_OPTIONS)(function)
+    _keep_on_disk(compiled, "-callback")
+    return compiled
+
+
+@contextmanager
+def _collector_off() -> Iterator[None]:
+    """Compile without Python's garbage collector: it takes a tenth of the time and frees next to nothing."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
+def _keep_on_disk(compiled: Any, mark: str, read_by: type[CompileResultCacheImpl] | None = None) -> None:
+    """Do what `njit(cache=True)` does with a cache of numba's own.
+
+    Args:
+        compiled: A function that `njit` has returned.
+        mark: Goes into the names of the files.
+        read_by: How results are written and read, default as numba does.
+    """
     function = compiled.py_func
     cache = _new_cache(function)
     if cache is None:
@@ -80,6 +127,8 @@ def _keep_on_disk(compiled: Any, mark: str) -> None:
     # types which the sources no longer have.
     cache_file._version += _digest_of_sources(Path(function.__code__.co_filename).parent)
     cache._cache_file = cache_file
+    if read_by is not None:
+        cache._impl = read_by(function)
     compiled._cache = cache
 
 
@@ -104,7 +153,7 @@ class _Cache(FunctionCache):
             _say(f"{_NOT_KEPT} ({error.strerror}: {self.cache_path}). {_WAY_OUT}")
 
 
-_NOT_KEPT = "Compiled functions cannot be kept, so every process spends a minute or more on them"
+_NOT_KEPT = "Compiled functions cannot be kept, so every process spends half a minute or more on them"
 _WAY_OUT = "Set NUMBA_CACHE_DIR to a folder that can be written to."
 
 
@@ -142,7 +191,8 @@ def direct(function: F, *example: Any) -> F:
         return function
     key = function, tuple(_kind_of(argument) for argument in example)
     if key not in _entry_points:
-        _entry_points[key] = compiled(tuple(_type_of(argument) for argument in example))
+        with _collector_off():
+            _entry_points[key] = compiled(tuple(_type_of(argument) for argument in example))
     return cast(F, _entry_points[key])
 
 
@@ -178,8 +228,10 @@ class Callback:
             return
         arguments = tuple(typeof(argument) for argument in example)
         self.type = types.FunctionType(types.none(*arguments))
-        direct(function, *example)
-        compiled = cast(Any, function).overloads[arguments]
+        version = _for_callbacks(cast(Any, function).py_func)
+        with _collector_off():
+            version.compile(arguments)
+        compiled = version.overloads[arguments]
         self._address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
     def __call__(self, *arguments: Any) -> None:

@@ -4,15 +4,15 @@ import dataclasses
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin
 
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.policies.mixture import leading_mixture
 from swarm_forage_env.policies.registry import split_interface
-from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
-from swarm_forage_env.scenarios.overrides import field_sections
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.overrides import field_types
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.sizing import checked_density
 from swarm_forage_env.study.spec import RunSpec, plan_run
@@ -156,13 +156,6 @@ def parse_setting(word: str) -> tuple[str, Any]:
     if name not in types:
         raise ConfigError(f"Unknown scenario field {name!r}.{suggestion(name, types)} See: swarm-forage info SCENARIO.")
     return name, _parse_value(name, text, types[name])
-
-
-def field_types() -> dict[str, Any]:
-    """Return the type of every scenario field that can be set by name."""
-    hints = {section: get_type_hints(section_class) for section, section_class in SECTIONS.items()}
-    hints[""] = get_type_hints(ScenarioConfig)
-    return {name: hints[section][name] for name, section in field_sections().items()}
 
 
 def _parse_value(name: str, text: str, kind: Any) -> Any:

@@ -12,8 +12,13 @@ from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env.cli.study_verdict import Places, scored_studies, waiting_lines
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import polars as pl
+
     from metrics.claims import Claim
     from metrics.scoring.figure_panels import StudyPanels
+    from metrics.scoring.study_models import ModelFigure
     from metrics.scoring.study_plots import StudyFigure
     from metrics.scoring.verdicts import Judged, Waiting
     from swarm_forage_env.study.study_table import StudyTable
@@ -145,16 +150,22 @@ def _claim_rows(
 def _study(
     table: "StudyTable", panels: "StudyPanels", judged: "Sequence[Judged]", waiting: "Sequence[Waiting]", band: str
 ) -> dict[str, Any]:
+    from metrics.scoring.cell_distributions import cell_distributions
+    from metrics.scoring.study_models import model_figures
     from metrics.scoring.study_plots import study_figures
     from swarm_forage_env.cli.study_report import described, status_report
+    from swarm_forage_env.cli.terminal import notes
 
     figures = [figure for figure in study_figures(panels) if figure.panels[0].variant == "corrected"]
+    notes().print(f"fitting models to {table.spec.name}")
     return {
         "name": table.spec.name,
         "anchor": f"study-{table.spec.study_id}",
         "title": table.spec.title,
         "state": status_report(table).splitlines()[0],
         "figures": [_figure(figure, judged, waiting, band) for figure in figures],
+        "models": [_model(figure) for figure in model_figures(table)],
+        "cells": _numbers(cell_distributions(table)),
         "missing": [
             f"{measure}: {why}" for (measure, variant), why in panels.missing.items() if variant == "corrected"
         ],
@@ -165,26 +176,44 @@ def _study(
 def _figure(
     figure: "StudyFigure", judged: "Sequence[Judged]", waiting: "Sequence[Waiting]", band: str
 ) -> dict[str, Any]:
+    from metrics.scoring.policy_pairs import policy_pairs
+    from swarm_forage_env.cli.study_plot import written
+
     frame = figure.to_frame()
-    shown = frame.select([name for name in frame.columns if not name.startswith("seed_") and name != "reading"])
     return {
         "title": figure.title,
-        "pictures": _pictures(figure, band),
+        "pictures": _pictures(figure.title, lambda folder: written(figure, folder, band), ("curves", "heat maps")),
         "claims": _claims_about(figure, judged, waiting),
-        "header": [name.replace("_", " ") for name in shown.columns],
-        "rows": shown.rows(),
+        "numbers": _numbers(frame.select([name for name in frame.columns if not name.startswith("seed_")])),
+        "pairs": _numbers(policy_pairs(figure.panels)),
     }
 
 
-def _pictures(figure: "StudyFigure", band: str) -> list[dict[str, str]]:
-    from swarm_forage_env.cli.study_plot import written
+def _model(figure: "ModelFigure") -> dict[str, Any]:
+    from swarm_forage_env.cli.study_plot import models_written
+
+    return {
+        "title": figure.title,
+        "pictures": _pictures(figure.title, lambda folder: models_written(figure, folder), ("runs and models",)),
+        "facts": _numbers(figure.facts()),
+    }
+
+
+def _numbers(frame: "pl.DataFrame") -> dict[str, Any]:
+    """Return a table as the page shows it; the heading already tells the reading where there is one of them."""
+    if not len(frame):
+        return {"header": [], "rows": []}
+    shown = frame.drop("reading") if frame["reading"].n_unique() < 2 else frame
+    return {"header": [name.replace("_", " ") for name in shown.columns], "rows": shown.rows()}
+
+
+def _pictures(title: str, write: "Callable[[Path], list[Path]]", kinds: Sequence[str]) -> list[dict[str, str]]:
     from swarm_forage_env.rendering.report import picture_address
 
     with tempfile.TemporaryDirectory() as folder:
-        files = [file for file in written(figure, Path(folder), band) if file.suffix == ".svg"]
-        kinds = ("curves", "heat maps")
+        files = [file for file in write(Path(folder)) if file.suffix == ".svg"]
         return [
-            {"address": picture_address(file.read_bytes()), "words": f"{figure.title}, {kind}"}
+            {"address": picture_address(file.read_bytes()), "words": f"{title}, {kind}"}
             for file, kind in zip(files, kinds, strict=False)
         ]
 

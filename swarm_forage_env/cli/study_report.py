@@ -77,7 +77,7 @@ def plan_report(spec: StudySpec, folder: StudyFolder, part: tuple[int, int], wor
     for label, runs in by_policy.items():
         seconds = [costs[kind_of(run)].seconds(run) for run in runs]
         robot_ticks = sum(run.robot_ticks for run in runs)
-        rows.append((label, f"{len(runs):,}", f"{robot_ticks:.3g}", f"{sum(seconds) / 3600.0:.3g}"))
+        rows.append((label, f"{len(runs):,}", f"{robot_ticks:.3g}", _hours(sum(seconds))))
     seconds = [costs[kind_of(run)].seconds(run) for run in todo.values()]
     busy = min(workers, max(1, len(todo)))
     wall = duration(max(sum(seconds) / busy, *seconds, 0.0))
@@ -89,6 +89,12 @@ def plan_report(spec: StudySpec, folder: StudyFolder, part: tuple[int, int], wor
             f"about {wall} on {counted(busy, 'core')} as fast as this one is now",
         ]
     )
+
+
+def _hours(seconds: float) -> str:
+    """Hours with two digits behind the point; nobody plans with fewer than 36 s."""
+    hours = seconds / 3600.0
+    return f"{hours:,.2f}" if hours >= 0.01 or seconds == 0.0 else "<0.01"
 
 
 def state_report(state: StudyState, folder: StudyFolder) -> str:

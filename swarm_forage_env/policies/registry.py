@@ -176,8 +176,10 @@ def policy_class(name: str) -> Callable[..., Policy]:
         if point.name == name:
             return point.load()
     known = policy_names()
+    needs_name = re.search(r"\.py\b|\w:\w", name) is not None  # a file of Python, or module:Class
     raise ValueError(
         f"Unknown policy {name!r}.{suggestion(name, known)} Installed policies: {', '.join(known) or 'none'}."
+        + (" A policy in Python is found by the name of an entry point, see docs/studies.md." if needs_name else "")
     )
 
 

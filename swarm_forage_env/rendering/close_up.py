@@ -15,6 +15,7 @@ from swarm_forage_env.rendering.paint import (
     Canvases,
     Colour,
     paint_box,
+    paint_crosses,
     paint_discs,
     paint_frame,
     paint_needles,
@@ -162,7 +163,9 @@ def _draw_beams(
 def _draw_robots(canvas: Canvas, lens: _Lens, scenario: ScenarioConfig, swarm: SwarmState, robot: int) -> None:
     radius = scenario.robots.radius_m * lens.scale
     centre = lens.pixels(swarm.position)
-    shown = swarm.present & lens.shows(centre, 2.0 * radius)
+    visible = lens.shows(centre, 2.0 * radius)
+    shown = swarm.present & visible
+    paint_crosses(canvas, centre[swarm.dead & visible], radius, 0.4 * radius, lens.palette.repair)
     carrying = swarm.carried_object >= 0
     direction = np.column_stack([np.cos(swarm.heading), -np.sin(swarm.heading)])
     paint_rings(canvas, centre[shown & ~swarm.active], 0.8 * radius, 0.4 * radius, lens.palette.repair)

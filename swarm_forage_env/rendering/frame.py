@@ -13,6 +13,7 @@ from swarm_forage_env.rendering.paint import (
     Canvases,
     Colour,
     paint_box,
+    paint_crosses,
     paint_discs,
     paint_frame,
     paint_glows,
@@ -101,7 +102,8 @@ def render_frame(
     Args:
         scenario: The configuration.
         swarm: Robots: blue discs when empty, orange ones around a square while carrying, grey rings in repair; the
-            needle shows the heading, a red ring interference. Robots without a body are left out.
+            needle shows the heading, a red ring interference, a grey cross where a robot died. Robots that are not
+            born yet are left out.
         objects: Objects; the free ones are drawn where they lie.
         caches: Caches, drawn with the number of objects inside.
         events: Counters for the line of figures, and which robots are in interference.
@@ -203,6 +205,7 @@ def _draw_robots(canvas: Canvas, view: View, swarm: SwarmState, events: StepEven
     working = swarm.present & swarm.active
     carrying = swarm.carried_object >= 0
     interfering = working & events.interfering
+    paint_crosses(canvas, centre[swarm.dead], radius, 0.4 * radius, view.palette.repair)
     paint_rings(canvas, centre[swarm.present & ~swarm.active], 0.8 * radius, 0.4 * radius, view.palette.repair)
     for rows, colour in ((working & ~carrying, view.palette.empty), (working & carrying, view.palette.carrying)):
         _draw_bodies(canvas, centre[rows], direction[rows], radius, colour, view.palette)
@@ -262,6 +265,8 @@ def _draw_symbol(canvas: Canvas, palette: Palette, name: str, x: float, y: float
         paint_rings(canvas, centre, radius, max(1.0, 0.3 * radius), palette.interference)
     elif name == "in repair":
         paint_rings(canvas, centre, 0.8 * radius, 0.4 * radius, palette.repair)
+    elif name == "dead":
+        paint_crosses(canvas, centre, 0.8 * radius, 0.4 * radius, palette.repair)
     elif name == "object":
         paint_squares(canvas, centre, 1.2 * radius, palette.object)
     elif name == "source":

@@ -129,6 +129,14 @@ def paint_needles(
     _paint_round(canvas, middle, along, length / 2.0, 0.0, (line + 1.0) / 2.0, colour)
 
 
+def paint_crosses(canvas: Canvas, centre: ArrayLike, radius: float, line: float, colour: Colour) -> None:
+    """Draw two crossing lines of length 2 `radius` at `centre` (n, 2)."""
+    middle = _places(centre)
+    for tilt in (-1.0, 1.0):
+        along = np.tile(np.array([1.0, tilt]) / np.sqrt(2.0), (len(middle), 1))
+        paint_needles(canvas, middle - radius * along, along, 2.0 * radius, line, colour)
+
+
 def paint_squares(canvas: Canvas, centre: ArrayLike, side: float, colour: Colour, opacity: float = 1.0) -> None:
     """Fill axis-aligned squares of side `side` at `centre` (n, 2)."""
     half = side / 2.0

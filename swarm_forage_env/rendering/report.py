@@ -25,7 +25,20 @@ def build_report(values: Mapping[str, Any]) -> str:
     pages = Environment(
         loader=FunctionLoader(_part), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    pages.filters["shown"] = shown
     return pages.get_template("report.html").render(values) + "\n"
+
+
+def shown(cell: Any) -> str:
+    """Return a cell of a table as readers see it: about four digits, no exponent where digits do, a dash for nothing.
+
+    shown(1492.625), shown(0.0128571)  # ("1,493", "0.01286")
+    """
+    if cell is None:
+        return "-"
+    if not isinstance(cell, float):
+        return f"{cell:,}" if isinstance(cell, int) and not isinstance(cell, bool) else str(cell)
+    return f"{cell:,.0f}" if 1e3 <= abs(cell) < 1e7 else f"{cell:.4g}"
 
 
 def picture_address(content: bytes, kind: str = "image/svg+xml") -> str:

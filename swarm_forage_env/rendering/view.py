@@ -165,7 +165,7 @@ def arena_view(scenario: ScenarioConfig, size_px: int = 900, theme: str = "dark"
 
 def legend_rows(scenario: ScenarioConfig, width: int, scale: float) -> list[list[tuple[str, float, float]]]:
     """Flow the legend into rows of (name, x, y of the middle below the arena) that fit `width` pixels."""
-    names = ["empty", "carrying", "in interference", "in repair", "object"]
+    names = ["empty", "carrying", "in interference", "in repair", "dead", "object"]
     if scenario.objects.placement != "power_law":
         names.append("source")
     names.append("nest")

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, get_type_hints
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
@@ -16,6 +16,13 @@ def field_sections() -> dict[str, str]:
     for section, section_class in SECTIONS.items():
         table.update({item.name: section for item in dataclasses.fields(section_class)})
     return table
+
+
+def field_types() -> dict[str, Any]:
+    """Return the type of every scenario field that can be set by name."""
+    hints = {section: get_type_hints(section_class) for section, section_class in SECTIONS.items()}
+    hints[""] = get_type_hints(ScenarioConfig)
+    return {name: hints[section][name] for name, section in field_sections().items()}
 
 
 def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:

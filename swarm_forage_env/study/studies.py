@@ -8,10 +8,10 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args, get_origin
 
 from swarm_forage_env._internal.fields import (
     ConfigError,
@@ -24,7 +24,7 @@ from swarm_forage_env._internal.fields import (
 )
 from swarm_forage_env.policies.mixture import SHARE, has_open_share
 from swarm_forage_env.policies.registry import policy_label
-from swarm_forage_env.scenarios.overrides import field_sections
+from swarm_forage_env.scenarios.overrides import field_sections, field_types
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import READINGS
 from swarm_forage_env.study.experiments import CRITERIA, UNDISTURBED, Experiment, swarms_of_sizes, wrappers_at
@@ -56,6 +56,8 @@ OF_THE_STUDY = {
     "quirks": "the readings of a study set them",
 }
 """Scenario fields that something else in a study decides, and what."""
+NOTHING = "none"
+"""On an axis of lists, the list without entries."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -70,7 +72,8 @@ class Axis:
     """A criterion (`experiments.CRITERIA`), a scenario field, a field of a wrapper ("sensor_noise.sigma",
     "throttle.waveform.amplitude"), or `SHARE`, which policies like "mixed:ppo=share,crw=rest" have."""
     values: tuple[Value, ...]
-    """Numbers, texts or truth values."""
+    """Numbers, texts or truth values. Of a field that holds a list, texts with its entries between commas
+    (`list_word`)."""
 
     def __post_init__(self) -> None:
         wrapper, dot, _ = self.name.partition(".")
@@ -86,6 +89,10 @@ class Axis:
             raise ConfigError(
                 f"Expected different numbers, texts or truth values on axis {self.name}, got {list(self.values)!r}."
             )
+        if self.name in _list_fields() and kinds != {"text"}:
+            raise ConfigError(
+                f"Expected lists on axis {self.name}, such as values = [[], [...]], got {list(self.values)!r}."
+            )
 
     @property
     def is_criterion(self) -> bool:
@@ -97,6 +104,29 @@ def _kind(value: Any) -> str:
     if isinstance(value, bool):
         return "truth value"
     return "number" if isinstance(value, int | float) else "text" if isinstance(value, str) else ""
+
+
+def list_word(entries: Sequence[Any]) -> str:
+    """Return a list as a place on an axis: ["nest_distance", "x"] is "nest_distance,x", [] is "none"."""
+    return ",".join(map(str, entries)) or NOTHING
+
+
+@cache
+def _list_fields() -> dict[str, type]:
+    """Scenario fields that hold a list -> the type of its entries."""
+    return {name: get_args(kind)[0] for name, kind in field_types().items() if get_origin(kind) is tuple}
+
+
+def _field_value(name: str, value: Value) -> Any:
+    """The value that a scenario takes for a place on the axis of a field."""
+    kind = _list_fields().get(name)
+    if kind is None:
+        return value
+    words = [] if value == NOTHING else [word.strip() for word in str(value).split(",")]
+    try:
+        return tuple(kind(word) for word in words)
+    except ValueError as error:
+        raise ConfigError(f"Expected lists of numbers on axis {name}, got {value!r}.") from error
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -352,7 +382,9 @@ class StudySpec:
         place = names.index(SIZE) if SIZE in names else None
         for values in product(*(axis.values for axis in self.axes if axis.name != SIZE)):
             here: dict[str, Any] = dict(zip((name for name in names if name != SIZE), values, strict=True))
-            overrides: dict[str, Any] = fixed | {name: value for name, value in here.items() if name in SCENARIO_FIELDS}
+            overrides: dict[str, Any] = fixed | {
+                name: _field_value(name, value) for name, value in here.items() if name in SCENARIO_FIELDS
+            }
             density = None if place is None else overrides.pop("density", None)
             world = scenario(self.scenario, quirks=READINGS[READING_NAMES[reading]], **overrides)
             if place is None:

@@ -38,7 +38,16 @@ from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixt
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.experiments import BUDGETS, CRITERIA, spread, study_values
-from swarm_forage_env.study.studies import SIZE, Axis, StudyPolicy, StudySpec, Value, plain_settings, study_policy
+from swarm_forage_env.study.studies import (
+    SIZE,
+    Axis,
+    StudyPolicy,
+    StudySpec,
+    Value,
+    list_word,
+    plain_settings,
+    study_policy,
+)
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
 SETS = Path(__file__).parent / "sets"
@@ -210,17 +219,23 @@ def _axes(
     for number, entry in enumerate(entries, 1):
         known_keys(entry, _AXIS_KEYS, "key of an axis")
         name = _axis_name(entry)
-        values = _listed(f"values of axis {name}", entry.get("values") or _of_paper(content, settings, name))
+        given = _listed(f"values of axis {name}", entry.get("values") or _of_paper(content, settings, name))
+        values = [_place(value) for value in given]
         is_last = number == len(entries)
         if "reference" in entry and not is_last:
             raise ConfigError(f"Expected a reference on the last axis only, got one on {name}.")
         if is_last:
-            reference = entry.get("reference", _usual_reference(name, values))
+            reference = _place(entry.get("reference", _usual_reference(name, values)))
             if reference is not None and reference not in values:
                 values = [reference, *values]
         axes.append(Axis(name=name, values=_chosen(name, values, reference if is_last else None, chosen.get(name))))
     known_keys(chosen, [axis.name for axis in axes], "axis", prefix="values.")
     return tuple(axes), reference
+
+
+def _place(value: Any) -> Any:
+    """A value of the file as a place on an axis: lists are texts there."""
+    return list_word(value) if isinstance(value, list) else value
 
 
 def _axis_name(entry: Mapping[str, Any]) -> str:
@@ -249,6 +264,7 @@ def _chosen(name: str, values: list[Value], reference: Value | None, asked: Any)
     if asked is None:
         return tuple(values)
     if isinstance(asked, list):
+        asked = [_place(value) for value in asked]
         several(f"values.{name}", tuple(asked), "values")
         unknown = [value for value in asked if value not in values]
         if unknown:

@@ -40,6 +40,8 @@ class SwarmState:
     """(N,) born and not dead: has a body."""
     active: BoolArray
     """(N,) present and not in repair: part of the tasked swarm. active implies present."""
+    dead: BoolArray
+    """(N,) was present and is no longer; `position` tells where it ended. Nothing but pictures reads it."""
 
     @classmethod
     def empty(cls, n_robots: int) -> "SwarmState":
@@ -57,6 +59,7 @@ class SwarmState:
             pending_until=np.zeros(n_robots, np.int32),
             present=np.ones(n_robots, np.bool_),
             active=np.ones(n_robots, np.bool_),
+            dead=np.zeros(n_robots, np.bool_),
         )
 
 

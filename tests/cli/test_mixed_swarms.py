@@ -25,7 +25,7 @@ def test_the_table_of_a_run_has_a_row_for_each_part(command):
 
 
 def test_films_and_information_take_mixed_swarms(command, tmp_path):
-    code, _, err = command("record", "--policy", MIXED, "--robots", "4", "--seconds", "8", "--size", "200")
+    code, _, err = command("record", "--policy", MIXED, "--robots", "4", "--seconds", "8", "--size", "300")
     assert (code, err) == (0, "")
     assert [file.suffix for file in (tmp_path / "results").iterdir()] == [".gif"]
     code, out, _ = command("info", MIXED)

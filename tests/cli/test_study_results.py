@@ -80,6 +80,11 @@ def test_figures_are_drawn_with_their_numbers(ran):
     assert {f"S1a_raw_performance_described{suffix}" for suffix in (".svg", ".png", ".csv")} <= names
     assert "S1a_raw_performance_described_sierra.svg" in names
     assert Path("figures/S1a_raw_performance_described.csv").read_text().startswith("reading,policy,population_size,")
+    pairs = Path("figures/S1a_raw_performance_described_pairs.csv").read_text()
+    assert pairs.startswith("reading,first,second,p_better,")
+    cells = Path("figures/S1a_cells.csv").read_text()
+    assert cells.startswith("reading,policy,population_size,n_runs,mean,lowest,highest,interquartile_mean,")
+    assert len(cells.splitlines()) == 1 + 8, "four policies of two sizes"
 
 
 def test_what_cannot_be_drawn_is_told(ran):

@@ -285,3 +285,40 @@ def test_kernels_check_every_index_where_numba_is_told_to(package, monkeypatch):
     monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
     reading = "import numpy as np; from controllers.beyond import beyond\ntry: beyond(np.zeros(3))"
     assert call(package, f"{reading}\nexcept IndexError: print('refused')") == "refused"
+
+
+SHARED = """
+from swarm_forage_env._internal.compiling import kernel
+
+@kernel
+def item(row: object, k: int) -> float:
+    return row[k]
+
+@kernel
+def first(row: object, k: int) -> float:
+    return item(row, 0) + item(row, 1) + item(row, k)
+
+@kernel
+def last(row: object, k: int) -> float:
+    return item(row, k)
+"""
+
+
+@pytest.mark.compiled
+def test_a_kernel_that_others_call_is_compiled_once_for_all_whole_numbers(package):
+    """Its code is kept, and a function of another process is made from it."""
+    (package / "shared.py").write_text(SHARED)
+    program = "import numpy as np; from controllers import shared; print(shared.{}(np.arange(3.0), np.int32(2)))"
+    assert call(package, program.format("first")) == "3.0"
+    assert call(package, program.format("last")) == "2.0"
+    kept = [file.name for file in package.parent.rglob("shared.item*.nbc")]
+    assert len(kept) == 1, kept
+
+
+@pytest.mark.compiled
+def test_a_fault_in_a_kernel_that_another_calls_reaches_python(package, monkeypatch):
+    (package / "shared.py").write_text(SHARED)
+    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
+    program = "import numpy as np; from controllers import shared\ntry: shared.last(np.zeros(3), 5)"
+    for _ in range(2):  # the second time from the cache
+        assert call(package, f"{program}\nexcept IndexError: print('refused')") == "refused"

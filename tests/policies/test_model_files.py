@@ -425,3 +425,9 @@ def test_a_local_name_holds_for_a_while():
 def test_a_local_name_does_not_hide_another_policy(name):
     with pytest.raises(ValueError, match="name of its own"), local_policy(name, list):
         pass
+
+
+@pytest.mark.parametrize("name", ["my_module.py", "my_module:StraightHome"])
+def test_a_policy_in_python_is_told_to_need_a_name(name):
+    with pytest.raises(ValueError, match="found by the name of an entry point"):
+        load_policy(name)

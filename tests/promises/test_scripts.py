@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from metrics.claims import CLAIMS, INTUITIONS
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import plan_run
@@ -93,6 +94,23 @@ def test_results_say_which_sets_and_cells_they_are_of(run):
     assert f"{len(pictures)} pictures" in out
     assert pictures
     assert "swarm-forage study run S1c --budget smoke --seeds 2 --reading both" in page
+    details = Path("page/results_in_detail.md").read_text(encoding="utf-8")
+    headings = re.findall(r"^### (\w+)$", details, flags=re.MULTILINE)
+    assert headings == [*CLAIMS, *INTUITIONS]
+    assert re.findall(r"\(results_in_detail\.md#(\w+)\)", page) == [name.lower() for name in CLAIMS]
+    (of_p2,) = re.findall(r"### P2\n\n(.+?)\n\n###", details, flags=re.DOTALL)
+    forms = [line.split(" | ")[:2] for line in of_p2.splitlines() if line.startswith(("| described", "| program"))]
+    assert forms == [["| described", "corrected"], ["| described", "sierra"]], "it is of one reading"
+    assert "Waits for runs of S1b" in details
+    assert f"| `S1c` | {len(whole.cells)} | 0 | 0 | - |" in page, "four intervals are too short for breakdowns"
+
+
+def test_sketches_of_theory_are_those_of_the_docs(run):
+    pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
+    assert run("draw_theory", ".")[0] == 0
+    for name in ("self_organisation.png", "task_graph.png"):
+        assert Path(name).read_bytes().startswith(b"\x89PNG")
+        assert (ROOT / "docs/images" / name).is_file()
 
 
 @pytest.mark.parametrize(

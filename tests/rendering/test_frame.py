@@ -188,6 +188,16 @@ def test_colours_tell_what_robots_do(world):
     assert world.pixel(picture, x, y, right_px=0.8 * world.view.robot_px) == pytest.approx(PALETTE.repair, abs=12)
 
 
+def test_a_cross_marks_where_a_robot_died_and_nothing_where_none_was_born(world):
+    swarm, (x, y) = world.swarm, world.swarm.position[0]
+    swarm.present[0] = swarm.active[0] = False
+    assert world.pixel(world.draw(), x, y) == PALETTE.floor
+    swarm.dead[0] = True
+    picture, arm_px = world.draw(), 0.6 * world.view.robot_px
+    assert world.pixel(picture, x, y, right_px=arm_px, down_px=arm_px) == pytest.approx(PALETTE.repair, abs=12)
+    assert np.linalg.norm(np.subtract(world.pixel(picture, x, y, right_px=arm_px), PALETTE.floor)) < 20
+
+
 def test_interference_is_a_ring_around_robots_at_work(world):
     x, y = world.swarm.position[0]
     ring_px = 1.55 * world.view.robot_px + 0.5
@@ -244,7 +254,7 @@ def test_the_legend_stays_inside_the_picture(width):
     config = scenario("warehouse_small", caches="dynamic")
     rows = legend_rows(config, width, width / 32.4)
     names = [name for row in rows for name, _, _ in row]
-    assert names == ["empty", "carrying", "in interference", "in repair", "object", "source", "nest", "cache"]
+    assert names == ["empty", "carrying", "in interference", "in repair", "dead", "object", "source", "nest", "cache"]
     font = view.text_font(view.text_height(width / 900))
     for row in rows:
         name, x, _ = row[-1]

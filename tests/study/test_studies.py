@@ -54,6 +54,27 @@ def test_the_reference_of_a_cell_differs_on_the_last_axis_only():
     assert replace(spec, reference=None).reference_of(cell) is None
 
 
+def test_fields_that_hold_lists_can_vary():
+    spec = study(Axis(name="nest_size_m", values=("3.2,12.8", "3.2,6.4")))
+    sizes = [spec.experiment(cell).scenario.arena.nest_size_m for cell in spec.cells]
+    assert sizes == [(3.2, 12.8), (3.2, 6.4)]
+    assert StudySpec.from_mapping(json.loads(spec.to_json())) == spec
+    spec = study(Axis(name="own_sensors", values=("none", "nest_distance,x")))
+    assert [spec.experiment(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance", "x")]
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "words"),
+    [
+        ("own_sensors", (1, 2), "Expected lists on axis own_sensors, such as"),
+        ("nest_size_m", ("3.2,wide",), "Expected lists of numbers on axis nest_size_m, got '3.2,wide'"),
+    ],
+)
+def test_what_is_no_list_is_refused_on_an_axis_of_lists(name, values, words):
+    with pytest.raises(ConfigError, match=words):
+        study(Axis(name=name, values=values))
+
+
 @pytest.mark.parametrize("criterion", ["population_size", "throttle", "noise", "population_dynamics", "handling_cost"])
 def test_the_runs_of_one_criterion_are_those_of_a_score(criterion):
     """One fact in one place: whoever scored a policy before finds its runs again."""

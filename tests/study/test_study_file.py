@@ -219,3 +219,16 @@ def test_no_file_is_opened_to_know_a_set_of_the_paper(monkeypatch, tmp_path):
     (tmp_path / "mine").write_text("whatever lies here")
     monkeypatch.setattr(study_file, "_read", lambda file: pytest.fail(f"{file} was opened"))
     assert not is_set_of_paper(mine)
+
+
+def test_an_axis_of_lists(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        'name = "mine"\nscenario = "warehouse_small"\npolicies = ["random"]\nreadings = ["described"]\n'
+        '[[axis]]\nfield = "own_sensors"\nvalues = [[], ["nest_distance"], ["nest_distance", "x"]]\nreference = []\n'
+        '[budget.few]\nseeds = 1\nvalues = { own_sensors = [["nest_distance"]] }\n'
+    )
+    spec = load_study(file)
+    assert spec.axes[0].values == ("none", "nest_distance")
+    assert spec.reference == "none"
+    assert [spec.experiment(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance",)]

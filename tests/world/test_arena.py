@@ -118,6 +118,19 @@ def test_the_dead_are_out_of_the_way():
     assert env.swarm.wheel_speed[1].tolist() == [0.0, 0.0]
 
 
+def test_a_robot_is_dead_from_when_it_leaves_until_it_comes_back():
+    env = tidy_world()
+    env.set_population(**population(env, gone=(0,)))
+    assert not env.swarm.dead.any()  # not born yet
+    act(env, {})
+    env.set_population(**population(env, gone=(0, 1)))
+    act(env, {})
+    env.set_population(**population(env, gone=(0, 1, 2)))
+    assert env.swarm.dead.tolist() == [False, True, True, False]
+    env.set_population(**population(env))
+    assert not env.swarm.dead.any()
+
+
 def test_a_robot_that_comes_drives_where_it_faces():
     env = tidy_world()
     env.set_population(**population(env, gone=(1,)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from metrics.scoring import study_panels
-from metrics.scoring.study_plots import draw_figure, draw_map, study_figures
+from metrics.scoring.study_plots import draw_figure, draw_map, limit_height, study_figures
 from metrics.statistics import aggregate
 from swarm_forage_env.study.studies import Axis
 from tests.support.made_tables import FOUR, made_study, made_table
@@ -113,3 +113,16 @@ def test_words_on_the_last_axis_and_studies_without_runs_have_no_figure():
     assert study_figures(study_panels(made_table(words, lambda cell: 1.0))) == ()
     spec = made_study()
     assert figures(lost={(cell, seed) for cell in spec.cells for seed in spec.seeds}) == ()
+
+
+def test_the_interval_of_two_runs_does_not_flatten_the_picture():
+    from matplotlib.figure import Figure
+
+    (figure,) = (one for one in figures(seeds=(0, 1)) if one.panels[0].measure == "raw_performance")
+    place = Figure().subplots()
+    place.set_ylim(-1e6, 1e6)
+    limit_height(place, figure)
+    runs = np.concatenate([scores.ravel() for scores in figure.panels[0].scores.values()])
+    bottom, top = place.get_ylim()
+    assert runs.min() - np.ptp(runs) < bottom < runs.min()
+    assert runs.max() < top < runs.max() + np.ptp(runs)

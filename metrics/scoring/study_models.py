@@ -1,0 +1,312 @@
+"""Models beside the runs of a study: laws and a mean field over swarm sizes, queues over time.
+
+Laws know all sizes of a line; the mean field knows one small swarm, the queue only the rates.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from metrics.checks import CurveError
+from metrics.curves import FloatArray
+from metrics.foraging_model import estimate_rates, mean_field
+from metrics.ladder import Ladder, fit_ladder
+from metrics.queues import PopulationComparison, compare_population
+from metrics.statistics import aggregate
+
+from .columns import SIZE
+from .studies import RunCurves
+from .study_tables import StudyLine, study_lines
+from .texts import number
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from swarm_forage_env.study.study_table import StudyTable
+
+DRAWN_LAWS = ("linear", "contention", "universal", "hamann")
+"""Laws that are drawn; the table has those of `metrics.fit_ladder`."""
+MEAN_FIELD = "mean field"
+LEAST_DELIVERED = 50.0
+"""Objects that the runs of the small swarm delivered together: enough for rates within 15 % (our choice)."""
+MIN_SIZES, MIN_RUNS = 4, 2
+"""What a ladder of laws takes at least."""
+_SEED = 1
+"""Fixed, so that the same runs give the same intervals."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curve:
+    """One line of a panel."""
+
+    name: str
+    x: FloatArray
+    """Rising, (K,)."""
+    y: FloatArray
+    lower: FloatArray | None = None
+    """Bounds of the 95 % interval of the mean, of what was seen."""
+    upper: FloatArray | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModelPanel:
+    """What was seen, and what models say of it."""
+
+    place: "Mapping[str, Any]"
+    """Policy, and the value on each axis but the last."""
+    words: str
+    """The same for people."""
+    seen: tuple[Curve, ...]
+    expected: tuple[Curve, ...]
+    facts: tuple[Mapping[str, Any], ...]
+    """Rows of the table beside the picture: parameters with intervals, or how far off a model is."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModelFigure:
+    """Panels of one kind of model under one reading."""
+
+    study: str
+    kind: str
+    """laws, or population."""
+    reading: str
+    title: str
+    x_label: str
+    y_label: str
+    is_log: bool
+    panels: tuple[ModelPanel, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of its files."""
+        return f"{self.study}_{self.kind}_{self.reading}"
+
+    def to_frame(self) -> "pl.DataFrame":
+        """Return the numbers behind the picture, one row per point of a curve."""
+        import polars as pl
+
+        rows: list[dict[str, Any]] = []
+        for panel in self.panels:
+            for what, curves in (("runs", panel.seen), ("model", panel.expected)):
+                for curve in curves:
+                    nothing = np.full(curve.x.shape, np.nan)
+                    low, high = (nothing if edge is None else edge for edge in (curve.lower, curve.upper))
+                    for x, y, lower, upper in zip(curve.x, curve.y, low, high, strict=True):
+                        where = {"reading": self.reading, **panel.place, "what": what, "curve": curve.name}
+                        rows.append(
+                            {**where, "x": float(x), "y": float(y), "lower": float(lower), "upper": float(upper)}
+                        )
+        return pl.DataFrame(rows, infer_schema_length=None).fill_nan(None)
+
+    def facts(self) -> "pl.DataFrame":
+        """Return the table beside the picture."""
+        import polars as pl
+
+        rows = [{"reading": self.reading, **panel.place, **row} for panel in self.panels for row in panel.facts]
+        return pl.DataFrame(rows, infer_schema_length=None).fill_nan(None)
+
+
+def model_figures(table: "StudyTable") -> tuple[ModelFigure, ...]:
+    """Return the figures of models of a study: laws where sizes vary, queues where the population does.
+
+    Args:
+        table: From `swarm_forage_env.read_study`.
+
+    Returns:
+        One figure per reading and kind; none for a study that varies neither, or without enough runs.
+    """
+    found: dict[tuple[str, str], list[ModelPanel]] = {}
+    lines = study_lines(table)
+    for line in lines:
+        panel = _law_panel(table, line)
+        if panel is not None:
+            found.setdefault(("laws", line.reading), []).append(panel)
+    for reading in table.spec.readings:
+        panels = _population_panels([line for line in lines if line.reading == reading])
+        if panels:
+            found["population", reading] = panels
+    amount = f"{lines[0].curves.amount} per robot in {table.spec.horizon_s:,.0f} s"
+    words = {
+        "laws": ("performance per robot beside laws", "robots", amount, True),
+        "population": ("robots at work beside the queue model", "time, s", "robots at work", False),
+    }
+    return tuple(
+        ModelFigure(
+            study=table.spec.name,
+            kind=kind,
+            reading=reading,
+            title=f"{table.spec.name}: {words[kind][0]}, reading {reading}",
+            x_label=words[kind][1],
+            y_label=words[kind][2],
+            is_log=words[kind][3],
+            panels=tuple(panels),
+        )
+        for (kind, reading), panels in found.items()
+    )
+
+
+def _place(line: StudyLine) -> dict[str, Any]:
+    return {**line.others, "policy": line.policy}
+
+
+def _words(line: StudyLine) -> str:
+    return ", ".join([*_axis_words(line), line.policy])
+
+
+def _axis_words(line: StudyLine) -> list[str]:
+    return [f"{name.replace('_', ' ')} {word}" for name, word in line.words.items()]
+
+
+def _law_panel(table: "StudyTable", line: StudyLine) -> ModelPanel | None:
+    """Deliveries per robot over the size, with laws fitted to all sizes, and the mean field of one small swarm."""
+    if not table.spec.axes or table.spec.axes[-1].name != SIZE or not line.curves.is_total:
+        return None
+    ladder_runs = [runs for runs in line.curves.sizes() if len(runs.seeds) >= MIN_RUNS]
+    if len(ladder_runs) < MIN_SIZES:
+        return None
+    sizes = [runs.n_robots for runs in ladder_runs]
+    totals = [runs.performance.sum(axis=-1) for runs in ladder_runs]
+    if not any(total.any() for total in totals):
+        return None
+    ladder = fit_ladder(sizes, totals, seed=_SEED)
+    n = np.array(sizes, dtype=np.float64)
+    at: FloatArray = np.exp2(np.linspace(math.log2(sizes[0]), math.log2(sizes[-1]), 8 * (len(sizes) - 1) + 1))
+    means = [aggregate(total) for total in totals]
+    seen = Curve(
+        name="runs",
+        x=n,
+        y=np.array([mean.mean for mean in means]) / n,
+        lower=np.array([mean.lower for mean in means]) / n,
+        upper=np.array([mean.upper for mean in means]) / n,
+    )
+    laws = [Curve(name=name, x=at, y=ladder.laws[name].law.performance(at) / at) for name in DRAWN_LAWS]
+    continued, knows = _mean_field(table, line, sizes)
+    return ModelPanel(
+        place=_place(line),
+        words=_words(line),
+        seen=(seen,),
+        expected=(*laws, *continued),
+        facts=(*_law_rows(ladder), *knows),
+    )
+
+
+def _law_rows(ladder: Ladder) -> Iterator[dict[str, Any]]:
+    """Yield parameters, critical size and class of scaling, each with its interval."""
+    for name, fit in ladder.laws.items():
+        for parameter, found in (*fit.parameters.items(), ("peak", fit.peak)):
+            if parameter != "peak" or math.isfinite(found.lower):
+                yield {
+                    "model": name,
+                    "parameter": parameter,
+                    "value": found.value,
+                    "lower": found.lower,
+                    "upper": found.upper,
+                    "error": fit.error,
+                }
+    b = ladder.exponent
+    yield {
+        "model": f"power, sizes up to {ladder.best_size}: {ladder.scaling}",
+        "parameter": "exponent",
+        "value": b.value,
+        "lower": b.lower,
+        "upper": b.upper,
+        "error": math.nan,
+    }
+
+
+def _mean_field(
+    table: "StudyTable", line: StudyLine, sizes: list[int]
+) -> tuple[tuple[Curve, ...], tuple[dict[str, Any], ...]]:
+    """What small swarms promise larger ones; nothing where the model does not hold: caches, or arenas that grow."""
+    worlds = [table.spec.specs_of(cell)[0].scenario for cell in line.cells]
+    arenas = {(world.arena.width_m, world.arena.height_m) for world in worlds}
+    if len(arenas) > 1 or any(world.caches != "none" for world in worlds) or 1 not in sizes:
+        return (), ()
+    found: dict[int, tuple[RunCurves, dict[str, FloatArray]]] = {}
+    columns = ("free_pickups", "collected", "n_carrying", "interference_fraction")
+    for cell, runs in zip(line.cells, line.curves.experiments, strict=True):
+        found[runs.n_robots] = (runs, table.curves(cell, *columns)[1])
+    small = next(
+        (
+            size
+            for size in sizes
+            if size > 1
+            and set(columns) <= found[size][1].keys()
+            and found[size][1]["collected"].sum() >= LEAST_DELIVERED
+        ),
+        None,
+    )
+    if small is None or "interference_fraction" not in found[1][1]:
+        return (), ()
+    mine, alone = found[small][1], found[1][1]["interference_fraction"]
+    try:
+        rates = estimate_rates(
+            small,
+            pickups=mine["free_pickups"],
+            deliveries=mine["collected"],
+            n_carrying=mine["n_carrying"],
+            interference=mine["interference_fraction"],
+            interval_s=table.spec.interval_s,
+            n_objects=worlds[0].objects.n_objects,
+            lone_interference=alone,
+        )
+    except CurveError:  # robots that never search, or always avoid: no rates
+        return (), ()
+    delivered = [float(mean_field(rates, size, table.spec.horizon_s).delivered[-1]) / size for size in sizes]
+    values = {
+        "finding": rates.finding,
+        "homing_s": rates.homing_s,
+        "encounters": rates.encounters,
+        "walls": rates.walls,
+    }
+    facts = [{"model": MEAN_FIELD, "parameter": name, "value": value} for name, value in values.items()]
+    facts.append({"model": MEAN_FIELD, "parameter": "robots that it knows", "value": float(small)})
+    curve = Curve(name=MEAN_FIELD, x=np.array(sizes, dtype=np.float64), y=np.array(delivered))
+    return (curve,), tuple(facts)
+
+
+def _population_panels(lines: Sequence[StudyLine]) -> list[ModelPanel]:
+    """Robots at work over time at each level of the population dynamics, beside the queue of its rates.
+
+    Policies with the same runs of the population, as they have with the same seeds, share a panel.
+    """
+    panels: dict[tuple[Any, ...], tuple[list[str], StudyLine, RunCurves, PopulationComparison]] = {}
+    for line in lines:
+        for runs in line.curves.experiments:
+            if runs.rates is None or not runs.seeds or "n_active" not in runs.curves:
+                continue
+            held = compare_population(runs.curves["n_active"], runs.rates, runs.n_robots, _ends(line))
+            key = (*line.others.values(), runs.value, held.observed.tobytes())
+            policies, *_ = panels.setdefault(key, ([], line, runs, held))
+            policies.append(line.policy)
+    return [_population_panel(*one) for one in panels.values()]
+
+
+def _ends(line: StudyLine) -> FloatArray:
+    assert line.curves.t_end_s is not None, "studies have a clock"
+    return line.curves.t_end_s
+
+
+def _population_panel(
+    policies: Sequence[str], line: StudyLine, runs: RunCurves, held: PopulationComparison
+) -> ModelPanel:
+    ends = _ends(line)
+    middle = ends - 0.5 * ends[0]
+    seen = Curve(name="runs", x=middle, y=held.observed, lower=held.lower, upper=held.upper)
+    facts = {
+        "observed": float(held.observed.mean()),
+        "predicted": float(held.predicted.mean()),
+        "rms_error": held.rms_error,
+        "share_inside": held.inside,
+        "n_runs": len(runs.seeds),
+    }
+    return ModelPanel(
+        place={**line.others, "level": runs.value, "policy": ", ".join(policies)},
+        words=", ".join([*_axis_words(line), f"level {number(runs.value)}", *policies]),
+        seen=(seen,),
+        expected=(Curve(name="queue", x=middle, y=held.predicted),),
+        facts=(facts,),
+    )

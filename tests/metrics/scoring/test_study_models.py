@@ -1,0 +1,110 @@
+"""Models beside the runs of a study: laws, the mean field, the queue."""
+
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import polars as pl
+import pytest
+
+from metrics.foraging_model import ForagingRates, mean_field
+from metrics.queues import PopulationRates, robots_at_work
+from metrics.scoring.model_plots import draw_models
+from metrics.scoring.study_models import MEAN_FIELD, model_figures
+from swarm_forage_env.study.studies import Axis, StudyPolicy
+from swarm_forage_env.study.study_table import StudyTable
+from tests.support.made_tables import made_study, made_table
+
+SIZES = (1, 2, 4, 8)
+ONE = (StudyPolicy(label="crw", policy="random"),)
+TWO = (*ONE, StudyPolicy(label="dpo", policy="random"))
+RATES = ForagingRates(finding=1e-4, homing_s=100.0, encounters=2e-4, walls=0.01, avoidance_s=1.0, n_objects=512.0)
+HORIZON_S, N_INTERVALS = 4000.0, 8
+
+
+def foraging_table(**settings):
+    """A study over sizes whose runs do what the mean field says."""
+    spec = made_study(
+        "mine",
+        Axis(name="population_size", values=SIZES),
+        policies=ONE,
+        settings=settings,
+        seeds=(0, 1),
+        horizon_s=HORIZON_S,
+        interval_s=HORIZON_S / N_INTERVALS,
+    )
+    rows = []
+    for number, cell in enumerate(spec.cells):
+        model = mean_field(RATES, cell.values[-1], HORIZON_S, n_points=80 * N_INTERVALS + 1)
+        carrying = model.carrying + model.avoiding_carrying
+        for seed in spec.seeds:
+            for interval in range(N_INTERVALS):
+                span = slice(80 * interval, 80 * (interval + 1) + 1)
+                delivered = model.delivered[span][-1] - model.delivered[span][0]
+                picked = delivered + carrying[span][-1] - carrying[span][0]
+                rows.append(
+                    {"cell": number, "seed": seed, "run_id": f"{number}_{seed}", "state": "done", "interval": interval}
+                    | {"performance": delivered, "collected": delivered, "free_pickups": picked}
+                    | {"n_carrying": carrying[span].mean(), "interference_fraction": model.interference[span].mean()}
+                    | {"n_active": float(cell.values[-1])}
+                )
+    return StudyTable(spec=spec, frame=pl.DataFrame(rows, infer_schema_length=None), versions=())
+
+
+@pytest.fixture(scope="module")
+def laws():
+    (figure,) = model_figures(foraging_table())
+    return figure
+
+
+def test_laws_and_the_mean_field_stand_beside_the_sizes(laws):
+    (panel,) = laws.panels
+    assert [curve.name for curve in panel.expected] == ["linear", "contention", "universal", "hamann", MEAN_FIELD]
+    runs, model = panel.seen[0], panel.expected[-1]
+    assert runs.x.tolist() == list(SIZES)
+    assert model.y == pytest.approx(runs.y, rel=0.05), "runs that follow the model are found again from two robots"
+    assert laws.name == "mine_laws_described"
+    assert laws.y_label == "objects per robot in 4,000 s"
+
+
+def test_facts_of_laws_have_intervals(laws):
+    facts = laws.facts()
+    slope = facts.filter(model="linear", parameter="a").row(0, named=True)
+    assert slope["lower"] <= slope["value"] <= slope["upper"]
+    assert facts.filter(parameter="exponent", model="power, sizes up to 8: sublinear").height == 1
+    known = facts.filter(model=MEAN_FIELD, parameter="robots that it knows")
+    assert known["value"].to_list() == [2.0]
+    assert set(laws.to_frame()["what"]) == {"runs", "model"}
+
+
+def test_models_are_drawn(laws, tmp_path):
+    files = [tmp_path / "laws.svg", tmp_path / "laws.png"]
+    draw_models(laws, files)
+    drawn = files[0].read_text()
+    assert ET.fromstring(drawn).tag.endswith("svg")
+    for word in ("<!-- hamann -->", "<!-- mean field -->", "<!-- robots -->", "dashed: models"):
+        assert word in drawn
+
+
+def test_worlds_with_caches_have_no_mean_field():
+    (figure,) = model_figures(foraging_table(caches="static"))
+    assert MEAN_FIELD not in {curve.name for curve in figure.panels[0].expected}
+
+
+def test_too_few_sizes_have_no_laws():
+    assert model_figures(made_table(made_study(), lambda cell: 5.0)) == ()
+
+
+def test_robots_at_work_stand_beside_the_queue():
+    spec = made_study(
+        "S1g", Axis(name="population_dynamics", values=(0.0, 1.0, 2.0)), policies=TWO, reference=0.0, seeds=(0, 1)
+    )
+    (figure,) = model_figures(made_table(spec, lambda cell: 5.0))
+    assert figure.name == "S1g_population_described"
+    assert [panel.words for panel in figure.panels] == ["level 1, crw, dpo", "level 2, crw, dpo"], "they share a panel"
+    cell = next(cell for cell in spec.cells if cell.values == (1.0,))
+    world, rates = spec.experiment(cell).scenario, spec.experiment(cell).population
+    per_s = PopulationRates(lambda_bd=rates.malfunction_per_tick / world.dt_s, mu_bd=rates.repair_per_tick / world.dt_s)
+    panel = figure.panels[0]
+    assert panel.expected[0].y == pytest.approx(robots_at_work(per_s, world.robots.n_robots, [10, 20, 30, 40]))
+    assert panel.seen[0].y == pytest.approx(np.full(4, 4.0))
+    assert figure.facts()["observed"].to_list() == [4.0, 4.0]
