@@ -47,6 +47,8 @@ class LiveRun:
         self._policy = policy
         policy.reset(self.forage_env.swarm_spec, stream_rng(seed, Stream.POLICY))
         self._obs = stack.reset_batch(seed)
+        if isinstance(stack, RunRecorder) and hasattr(policy, "part_rows"):
+            stack.divide(policy.part_rows)  # type: ignore[attr-defined] - optional, see Policy
         self._has_tasks = hasattr(policy, "task")
 
     @property
@@ -54,10 +56,12 @@ class LiveRun:
         """The policy for a run without Python between ticks; None where anybody might have a say there.
 
         That is a wrapper other than the recorder, a subclass, a method that was replaced, an own sensor that the policy
-        reads, or Chipmunk.
+        reads, a mixed swarm, or Chipmunk.
         """
         stack, env, policy = self._stack, self.forage_env, self._policy
         is_bare = type(stack) is RunRecorder and stack.env is env and type(env) is ForageEnv
+        if hasattr(policy, "part_rows"):  # parts are counted tick by tick
+            return None
         if not is_bare or env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
             return None
         if "after_step" in vars(stack) or "step_batch" in {*vars(stack), *vars(env)}:
