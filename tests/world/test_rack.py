@@ -42,8 +42,9 @@ class OneByOne(ArenaBatch):
 def ways(batch: ArenaBatch) -> tuple[bool, bool, bool, bool]:
     """Whether arenas are stepped together, booked together, paid and observed without Python."""
     rack, settlement = batch._chosen_ways()
-    together = settlement is not None
-    return rack is not None, together, together and settlement.pays, together and settlement.copies
+    if settlement is None:
+        return rack is not None, False, False, False
+    return rack is not None, True, settlement.pays, settlement.copies
 
 
 def drawn(ticks: int, n_arenas: int) -> np.ndarray:
@@ -80,7 +81,9 @@ def test_arenas_together_are_those_alone(wrappers, fields, chosen_ways):
     obs, _ = together.reset([4, 5, 6], [None] * 3)
     np.testing.assert_array_equal(obs, np.concatenate([one.reset([4 + k], [None])[0] for k, one in enumerate(alone)]))
     n_ended = 0
-    for actions in drawn(150, 3)[..., : together.interface.action_space.shape[0]]:
+    shape = together.interface.action_space.shape
+    assert shape is not None
+    for actions in drawn(150, 3)[..., : shape[0]]:
         step = together.step(actions)
         expected = joined([one.step(rows) for one, rows in zip(alone, np.split(actions, 3), strict=True)])
         for name in COLUMNS:
@@ -101,18 +104,23 @@ def test_one_arena_alone_takes_the_same_way():
 
 
 def test_the_arrays_of_a_snapshot_are_found():
-    batch, other = (each(plan(nest_progress=0.1), 2) for each in (ArenaBatch, OneByOne))
-    for each in (batch, other):
-        each.reset([0, 1], [None] * 2)
-    kept = None
-    for tick, actions in enumerate(drawn(30, 2)):
-        np.testing.assert_array_equal(batch.step(actions).rewards, other.step(actions).rewards)
-        if tick == 10:
-            kept = [each.arenas[1].snapshot() for each in (batch, other)]
-        if tick == 20:
-            for each, snapshot in zip((batch, other), kept, strict=True):
-                each.arenas[1].restore(snapshot)
-    np.testing.assert_array_equal(batch.step(actions).obs, other.step(actions).obs)
+    batches = [each(plan(nest_progress=0.1), 2) for each in (ArenaBatch, OneByOne)]
+    for batch in batches:
+        batch.reset([0, 1], [None] * 2)
+    actions = drawn(30, 2)
+    for now in actions[:10]:
+        for batch in batches:
+            batch.step(now)
+    kept = [batch.arenas[1].snapshot() for batch in batches]
+    for now in actions[10:20]:
+        for batch in batches:
+            batch.step(now)
+    for batch, snapshot in zip(batches, kept, strict=True):
+        batch.arenas[1].restore(snapshot)
+    for now in actions[20:]:
+        ours, theirs = (batch.step(now) for batch in batches)
+        np.testing.assert_array_equal(ours.obs, theirs.obs)
+        np.testing.assert_array_equal(ours.rewards, theirs.rewards)
 
 
 def arenas(n: int) -> list[ForagingArena]:
