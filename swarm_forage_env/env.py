@@ -184,6 +184,17 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """Ticks done since reset."""
         return self.arena.tick
 
+    @property
+    def terminated(self) -> BoolArray:
+        """(N,) robots that are dead for good; read only."""
+        return self._terminated
+
+    @property
+    def reward_model(self) -> RewardModel:
+        """What makes the rewards of this run; another object after a reset."""
+        self._require_reset()
+        return self._rewards
+
     def set_population(self, *, active: BoolArray, present: BoolArray, terminated: BoolArray | None = None) -> None:
         """Set which robots are at work and which are in the world; see `ForagingArena.set_population`.
 

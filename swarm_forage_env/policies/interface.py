@@ -91,6 +91,8 @@ class LearnerInterface:
     Attributes:
         config: The choices.
         layout: Columns of what the learner sees.
+        shows_all: Whether that is the row of the environment as it is.
+        passes_on: Whether actions are commands of the environment as they are.
         observation_space: Box of one robot's row, (d,) float32 in [-1, 1].
         action_space: Box or Discrete of one robot's action.
     """
@@ -126,6 +128,8 @@ class LearnerInterface:
         self._grips = np.array(list(GRIP_COMMANDS.values()), np.float32)
         self._commands = np.zeros((spec.n_robots, 3), np.float32)
         self.layout = learner_layout(source, config)
+        self.shows_all = self.layout == source
+        self.passes_on = not (self._is_discrete or config.automatic_gripper)
         own = [source[name] for name in config.sensors]
         self._own_columns = np.array([column for part in own for column in range(part.start, part.stop)], np.intp)
         self._n_built_in = self.layout.size - len(self._own_columns)

@@ -11,20 +11,20 @@ Row `a * N + i` is always robot i of arena a. The life of a row:
   `ArenaStep.is_episode` is false for them.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.kernels.rows import book_rows
 from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
+from swarm_forage_env.views.settlement import Settlement, can_settle
 from swarm_forage_env.world.arena import ForagingArena
+from swarm_forage_env.world.kernels.rows import book_rows
 from swarm_forage_env.world.rack import Rack, can_share_a_rack
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
@@ -159,8 +159,8 @@ class ArenaBatch:
         self._lengths = np.zeros((n_arenas, self.n_robots), np.int32)
         self._n_columns = self.interface.layout.size
         self._commands = np.zeros((n_arenas, self.n_robots, 3), np.float32)
-        self._racked: tuple[list[ForagingArena], Rack | None] | None = None
-        self._book: Callable[..., int] | None = None
+        self._rows = self._absent, self._present, self._returns, self._lengths
+        self._ways: tuple[list[ForagingArena], Rack | None, Settlement | None] | None = None
         self._no_endings = _Endings().joined(self._n_columns)
 
     def reset(
@@ -214,13 +214,17 @@ class ArenaBatch:
         shape, columns = (self.n_arenas, self.n_robots), self._n_columns
         obs = np.empty((*shape, columns), np.float32)
         rewards = np.zeros(shape, np.float32)
-        terminated, truncated, active = flags = np.zeros((3, *shape), np.bool_)
+        terminated, _, active = flags = np.zeros((3, *shape), np.bool_)
+        rack, settlement = self._chosen_ways()
+        actions = actions.reshape(*shape, *actions.shape[1:])
+        if rack is not None:
+            ticks = self._together(rack, settlement, actions, rewards)
+        else:
+            ticks = [self._alone(number, actions[number], rewards[number]) for number in range(self.n_arenas)]
+        n_terminated = self._book(settlement, ticks, rewards, (terminated, active), obs)
         endings: _Endings | None = None
-        ended = self._advance(actions.reshape(*shape, *actions.shape[1:]), rewards)
-        for number, (dead, all_dead, at_horizon) in enumerate(ended):
-            n_terminated = self._take_rows(number, dead, rewards[number], terminated[number], active[number])
-            self.arenas[number].observe(obs[number])
-            if n_terminated or all_dead or at_horizon:
+        for number, (dead, all_dead, at_horizon) in enumerate(ticks):
+            if n_terminated[number] or all_dead or at_horizon:
                 endings = endings or _Endings()
                 out = obs[number], *flags[:, number]
                 self._conclude(number, dead, all_dead or at_horizon, out, endings)
@@ -231,42 +235,71 @@ class ArenaBatch:
             obs=obs, rewards=rewards.ravel(), terminated=terminated, truncated=truncated, active=active, **ended
         )
 
-    def _take_rows(
-        self, number: int, dead: BoolArray, rewards: np.ndarray, terminated: BoolArray, active: BoolArray
-    ) -> int:
-        """Book a decision of one arena, see `book_rows`; returns how many rows terminate in it."""
-        swarm = self.arenas[number].forage_env.arena.swarm
-        absent, present = self._absent[number], self._present[number]
-        books = absent, present, self._returns[number], self._lengths[number], terminated, active
-        arguments = (dead, swarm.present, swarm.active, rewards, *books)
-        if self._book is None:
-            self._book = direct(book_rows, *arguments)
-        return self._book(*arguments)
-
-    def _advance(self, actions: np.ndarray, rewards: np.ndarray) -> list[tuple[BoolArray, bool, bool]]:
-        """Carry out a decision in every arena, together where they can be; see `LearnerArena.step`.
+    def _together(
+        self, rack: Rack, settlement: Settlement | None, actions: np.ndarray, rewards: np.ndarray
+    ) -> list[tuple[BoolArray, bool, bool]]:
+        """Carry out a decision in all arenas; returns what `LearnerArena.step` does, for each.
 
         Args:
+            rack: What steps them.
+            settlement: What works out their rewards, if it can.
             actions: (A, N) or (A, N, k).
             rewards: (A, N), to be added to.
         """
-        rack = self._rack()
-        if rack is None:
-            return [self._alone(number, actions[number], rewards[number]) for number in range(self.n_arenas)]
+        payer = settlement if settlement is not None and settlement.pays else None
         ticks: list[tuple[BoolArray, bool, bool]] = [(np.zeros(0, np.bool_), False, False)] * self.n_arenas
         going = list(range(self.n_arenas))
         for _ in range(self.interface.config.decision_ticks):
-            gains = {number: self._begin(number, actions[number]) for number in going}
+            if payer is not None and self.interface.passes_on and actions.shape == self._commands.shape:
+                np.copyto(self._commands, actions, casting="same_kind")
+                payer.remember(going)
+                gains: dict[int, FloatArray | None] = dict.fromkeys(going)
+            else:
+                gains = {number: self._begin(number, actions[number]) for number in going}
             for number, error in rack.step(gains, self._commands).items():
                 self._note(error, number)
                 raise error
+            if payer is not None:
+                payer.pay(going, rewards)
             for number in going:
                 arena = self.arenas[number]
-                ticks[number] = arena.take(arena.env.end_step(), rewards[number])
+                ticks[number] = arena.ending if payer else arena.take(arena.env.end_step(), rewards[number])
             going = [number for number in going if not any(ticks[number][1:])]
             if not going:
                 break
         return ticks
+
+    def _book(
+        self,
+        settlement: Settlement | None,
+        ticks: Sequence[tuple[BoolArray, bool, bool]],
+        rewards: np.ndarray,
+        flags: tuple[BoolArray, BoolArray],
+        obs: ObsArray,
+    ) -> list[int]:
+        """Book a decision of every arena, see `book_rows`, and write what learners see.
+
+        Args:
+            settlement: What does it for all at once, if there is something.
+            ticks: What the last tick of each arena has brought, see `LearnerArena.step`.
+            rewards: (A, N)
+            flags: terminated, active, each (A, N), are written.
+            obs: (A, N, d) is written.
+
+        Returns:
+            How many rows of each arena terminate.
+        """
+        if settlement is not None:
+            n_terminated = settlement.book(rewards, self._rows, flags, obs)
+        else:
+            n_terminated = [
+                book_rows(ticks[number][0], arena.forage_env.swarm.present, arena.forage_env.active, *rows)
+                for number, (arena, *rows) in enumerate(zip(self.arenas, rewards, *self._rows, *flags, strict=True))
+            ]
+        if settlement is None or not settlement.copies:
+            for arena, out in zip(self.arenas, obs, strict=True):
+                arena.observe(out)
+        return n_terminated
 
     def _begin(self, number: int, actions: np.ndarray) -> FloatArray | None:
         """Write the commands of an arena's next tick; returns the gains on the wheels' speeds, if there are any."""
@@ -292,13 +325,19 @@ class ArenaBatch:
             "stepped already; where there are others, reset before going on."
         )
 
-    def _rack(self) -> Rack | None:
-        """Return what steps all arenas together, None where they have to be stepped one by one."""
+    def _chosen_ways(self) -> tuple[Rack | None, Settlement | None]:
+        """Return what steps all arenas together and what settles a step of all together.
+
+        Either is None where arenas have to be taken one by one.
+        """
         worlds = [arena.forage_env.arena for arena in self.arenas]
-        if self._racked is None or worlds != self._racked[0]:  # by identity
-            together = len(worlds) > 1 and can_share_a_rack(worlds) and all(map(_steps_in_parts, self.arenas))
-            self._racked = worlds, Rack(worlds) if together else None
-        return self._racked[1]
+        if self._ways is None or worlds != self._ways[0]:  # by identity
+            in_parts = all(map(_steps_in_parts, self.arenas))
+            rack = Rack(worlds) if in_parts and can_share_a_rack(worlds) else None
+            self._ways = worlds, rack, Settlement(self.arenas) if in_parts and can_settle() else None
+        elif self._ways[2] is not None:
+            self._ways[2].follow()
+        return self._ways[1:]
 
     def _conclude(
         self,

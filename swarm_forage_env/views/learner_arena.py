@@ -182,6 +182,13 @@ class LearnerArena:
         rewards += reward
         return dead, bool(dead[0] and dead.all()), truncated
 
+    @property
+    def ending(self) -> tuple[BoolArray, bool, bool]:
+        """What `step` returns, after a tick of the environment itself."""
+        env = self.forage_env
+        dead = env.terminated
+        return dead, bool(dead[0] and dead.all()), env.arena.tick >= env.max_cycles
+
     def snapshot(self, *, agents: Sequence[str] = ()) -> LearnerSnapshot:
         """Return the state of the run and of the sequence of seeds; see `ForageEnv.snapshot`."""
         return LearnerSnapshot(

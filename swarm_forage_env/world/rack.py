@@ -54,6 +54,7 @@ class Rack:
         self._walks = np.zeros((n_seats, config.objects.n_objects if self._draws_walks else n_robots))
         self._outcomes = np.zeros(n_seats, np.int64)
         self._rows = self._gain, self._ticks, self._has_changed, self._picks, self._walks, self._outcomes
+        self._all_seats = np.arange(n_seats)
         self._step_each: Callable[..., None] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -77,15 +78,16 @@ class Rack:
             self._note_addresses()
         for seat, gain in gains.items():
             self._prepare(seat, gain)
-        seats = np.fromiter(gains, np.int64, len(gains))
+        seats = self._all_seats if len(gains) == len(self.arenas) else np.array(list(gains))
         arguments = (*self._places, seats, actions, *self._rows)
         if self._step_each is None:
             self._step_each = direct(whole_each, *arguments)
         self._step_each(*arguments)
         refused: dict[int, ActionError] = {}
+        outcomes = self._outcomes.tolist()
         for seat in gains:
             try:
-                self.arenas[seat].conclude(int(self._outcomes[seat]), actions[seat], self._gain[seat])
+                self.arenas[seat].conclude(outcomes[seat], actions[seat], self._gain[seat])
             except ActionError as error:
                 refused[seat] = error
         return refused

@@ -12,7 +12,7 @@ import numpy as np
 from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env.contract.own import OwnFunctionError, OwnReward, called, own_reward
 from swarm_forage_env.scenarios.config import RewardConfig
-from swarm_forage_env.world.kernels.reward import Happenings, Weights, rewards
+from swarm_forage_env.world.kernels.reward import Happenings, Payment, Weights, rewards
 from swarm_forage_env.world.state import StepEvents, SwarmState
 
 
@@ -68,6 +68,20 @@ class RewardModel:
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and snapshots are made of: everything but functions, which cannot all be stored."""
         return {name: value for name, value in vars(self).items() if name not in {"_rewards", "_own"}}
+
+    @property
+    def payment(self) -> Payment | None:
+        """What `kernels.reward.pay` does the work of `reward` with; None where it cannot: a user's function, `team`."""
+        if self._own_name or self._is_team:
+            return None
+        return Payment(
+            happenings=self._happenings,
+            happened=self._events.happened,
+            total=self._total,
+            reward=self._reward,
+            weights=self._weights,
+            is_dense=self._is_dense,
+        )
 
     def remember(self) -> None:
         """Keep the positions before a step, if a term needs them."""

@@ -123,8 +123,10 @@ TWINS = {
 
 IN_ORDER = "only calls others, each with its twin; whole runs are in tests/promises/test_golden_runs.py"
 
+ONE_BY_ONE = "compared with arenas that are taken one by one in tests/world/test_rack.py"
+
 WITHOUT = {
-    "swarm_forage_env.policies.kernels.rows.book_rows": "sums row by row; the lives of rows are told by hand in "
+    "swarm_forage_env.world.kernels.rows.book_rows": "sums row by row; the lives of rows are told by hand in "
     "tests/views/test_arenas.py",
     "swarm_forage_env.rendering.kernels.shapes.paint_share": "one product per colour; by hand in "
     "tests/rendering/test_paint.py",
@@ -133,6 +135,8 @@ WITHOUT = {
     "swarm_forage_env.world.kernels.bodies.tell_poses": "compared with `unpack_poses` in tests/world/test_bodies.py",
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "
     "tests/world/test_interactions_timing.py",
+    "swarm_forage_env.world.kernels.many.book_each": "`book_rows` for each world, and a copy; " + ONE_BY_ONE,
+    "swarm_forage_env.world.kernels.many.pay_each": "`rewards` for each world; " + ONE_BY_ONE,
     "swarm_forage_env.world.kernels.many.whole_each": "`tick.whole` for each world; compared with arenas that are "
     "stepped alone in tests/world/test_rack.py",
     "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",

@@ -8,6 +8,7 @@ import pytest
 
 from swarm_forage_env import scenario
 from swarm_forage_env.contract.policy import ActionError
+from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
 from swarm_forage_env.views.learner_arena import ArenaPlan, plan_arena
 from swarm_forage_env.world.arena import ForagingArena
@@ -21,13 +22,29 @@ ADVERSITY = (
     "population:malfunction_per_tick=0.02,repair_per_tick=0.03,death_per_tick=0.003",
     "throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=20",
 )
+DRIVEN = InterfaceConfig(observation="compact", automatic_gripper=True, decision_ticks=7)
 COLUMNS = ("obs", "rewards", "terminated", "truncated", "active", "ended", "final_obs", "returns", "lengths")
 
 
-def plan(*wrappers: str, **fields) -> ArenaPlan:
+def plan(*wrappers: str, interface: InterfaceConfig | None = None, **fields) -> ArenaPlan:
     """A small world, 60 ticks long, so that arenas end and begin anew."""
-    world = scenario("warehouse_small", **{"n_robots": N_ROBOTS, "n_objects": 60} | fields)
-    return plan_arena(world, {"physics": "compiled"}, wrappers=wrappers, max_cycles=60)
+    world = scenario("warehouse_small", **{"n_robots": N_ROBOTS, "n_objects": 60, "physics": "compiled"} | fields)
+    return plan_arena(world, {}, wrappers=wrappers, interface=interface, max_cycles=60)
+
+
+class OneByOne(ArenaBatch):
+    """Arenas that are never taken together: what they do is what the others have to do."""
+
+    def _chosen_ways(self) -> tuple[None, None]:
+        return None, None
+
+
+def ways(batch: ArenaBatch) -> tuple[bool, bool, bool, bool]:
+    """Whether arenas are stepped together, booked together, paid and observed without Python."""
+    rack, settlement = batch._chosen_ways()
+    if settlement is None:
+        return rack is not None, False, False, False
+    return rack is not None, True, settlement.pays, settlement.copies
 
 
 def drawn(ticks: int, n_arenas: int) -> np.ndarray:
@@ -45,25 +62,65 @@ def joined(steps: list[ArenaStep]) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("wrappers", "fields"),
-    [((), {}), (ADVERSITY, {}), ((), {"caches": "dynamic"}), ((), {"walk_probability": 0.02, "caches": "static"})],
-    ids=["bare", "wrapped", "dynamic caches", "static caches and walking objects"],
+    ("wrappers", "fields", "chosen_ways"),
+    [
+        ((), {}, (True, True, True, True)),
+        (ADVERSITY, {}, (True, True, False, False)),
+        ((), {"caches": "dynamic"}, (True, True, True, True)),
+        ((), {"walk_probability": 0.02, "caches": "static"}, (True, True, True, True)),
+        ((), {"nest_progress": 0.1, "interference": -0.1, "tick": -0.01}, (True, True, True, True)),
+        ((), {"nest_progress": 0.1, "team": True}, (True, True, False, True)),
+        ((), {"interface": DRIVEN, "first_pickup": 1.0}, (True, True, True, False)),
+        ((), {"physics": "chipmunk"}, (False, True, True, True)),
+    ],
+    ids=["bare", "wrapped", "dynamic caches", "walking objects", "rewards", "a team", "an interface", "Chipmunk"],
 )
-def test_arenas_together_are_those_alone(wrappers, fields):
+def test_arenas_together_are_those_alone(wrappers, fields, chosen_ways):
     chosen = plan(*wrappers, **fields)
-    together, alone = ArenaBatch(chosen, 3), [ArenaBatch(chosen, 1) for _ in range(3)]
+    together, alone = ArenaBatch(chosen, 3), [OneByOne(chosen, 1) for _ in range(3)]
     obs, _ = together.reset([4, 5, 6], [None] * 3)
     np.testing.assert_array_equal(obs, np.concatenate([one.reset([4 + k], [None])[0] for k, one in enumerate(alone)]))
     n_ended = 0
-    for actions in drawn(150, 3):
+    shape = together.interface.action_space.shape
+    assert shape is not None
+    for actions in drawn(150, 3)[..., : shape[0]]:
         step = together.step(actions)
         expected = joined([one.step(rows) for one, rows in zip(alone, np.split(actions, 3), strict=True)])
         for name in COLUMNS:
             np.testing.assert_array_equal(getattr(step, name), expected[name], err_msg=name)
         n_ended += len(step.outcomes)
-    assert together._rack() is not None
-    assert all(one._rack() is None for one in alone)
+    assert ways(together) == chosen_ways
     assert n_ended >= 6
+
+
+def test_one_arena_alone_takes_the_same_way():
+    batch, other = ArenaBatch(plan(nest_progress=0.1), 1), OneByOne(plan(nest_progress=0.1), 1)
+    np.testing.assert_array_equal(batch.reset([3], [None])[0], other.reset([3], [None])[0])
+    for actions in drawn(70, 1):
+        ours, theirs = batch.step(actions), other.step(actions)
+        for name in COLUMNS:
+            np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), err_msg=name)
+    assert ways(batch) == (True,) * 4
+
+
+def test_the_arrays_of_a_snapshot_are_found():
+    batches = [each(plan(nest_progress=0.1), 2) for each in (ArenaBatch, OneByOne)]
+    for batch in batches:
+        batch.reset([0, 1], [None] * 2)
+    actions = drawn(30, 2)
+    for now in actions[:10]:
+        for batch in batches:
+            batch.step(now)
+    kept = [batch.arenas[1].snapshot() for batch in batches]
+    for now in actions[10:20]:
+        for batch in batches:
+            batch.step(now)
+    for batch, snapshot in zip(batches, kept, strict=True):
+        batch.arenas[1].restore(snapshot)
+    for now in actions[20:]:
+        ours, theirs = (batch.step(now) for batch in batches)
+        np.testing.assert_array_equal(ours.obs, theirs.obs)
+        np.testing.assert_array_equal(ours.rewards, theirs.rewards)
 
 
 def arenas(n: int) -> list[ForagingArena]:
@@ -176,7 +233,7 @@ def test_who_may_share_a_rack():
 def test_a_stack_whose_step_was_replaced_is_stepped_by_it(monkeypatch):
     batch = ArenaBatch(plan("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=20"), 2)
     batch.reset([0, 1], [None] * 2)
-    assert batch._rack() is not None
+    assert ways(batch)[0]
     calls = []
     original = Throttle.step_batch
 
@@ -187,6 +244,7 @@ def test_a_stack_whose_step_was_replaced_is_stepped_by_it(monkeypatch):
     monkeypatch.setattr(Throttle, "step_batch", counted)
     other = ArenaBatch(plan("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=20"), 2)
     other.reset([0, 1], [None] * 2)
+    assert ways(other) == (False,) * 4
     now = drawn(1, 2)[0]
     np.testing.assert_array_equal(other.step(now).obs, batch.step(now).obs)
     assert len(calls) == 2

@@ -11,9 +11,11 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.types import ActionArray, FloatArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.interact import InteractionState
+from swarm_forage_env.world.kernels.reward import Happenings, Payment, pay
+from swarm_forage_env.world.kernels.rows import Robots, book_rows
 from swarm_forage_env.world.kernels.tick import whole
 from swarm_forage_env.world.kernels.world import Sensors, World
 
@@ -191,3 +193,90 @@ def whole_each(
             chance[b],
             walk_chance[b],
         )
+
+
+@kernel
+def payment_at(p: Payment, at: np.ndarray) -> Payment:
+    """Payment like `p` whose arrays are `at` (11,) these addresses."""
+    h = p.happenings
+    return Payment(
+        Happenings(
+            array_at(h.code, at[0]),
+            array_at(h.first_picked, at[1]),
+            array_at(h.interfering, at[2]),
+            array_at(h.carried_object, at[3]),
+            array_at(h.active, at[4]),
+            array_at(h.position, at[5]),
+            array_at(h.previous_position, at[6]),
+            array_at(h.nest_centre_m, at[7]),
+        ),
+        array_at(p.happened, at[8]),
+        array_at(p.total, at[9]),
+        array_at(p.reward, at[10]),
+        p.weights,
+        p.is_dense,
+    )
+
+
+@kernel
+def pay_each(p: Payment, payments_at: np.ndarray, seats: np.ndarray, paid: ObsArray) -> None:
+    """Add the rewards of a tick, world by world, as `reward.pay` does.
+
+    Args:
+        p: Any of the payments: gives types, shapes and weights.
+        payments_at: (B, 11) addresses of the arrays of each.
+        seats: Which of the B worlds were stepped.
+        paid: (B, N) float32.
+    """
+    for seat in range(seats.shape[0]):
+        b = seats[seat]
+        pay(payment_at(p, payments_at[b]), paid[b])
+
+
+@kernel
+def book_each(
+    robots: Robots,
+    robots_at: np.ndarray,
+    reward: ObsArray,
+    absent: BoolArray,
+    present: BoolArray,
+    returns: FloatArray,
+    lengths: IntArray,
+    terminated: BoolArray,
+    active: BoolArray,
+    n_terminated: np.ndarray,
+    obs: ObsArray,
+) -> None:
+    """Book a step of learners, world by world, as `rows.book_rows` does, and copy the observations.
+
+    Args:
+        robots: Those of any of the worlds: gives types and shapes.
+        robots_at: (B, 4) addresses of the arrays of each.
+        reward: (B, N), and all others as in `book_rows` with one more dimension in front.
+        absent: (B, N).
+        present: (B, N).
+        returns: (B, N).
+        lengths: (B, N).
+        terminated: (B, N).
+        active: (B, N).
+        n_terminated: (B,) is written: how many rows of each world terminate.
+        obs: (B, N, D) is written, or (0, N, D) where nobody wants it.
+    """
+    for b in range(robots_at.shape[0]):
+        n_terminated[b] = book_rows(
+            array_at(robots.dead, robots_at[b, 0]),
+            array_at(robots.is_present, robots_at[b, 1]),
+            array_at(robots.is_active, robots_at[b, 2]),
+            reward[b],
+            absent[b],
+            present[b],
+            returns[b],
+            lengths[b],
+            terminated[b],
+            active[b],
+        )
+        if obs.shape[0] > 0:
+            seen = array_at(robots.obs, robots_at[b, 3])
+            for i in range(seen.shape[0]):
+                for k in range(seen.shape[1]):
+                    obs[b, i, k] = seen[i, k]

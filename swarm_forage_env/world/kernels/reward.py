@@ -37,6 +37,21 @@ class Happenings(NamedTuple):
     """(2,)."""
 
 
+class Payment(NamedTuple):
+    """Everything that the rewards of a tick are made of, where no function of Python adds to them."""
+
+    happenings: Happenings
+    happened: BoolArray
+    """(1,) see `world.state.StepEvents`."""
+    total: FloatArray
+    """(N,) the rewards of the tick."""
+    reward: ObsArray
+    """(N,) the same, rounded to float32."""
+    weights: Weights
+    is_dense: bool
+    """Whether there may be a reward in a tick in which nothing happened."""
+
+
 @kernel
 def delivered(h: Happenings, i: int) -> float:
     """1 for a robot that delivered an object to the nest in this tick."""
@@ -82,3 +97,14 @@ def rewards(h: Happenings, weights: Weights, total: FloatArray, reward: ObsArray
         value += weights.tick
         total[i] = value if h.active[i] else 0.0
         reward[i] = total[i]
+
+
+@kernel
+def pay(p: Payment, paid: ObsArray) -> None:
+    """Work out the rewards of a tick and add them to `paid` (N,) float32."""
+    if p.happened[0] or p.is_dense:
+        rewards(p.happenings, p.weights, p.total, p.reward)
+    else:
+        p.reward[:] = 0.0
+    for i in range(paid.shape[0]):
+        paid[i] += p.reward[i]

@@ -1,7 +1,22 @@
 """The rows of a batch of robots, for learners: what a step adds to the episode of each."""
 
+from typing import NamedTuple
+
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+
+
+class Robots(NamedTuple):
+    """The robots of an arena as they are after a step."""
+
+    dead: BoolArray
+    """(N,)"""
+    is_present: BoolArray
+    """(N,) in the world."""
+    is_active: BoolArray
+    """(N,) at work."""
+    obs: ObsArray
+    """(N, D)"""
 
 
 @kernel
