@@ -345,7 +345,9 @@ def _warm_up_workers(pool: Executor, specs: Iterable[RunSpec]) -> bool:
     that is killed, too: False is returned, the pool is broken, and in the next one only runs that kill again fail.
     """
     kinds = tuple({_kernel_kind(spec): spec for spec in specs}.values())
-    return _compiled_together(pool, kinds[0]) and not any(_is_broken_by(pool.submit(warm_up, spec)) for spec in kinds)
+    if not all(_compiled_together(pool, spec) for spec in kinds[:1]):  # what is left of other kinds is their policy
+        return False
+    return not any(_is_broken_by(pool.submit(warm_up, spec)) for spec in kinds)
 
 
 def _compiled_together(pool: Executor, spec: RunSpec) -> bool:
