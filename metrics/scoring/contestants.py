@@ -82,12 +82,12 @@ def _contestant(
     policy: PolicyLike, name: str | None, parameters: Mapping[str, Any], scenario: "ScenarioConfig", asked: str | None
 ) -> Contestant:
     """Find out what was given as a policy."""
-    from swarm_forage_env.policies.registry import from_callable, is_policy_file
+    from swarm_forage_env.policies.registry import from_callable, policy_label
     from swarm_forage_env.study.spec import chosen_caches, pin_policy
 
     if isinstance(policy, (str, Path)):
         found, pinned, stating = pin_policy(policy, parameters)
-        label = name or (Path(policy).stem if is_policy_file(found) else found)
+        label = name or policy_label(found)
         return Contestant(label=label, policy=found, parameters=pinned, caches=chosen_caches(asked, stating, scenario))
     if not callable(policy) and not _is_policy(policy):
         raise TypeError(

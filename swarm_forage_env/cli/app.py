@@ -15,6 +15,7 @@ from swarm_forage_env.cli.availability import availability
 from swarm_forage_env.cli.choose import choose
 from swarm_forage_env.cli.compare import compare
 from swarm_forage_env.cli.curves import curves
+from swarm_forage_env.cli.dataset import dataset
 from swarm_forage_env.cli.ending import end
 from swarm_forage_env.cli.maps import maps
 from swarm_forage_env.cli.options import EXIT_INTERRUPTED, EXIT_TERMINATED, complain
@@ -68,7 +69,7 @@ def _options(
 
 
 # `--help` lists them in this order.
-for command in (run, score, compare, predict, choose, train, curves):
+for command in (run, score, compare, predict, choose, train, curves, dataset):
     app.command()(command)
 app.add_typer(study, name="study")
 app.command("list")(list_everything)

@@ -13,6 +13,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.registry import is_policy_file, policy_class, policy_names, split_interface
@@ -39,6 +40,8 @@ def overview() -> tuple[Table, Table]:
 def information(name: str) -> str:
     """Return everything about a scenario (by name or environment id) or a policy (by name or file) as text.
 
+    Of a mixed swarm that is everything about the policies in it.
+
     Raises:
         ConfigError: neither a scenario nor a policy has that name, or the file holds none.
     """
@@ -50,6 +53,8 @@ def information(name: str) -> str:
         return "\n".join([*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])])
     if is_policy_file(name):
         return "\n".join(_file_lines(Path(split_interface(name)[0])))
+    if is_mixture(name):
+        return "\n\n".join(information(part.policy) for part in mixture_parts(name))
     known = (*presets.SCENARIO_NAMES, *policy_names())
     raise ConfigError(f"Unknown scenario or policy {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
 

@@ -24,15 +24,17 @@ def record(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
 ) -> None:
     """Film a run."""
+    from swarm_forage_env._internal.files import as_file_name
     from swarm_forage_env.cli.scenario_options import described_world
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
+    from swarm_forage_env.policies.registry import policy_label
     from swarm_forage_env.rendering.view import RenderError
     from swarm_forage_env.study.film import record_run
 
     world, asked_caches, disturbances = described_world(described)
     _refuse_unknown(policy)
-    film = out or Path("results", f"{described.scenario}_{Path(policy).stem}.gif")
+    film = out or Path("results", f"{described.scenario}_{as_file_name(policy_label(policy))}.gif")
     try:
         with progress_bar("pictures") as progress:
             written = record_run(

@@ -163,4 +163,7 @@ def _refusing_policies() -> Iterator[None]:
 
 
 def _default_file(spec: "RunSpec") -> Path:
-    return RESULTS / f"{spec.scenario.name}_{Path(spec.policy).stem}.html"
+    from swarm_forage_env._internal.files import as_file_name
+    from swarm_forage_env.policies.registry import policy_label
+
+    return RESULTS / f"{spec.scenario.name}_{as_file_name(policy_label(spec.policy))}.html"

@@ -12,8 +12,10 @@ from rich.table import Table
 
 from metrics.scoring.texts import counted
 from metrics.statistics import aggregate
+from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts, part_sizes
+from swarm_forage_env.policies.registry import part_labels
 from swarm_forage_env.rendering.plots import Curve, draw_curves
-from swarm_forage_env.scenarios.performance import Quantity, quantity
+from swarm_forage_env.scenarios.performance import Quantity, part_column, performance_curve, quantity
 from swarm_forage_env.study.progress import duration
 from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.runner import StudyResult
@@ -41,6 +43,19 @@ class Estimate:
 
 
 @dataclass(frozen=True, slots=True)
+class PartSummary:
+    """What one part of a mixed swarm does."""
+
+    policy: str
+    n_robots: int
+    deliveries_per_1000_s: Estimate
+    deliveries_per_robot_per_1000_s: Estimate
+    """Per robot of the part that is present."""
+    first_pickups_per_1000_s: Estimate
+    interference_fraction: float
+
+
+@dataclass(frozen=True, slots=True)
 class ControllerSummary:
     """One row of the table."""
 
@@ -50,10 +65,14 @@ class ControllerSummary:
     performance: Estimate
     """Of what the scenario names: per 1,000 s for totals, else the mean over intervals."""
     deliveries_per_1000_s: Estimate
+    deliveries_per_robot_per_1000_s: Estimate
+    """Per robot that is present."""
     first_pickups_per_1000_s: Estimate
     interference_fraction: float
     simulated_s_per_wall_s: float
     """Simulated seconds per second and process, policy and recording included."""
+    parts: tuple[PartSummary, ...] = ()
+    """Of a mixed swarm, in order."""
 
 
 def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[ControllerSummary, ...]:
@@ -72,11 +91,47 @@ def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[C
                     n_runs=len(own),
                     performance=_estimate([performance_number(record, read_as) for record in own]),
                     deliveries_per_1000_s=_estimate([record.rate_per_1000_s("collected") for record in own]),
+                    deliveries_per_robot_per_1000_s=_per_robot(own),
                     first_pickups_per_1000_s=_estimate([record.rate_per_1000_s("first_picked") for record in own]),
                     interference_fraction=float(np.mean([record.interference_fraction.mean() for record in own])),
                     simulated_s_per_wall_s=sum(record.horizon_s for record in own) / wall_s if wall_s else math.nan,
+                    parts=_parts(next(spec for spec in specs if spec.policy == controller), own),
                 )
             )
+    return tuple(summaries)
+
+
+def _per_robot(records: Sequence[RunRecord]) -> Estimate:
+    shares = [
+        np.divide(record.collected, record.n_present, out=np.zeros(record.n_intervals), where=record.n_present > 0.0)
+        for record in records
+    ]
+    return _estimate([float(each.sum()) * 1000.0 / one.horizon_s for each, one in zip(shares, records, strict=True)])
+
+
+def _parts(spec: RunSpec, records: Sequence[RunRecord]) -> tuple[PartSummary, ...]:
+    """Return what each part of a mixed swarm has done, nothing of another swarm."""
+    if not is_mixture(spec.policy):
+        return ()
+    sizes = part_sizes(spec.policy, spec.scenario.robots.n_robots, spec.parameters.get("share"))
+    summaries: list[PartSummary] = []
+    for number, (label, size) in enumerate(zip(part_labels(spec.policy), sizes, strict=True), start=1):
+
+        def rate(name: str, part: int = number) -> Estimate:
+            totals = [float(performance_curve(part_column(part, name), one.columns()).sum()) for one in records]
+            return _estimate([total * 1000.0 / one.horizon_s for total, one in zip(totals, records, strict=True)])
+
+        fractions = [performance_curve(part_column(number, "interference_fraction"), one.columns()) for one in records]
+        summaries.append(
+            PartSummary(
+                policy=label,
+                n_robots=size,
+                deliveries_per_1000_s=rate("collected"),
+                deliveries_per_robot_per_1000_s=rate("collected_per_robot"),
+                first_pickups_per_1000_s=rate("first_picked"),
+                interference_fraction=float(np.mean(fractions)),
+            )
+        )
     return tuple(summaries)
 
 
@@ -96,17 +151,26 @@ def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummar
     for name in ("controller", "caches"):
         table.add_column(name)
     numbers = ["runs", *([f"{other.title}\n{span(other)}"] if other else []), "deliveries\nper 1,000 s"]
+    any_is_mixed = any(row.parts for row in summaries)
+    numbers += ["per robot"] if any_is_mixed else []
     for name in (*numbers, "interference", "simulated s\nper wall s"):
         table.add_column(name, justify="right")
     for row in summaries:
         rates = [*([str(row.performance)] if other else []), str(row.deliveries_per_1000_s)]
+        rates += [str(row.deliveries_per_robot_per_1000_s)] if any_is_mixed else []
         tail = [f"{row.interference_fraction:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
         table.add_row(shown(row.controller), row.caches, str(row.n_runs), *rates, *tail)
+        for part in row.parts:
+            name = f"  of which {part.policy} ({counted(part.n_robots, 'robot')})"
+            rates = [str(part.deliveries_per_1000_s), str(part.deliveries_per_robot_per_1000_s)]
+            table.add_row(name, "", "", *([""] if other else []), *rates, f"{part.interference_fraction:.3f}", "")
     return table
 
 
 def shown(policy: str) -> str:
     """Return the name of a policy for people; a file below the current folder is shown relative to it."""
+    if is_mixture(policy):
+        return mixture_of([Part(shown(part.policy), part.amount) for part in mixture_parts(policy)])
     path = Path(policy)
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else policy
 
@@ -227,6 +291,6 @@ def _without_nan(value: Any) -> Any:
     """Replace NaN, which JSON does not have, by None."""
     if isinstance(value, dict):
         return {key: _without_nan(item) for key, item in value.items()}
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return [_without_nan(item) for item in value]
     return None if isinstance(value, float) and math.isnan(value) else value

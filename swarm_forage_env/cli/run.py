@@ -24,7 +24,7 @@ def run(
             "--policy",
             "--controller",
             help="One or more, separated by commas: names, or files of trained policies. A file that does not tell its "
-            "interface can be told it: model.zip:decision_ticks=5.",
+            "interface can be told it: model.zip:decision_ticks=5. mixed:dpo=10,crw=rest lets several drive one swarm.",
         ),
     ] = "crw",
     seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,

@@ -166,7 +166,8 @@ class Policy(Protocol):
 
     Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
     doing, for people (`study.stuck` shows it); `describe_robots() -> RobotStates`, the same of all robots as arrays
-    (`study.replay` keeps it); `compiled() -> CompiledPolicy | None`, for runs without Python
+    (`study.replay` keeps it); `part_rows`, slices of rows that the record tells apart, set by `reset` (of mixed
+    swarms, whose runs are counted tick by tick); `compiled() -> CompiledPolicy | None`, for runs without Python
     between ticks; the class attributes `caches` ("none", "static", "dynamic": those that
     the policy is made for) and `reads` (names of the slices it looks at; default all;
     "light if carrying" = light only of robots that carry).

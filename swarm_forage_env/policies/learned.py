@@ -70,6 +70,11 @@ class LearnedPolicy:
         self._ticks_left = 0
         self._memory: Any = None
 
+    @property
+    def chosen(self) -> np.ndarray:
+        """Actions of the last decision as the controller gave them, one row per robot; see `LearnerInterface`."""
+        return self._chosen
+
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
         if self._ticks_left == 0:

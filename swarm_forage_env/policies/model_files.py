@@ -200,6 +200,8 @@ class ModelOutside:
 
     caches: str | None
     """Kind of caches that its note states; None without a note."""
+    interface: InterfaceConfig | None = None
+    """What it saw and did in training, from its note and what is said with it; None for files of other packages."""
 
 
 def look_at_file(path: str | Path, *, digest: str | None = None, **parameters: Any) -> ModelOutside:
@@ -243,8 +245,7 @@ def look_at_model(path: str | Path, *, interface: GivenInterface = None) -> Mode
         raise ModelError(f"Expected {path} to be a model saved by stable-baselines3: {reason}.") from error
     note = about.get(MODEL_NOTE)
     noted, caches = (None, None) if note is None else _read_note(note, file)
-    chosen_interface(interface, noted)
-    return ModelOutside(caches=caches)
+    return ModelOutside(caches=caches, interface=chosen_interface(interface, noted))
 
 
 def file_digest(path: str | Path) -> str:

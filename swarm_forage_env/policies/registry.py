@@ -15,6 +15,7 @@ from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import Policy, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies import trust
+from swarm_forage_env.policies.mixture import Part, different_labels, is_mixture, mixture_of, mixture_parts
 
 POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
 """Entry-point group under which installed packages offer policies by name."""
@@ -124,6 +125,19 @@ def named_interface(policy: str, parameters: Mapping[str, Any]) -> tuple[str, di
     return file, {**parameters, "interface": interface}
 
 
+def policy_label(policy: str) -> str:
+    """Return the name of a policy for people: of a file its name without folder and ending."""
+    if is_mixture(policy):
+        parts = mixture_parts(policy)
+        return mixture_of([Part(policy_label(part.policy), part.amount) for part in parts])
+    return PurePath(policy).stem if is_policy_file(policy) else policy
+
+
+def part_labels(policy: str) -> tuple[str, ...]:
+    """Return the names of the parts of a mixed swarm for people, all different."""
+    return different_labels([policy_label(part.policy) for part in mixture_parts(policy)])
+
+
 def file_of(policy: str) -> str:
     """Return a policy without the words that may stand behind its file; see `split_interface`. They are not read."""
     found = _FILE_WITH_WORDS.fullmatch(policy)
@@ -152,6 +166,8 @@ def policy_class(name: str) -> Callable[..., Policy]:
     """
     if name in _LOCAL_POLICIES:
         return _LOCAL_POLICIES[name]
+    if is_mixture(name):
+        return _mixed(name)
     file, _ = split_interface(name)
     for opener in _openers(file):
         trust.check(file)
@@ -165,6 +181,14 @@ def policy_class(name: str) -> Callable[..., Policy]:
         f"Unknown policy {name!r}.{suggestion(name, known)} Installed policies: {', '.join(known) or 'none'}."
         + (" A policy in Python is found by the name of an entry point, see docs/studies.md." if needs_name else "")
     )
+
+
+def _mixed(name: str) -> Callable[..., Policy]:
+    from swarm_forage_env.policies.mixed import MixedPolicy  # late: that module builds on this one
+
+    for part in mixture_parts(name):
+        policy_class(part.policy)  # refuses what is unknown or not trusted before anything is opened
+    return partial(MixedPolicy, name)
 
 
 def _opened(opener: Callable[..., Policy], name: str, **parameters: Any) -> Policy:

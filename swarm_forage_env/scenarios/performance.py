@@ -3,11 +3,14 @@
     collected                   a recorded column, as it is
     1/interference_fraction     a column of which less is better, turned round: 1/x in each interval, where 1/0 is 0
     task_balance, cache_load    computed from several columns
+    part_1_collected            the same of the first part of a mixed swarm, see `PART_COLUMNS`
+    part_1_collected_per_robot  divided by the robots of that part which are present
 
 Performance is a way to read a run and no part of it: a record holds all columns, so another performance needs no other
 run. The paper proposes such measures beside deliveries in its discussion.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -143,18 +146,59 @@ DERIVED_PERFORMANCES = tuple(_FORMULAS)
 """Performances that are computed from several columns."""
 
 
+_COUNTED_OF_PARTS = ("collected", "first_picked")
+PART_COLUMNS = (*_COUNTED_OF_PARTS, "interference_fraction", "n_active", "n_present")
+"""Columns that the record of a mixed swarm also has of each part, under the name of `part_column`."""
+_PER_ROBOT = "_per_robot"
+_PART_NAME = re.compile(
+    rf"part_(?P<part>[1-9]\d{{0,3}})_(?P<column>{'|'.join(PART_COLUMNS)}|(?:{'|'.join(_COUNTED_OF_PARTS)}){_PER_ROBOT})"
+)
+
+
+def part_column(part: int | str, column: str) -> str:
+    """Return the name of a column about one part of a mixed swarm, numbered from 1; "K" stands for any."""
+    return f"part_{part}_{column}"
+
+
+def _quantity_of_part(name: str) -> Quantity | None:
+    found = _PART_NAME.fullmatch(name)
+    if found is None:
+        return None
+    column, of_part = found["column"], f"of part {found['part']}"
+    whole = PERFORMANCE_COLUMNS[column.removesuffix(_PER_ROBOT)]
+    if column.endswith(_PER_ROBOT):
+        return Quantity(name, f"{whole.unit} per robot", whole.is_total, f"{whole.title} per robot {of_part}")
+    return Quantity(name, whole.unit, whole.is_total, f"{whole.title} {of_part}")
+
+
+def _of_part(name: str, columns: Columns) -> Curve:
+    """Compute a quantity of one part. A swarm that is not mixed is its only part."""
+    found = _PART_NAME.fullmatch(name)
+    assert found is not None, "quantity knows the name"
+    part, column = int(found["part"]), found["column"]
+    if column.endswith(_PER_ROBOT):
+        total = _of_part(part_column(part, column.removesuffix(_PER_ROBOT)), columns)
+        robots = _of_part(part_column(part, "n_present"), columns)
+        return np.divide(total, robots, out=np.zeros_like(total), where=robots > 0.0)
+    if name in columns:
+        return columns[name].astype(np.float64)
+    is_mixed = part_column(1, "collected") in columns
+    return np.zeros(len(columns["interval"])) if is_mixed or part > 1 else _column(column, columns)
+
+
 def quantity(name: str) -> Quantity:
     """Return what the numbers of a performance are.
 
     Args:
-        name: A column of `PERFORMANCE_COLUMNS`, one of `DERIVED_PERFORMANCES`, or one of both after "1/".
+        name: A column of `PERFORMANCE_COLUMNS`, one of `DERIVED_PERFORMANCES`, a column of a part of a mixed swarm, or
+            one of them after "1/".
 
     Raises:
         ConfigError: there is no such performance; the message has the nearest one.
     """
     is_text = isinstance(name, str)  # pyright: ignore[reportUnnecessaryIsInstance] - files and users give anything
     sign, own = _split(name) if is_text else ("", "")
-    found = _FORMULAS[own][0] if own in _FORMULAS else PERFORMANCE_COLUMNS.get(own)
+    found = _FORMULAS[own][0] if own in _FORMULAS else PERFORMANCE_COLUMNS.get(own) or _quantity_of_part(own)
     if found is None:
         known = [sign + each for each in (*PERFORMANCE_COLUMNS, *_FORMULAS)]
         meant = sign + _NAME_OF_WORDS.get(own, own)
@@ -183,7 +227,10 @@ def performance_curve(name: str, columns: Columns) -> Curve:
     """
     quantity(name)
     sign, own = _split(name)
-    values = _FORMULAS[own][1](columns) if own in _FORMULAS else _column(own, columns)
+    if own in _FORMULAS:
+        values = _FORMULAS[own][1](columns)
+    else:
+        values = _of_part(own, columns) if _PART_NAME.fullmatch(own) else _column(own, columns)
     if not sign:
         return values
     # 1/0 is 0, because distances between curves cannot take infinities. It suits columns that are rarely 0.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.files import check_file
 from swarm_forage_env.contract.policy import Policy
-from swarm_forage_env.policies.registry import is_policy_file, load_policy
+from swarm_forage_env.policies.registry import load_policy, policy_label
 from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.rendering.video import Frame, check_film, write_film
 from swarm_forage_env.rendering.view import RenderError, arena_view, refusing
@@ -109,7 +109,7 @@ def cast_policy(
     """
     stating: object = policy
     if isinstance(policy, str):
-        name = Path(policy).stem if is_policy_file(policy) else policy
+        name = policy_label(policy)
         found, pinned, stating = pin_policy(policy, parameters or {})
         policy = load_policy(found, pinned)
     elif parameters:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.contract.types import FloatArray, IntArray
-from swarm_forage_env.scenarios.performance import performance_curve
+from swarm_forage_env.scenarios.performance import PART_COLUMNS, PERFORMANCE_COLUMNS, part_column, performance_curve
 
 if TYPE_CHECKING:
     import polars as pl
@@ -277,6 +277,10 @@ KNOWN_CONTRIBUTIONS: dict[str, tuple[str, str]] = {
     "n_in_repair": ("robots", "length of the repair queue, mean over ticks"),
     "time_at_work_s": ("s", "mean length of the stays in the tasked swarm that ended in the interval; 0 = none ended"),
     "time_in_repair_s": ("s", "mean length of the absences that ended with a repair in the interval; 0 = none ended"),
+}
+KNOWN_CONTRIBUTIONS |= {
+    part_column("K", name): (PERFORMANCE_COLUMNS[name].unit, f"{name} of part K of a mixed swarm, from 1")
+    for name in PART_COLUMNS
 }
 """Columns of `RunRecord.contributed` that this package may write: unit and meaning. Present only where they apply."""
 

@@ -47,6 +47,8 @@ class LiveRun:
         self._policy = policy
         policy.reset(self.forage_env.swarm_spec, stream_rng(seed, Stream.POLICY))
         self._obs = stack.reset_batch(seed)
+        if isinstance(stack, RunRecorder) and hasattr(policy, "part_rows"):
+            stack.divide(policy.part_rows)  # type: ignore[attr-defined] - optional, see Policy
         self._has_tasks = hasattr(policy, "task")
 
     @property
@@ -78,9 +80,11 @@ def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> Compi
     """Return a policy, which was reset, for a run without Python between ticks; None where anybody might have a say.
 
     That is a wrapper other than the recorder, a subclass, a method that was replaced, an own sensor that the policy
-    reads, or Chipmunk.
+    reads, a mixed swarm, or Chipmunk.
     """
     env = stack.unwrapped
+    if hasattr(policy, "part_rows"):  # parts are counted tick by tick
+        return None
     is_bare = type(stack) is RunRecorder and stack.env is env and type(env) is ForageEnv
     if not is_bare or env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
         return None

@@ -373,7 +373,8 @@ def _is_broken_by(future: Future[Any]) -> bool:
 
 def _kernel_kind(spec: RunSpec) -> tuple[Any, ...]:
     """Runs of one kind use the same kernels."""
-    return spec.policy, spec.scenario.physics, spec.scenario.caches, tuple(config.name for config in spec.wrappers)
+    world = spec.scenario
+    return spec.policy, world.caches, world.physics, tuple(config.name for config in spec.wrappers)
 
 
 class _Pool(ProcessPoolExecutor):

@@ -22,7 +22,8 @@ from swarm_forage_env._internal.fields import (
     table,
     whole,
 )
-from swarm_forage_env.policies.registry import is_policy_file
+from swarm_forage_env.policies.mixture import SHARE, has_open_share
+from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.scenarios.overrides import field_sections, field_types
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import READINGS
@@ -68,8 +69,8 @@ class Axis:
     """
 
     name: str
-    """A criterion (`experiments.CRITERIA`), a scenario field, or a field of a wrapper ("sensor_noise.sigma",
-    "throttle.waveform.amplitude")."""
+    """A criterion (`experiments.CRITERIA`), a scenario field, a field of a wrapper ("sensor_noise.sigma",
+    "throttle.waveform.amplitude"), or `SHARE`, which policies like "mixed:ppo=share,crw=rest" have."""
     values: tuple[Value, ...]
     """Numbers, texts or truth values. Of a field that holds a list, texts with its entries between commas
     (`list_word`)."""
@@ -79,7 +80,9 @@ class Axis:
         if dot:
             wrapper_config_class(wrapper)  # refuses unknown names; the field is checked with its values
         else:
-            known_name("axis", self.name, (*CRITERIA, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY)))
+            known_name(
+                "axis", self.name, (*CRITERIA, SHARE, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY))
+            )
         several(f"the values of axis {self.name}", self.values, "values")
         kinds = {_kind(value) for value in self.values}
         if len(kinds) > 1 or "" in kinds or len(set(self.values)) < len(self.values):
@@ -159,7 +162,7 @@ def study_policy(
     except ValueError as error:
         raise ConfigError(str(error)) from error
     return StudyPolicy(
-        label=label or (Path(found).stem if is_policy_file(found) else found),
+        label=label or policy_label(found),
         policy=found,
         parameters=pinned,
         caches=caches or stated_caches(stating),
@@ -229,6 +232,13 @@ class StudySpec:
             raise ConfigError(f"Expected one axis for the swarm size, got {SIZE} and n_robots.")
         if self.reference is not None and (not self.axes or self.reference not in self.axes[-1].values):
             raise ConfigError(f"Expected the reference among the values of the last axis, got {self.reference!r}.")
+        if any(axis.name == SHARE for axis in self.axes):
+            for policy in self.policies:
+                if not has_open_share(policy.policy):
+                    raise ConfigError(
+                        f"Expected only mixed swarms with a part that the axis {SHARE} sets, such as "
+                        f"mixed:dpo={SHARE},crw=rest, got {policy.label}. At the share 0 or 1 they have one part."
+                    )
         for cell in self.cells:
             self._planned(cell)  # refuses what scenarios, wrappers and runs refuse
 
@@ -414,10 +424,12 @@ class StudySpec:
         experiment, policy = self.experiment(cell), self._policies[cell.policy]
         asked = any(name == "caches" for name in (*self.settings, *(axis.name for axis in self.axes)))
         world = experiment.scenario
+        here = zip((axis.name for axis in self.axes), cell.values, strict=True)
+        shares = {name: value for name, value in here if name == SHARE}
         return RunSpec(
             scenario=world if asked or policy.caches is None else replace(world, caches=policy.caches),
             policy=policy.policy,
-            parameters=policy.parameters,
+            parameters={**policy.parameters, **shares},
             wrappers=experiment.wrappers,
             criterion=experiment.criterion,
             criterion_value=experiment.value,

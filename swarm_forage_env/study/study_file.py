@@ -13,7 +13,7 @@
     death_per_tick = 0.0001
 
     [[axis]]                               # any number; the last one is plotted along x
-    criterion = "noise"                    # or field = "n_objects", or field = "sensor_noise.sigma"
+    criterion = "noise"                    # or field = "n_objects", "sensor_noise.sigma" or "share" (mixed swarms)
     values = [0.01, 0.02, 0.03]            # of a criterion; default those of the paper
     reference = 0.0                        # only on the last axis; default see `load_study`
 
@@ -34,6 +34,7 @@ from typing import Any
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, known_keys, known_name, several, table, whole
 from swarm_forage_env._internal.parsing import parse_toml
 from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts
 from swarm_forage_env.policies.registry import is_policy_file
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.experiments import BUDGETS, CRITERIA, spread, study_values
@@ -197,7 +198,14 @@ def _policy(entry: Any, folder: Path) -> StudyPolicy:
     word = keys.pop("policy", None)
     if not isinstance(word, str):
         raise ConfigError(f"Missing key 'policy', a name or a file, in {entry!r}.")
-    return study_policy(str(folder / word) if is_policy_file(word) else word, **keys)
+    return study_policy(_beside(word, folder), **keys)
+
+
+def _beside(word: str, folder: Path) -> str:
+    """Return a policy with the paths of files, also those in a mixed swarm, as they are seen from a folder."""
+    if is_mixture(word):
+        return mixture_of([Part(_beside(part.policy, folder), part.amount) for part in mixture_parts(word)])
+    return str(folder / word) if is_policy_file(word) else word
 
 
 def _axes(

@@ -122,6 +122,23 @@ def test_a_study_that_names_a_model_is_refused(command, model, tmp_path):
         assert (code, Path("owned").exists()) == (2, False), err
 
 
+def test_the_same_holds_for_each_part_of_a_mixed_swarm(command, model, tmp_path):
+    pytest.importorskip("stable_baselines3")
+    mixture = f"mixed:{model.name}=1,crw=rest"
+    code, out, err = command("run", "--policy", f"crw,{mixture}", *TINY, "--dry-run", "--json", "--caches", "none")
+    assert (code, Path("owned").exists()) == (0, False), err
+    spec = RunSpec.from_mapping(json.loads(out)["runs"][1]["spec"])
+    assert spec.policy == f"mixed:{model}=1,crw=rest"
+    store = RunStore(tmp_path / "store")
+    store.write_failure(RunFailure(spec=spec, error="e", traceback="t"))
+    code, _, err = command("rerun", str(store.failure_path(spec.run_id)))
+    assert (code, Path("owned").exists()) == (2, False)
+    assert "a model that you did not name yourself" in err
+    code, _, err = command("run", "--policy", mixture, *TINY)
+    assert (code, Path("owned").exists()) == (2, True)
+    assert f"opening {model}, a model" in err
+
+
 def test_the_option_opens_what_a_file_names(command, model, tmp_path):
     pytest.importorskip("stable_baselines3")
     spec = RunSpec(scenario=scenario("warehouse_small", n_robots=2, n_objects=10), policy=str(model))

@@ -3,7 +3,6 @@
 import math
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from swarm_forage_env._internal.fields import number
 from swarm_forage_env.contract.policy import Policy, RobotStates
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.registry import is_policy_file, load_policy
+from swarm_forage_env.policies.registry import load_policy, policy_label
 from swarm_forage_env.rendering.view import refusing
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.study.record import RunRecord, software_versions
@@ -82,7 +81,7 @@ def record_replay(
     recorder.close()
     replay = Replay(
         spec=spec,
-        label=Path(spec.policy).stem if is_policy_file(spec.policy) else spec.policy,
+        label=policy_label(spec.policy),
         frame_ticks=step,
         end_tick=env.tick,
         signals=_signals(spec, album.ticks),

@@ -1,0 +1,87 @@
+"""The command `dataset`."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm_forage_env.cli.options import EXIT_INTERRUPTED, DryRun, complain
+from swarm_forage_env.cli.world_options import World, takes_world
+
+if TYPE_CHECKING:
+    from swarm_forage_env.training.datasets.recording import DatasetPlan
+
+
+@takes_world
+def dataset(  # long: one parameter per option
+    described: World,
+    policy: Annotated[
+        str, typer.Option("--policy", help="A name, a file of a trained policy, or a mixed swarm.")
+    ] = "dpo",
+    seeds: Annotated[int, typer.Option(min=1, help="Number of runs.")] = 1,
+    first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first run.")] = 0,
+    horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
+    observation: Annotated[
+        str | None,
+        typer.Option(help="full or compact; default what a learned policy sees, else full."),
+    ] = None,
+    compress: Annotated[bool, typer.Option("--compress", help="Smaller files, which take longer to write.")] = False,
+    minari: Annotated[
+        str | None, typer.Option(metavar="ID", help="Also make a Minari data set of the whole swarm as one agent.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/datasets/SCENARIO_POLICY.")] = None,
+    dry_run: DryRun = False,
+) -> None:
+    """Record what robots see and do, for offline reinforcement learning and imitation.
+
+    Writes observations, actions, rewards and ends of every robot. Runs that the folder holds already are not repeated,
+    so an interrupted command can simply be given again.
+    """
+    from swarm_forage_env._internal.files import as_file_name
+    from swarm_forage_env.cli.scenario_options import plan_runs
+    from swarm_forage_env.cli.terminal import progress_bar
+    from swarm_forage_env.policies.registry import policy_label
+    from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
+
+    options = replace(described, horizon=horizon)
+    spec = plan_runs(options, (policy,), n_seeds=1, first_seed=first_seed)[0]
+    plan = plan_dataset(spec, range(first_seed, first_seed + seeds), observation=observation, compress=compress)
+    folder = out or Path("results", "datasets", as_file_name(f"{spec.scenario.name}_{policy_label(spec.policy)}"))
+    typer.echo(_described(plan, folder))
+    if dry_run:
+        return
+    try:
+        with progress_bar("decisions") as progress:
+            runs = record_dataset(plan, folder, progress=progress)
+    except KeyboardInterrupt:
+        words = f"Interrupted. Finished runs are kept in {folder}; the same command does the rest."
+        raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None
+    delivered = sum(run.collected for run in runs)
+    typer.echo(f"wrote {folder}: {sum(sum(run.chunks) for run in runs):,} decisions, {delivered:,} objects delivered")
+    if minari is not None:
+        from swarm_forage_env.training.datasets.minari_export import export_minari
+
+        typer.echo(f"wrote the Minari data set {export_minari(folder, minari).spec.dataset_id}")
+
+
+def _described(plan: "DatasetPlan", folder: Path) -> str:
+    """Return what is to be recorded and how much room it takes."""
+    from metrics.scoring.texts import counted
+    from swarm_forage_env.policies.registry import policy_label
+
+    scenario, config, n_todo = plan.spec.scenario, plan.card.interface, len(plan.missing(folder))
+    actions = "commands of three numbers" if len(plan.action_shape) == 2 else f"{plan.card.n_actions} discrete actions"
+    if len(plan.action_shape) == 2 and plan.action_shape[-1] == 2:
+        actions = "commands of two numbers"
+    room = f"{'at most' if plan.compress else 'about'} {n_todo * plan.run_bytes / 1e6:,.1f} MB"
+    each = counted(plan.n_decisions, "decision") + f" of {counted(scenario.robots.n_robots, 'robot')}"
+    return "\n".join(
+        [
+            f"policy        {policy_label(plan.spec.policy)} in {scenario.name}, {scenario.horizon_s:g} s",
+            f"runs          {len(plan.card.seeds)}, of which {n_todo} to do; {each} each",
+            f"observations  {config.observation}, {len(plan.card.columns)} columns",
+            f"actions       {actions}, one per {counted(config.decision_ticks, 'tick')}",
+            f"room          {room} in {folder}",
+        ]
+    )

@@ -1,0 +1,1 @@
+"""Trajectories of policies as files: for offline reinforcement learning and imitation."""

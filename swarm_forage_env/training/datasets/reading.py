@@ -1,0 +1,172 @@
+"""Reading a data set back: runs as the environment gave them, episodes of single robots, and transitions."""
+
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from swarm_forage_env.contract.types import BoolArray, ObsArray
+from swarm_forage_env.training.datasets.layout import ARRAYS, Card, DatasetError, RunSummary, chunk_file, summary_file
+
+_BROKEN = (OSError, EOFError, LookupError, ValueError, zipfile.BadZipFile, zlib.error)
+"""Errors of numpy and zipfile over a file that is missing, damaged or something else."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Steps:
+    """Decisions of all robots, a chunk or a whole run of n; `datasets.layout` has shapes and meaning."""
+
+    seed: int
+    observations: ObsArray
+    actions: np.ndarray
+    rewards: np.ndarray
+    terminated: BoolArray
+    truncated: BoolArray
+    active: BoolArray
+
+    def __len__(self) -> int:
+        return len(self.rewards)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Episode:
+    """What one robot saw and did in a run of L decisions, until it died or the run ended."""
+
+    seed: int
+    robot: int
+    """Row of the robot."""
+    observations: ObsArray
+    """(L + 1, d); after a death the last one is zeros."""
+    actions: np.ndarray
+    """(L,) or (L, k)."""
+    rewards: np.ndarray
+    """(L,) float64."""
+    terminated: bool
+    """Whether the robot died."""
+    truncated: bool
+    """Whether the run ended although the robot could have gone on."""
+    active: BoolArray
+    """(L + 1,) whether the robot was at work; what it does while it is not has no effect."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True, eq=False)
+class Transitions:
+    """Single decisions of single robots, all of them active; R rows."""
+
+    observations: ObsArray
+    """(R, d)."""
+    actions: np.ndarray
+    """(R,) or (R, k)."""
+    rewards: np.ndarray
+    """(R,) float64."""
+    next_observations: ObsArray
+    """(R, d)."""
+    terminated: BoolArray
+    """(R,)."""
+    truncated: BoolArray
+    """(R,)."""
+
+    def __len__(self) -> int:
+        return len(self.rewards)
+
+
+class TrajectoryDataset:
+    """The runs of a folder that are whole.
+
+        dataset = TrajectoryDataset("results/dpo_small")
+        for episode in dataset.episodes():
+            print(episode.robot, episode.rewards.sum())
+
+    Attributes:
+        folder: Where it lies.
+        card: What is true of all runs.
+        runs: Summary of each whole run, in the order of the seeds that were asked for.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        """Open a folder; raises DatasetError where it holds no data set."""
+        self.folder = Path(folder)
+        self.card = Card.read(self.folder)
+        whole = [seed for seed in self.card.seeds if summary_file(self.folder, seed).exists()]
+        self.runs = tuple(RunSummary.read(self.folder, seed) for seed in whole)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all runs are there that were asked for."""
+        return len(self.runs) == len(self.card.seeds)
+
+    def chunks(self) -> Iterator[Steps]:
+        """Yield all chunks, run by run, one in memory at a time; raises DatasetError for a damaged one."""
+        for run in self.runs:
+            yield from self._chunks_of(run)
+
+    def _chunks_of(self, run: RunSummary) -> Iterator[Steps]:
+        for number, n_decisions in enumerate(run.chunks):
+            steps = _read(chunk_file(self.folder, run.seed, number), run.seed)
+            if len(steps) != n_decisions:
+                file = chunk_file(self.folder, run.seed, number)
+                raise DatasetError(f"Expected {n_decisions} decisions in {file}, got {len(steps)}.")
+            yield steps
+
+    def steps(self, seed: int) -> Steps:
+        """Return a whole run.
+
+        Raises:
+            DatasetError: the run is not there, or damaged.
+        """
+        run = next((run for run in self.runs if run.seed == seed), None)
+        if run is None:
+            seeds = ", ".join(str(run.seed) for run in self.runs) or "none"
+            raise DatasetError(f"Expected one of the runs in {self.folder}, seeds {seeds}, got seed {seed}.")
+        chunks = list(self._chunks_of(run))
+        joined = {
+            # Of the two arrays with one row more, the last row of a chunk is the first of the next one.
+            name: np.concatenate(
+                [getattr(chunk, name)[: len(chunk)] for chunk in chunks]
+                + ([getattr(chunks[-1], name)[-1:]] if name in ("observations", "active") else [])
+            )
+            for name in ARRAYS
+        }
+        return Steps(seed=seed, **joined)
+
+    def episodes(self) -> Iterator[Episode]:
+        """Yield the episode of every robot, run by run."""
+        for run in self.runs:
+            steps = self.steps(run.seed)
+            for robot in range(steps.rewards.shape[1]):
+                deaths = np.flatnonzero(steps.terminated[:, robot])
+                end = int(deaths[0]) + 1 if len(deaths) else len(steps)
+                yield Episode(
+                    seed=run.seed,
+                    robot=robot,
+                    observations=steps.observations[: end + 1, robot],
+                    actions=steps.actions[:end, robot],
+                    rewards=steps.rewards[:end, robot],
+                    terminated=bool(len(deaths)),
+                    truncated=bool(steps.truncated[end - 1, robot]),
+                    active=steps.active[: end + 1, robot],
+                )
+
+    def transitions(self) -> Transitions:
+        """Return all decisions of robots that were at work, in memory; for more than that, use `chunks`."""
+        found: dict[str, list[np.ndarray]] = {name: [] for name in Transitions.__dataclass_fields__}
+        for chunk in self.chunks():
+            working = chunk.active[:-1]
+            for name in ("actions", "rewards", "terminated", "truncated"):
+                found[name].append(getattr(chunk, name)[working])
+            found["observations"].append(chunk.observations[:-1][working])
+            found["next_observations"].append(chunk.observations[1:][working])
+        if not found["rewards"]:
+            raise DatasetError(f"Expected a run in {self.folder} that is whole, found none; record it to its end.")
+        return Transitions(**{name: np.concatenate(parts) for name, parts in found.items()})
+
+
+def _read(file: Path, seed: int) -> Steps:
+    try:
+        with np.load(file, allow_pickle=False) as arrays:
+            return Steps(seed=seed, **{name: arrays[name] for name in ARRAYS})
+    except _BROKEN as error:
+        raise DatasetError(f"Cannot read {file}: it is missing or damaged ({' '.join(str(error).split())}).") from error

@@ -1,0 +1,302 @@
+"""Recording what a policy sees and does: `plan_dataset` says what, `record_dataset` does it."""
+
+import errno
+import math
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, several, whole
+from swarm_forage_env._internal.files import check_folder, replacing
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.contract.policy import Policy, SwarmSpec
+from swarm_forage_env.policies import trust
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.learned import LearnedPolicy
+from swarm_forage_env.policies.mixture import is_mixture, part_sizes
+from swarm_forage_env.policies.model_files import look_at_file
+from swarm_forage_env.policies.registry import is_policy_file, load_policy, part_labels
+from swarm_forage_env.study.record import software_versions
+from swarm_forage_env.study.run import build_env
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.training.datasets.layout import (
+    CARD_FILE,
+    Card,
+    DatasetError,
+    RunSummary,
+    chunk_file,
+    summary_file,
+)
+
+CHUNK_BYTES = 2**25
+"""Most bytes of a chunk (our choice: 32 MiB are read at once without thought on any machine)."""
+_HEADERS_BYTES = 2_000
+"""What names, types and the table of contents of a chunk take at most; six arrays have about 1,500."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class DatasetPlan:
+    """What is to be recorded."""
+
+    spec: RunSpec
+    """The run; its seed is replaced by each of `seeds`."""
+    card: Card
+    compress: bool = False
+    """Whether chunks are compressed: slower, several times smaller."""
+
+    @property
+    def n_decisions(self) -> int:
+        """Decisions of a run that nothing ends early."""
+        return math.ceil(self.spec.scenario.horizon_ticks / self.card.interface.decision_ticks)
+
+    @property
+    def chunk_decisions(self) -> int:
+        """Decisions in a chunk, the last one of a run aside."""
+        return max(1, min(self.n_decisions, CHUNK_BYTES // self._decision_bytes))
+
+    @property
+    def _decision_bytes(self) -> int:
+        """Bytes of one decision of all robots: observation, action, reward and three truth values."""
+        action = 8 if self.card.n_actions is not None else 4 * self.action_shape[-1]
+        return self.spec.scenario.robots.n_robots * (4 * len(self.card.columns) + action + 8 + 3)
+
+    @property
+    def action_shape(self) -> tuple[int, ...]:
+        """Shape of one action of all robots, (N,) or (N, k)."""
+        n_robots, config = self.spec.scenario.robots.n_robots, self.card.interface
+        if self.card.n_actions is not None:
+            return (n_robots,)
+        return (n_robots, 2 if config.automatic_gripper else 3)
+
+    @property
+    def run_bytes(self) -> int:
+        """Bytes of one run; if it is compressed or ends early, fewer."""
+        n_chunks = math.ceil(self.n_decisions / self.chunk_decisions)
+        n_robots = self.spec.scenario.robots.n_robots
+        last_rows = n_chunks * n_robots * (4 * len(self.card.columns) + 1)
+        return self.n_decisions * self._decision_bytes + last_rows + n_chunks * _HEADERS_BYTES
+
+    def missing(self, folder: Path) -> tuple[int, ...]:
+        """Return the seeds whose runs are not yet whole in a folder."""
+        return tuple(seed for seed in self.card.seeds if not summary_file(folder, seed).exists())
+
+
+def plan_dataset(
+    spec: RunSpec, seeds: Sequence[int], *, observation: str | None = None, compress: bool = False
+) -> DatasetPlan:
+    """Plan a data set. The policy is opened to see how it decides.
+
+    A learned policy is recorded as it was trained: what it saw, which action it chose, once per decision. Other
+    policies are recorded in every tick, with their commands as actions.
+
+    Args:
+        spec: The run, see `study.spec.plan_run`.
+        seeds: Seeds of the runs, each once.
+        observation: "full" or "compact": what is recorded instead of what a learned policy sees, or of "full".
+        compress: See `DatasetPlan`.
+
+    Raises:
+        ConfigError: seeds that are no different whole numbers, or an unknown kind of observation.
+        ValueError: the policy refuses the swarm.
+    """
+    several("seeds", tuple(seeds), "seeds")
+    for seed in seeds:
+        whole("a seed", seed, at_least=0)
+    if len(set(seeds)) < len(seeds) or len(seeds) > MOST_SEEDS:
+        raise ConfigError(f"Expected different seeds, at most {MOST_SEEDS:,}, got {len(seeds)} of them.")
+    world = SwarmSpec.of(spec.scenario)
+    config = _interface_of(spec, world)
+    config = (config if observation is None else replace(config, observation=observation)).for_scenario(spec.scenario)
+    interface = LearnerInterface(config, world)
+    space = interface.action_space
+    parts: dict[str, int] = {}
+    if is_mixture(spec.policy):
+        sizes = part_sizes(spec.policy, world.n_robots, spec.parameters.get("share"))
+        parts = dict(zip(part_labels(spec.policy), sizes, strict=True))
+    card = Card(
+        run=replace(spec, seed=seeds[0]).to_mapping(),
+        interface=config,
+        seeds=tuple(seeds),
+        columns=tuple(part.name for part in interface.layout for _ in range(part.size)),
+        n_actions=int(space.n) if isinstance(space, spaces.Discrete) else None,
+        parts=parts,
+        versions=software_versions(),
+    )
+    return DatasetPlan(spec=spec, card=card, compress=compress)
+
+
+def _interface_of(spec: RunSpec, world: SwarmSpec) -> InterfaceConfig:
+    """Return how a policy decides: the interface of a learned one; full observations and commands of all others."""
+    if is_mixture(spec.policy):
+        return InterfaceConfig()
+    if trust.only_looks() and is_policy_file(spec.policy) and trust.runs_code(spec.policy):
+        return look_at_file(spec.policy, **spec.parameters).interface or InterfaceConfig()
+    policy = load_policy(spec.policy, spec.parameters)
+    if not isinstance(policy, LearnedPolicy):
+        return InterfaceConfig()
+    policy.reset(world, stream_rng(spec.seed, Stream.POLICY))
+    return policy.interface.config
+
+
+def record_dataset(
+    plan: DatasetPlan, folder: str | Path, *, progress: Callable[[int, int], None] | None = None
+) -> tuple[RunSummary, ...]:
+    """Make the runs that a folder lacks; each chunk is there whole or not at all.
+
+    After an interruption the same call goes on: runs that are whole are kept, the one under way is made again. A folder
+    may get more seeds later.
+
+    Args:
+        plan: What to record.
+        folder: Where it goes; it is made if it is missing.
+        progress: Called with (decisions done, decisions in all) after each chunk.
+
+    Returns:
+        One summary per seed of the plan.
+
+    Raises:
+        DatasetError: the folder holds another data set, or one of other versions.
+        OSError: the folder cannot be written to, or has no room; then nothing has been run.
+    """
+    folder = Path(folder)
+    card = _card_of_folder(plan.card, folder)
+    todo = plan.missing(folder)
+    _check_room(folder, len(todo) * plan.run_bytes)
+    card.write(folder)
+    for draft in folder.glob(".*.tmp"):  # of a process that was killed
+        draft.unlink(missing_ok=True)
+    in_all = len(todo) * plan.n_decisions
+    for number, seed in enumerate(todo):
+
+        def tell(done: int, before: int = number * plan.n_decisions) -> None:
+            if progress is not None:
+                progress(before + done, in_all)
+
+        _record_run(plan, seed, folder, tell).write(folder)
+    return tuple(RunSummary.read(folder, seed) for seed in plan.card.seeds)
+
+
+def _card_of_folder(card: Card, folder: Path) -> Card:
+    """Return the card with the seeds that the folder has already.
+
+    Raises:
+        DatasetError: it differs in anything else.
+    """
+    if not (folder / CARD_FILE).exists():
+        return card
+    there = Card.read(folder)
+    for name in ("interface", "columns", "versions"):
+        if getattr(there, name) != getattr(card, name):
+            raise DatasetError(
+                f"Expected the data set in {folder} to go on, but it has other {name}; give another --out."
+            )
+    if replace(there.spec, seed=0) != replace(card.spec, seed=0):
+        raise DatasetError(
+            f"Expected the data set in {folder} to go on, but it is of another run ({there.spec.describe()}); give "
+            "another --out."
+        )
+    return replace(there, seeds=tuple(dict.fromkeys((*there.seeds, *card.seeds))))
+
+
+def _check_room(folder: Path, needed: int) -> None:
+    check_folder(folder)
+    place = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    free = shutil.disk_usage(place).free
+    if needed > free:
+        raise OSError(
+            errno.ENOSPC,
+            f"Expected {needed / 1e9:,.1f} GB of free disk for the data set, got {free / 1e9:,.1f} GB; take fewer "
+            "seeds, a shorter horizon or compact observations",
+            str(folder),
+        )
+
+
+class _Chunk:
+    """Arrays of a chunk that is being filled; they are used again for the next one."""
+
+    def __init__(self, plan: DatasetPlan) -> None:
+        n_robots, size = plan.spec.scenario.robots.n_robots, plan.chunk_decisions
+        is_discrete = plan.card.n_actions is not None
+        self.observations = np.empty((size + 1, n_robots, len(plan.card.columns)), np.float32)
+        self.actions = np.empty((size, *plan.action_shape), np.int64 if is_discrete else np.float32)
+        self.rewards = np.zeros((size, n_robots))
+        self.terminated = np.zeros((size, n_robots), np.bool_)
+        self.truncated = np.zeros((size, n_robots), np.bool_)
+        self.active = np.empty((size + 1, n_robots), np.bool_)
+        self.length = 0
+
+    @property
+    def is_full(self) -> bool:
+        return self.length == len(self.rewards)
+
+    def write(self, file: Path, *, compress: bool) -> None:
+        """Write what is there and go on with the last observation as the first."""
+        n = self.length
+        arrays: dict[str, Any] = {
+            name: getattr(self, name)[:n] for name in ("actions", "rewards", "terminated", "truncated")
+        }
+        arrays |= {name: getattr(self, name)[: n + 1] for name in ("observations", "active")}
+        with replacing(file, ending=".tmp") as draft, draft.open("wb") as opened:
+            (np.savez_compressed if compress else np.savez)(opened, **arrays)
+        self.observations[0], self.active[0] = self.observations[n], self.active[n]
+        self.rewards[:] = 0.0
+        self.terminated[:] = self.truncated[:] = False
+        self.length = 0
+
+
+def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int], None]) -> RunSummary:
+    spec, config = plan.spec, plan.card.interface
+    policy: Policy = load_policy(spec.policy, spec.parameters)
+    env = build_env(spec.scenario, spec.wrappers, reads=_reads(policy, config))
+    world = env.unwrapped
+    policy.reset(world.swarm_spec, stream_rng(seed, Stream.POLICY))
+    obs = env.reset_batch(seed)
+    interface, chunk = LearnerInterface(config, world.swarm_spec), _Chunk(plan)
+    interface.observe(obs, chunk.observations[0])
+    chunk.active[0] = world.active
+    lengths: list[int] = []
+    gone, over = np.zeros(len(world.active), np.bool_), False
+    while not over:
+        row, truncated, dead = chunk.length, False, gone
+        for tick in range(config.decision_ticks):
+            commands = policy.act(obs, world.active)
+            if tick == 0:
+                chunk.actions[row] = policy.chosen if isinstance(policy, LearnedPolicy) else commands
+            tasks = getattr(policy, "task", None)
+            obs, rewards, dead, truncated = env.step_batch(commands, tasks=tasks)
+            chunk.rewards[row] += rewards
+            over = truncated or bool(dead.all())
+            if over:
+                break
+        np.logical_and(dead, ~gone, out=chunk.terminated[row])
+        if truncated:
+            np.logical_not(dead, out=chunk.truncated[row])
+        gone = dead.copy()
+        interface.observe(obs, chunk.observations[row + 1])
+        chunk.active[row + 1] = world.active
+        chunk.length += 1
+        if chunk.is_full or over:
+            lengths.append(chunk.length)
+            chunk.write(chunk_file(folder, seed, len(lengths) - 1), compress=plan.compress)
+            tell(sum(lengths))
+    env.close()
+    counters = world.events.counters
+    return RunSummary(
+        seed=seed,
+        truncated=world.tick >= world.max_cycles,
+        chunks=tuple(lengths),
+        collected=int(counters[Counter.COLLECTED]),
+        first_picked=int(counters[Counter.FIRST_PICKED]),
+    )
+
+
+def _reads(policy: Policy, config: InterfaceConfig) -> tuple[str, ...] | None:
+    """Return the slices that the policy or the data set uses; None = all."""
+    used: tuple[str, ...] | None = getattr(policy, "reads", None)
+    return None if used is None or config.reads is None else (*used, *config.reads)

@@ -1,0 +1,265 @@
+"""Trajectories as files: they hold what the environment gave, and are there whole or not at all."""
+
+import json
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarm_forage_env import ConfigError, load_policy, plan_run, run_one, scenario
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.policies.interface import LearnerInterface
+from swarm_forage_env.study.run import build_env
+from swarm_forage_env.training.datasets import recording
+from swarm_forage_env.training.datasets.layout import DatasetError, chunk_file, summary_file
+from swarm_forage_env.training.datasets.reading import TrajectoryDataset
+from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
+from swarm_forage_env.views.gymnasium import JointForageEnv
+from swarm_forage_env.wrappers.population import PopulationConfig
+from swarm_forage_env.wrappers.registry import parse_wrapper
+
+WORLD = scenario("warehouse_small", n_robots=4, n_objects=400, horizon_s=20.0, interval_s=20.0, physics="compiled")
+DEADLY = (PopulationConfig(death_per_tick=0.02),)
+
+
+@pytest.fixture(autouse=True)
+def small_chunks(monkeypatch):
+    """Chunks of some thirty decisions, so that a short run has several."""
+    monkeypatch.setattr(recording, "CHUNK_BYTES", 60_000)
+
+
+def plan(policy="crw", seeds=(3,), wrappers=(), **choices):
+    return plan_dataset(plan_run(WORLD, policy, wrappers=wrappers), seeds, **choices)
+
+
+def files(folder):
+    return {file.name: file.read_bytes() for file in sorted(folder.iterdir())}
+
+
+# What is in it
+
+
+@pytest.mark.parametrize("policy", ["crw", "stochm", "mixed:ppo_warehouse_small=1,random=rest"])
+def test_a_run_read_back_is_what_the_environment_gave(policy, tmp_path):
+    planned = plan(policy, wrappers=DEADLY)
+    record_dataset(planned, tmp_path)
+    steps = TrajectoryDataset(tmp_path).steps(3)
+    spec = planned.spec
+    env, driver = build_env(spec.scenario, spec.wrappers), load_policy(spec.policy, spec.parameters)
+    driver.reset(env.unwrapped.swarm_spec, stream_rng(3, Stream.POLICY))
+    obs, dead = env.reset_batch(3), np.zeros(4, np.bool_)
+    for tick in range(len(steps)):
+        np.testing.assert_array_equal(steps.observations[tick], obs)
+        np.testing.assert_array_equal(steps.active[tick], env.unwrapped.active)
+        commands = driver.act(obs, env.unwrapped.active)
+        np.testing.assert_array_equal(steps.actions[tick], commands)
+        obs, rewards, terminated, truncated = env.step_batch(commands, tasks=getattr(driver, "task", None))
+        np.testing.assert_array_equal(steps.rewards[tick], rewards)
+        np.testing.assert_array_equal(steps.terminated[tick], terminated & ~dead)
+        np.testing.assert_array_equal(steps.truncated[tick], ~terminated if truncated else np.zeros(4, np.bool_))
+        dead = terminated.copy()
+    np.testing.assert_array_equal(steps.observations[-1], obs)
+    assert truncated or dead.all()
+    assert dead.any(), "a run without deaths shows nothing of them"
+
+
+def test_a_run_of_a_data_set_is_the_run_of_that_seed(tmp_path):
+    (summary,) = record_dataset(plan("ppo_warehouse_small"), tmp_path)
+    record = run_one(replace(plan("ppo_warehouse_small").spec, seed=3))
+    assert (summary.collected, summary.first_picked) == (record.collected.sum(), record.first_picked.sum())
+    assert summary.truncated
+
+
+def test_a_learned_policy_is_recorded_as_it_decides(tmp_path):
+    planned = plan("ppo_warehouse_small")
+    config = planned.card.interface
+    assert (config.observation, config.decision_ticks) == ("compact", 5)
+    record_dataset(planned, tmp_path)
+    steps = TrajectoryDataset(tmp_path).steps(3)
+    assert (len(steps), steps.actions.shape, steps.actions.dtype) == (20, (20, 4), np.int64)
+    env = JointForageEnv(WORLD, interface=config)
+    obs, _ = env.reset(seed=3)
+    for number, action in enumerate(steps.actions):
+        np.testing.assert_array_equal(steps.observations[number], obs)
+        obs, reward, _, truncated, info = env.step(action)
+        assert reward == steps.rewards[number].sum()
+        np.testing.assert_array_equal(info["active"], steps.active[number + 1])
+    assert truncated
+    np.testing.assert_array_equal(steps.observations[-1], obs)
+
+
+def test_observations_can_be_compact_for_any_policy(tmp_path):
+    planned = plan("crw", observation="compact")
+    record_dataset(planned, tmp_path)
+    full = TrajectoryDataset(tmp_path).card
+    assert len(full.columns) == LearnerInterface(planned.card.interface, env_spec()).layout.size == 23
+    with pytest.raises(ConfigError, match="observation"):
+        plan("crw", observation="compakt")
+
+
+def env_spec():
+    return build_env(WORLD).unwrapped.swarm_spec
+
+
+def test_episodes_end_where_robots_do(tmp_path):
+    record_dataset(plan("random", seeds=(3, 4), wrappers=DEADLY), tmp_path)
+    dataset = TrajectoryDataset(tmp_path)
+    episodes = list(dataset.episodes())
+    assert [(one.seed, one.robot) for one in episodes] == [(seed, robot) for seed in (3, 4) for robot in range(4)]
+    assert any(one.terminated for one in episodes)
+    for one in episodes:
+        steps = dataset.steps(one.seed)
+        length = len(one.rewards)
+        assert len(one.observations) == len(one.active) == length + 1
+        assert one.terminated != one.truncated or len(steps) < 100
+        assert steps.terminated[length - 1, one.robot] == one.terminated
+        if one.terminated:
+            assert not one.observations[-1].any()
+            assert not steps.active[length:, one.robot].any()
+
+
+def test_transitions_are_the_decisions_of_robots_at_work(tmp_path):
+    wrappers = (parse_wrapper("population:malfunction_per_tick=0.3,repair_per_tick=0.3"),)
+    record_dataset(plan("random", wrappers=wrappers), tmp_path)
+    dataset = TrajectoryDataset(tmp_path)
+    rows, steps = dataset.transitions(), dataset.steps(3)
+    working = steps.active[:-1]
+    assert 0 < len(rows) == working.sum() < working.size
+    np.testing.assert_array_equal(rows.observations, steps.observations[:-1][working])
+    np.testing.assert_array_equal(rows.next_observations, steps.observations[1:][working])
+    np.testing.assert_array_equal(rows.actions, steps.actions[working])
+
+
+# Whole or not at all
+
+
+@pytest.mark.parametrize("is_killed", [False, True])
+def test_an_interrupted_recording_goes_on(is_killed, tmp_path, monkeypatch):
+    whole, cut = tmp_path / "whole", tmp_path / "cut"
+    record_dataset(plan(seeds=(1, 2)), whole)
+    save, calls = np.savez, []
+
+    def interrupted(file, **arrays):
+        calls.append(file)
+        if len(calls) == 6:
+            file.write(b"half of a chunk")
+            raise KeyboardInterrupt
+        save(file, **arrays)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(np, "savez", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            record_dataset(plan(seeds=(1, 2)), cut)
+    if is_killed:  # then the draft stays
+        (cut / ".seed_000002_0001.npz.0123.tmp").write_bytes(b"half of a chunk")
+    there = TrajectoryDataset(cut)
+    assert [run.seed for run in there.runs] == [1]
+    assert not there.is_complete
+    first = summary_file(cut, 1).stat().st_mtime_ns, chunk_file(cut, 1, 0).stat().st_mtime_ns
+    record_dataset(plan(seeds=(1, 2)), cut)
+    assert first == (summary_file(cut, 1).stat().st_mtime_ns, chunk_file(cut, 1, 0).stat().st_mtime_ns)
+    assert files(cut) == files(whole)
+    assert TrajectoryDataset(cut).is_complete
+
+
+def test_seeds_can_be_added_but_nothing_else_changed(tmp_path):
+    record_dataset(plan(seeds=(1,)), tmp_path)
+    record_dataset(plan(seeds=(2, 1)), tmp_path)
+    assert TrajectoryDataset(tmp_path).card.seeds == (1, 2)
+    with pytest.raises(DatasetError, match="another run"):
+        record_dataset(plan("random"), tmp_path)
+    with pytest.raises(DatasetError, match="other interface"):
+        record_dataset(plan(observation="compact"), tmp_path)
+
+
+def test_the_estimate_is_what_is_written(tmp_path):
+    planned = plan()
+    record_dataset(planned, tmp_path)
+    written = sum(file.stat().st_size for file in tmp_path.glob("*.npz"))
+    assert len(list(tmp_path.glob("*.npz"))) > 1
+    assert 0.9 * planned.run_bytes < written <= planned.run_bytes
+    packed = plan(compress=True)
+    record_dataset(packed, tmp_path / "packed")
+    assert sum(file.stat().st_size for file in (tmp_path / "packed").glob("*.npz")) < written / 2
+    same = (TrajectoryDataset(folder).steps(3).observations for folder in (tmp_path, tmp_path / "packed"))
+    np.testing.assert_array_equal(*same)
+
+
+def test_a_disk_without_room_is_told_before_anything_is_run(tmp_path, monkeypatch):
+    monkeypatch.setattr(recording.shutil, "disk_usage", lambda _: type("Usage", (), {"free": 1000})())
+    with pytest.raises(OSError, match="free disk for the data set"):
+        record_dataset(plan(), tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+def test_damaged_files_are_named(tmp_path):
+    record_dataset(plan(), tmp_path)
+    dataset = TrajectoryDataset(tmp_path)
+    with pytest.raises(DatasetError, match="seeds 3, got seed 9"):
+        dataset.steps(9)
+    chunk = chunk_file(tmp_path, 3, 1)
+    content = bytearray(chunk.read_bytes())
+    content[len(content) // 2] ^= 1
+    chunk.write_bytes(content)
+    with pytest.raises(DatasetError, match=chunk.name):
+        dataset.steps(3)
+    card = json.loads((tmp_path / "dataset.json").read_text())
+    (tmp_path / "dataset.json").write_text(json.dumps(card | {"schema_version": 9}))
+    with pytest.raises(DatasetError, match="schema version 1"):
+        TrajectoryDataset(tmp_path)
+    (tmp_path / "dataset.json").unlink()
+    with pytest.raises(DatasetError, match=r"dataset\.json"):
+        TrajectoryDataset(tmp_path)
+
+
+@pytest.mark.parametrize("seeds", [(), (1, 1), (-1,), (0.5,)])
+def test_bad_seeds_are_refused(seeds):
+    with pytest.raises(ConfigError, match="seed"):
+        plan(seeds=seeds)
+
+
+# For other libraries
+
+
+def test_torch_reads_batches(tmp_path):
+    torch = pytest.importorskip("torch")
+    from swarm_forage_env.training.datasets.torch_data import TransitionData
+
+    record_dataset(plan("ppo_warehouse_small"), tmp_path)
+    data, rows = TransitionData(tmp_path), TrajectoryDataset(tmp_path).transitions()
+    assert len(data) == len(rows) == 80
+    (batch,) = torch.utils.data.DataLoader(data, batch_size=80)
+    for name, values in batch.items():
+        np.testing.assert_array_equal(values.numpy(), getattr(rows, name).astype(values.numpy().dtype))
+    assert batch["rewards"].dtype == torch.float32
+
+
+@pytest.mark.parametrize("policy", ["crw", "ppo_warehouse_small"])
+def test_minari_gets_the_same_numbers(policy, tmp_path, monkeypatch):
+    minari = pytest.importorskip("minari")
+    from swarm_forage_env.training.datasets.minari_export import export_minari
+
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "minari"))
+    folder = tmp_path / "ours"
+    record_dataset(plan(policy, seeds=(3, 5)), folder)
+    export_minari(folder, "swarm_forage/test-v0", author="somebody")
+    theirs, ours = minari.load_dataset("swarm_forage/test-v0"), TrajectoryDataset(folder)
+    assert theirs.total_episodes == 2
+    for episode, run in zip(theirs.iterate_episodes(), ours.runs, strict=True):
+        steps = ours.steps(run.seed)
+        np.testing.assert_array_equal(episode.observations, steps.observations)
+        np.testing.assert_array_equal(episode.actions, steps.actions)
+        np.testing.assert_array_equal(episode.rewards, steps.rewards.sum(axis=1))
+        assert episode.observations[0] in theirs.observation_space
+        assert episode.actions[0] in theirs.action_space
+        assert not episode.terminations.any()
+        assert np.flatnonzero(episode.truncations).tolist() == [len(steps) - 1]
+
+
+def test_without_minari_the_error_says_what_to_install(tmp_path, monkeypatch):
+    from swarm_forage_env.training.datasets.minari_export import export_minari
+
+    monkeypatch.setitem(sys.modules, "minari", None)
+    with pytest.raises(ImportError, match=r'pip install "\.\[minari\]"'):
+        export_minari(tmp_path, "x-v0")
