@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from site_search import share_of_run
 from speed_cases import WRAPPERS, large_world
 
 from swarm_forage_env.policies.registry import load_policy
@@ -302,6 +303,13 @@ def wrapper_rows(ticks: int, repeats: int) -> Iterator[Row]:
     yield Row("four wrappers beyond their draws", 100 * beyond, "%", "<= 10", beyond <= 0.1)
 
 
+def site_rows(ticks: int, repeats: int) -> Iterator[Row]:
+    """What share of a run the search for cache sites takes; the run is of 10,000 s, with --quick of 2,000 s."""
+    spec = run_spec(warehouse_medium(caches="dynamic", physics="compiled"), "stochx", 5 * ticks)
+    share, note = share_of_run(spec, repeats)
+    yield Row(f"STOCHX's cache sites, {spec.scenario.horizon_s:,.0f} s", 100 * share, "%", "-", None, note)
+
+
 def start_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a case like the others; ticks are few
     """Import and first ticks, those of the first pick-up included, each in fresh interpreters."""
     seconds = statistics.median(in_fresh_process(IMPORT) for _ in range(repeats))
@@ -385,6 +393,7 @@ def cases() -> dict[str, Case]:
     return dict(rates) | {
         "scaling: CRW, N = 4,096 and 16,384": scaling_rows,
         "four wrappers, N = 200": wrapper_rows,
+        "search for cache sites: STOCHX, N = 200": site_rows,
         "PettingZoo dict API, N = 200": dict_rows,
         "learning: VecEnv and PPO": learning_rows,
         "pictures: rgb_array and window": frame_rows,

@@ -4,8 +4,10 @@ import functools
 import gc
 import hashlib
 import logging
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -145,6 +147,13 @@ class _Cache(FunctionCache):
                 self.flush()
             return None
 
+    def holds(self, sig: Any, target_context: Any) -> bool:
+        """Return whether something is kept for a signature; it may yet turn out to be damaged."""
+        try:
+            return self._index_key(sig, target_context.codegen()) in self._cache_file._load_index()
+        except Exception:  # noqa: BLE001 - as above; who loads it says so
+            return True
+
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled."""
         try:
@@ -196,6 +205,31 @@ def direct(function: F, *example: Any) -> F:
     return cast(F, _entry_points[key])
 
 
+def compile_part(function: Callable[..., Any], *example: Any) -> None:
+    """Compile what kernels take from `function` when they call it, for arguments of the types of `example`."""
+    if is_compiled(function):
+        with _collector_off():
+            cast(Any, function).get_call_template(tuple(_type_of(argument) for argument in example), {})
+
+
+def is_new(function: Callable[..., Any], *example: Any) -> bool:
+    """Whether `direct` would have to compile `function`, and other processes could use the result.
+
+    That is not so where the compiler is switched off, or no folder can be written to.
+    """
+    compiled = cast(Any, function)
+    if not is_compiled(function) or not isinstance(compiled._cache, _Cache):
+        return False
+    kinds = tuple(_type_of(argument) for argument in example)
+    if kinds in compiled.overloads or compiled._cache.holds(kinds, compiled.targetctx):
+        return False
+    try:
+        with tempfile.TemporaryFile(dir=compiled._cache.cache_path):
+            return True
+    except OSError:
+        return False
+
+
 _entry_points: dict[Any, Callable[..., Any]] = {}
 """Kernel and kinds of its arguments -> what `direct` returns. To find the types of a whole world takes numba
 milliseconds, and every run of a study asks."""
@@ -221,18 +255,17 @@ class Callback:
     """A kernel that another one takes as an argument: which one it is may change without compiling anything anew."""
 
     def __init__(self, function: Callable[..., Any], *example: Any) -> None:
-        """Compile `function`, which returns nothing, for arguments of the types of `example`."""
+        """Take `function`, which returns nothing, for arguments of the types of `example`; it is compiled when used."""
         self.function = function
         self.type: Any = None
-        if not is_compiled(function):
-            return
-        arguments = tuple(typeof(argument) for argument in example)
-        self.type = types.FunctionType(types.none(*arguments))
-        version = _for_callbacks(cast(Any, function).py_func)
-        with _collector_off():
-            version.compile(arguments)
-        compiled = version.overloads[arguments]
-        self._address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+        if is_compiled(function):
+            self._arguments = tuple(typeof(argument) for argument in example)
+            self.type = types.FunctionType(types.none(*self._arguments))
+
+    def prepare(self) -> None:
+        """Compile it now, unless that has happened."""
+        if self.type is not None:
+            self.__wrapper_address__()
 
     def __call__(self, *arguments: Any) -> None:
         """Call the function itself, for kernels that are not compiled."""
@@ -245,6 +278,14 @@ class Callback:
     def __wrapper_address__(self) -> int:
         """Return the address that compiled code jumps to."""
         return self._address
+
+    @cached_property
+    def _address(self) -> int:
+        version = _for_callbacks(cast(Any, self.function).py_func)
+        with _collector_off():
+            version.compile(self._arguments)
+        compiled = version.overloads[self._arguments]
+        return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
     def signature(self) -> Any:
         """Return numba's signature."""

@@ -53,22 +53,8 @@ class LiveRun:
 
     @property
     def compiled_policy(self) -> CompiledPolicy | None:
-        """The policy for a run without Python between ticks; None where anybody might have a say there.
-
-        That is a wrapper other than the recorder, a subclass, a method that was replaced, an own sensor that the policy
-        reads, a mixed swarm, or Chipmunk.
-        """
-        stack, env, policy = self._stack, self.forage_env, self._policy
-        is_bare = type(stack) is RunRecorder and stack.env is env and type(env) is ForageEnv
-        if hasattr(policy, "part_rows"):  # parts are counted tick by tick
-            return None
-        if not is_bare or env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
-            return None
-        if "after_step" in vars(stack) or "step_batch" in {*vars(stack), *vars(env)}:
-            return None
-        if env.arena.reads_own_sensors:
-            return None
-        return policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
+        """The policy for a run without Python between ticks, see `compiled_policy_of`."""
+        return compiled_policy_of(self._stack, self._policy)
 
     def advance(self, *, to_tick: int | None = None) -> None:
         """Let policy and environment act in turn until `to_tick` ticks have passed since the start, or the run ends."""
@@ -88,6 +74,25 @@ class LiveRun:
             # Checking the first row alone is fast, and in almost every tick it is enough.
             over = truncated or bool(terminated[0] and terminated.all())
         self._obs, self.over = obs, over
+
+
+def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> CompiledPolicy | None:
+    """Return a policy, which was reset, for a run without Python between ticks; None where anybody might have a say.
+
+    That is a wrapper other than the recorder, a subclass, a method that was replaced, an own sensor that the policy
+    reads, a mixed swarm, or Chipmunk.
+    """
+    env = stack.unwrapped
+    if hasattr(policy, "part_rows"):  # parts are counted tick by tick
+        return None
+    is_bare = type(stack) is RunRecorder and stack.env is env and type(env) is ForageEnv
+    if not is_bare or env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
+        return None
+    if "after_step" in vars(stack) or "step_batch" in {*vars(stack), *vars(env)}:
+        return None
+    if env.arena.reads_own_sensors:
+        return None
+    return policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
 
 
 def build_env(

@@ -19,7 +19,7 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     wait,
 )
-from contextlib import closing, contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -27,11 +27,19 @@ from typing import Any, TypeAlias
 
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env._internal.files import check_folder
+from swarm_forage_env.study.first_run import (
+    WAKE_UP_EVERY_S,
+    compile_outermost,
+    compile_run,
+    compile_start,
+    is_first_run,
+)
 from swarm_forage_env.study.progress import RunProgress
 from swarm_forage_env.study.record import RunRecord, software_versions
 from swarm_forage_env.study.run import run_one, warm_up
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import RunFailure, RunStore
+from swarm_forage_env.world.halves import compile_half
 
 Outcome: TypeAlias = RunRecord | RunFailure
 Task: TypeAlias = tuple[RunSpec, ...]
@@ -54,8 +62,6 @@ KILLED = (
     "time (--jobs 1), or a smaller run."
 )
 """What is said of a run whose worker died: the system gives no reason."""
-WAKE_UP_EVERY_S = 0.5
-"""The driver never sleeps longer, because with the signal handler of a library (polars) Ctrl-C may not end a sleep."""
 
 
 class WorkerError(RuntimeError):
@@ -163,7 +169,7 @@ def run_each(
     if executor is not None:
         outcomes = _run_elsewhere(executor, _batches(todo, batch_robot_ticks))
     elif jobs == 1 or len(todo) == 1:
-        outcomes = _run_on(_InProcess(), todo, limit=1)
+        outcomes = _run_here(todo)
     else:
         outcomes = _run_in_pool(todo, min(jobs or available_cores(), max(1, len(todo))))
     return _stored(outcomes, store)
@@ -248,6 +254,14 @@ def _submitted(executor: Executor, task: Task) -> Future[Any]:
     return executor.submit(run_one, task[0]) if len(task) == 1 else executor.submit(run_several, task)
 
 
+def _run_here(todo: deque[Task]) -> Generator[Outcome]:
+    """Run `todo` in this process. A further one may help to compile."""
+    if todo and available_cores() > 1:
+        with suppress(Exception):  # the run itself raises it again, and it is recorded then
+            compile_run(todo[0][0])
+    yield from _run_on(_InProcess(), todo, limit=1)
+
+
 def _batches(tasks: deque[Task], robot_ticks: int) -> deque[Task]:
     """Join neighbours that differ in the seed alone, until a task has so many robot-ticks."""
     joined: deque[Task] = deque()
@@ -330,8 +344,24 @@ def _warm_up_workers(pool: Executor, specs: Iterable[RunSpec]) -> bool:
     Errors are ignored here: the same run raises them again later, and they are recorded then. That holds for a worker
     that is killed, too: False is returned, the pool is broken, and in the next one only runs that kill again fail.
     """
-    kinds = {_kernel_kind(spec): spec for spec in specs}
-    return not any(_is_broken_by(pool.submit(warm_up, spec)) for spec in kinds.values())
+    kinds = tuple({_kernel_kind(spec): spec for spec in specs}.values())
+    if not all(_compiled_together(pool, spec) for spec in kinds[:1]):  # what is left of other kinds is their policy
+        return False
+    return not any(_is_broken_by(pool.submit(warm_up, spec)) for spec in kinds)
+
+
+def _compiled_together(pool: Executor, spec: RunSpec) -> bool:
+    """Have two workers compile what a first run needs, see `study.first_run`; False if one is killed."""
+    asked = pool.submit(is_first_run, spec)
+    if _is_broken_by(asked):
+        return False
+    if asked.exception() is not None or not asked.result():
+        return True
+    halves = [pool.submit(compile_half, spec.scenario, half) for half in (0, 1)]
+    if any([_is_broken_by(future) for future in halves]):  # noqa: C419 - a list: all are waited for
+        return False
+    ends = [pool.submit(end, spec) for end in (compile_outermost, compile_start)]
+    return not any([_is_broken_by(future) for future in ends])  # noqa: C419 - as above
 
 
 def _is_broken_by(future: Future[Any]) -> bool:

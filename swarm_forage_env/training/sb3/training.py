@@ -32,8 +32,10 @@ from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_choice
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.study.first_run import compile_world
 from swarm_forage_env.study.record import software_versions
 from swarm_forage_env.study.run import run_policy
+from swarm_forage_env.study.runner import available_cores
 from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, PLAN_FILE, read_evaluations, write_evaluations
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
@@ -114,6 +116,8 @@ def train(
     check_folder(folder)
     torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
     watch = _Watch(plan, folder, report or _keep_quiet)
+    if available_cores() > 1:
+        compile_world(plan.scenario)
     env = SwarmVecEnv(
         plan.scenario,
         n_arenas=plan.n_arenas,
