@@ -89,7 +89,7 @@ def _breakdowns(table: "StudyTable", line: StudyLine, runs: RunCurves, reference
     half = max(1, level.size // 2)
     # Deliveries grow in the course of a run or fade: the window must hold enough where there is least, but the start.
     per_interval = float(level[-half:].mean()) if line.curves.is_total else ENOUGH
-    window = math.inf if per_interval <= 0.0 else max(LEAST_WINDOW, math.ceil(ENOUGH / per_interval))
+    window = max(LEAST_WINDOW, math.ceil(ENOUGH / per_interval)) if per_interval > 0.0 else math.inf  # NaN: no window
     if window > half:
         return _numbers(math.nan, math.nan, math.nan, math.nan)
     try:

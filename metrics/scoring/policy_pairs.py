@@ -40,6 +40,8 @@ def policy_pairs(panels: Sequence[StudyPanel]) -> "pl.DataFrame":
     for panel in panels:
         pairs = list(combinations(panel.scores, 2))
         differences = [panel.scores[first] - panel.scores[second] for first, second in pairs]
+        if not pairs:  # a single policy
+            continue
         p_values = holm(np.array([_p(level) for difference in differences for level in difference]))
         adjusted = p_values.reshape(len(pairs), -1)
         for (first, second), difference, of_pair in zip(pairs, differences, adjusted, strict=True):

@@ -220,9 +220,14 @@ def _law_rows(ladder: Ladder) -> Iterator[dict[str, Any]]:
 def _mean_field(
     table: "StudyTable", line: StudyLine, sizes: list[int]
 ) -> tuple[tuple[Curve, ...], tuple[dict[str, Any], ...]]:
-    """What small swarms promise larger ones; nothing where the model does not hold: caches, or arenas that grow."""
+    """What small swarms promise larger ones; nothing where the model does not hold.
+
+    That is with caches, in arenas that grow, for another performance than deliveries, and for mixed swarms.
+    """
     worlds = [table.spec.specs_of(cell)[0].scenario for cell in line.cells]
     arenas = {(world.arena.width_m, world.arena.height_m) for world in worlds}
+    if any(world.performance != "collected" for world in worlds) or line.policy.startswith("mixed:"):
+        return (), ()
     if len(arenas) > 1 or any(world.caches != "none" for world in worlds) or 1 not in sizes:
         return (), ()
     found: dict[int, tuple[RunCurves, dict[str, FloatArray]]] = {}

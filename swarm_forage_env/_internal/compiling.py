@@ -140,7 +140,11 @@ class _Cache(FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was compiled before, or None."""
         try:
-            return super().load_overload(sig, target_context)
+            found = super().load_overload(sig, target_context)
+            # Two processes that keep different types at the same moment can choose the same name for a file.
+            if found is not None and found.signature.args != tuple(sig):
+                raise ValueError(f"types {found.signature.args} under those of {tuple(sig)}")
+            return found
         except Exception as error:  # noqa: BLE001 - what a damaged file raises depends on where it is damaged
             _say(f"Compiled functions in {self.cache_path} cannot be read and are made anew ({error}).")
             with suppress(OSError):

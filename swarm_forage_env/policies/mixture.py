@@ -18,6 +18,8 @@ from functools import lru_cache
 from math import floor
 from typing import Any
 
+import numpy as np
+
 from swarm_forage_env._internal.fields import ConfigError, number
 
 PREFIX = "mixed:"
@@ -100,8 +102,13 @@ def mixture_parts(policy: str) -> tuple[Part, ...]:
 def _plain(amount: str) -> str:
     """Return an amount as it is stored: 20% and .20 are 0.2."""
     if amount.endswith("%"):
-        return str(float(Fraction(amount[:-1]) / 100))
-    return str(float(amount)) if "." in amount else amount if amount in (REST, SHARE) else str(int(amount))
+        return _decimal(Fraction(amount[:-1]) / 100)
+    return _decimal(Fraction(amount)) if "." in amount else amount if amount in (REST, SHARE) else str(int(amount))
+
+
+def _decimal(share: Fraction) -> str:
+    """Return a share with a decimal point and without an exponent."""
+    return np.format_float_positional(float(share), trim="0")
 
 
 def has_open_share(policy: str) -> bool:

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from typing import TextIO
 
@@ -50,7 +51,8 @@ def compile_world(scenario: ScenarioConfig) -> None:
     The outermost kernel is left to the first step: there may be one arena or several.
     """
     if is_first(scenario):
-        with _Helper(plan_run(scenario, "random")) as helper:
+        whole = replace(scenario, horizon_s=scenario.interval_s)  # a plan is of whole intervals
+        with _Helper(plan_run(whole, "random")) as helper:
             compile_half(scenario, 0)
             helper.wait_for_end()
 
@@ -118,7 +120,10 @@ class _Helper:
         """End the process."""
         if self._process is not None:
             self._process.kill()
-            self._talker.join()
+            self._talker.join(WAKE_UP_EVERY_S)
+            if self._talker.is_alive():  # a policy has started a process that holds the pipe, and may keep it for long
+                self._process.wait()
+                return
             with suppress(OSError), self._process:  # leaving it closes the pipes and waits
                 pass
 
@@ -137,16 +142,16 @@ class _Helper:
 
     def wait_for_half(self) -> None:
         """Wait until its half is compiled, or it is no more."""
-        _wait(self._half)
+        self._wait(self._half)
 
     def wait_for_end(self) -> None:
         """Wait until it is no more."""
-        _wait(self._end)
+        self._wait(self._end)
 
-
-def _wait(event: threading.Event) -> None:
-    while not event.wait(WAKE_UP_EVERY_S):
-        pass
+    def _wait(self, event: threading.Event) -> None:
+        while not event.wait(WAKE_UP_EVERY_S):
+            if self._process is None or self._process.poll() is not None:
+                return
 
 
 def help_out() -> None:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION = 2
 """Version of the file layout; raised whenever a column changes its name, type or meaning."""
-PACKAGES = ("swarm-forage-env", "numpy", "scipy", "numba", "pymunk", "pettingzoo")
+PACKAGES = ("swarm-forage-env", "numpy", "scipy", "numba", "llvmlite", "pymunk", "pettingzoo")
 """Distributions whose versions are part of every record."""
 
 CountArray: TypeAlias = NDArray[np.int64]

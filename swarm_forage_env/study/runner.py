@@ -357,11 +357,14 @@ def _compiled_together(pool: Executor, spec: RunSpec) -> bool:
         return False
     if asked.exception() is not None or not asked.result():
         return True
-    halves = [pool.submit(compile_half, spec.scenario, half) for half in (0, 1)]
-    if any([_is_broken_by(future) for future in halves]):  # noqa: C419 - a list: all are waited for
+    try:
+        halves = [pool.submit(compile_half, spec.scenario, half) for half in (0, 1)]
+        if any([_is_broken_by(future) for future in halves]):  # noqa: C419 - a list: all are waited for
+            return False
+        ends = [pool.submit(end, spec) for end in (compile_outermost, compile_start)]
+        return not any([_is_broken_by(future) for future in ends])  # noqa: C419 - as above
+    except BrokenExecutor:  # between two tasks
         return False
-    ends = [pool.submit(end, spec) for end in (compile_outermost, compile_start)]
-    return not any([_is_broken_by(future) for future in ends])  # noqa: C419 - as above
 
 
 def _is_broken_by(future: Future[Any]) -> bool:

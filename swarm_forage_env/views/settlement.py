@@ -88,7 +88,7 @@ class Settlement:
 
         Args:
             rewards: (A, N) of the step.
-            rows: absent, present, returns, lengths, each (A, N); see `kernels.rows.book_rows`.
+            rows: absent, present, returns, lengths, each (A, N); see `world.kernels.rows.book_rows`.
             flags: terminated, active, each (A, N), are written.
             obs: (A, N, D).
         """

@@ -253,6 +253,18 @@ def test_damaged_files_of_the_cache_are_made_anew(inner, tmp_path, name, caplog)
 
 
 @pytest.mark.compiled
+def test_what_is_kept_for_other_types_is_not_taken(inner, tmp_path, caplog):
+    function = inner()
+    function(np.float32(1.0))
+    first, second = sorted(tmp_path.rglob("*.nbc"))
+    second.write_bytes(first.read_bytes())  # as if two processes had chosen the same name
+    caplog.clear()
+    again = inner()
+    assert again(np.float32(1.0)) == 2.0
+    assert "cannot be read and are made anew" in caplog.text
+
+
+@pytest.mark.compiled
 def test_without_a_place_for_compiled_functions_they_are_compiled_in_every_process(inner, monkeypatch, caplog):
     # Not by permissions: whoever runs the tests may be allowed to write everywhere.
     monkeypatch.setattr(CacheImpl, "_locator_classes", [])

@@ -10,7 +10,7 @@ from swarm_forage_env.cli.scenario_options import split_names
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.mixed import MixedPolicy
-from swarm_forage_env.policies.mixture import mixture_parts, part_sizes
+from swarm_forage_env.policies.mixture import mixture_of, mixture_parts, part_sizes
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.registry import local_policy, policy_label
@@ -37,6 +37,12 @@ class Witness:
 # Names
 
 
+def test_small_shares_are_stored_as_they_are_read():
+    parts = mixture_parts("mixed:crw=0.0015%,dpo=rest")
+    assert parts[0].amount == "0.000015"
+    assert mixture_parts(mixture_of(parts)) == parts
+
+
 @pytest.mark.parametrize(
     ("amounts", "n_robots", "sizes"),
     [
@@ -48,6 +54,7 @@ class Witness:
         ("crw=0.2,dpo=rest", 1, (0, 1)),
         ("crw=0.0,dpo=1.0", 7, (0, 7)),
         ("crw=rest", 3, (3,)),
+        ("crw=0.001%,dpo=rest", 100_000, (1, 99_999)),
     ],
 )
 def test_amounts_become_numbers_of_robots(amounts, n_robots, sizes):

@@ -9,8 +9,8 @@ FIGURE = {
     "title": "a < b",
     "pictures": [{"address": picture_address(b"<svg/>"), "words": "curves"}],
     "claims": [],
-    "header": ["policy", "mean"],
-    "rows": [("crw", 0.12345678), ("dpo", None)],
+    "numbers": {"header": ["policy", "mean"], "rows": [("crw", 0.12345678), ("dpo", None)]},
+    "pairs": {"header": [], "rows": []},
 }
 VALUES = {
     "title": "<b>bold</b>",
@@ -26,6 +26,8 @@ VALUES = {
             "title": "</script>",
             "state": "",
             "figures": [FIGURE],
+            "models": [],
+            "cells": {"header": [], "rows": []},
             "missing": [],
             "settings": "",
         }
@@ -59,7 +61,7 @@ def test_numbers_are_short_and_keep_their_value_for_sorting():
     assert '<td class="number" data-value="0.12345678">0.1235</td>' in page
     assert "<td>-</td>" in page
     assert "12,000" in page
-    assert "1.5e+06" in page
+    assert "1,500,000" in page
 
 
 def test_without_claims_there_is_no_part_about_them():

@@ -2,7 +2,9 @@
 
 import subprocess
 import sys
+import time
 from concurrent.futures import Future
+from dataclasses import replace
 
 import pytest
 
@@ -71,6 +73,23 @@ def test_another_process_that_fails_changes_nothing(done, monkeypatch, program):
     monkeypatch.setattr(first_run, "_PROGRAM", program)
     compile_run(run_of("compiled"))
     assert done == ["half 0", "outermost"]
+
+
+def test_a_process_that_outlives_the_other_one_is_not_waited_for(done, monkeypatch):
+    child = "import subprocess, sys; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(30)'])"
+    monkeypatch.setattr(first_run, "_PROGRAM", child)
+    monkeypatch.setattr(first_run, "WAKE_UP_EVERY_S", 0.05)
+    started = time.monotonic()
+    compile_run(run_of("compiled"))
+    assert done == ["half 0", "outermost"]
+    assert time.monotonic() - started < 20.0, "a child of the other process still holds its pipe"
+
+
+def test_a_world_of_a_training_may_last_as_long_as_it_likes(done, monkeypatch):
+    monkeypatch.setattr(first_run, "is_first", lambda config: True)
+    monkeypatch.setattr(first_run, "_PROGRAM", "print()")
+    first_run.compile_world(replace(run_of("compiled").scenario, horizon_s=3.4))
+    assert done == ["half 0"]
 
 
 def test_without_another_process_this_one_does_its_part(done, monkeypatch, tmp_path):

@@ -193,6 +193,16 @@ def test_a_disk_without_room_is_told_before_anything_is_run(tmp_path, monkeypatc
     assert not (tmp_path / "new").exists()
 
 
+def test_arrays_of_other_lengths_are_named(tmp_path):
+    record_dataset(plan(), tmp_path)
+    chunk = chunk_file(tmp_path, 3, 0)
+    with np.load(chunk) as arrays:
+        values = dict(arrays)
+    np.savez(chunk, **values | {"active": values["active"][:-1]})
+    with pytest.raises(DatasetError, match=r"Expected active of \(decisions, robots\)"):
+        TrajectoryDataset(tmp_path).steps(3)
+
+
 def test_damaged_files_are_named(tmp_path):
     record_dataset(plan(), tmp_path)
     dataset = TrajectoryDataset(tmp_path)

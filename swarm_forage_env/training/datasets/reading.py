@@ -1,7 +1,5 @@
 """Reading a data set back: runs as the environment gave them, episodes of single robots, and transitions."""
 
-import zipfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,10 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from swarm_forage_env.contract.types import BoolArray, ObsArray
+from swarm_forage_env.policies.network import BROKEN_ARCHIVE
 from swarm_forage_env.training.datasets.layout import ARRAYS, Card, DatasetError, RunSummary, chunk_file, summary_file
 
-_BROKEN = (OSError, EOFError, LookupError, ValueError, zipfile.BadZipFile, zlib.error)
+_BROKEN = (*BROKEN_ARCHIVE, ValueError)
 """Errors of numpy and zipfile over a file that is missing, damaged or something else."""
+_LONGER_BY_ONE = ("observations", "active")
+"""Arrays that also have what follows the last decision."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -104,11 +105,15 @@ class TrajectoryDataset:
             yield from self._chunks_of(run)
 
     def _chunks_of(self, run: RunSummary) -> Iterator[Steps]:
+        n_robots = self.card.spec.scenario.robots.n_robots
         for number, n_decisions in enumerate(run.chunks):
-            steps = _read(chunk_file(self.folder, run.seed, number), run.seed)
-            if len(steps) != n_decisions:
-                file = chunk_file(self.folder, run.seed, number)
-                raise DatasetError(f"Expected {n_decisions} decisions in {file}, got {len(steps)}.")
+            file = chunk_file(self.folder, run.seed, number)
+            steps = _read(file, run.seed)
+            for name in ARRAYS:
+                expected = n_decisions + (name in _LONGER_BY_ONE), n_robots
+                shape = getattr(steps, name).shape
+                if shape[:2] != expected:
+                    raise DatasetError(f"Expected {name} of (decisions, robots) = {expected} in {file}, got {shape}.")
             yield steps
 
     def steps(self, seed: int) -> Steps:
@@ -126,7 +131,7 @@ class TrajectoryDataset:
             # Of the two arrays with one row more, the last row of a chunk is the first of the next one.
             name: np.concatenate(
                 [getattr(chunk, name)[: len(chunk)] for chunk in chunks]
-                + ([getattr(chunks[-1], name)[-1:]] if name in ("observations", "active") else [])
+                + ([getattr(chunks[-1], name)[-1:]] if name in _LONGER_BY_ONE else [])
             )
             for name in ARRAYS
         }

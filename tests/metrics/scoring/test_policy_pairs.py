@@ -6,7 +6,7 @@ import pytest
 from metrics.scoring import study_figures, study_panels
 from metrics.scoring.policy_pairs import policy_pairs
 from metrics.significance import holm, paired_p
-from swarm_forage_env.study.studies import Axis
+from swarm_forage_env.study.studies import Axis, StudyPolicy
 from tests.support.made_tables import FOUR, made_study, made_table
 
 HEIGHTS = dict(zip(FOUR, (4.0, 4.0, 6.0, 9.0), strict=True))
@@ -54,3 +54,11 @@ def test_a_policy_without_runs_is_left_open():
     first = policy_pairs(panels("raw_performance", lost=lost)).row(0, named=True)
     assert (first["p_better"], first["n_levels"]) == (None, 0)
     assert first["lower"] == pytest.approx(None)
+
+
+def test_a_single_policy_has_no_pairs():
+    spec = made_study(
+        "mine", Axis(name="population_size", values=(1, 2, 4)), policies=(StudyPolicy(label="crw", policy="crw"),)
+    )
+    (figure,) = study_figures(study_panels(made_table(spec, lambda cell: 5.0), measures=("raw_performance",)))
+    assert policy_pairs(figure.panels).height == 0

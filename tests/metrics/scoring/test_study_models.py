@@ -90,6 +90,11 @@ def test_worlds_with_caches_have_no_mean_field():
     assert MEAN_FIELD not in {curve.name for curve in figure.panels[0].expected}
 
 
+def test_the_mean_field_is_of_deliveries_only():
+    (figure,) = model_figures(foraging_table(performance="free_pickups"))
+    assert MEAN_FIELD not in {curve.name for curve in figure.panels[0].expected}
+
+
 def test_too_few_sizes_have_no_laws():
     assert model_figures(made_table(made_study(), lambda cell: 5.0)) == ()
 
