@@ -51,6 +51,10 @@ def dataset(  # long: one parameter per option
     typer.echo(_described(plan, folder))
     if dry_run:
         return
+    if minari is not None:
+        from swarm_forage_env.training.datasets.minari_export import check_minari, export_minari
+
+        check_minari(minari)  # before hours of work
     try:
         with progress_bar("decisions") as progress:
             runs = record_dataset(plan, folder, progress=progress)
@@ -60,8 +64,6 @@ def dataset(  # long: one parameter per option
     delivered = sum(run.collected for run in runs)
     typer.echo(f"wrote {folder}: {sum(sum(run.chunks) for run in runs):,} decisions, {delivered:,} objects delivered")
     if minari is not None:
-        from swarm_forage_env.training.datasets.minari_export import export_minari
-
         typer.echo(f"wrote the Minari data set {export_minari(folder, minari).spec.dataset_id}")
 
 

@@ -388,7 +388,5 @@ class ForagingArena:
             swarm.facing[robot] = np.cos(angle), np.sin(angle)
             self._physics.place(robot, x, y, angle)
         self.has_changed |= not np.array_equal(swarm.present, present)
-        if self.tick > 0:  # before, a robot that leaves is one that is to be born later
-            swarm.dead |= swarm.present
-        swarm.dead &= ~present
+        swarm.dead[:] = (swarm.dead | swarm.present) & ~present
         swarm.active[:], swarm.present[:] = active, present

@@ -41,7 +41,8 @@ class SwarmState:
     active: BoolArray
     """(N,) present and not in repair: part of the tasked swarm. active implies present."""
     dead: BoolArray
-    """(N,) was present and is no longer; `position` tells where it ended. Nothing but pictures reads it."""
+    """(N,) was present and is no longer; `position` tells where it ended. Only pictures read it, and whoever keeps
+    robots back at a reset, until they are born, unsets it."""
 
     @classmethod
     def empty(cls, n_robots: int) -> "SwarmState":

@@ -78,6 +78,7 @@ class PopulationDynamics(SwarmWrapper):
         self._repair_ticks = 0
         if not self._state.present.all():
             self._apply()
+            self.unwrapped.swarm.dead[:] = False  # they are not born yet
             self.unwrapped.arena.observe()
 
     def before_step(self) -> None:

@@ -248,12 +248,17 @@ def test_torch_reads_batches(tmp_path):
 @pytest.mark.parametrize("policy", ["crw", "ppo_warehouse_small"])
 def test_minari_gets_the_same_numbers(policy, tmp_path, monkeypatch):
     minari = pytest.importorskip("minari")
-    from swarm_forage_env.training.datasets.minari_export import export_minari
+    from swarm_forage_env.training.datasets.minari_export import check_minari, export_minari
 
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "minari"))
     folder = tmp_path / "ours"
     record_dataset(plan(policy, seeds=(3, 5)), folder)
+    check_minari("swarm_forage/test-v0")
     export_minari(folder, "swarm_forage/test-v0", author="somebody")
+    with pytest.raises(DatasetError, match="a new Minari data set"):
+        check_minari("swarm_forage/test-v0")
+    with pytest.raises(DatasetError, match=r"such as swarm_forage/dpo-v0, got 'test'"):
+        check_minari("test")
     theirs, ours = minari.load_dataset("swarm_forage/test-v0"), TrajectoryDataset(folder)
     assert theirs.total_episodes == 2
     for episode, run in zip(theirs.iterate_episodes(), ours.runs, strict=True):

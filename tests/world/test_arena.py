@@ -120,12 +120,9 @@ def test_the_dead_are_out_of_the_way():
 
 def test_a_robot_is_dead_from_when_it_leaves_until_it_comes_back():
     env = tidy_world()
-    env.set_population(**population(env, gone=(0,)))
-    assert not env.swarm.dead.any()  # not born yet
+    env.set_population(**population(env, gone=(1,)))
     act(env, {})
-    env.set_population(**population(env, gone=(0, 1)))
-    act(env, {})
-    env.set_population(**population(env, gone=(0, 1, 2)))
+    env.set_population(**population(env, gone=(1, 2)))
     assert env.swarm.dead.tolist() == [False, True, True, False]
     env.set_population(**population(env))
     assert not env.swarm.dead.any()

@@ -4,6 +4,7 @@ Its episodes are those of `views.gymnasium.JointForageEnv` with the same scenari
 same actions: observations (N, d), the sum of the rewards of all robots, termination when all are dead.
 """
 
+import re
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,28 @@ from swarm_forage_env.training.datasets.reading import TrajectoryDataset
 
 if TYPE_CHECKING:
     from minari import MinariDataset
+
+
+_ID = re.compile(r"(?:[\w-]+/)*[\w-]+-v\d+")
+
+
+def check_minari(dataset_id: str) -> None:
+    """Refuse a name under which `export_minari` could make nothing.
+
+    Raises:
+        ImportError: minari is not installed.
+        DatasetError: it is no name of a Minari data set, or there is one of that name.
+    """
+    try:
+        import minari
+    except ImportError as error:
+        raise ImportError(f"A Minari data set needs minari: {install_command('minari')}.") from error
+    if not _ID.fullmatch(dataset_id):
+        raise DatasetError(f"Expected a name of a Minari data set, such as swarm_forage/dpo-v0, got {dataset_id!r}.")
+    if dataset_id in minari.list_local_datasets():
+        raise DatasetError(
+            f"Expected the name of a new Minari data set, got {dataset_id!r}, which is there; name another."
+        )
 
 
 def export_minari(folder: str | Path, dataset_id: str, **about: Any) -> "MinariDataset":
