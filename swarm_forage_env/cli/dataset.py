@@ -52,7 +52,7 @@ def dataset(  # long: one parameter per option
     if dry_run:
         return
     if minari is not None:
-        from swarm_forage_env.training.datasets.minari_export import check_minari, export_minari
+        from swarm_forage_env.training.datasets.minari_export import check_minari
 
         check_minari(minari)  # before hours of work
     try:
@@ -64,6 +64,8 @@ def dataset(  # long: one parameter per option
     delivered = sum(run.collected for run in runs)
     typer.echo(f"wrote {folder}: {sum(sum(run.chunks) for run in runs):,} decisions, {delivered:,} objects delivered")
     if minari is not None:
+        from swarm_forage_env.training.datasets.minari_export import export_minari
+
         typer.echo(f"wrote the Minari data set {export_minari(folder, minari).spec.dataset_id}")
 
 
