@@ -120,18 +120,14 @@ class _Helper:
         """End the process."""
         if self._process is not None:
             self._process.kill()
-            self._talker.join(WAKE_UP_EVERY_S)
-            if self._talker.is_alive():  # a policy has started a process that holds the pipe, and may keep it for long
-                self._process.wait()
-                return
-            with suppress(OSError), self._process:  # leaving it closes the pipes and waits
-                pass
+            self._process.wait()
+            self._talker.join(WAKE_UP_EVERY_S)  # it lives on where a policy has started a process that holds the pipe
 
     def _talk(self, process: "subprocess.Popen[str]") -> None:
         """Tell the process what to do, and note how far it is. It ends when nobody holds its stdin any more."""
         assert process.stdin is not None, "it is a pipe"
         assert process.stdout is not None, "it is a pipe"
-        with suppress(OSError, ValueError):
+        with suppress(OSError, ValueError), process.stdin, process.stdout:
             process.stdin.write(self._spec.to_json() + "\n")
             process.stdin.flush()
             process.stdout.readline()
