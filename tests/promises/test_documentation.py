@@ -13,8 +13,19 @@ from scripts.update_docs import FIVE
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("**/*.md"))]
-BLOCK = re.compile(r"(<!-- not run: .+ -->\n)?^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
-"""A Python example; one that takes too long for a test says so in a comment before it."""
+BLOCK = re.compile(r"(?:<!-- (not run: .+|needs \w+) -->\n)?^```python\n(.*?)^```", re.DOTALL | re.MULTILINE)
+"""A Python example. One that takes too long for a test, or needs an extra, says so in a comment before it."""
+
+
+def examples(page: Path) -> list[tuple[str, str]]:
+    """(what the comment says or nothing, the code) of each example that a test can run."""
+    return [(needs, block) for needs, block in BLOCK.findall(page.read_text()) if not needs.startswith("not run")]
+
+
+def run_all(blocks, page):
+    names: dict[str, object] = {}
+    for number, block in enumerate(blocks, 1):
+        exec(compile(block, f"{page.name}, example {number}", "exec"), names)  # noqa: S102 - our own documentation
 
 
 @pytest.mark.compiled
@@ -22,12 +33,21 @@ BLOCK = re.compile(r"(<!-- not run: .+ -->\n)?^```python\n(.*?)^```", re.DOTALL 
     "page", [page for page in PAGES if "```python" in page.read_text()], ids=lambda page: page.name
 )
 def test_python_examples_run(page, tmp_path, monkeypatch):
-    """The examples of a page run one after the other, as a user would type them."""
+    """The examples of a page run one after the other, as a user would type them, without any extra."""
     monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    for number, (skipped, block) in enumerate(BLOCK.findall(page.read_text()), 1):
-        if not skipped:
-            exec(compile(block, f"{page.name}, example {number}", "exec"), names)  # noqa: S102 - our own documentation
+    run_all([block for needs, block in examples(page) if not needs], page)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if "<!-- needs " in page.read_text()], ids=lambda page: page.name
+)
+def test_python_examples_run_with_their_extras(page, tmp_path, monkeypatch):
+    for needs, _ in examples(page):
+        if needs:
+            pytest.importorskip(needs.removeprefix("needs "))
+    monkeypatch.chdir(tmp_path)
+    run_all([block for _, block in examples(page)], page)
 
 
 @pytest.mark.parametrize("name", ["run", "tests"])
