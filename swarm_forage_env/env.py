@@ -10,13 +10,12 @@ from pettingzoo import ParallelEnv
 
 from swarm_forage_env._internal.fields import as_whole, instance, switch
 from swarm_forage_env.contract.calls import is_over, no_options
-from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.arena import ForagingArena
+from swarm_forage_env.world.global_state import global_state
 from swarm_forage_env.world.rewards import RewardModel
 from swarm_forage_env.world.snapshots import Origin, Snapshot, package_version, read, take
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
@@ -458,33 +457,12 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         return {agent: {"active": active[agent]} for agent in agents}
 
     def state(self) -> np.ndarray:
-        """Global view of fixed size, (6 N + 3 M,) float32 in [-1, 1].
-
-        Per robot: x, y as in the observation, cos and sin of the heading, carrying, active (zeros when not present).
-        Then per object: x, y of its cell (of its carrier while carried, zeros while waiting), status / 3.
+        """Global view of fixed size, (6 N + 3 M,) float32 in [-1, 1]; see `world.global_state`.
 
         Raises:
             RuntimeError: before the first reset.
         """
-        swarm, objects, arena = self.swarm, self.objects, self.scenario.arena
-        size = np.array([arena.width_m, arena.height_m])
-        robots = np.column_stack(
-            [
-                2.0 * swarm.position / size - 1.0,
-                np.cos(swarm.heading),
-                np.sin(swarm.heading),
-                swarm.carried_object >= 0,
-                swarm.active,
-            ]
-        )
-        robots[~swarm.present] = 0.0
-        places = 2.0 * (objects.cell + 0.5) * CELL_M / size - 1.0
-        places[objects.status == ObjectStatus.WAITING] = 0.0
-        carriers = np.flatnonzero(swarm.carried_object >= 0)
-        places[swarm.carried_object[carriers]] = robots[carriers, :2]
-        things = np.column_stack([places, objects.status / 3.0])
-        flat = np.concatenate([robots.ravel(), things.ravel()])
-        return np.clip(flat, -1.0, 1.0).astype(np.float32)
+        return global_state(self.scenario.arena, self.swarm, self.objects)
 
     def render(self) -> np.ndarray | None:
         """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None.
