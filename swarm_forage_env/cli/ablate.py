@@ -1,23 +1,22 @@
 """The command `ablate`."""
 
-from typing import Annotated
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import (
-    EXIT_FAILURE,
-    AsJson,
-    Caches,
-    DryRun,
-    Jobs,
-    Out,
-    Performance,
-    Settings,
-    Wrappers,
-)
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, Caches, DryRun, Jobs, Out
+from swarm_forage_env.cli.world_options import World, takes_world
+
+if TYPE_CHECKING:
+    from swarm_forage_env.study.ablation import Ablation
+    from swarm_forage_env.study.store import RunStore
 
 
-def ablate(  # long: one parameter per option
+@takes_world("performance", "settings", "wrappers")
+def ablate(
+    *,
     scenario: Annotated[
         str, typer.Option("--scenario", help="One or more presets, separated by commas.")
     ] = "warehouse_small,warehouse_medium",
@@ -31,9 +30,7 @@ def ablate(  # long: one parameter per option
     seeds: Annotated[int, typer.Option(min=2, help="Runs per policy, size and switched quirk.")] = 3,
     horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
     caches: Caches = None,
-    performance: Performance = None,
-    settings: Settings = None,
-    wrappers: Wrappers = None,
+    described: World,
     out: Out = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -43,57 +40,70 @@ def ablate(  # long: one parameter per option
 
     The tables are Markdown. Records go to a folder; an interrupted command can simply be given again.
     """
-    from dataclasses import replace
     from pathlib import Path
 
-    from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
-    from swarm_forage_env.cli.ablation_report import ablation_json, ablation_pages
-    from swarm_forage_env.cli.interrupts import resumable
-    from swarm_forage_env.cli.report import estimated_seconds, plan_note
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, described_world, split_names, split_numbers
-    from swarm_forage_env.scenarios.performance import quantity
-    from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
-    from swarm_forage_env.study.ablation import plan_ablation, run_ablation
-    from swarm_forage_env.study.runner import available_cores
+    from swarm_forage_env._internal.fields import MOST_SEEDS, whole
+    from swarm_forage_env.cli.scenario_options import split_names, split_numbers
     from swarm_forage_env.study.store import RunStore
 
     whole("--seeds", seeds, at_least=2, at_most=MOST_SEEDS)
-    sizes = split_numbers("--robots", robots, int)
-    told = ScenarioOptions(
-        scenario="",
-        horizon=horizon,
-        performance=performance,
-        settings=tuple(settings or ()),
-        wrappers=tuple(wrappers or ()),
-    )
-    described = [
-        described_world(replace(told, scenario=name, robots=size)) for name in split_names(scenario) for size in sizes
+    worlds = [
+        replace(described, scenario=name, robots=size, horizon=horizon)
+        for name in split_names(scenario)
+        for size in split_numbers("--robots", robots, int)
     ]
-    worlds, disturbances = [world for world, _, _ in described], described[0][2]
+    plan = _plan(worlds, split_names(policy), quirks, seeds, caches)
+    store = RunStore(out or Path("results", "ablation"))
+    if dry_run:
+        _show_plan(plan, store, seeds, jobs)
+    else:
+        _run(plan, store, jobs, as_json=as_json)
+
+
+def _plan(
+    described: Sequence[World], policies: Sequence[str], quirks: str, seeds: int, caches: str | None
+) -> "Ablation":
+    from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env.cli.scenario_options import described_world, split_names
+    from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
+    from swarm_forage_env.study.ablation import plan_ablation
+
+    worlds = [described_world(one) for one in described]
     every = {"all": QUIRK_NAMES, "none": ()}
     switched = every[quirks] if quirks in every else split_names(quirks)
     try:
-        plan = plan_ablation(
-            worlds,
-            split_names(policy),
+        return plan_ablation(
+            [world for world, _, _ in worlds],
+            policies,
             quirks=switched,
             seeds=range(seeds),
             caches=caches,
-            wrappers=disturbances,
+            wrappers=worlds[0][2],
         )
     except ValueError as error:  # of a policy
         raise ConfigError(str(error)) from error
-    store = RunStore(out or Path("results", "ablation"))
-    if dry_run:
-        todo = [spec for spec in plan.all if spec.run_id not in store]
-        processes = jobs or available_cores()
-        note = plan_note(todo, estimated_seconds(todo, processes), processes)
-        typer.echo(f"At most {note} A quirk that changes nothing needs one run instead of {seeds}.")
-        return
+
+
+def _show_plan(plan: "Ablation", store: "RunStore", seeds: int, jobs: int | None) -> None:
+    from swarm_forage_env.cli.report import estimated_seconds, plan_note
+    from swarm_forage_env.study.runner import available_cores
+
+    todo = [spec for spec in plan.all if spec.run_id not in store]
+    processes = jobs or available_cores()
+    note = plan_note(todo, estimated_seconds(todo, processes), processes)
+    typer.echo(f"At most {note} A quirk that changes nothing needs one run instead of {seeds}.")
+
+
+def _run(plan: "Ablation", store: "RunStore", jobs: int | None, *, as_json: bool) -> None:
+    from swarm_forage_env.cli.ablation_report import ablation_json, ablation_pages
+    from swarm_forage_env.cli.interrupts import resumable
+    from swarm_forage_env.scenarios.performance import quantity
+    from swarm_forage_env.study.ablation import run_ablation
+
     with resumable(store.folder):
         result = run_ablation(plan, store=store, jobs=jobs, progress=True)
     show = ablation_json if as_json else ablation_pages
-    typer.echo(show(result, quantity(worlds[0].performance)))
+    typer.echo(show(result, quantity(plan.all[0].scenario.performance)))
     for failure in result.failures:
         typer.echo(f"failed: {failure.spec.describe()}: {failure.error}", err=True)
     if result.failures:

@@ -1,25 +1,17 @@
 """The command `choose`."""
 
+from dataclasses import replace
 from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import (
-    AsJson,
-    Caches,
-    DryRun,
-    Jobs,
-    Objects,
-    Out,
-    Performance,
-    Robots,
-    Scenario,
-    Settings,
-    Side,
-)
+from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Out
+from swarm_forage_env.cli.world_options import World, takes_world
 
 
-def choose(  # long: one parameter per option
+@takes_world("scenario", "robots", "objects", "side", "caches", "performance", "settings")
+def choose(
+    described: World,
     policy: Annotated[
         str,
         typer.Option(
@@ -51,15 +43,8 @@ def choose(  # long: one parameter per option
         float | None,
         typer.Option(metavar="SIGMA", help="Standard deviation of the noise of all sensors and wheels."),
     ] = None,
-    scenario: Scenario = "warehouse_small",
-    robots: Robots = None,
     seeds: Annotated[int, typer.Option(min=2, help="Runs per policy and condition.")] = 4,
     horizon: Annotated[float | None, typer.Option(help="Seconds per run, whole intervals of 200 s.")] = None,
-    objects: Objects = None,
-    side: Side = None,
-    caches: Caches = None,
-    performance: Performance = None,
-    settings: Settings = None,
     out: Out = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -71,18 +56,9 @@ def choose(  # long: one parameter per option
     mean performance reaches the demand. Runs that the folder holds already are not repeated.
     """
     from swarm_forage_env.cli.decision_report import Demands, choose_runs
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder
+    from swarm_forage_env.cli.scenario_options import default_folder
 
-    described = ScenarioOptions(
-        scenario=scenario,
-        robots=robots,
-        objects=objects,
-        side=side,
-        caches=caches,
-        performance=performance,
-        horizon=horizon,
-        settings=tuple(settings or ()),
-    )
+    described = replace(described, horizon=horizon)
     demands = Demands(deliver=deliver, keep=keep, failures=failures, deaths=deaths, noise=noise)
-    folder = out or default_folder(scenario)
+    folder = out or default_folder(described.scenario)
     choose_runs(described, policy, demands, seeds, folder, jobs, as_json=as_json, dry_run=dry_run)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.training.datasets.recording import DatasetPlan
 
 
-@takes_world
+@takes_world()
 def dataset(  # long: one parameter per option
     described: World,
     policy: Annotated[

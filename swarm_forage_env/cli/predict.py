@@ -1,36 +1,28 @@
 """The command `predict`."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import (
-    AsJson,
-    Caches,
-    DryRun,
-    Jobs,
-    Objects,
-    Out,
-    Performance,
-    Scenario,
-    Settings,
-    refuse_options_of_runs,
-)
+from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Out, refuse_options_of_runs
+from swarm_forage_env.cli.world_options import World, takes_world
 
 _OF_CURVES = ("curves", "fit", "hold", "performance", "out", "as_json")
 """Options of `predict` that go with --curves."""
 
 
-def predict(  # long: one parameter per option
+@takes_world("scenario", "objects", "caches", "performance", "settings")
+def predict(
     context: typer.Context,
+    described: World,
     policy: Annotated[
         str | None, typer.Option(help="One or more, separated by commas: names, or files of trained policies.")
     ] = None,
     curves: Annotated[
         Path | None, typer.Option(help="Predict from curves in a CSV or Parquet file instead (docs/deciding.md).")
     ] = None,
-    scenario: Scenario = "warehouse_small",
     fit: Annotated[
         str | None,
         typer.Option(
@@ -43,10 +35,6 @@ def predict(  # long: one parameter per option
     ] = None,
     seeds: Annotated[int, typer.Option(min=2, help="Runs per size.")] = 4,
     horizon: Annotated[float | None, typer.Option(help="Seconds per run, whole intervals of 200 s.")] = None,
-    objects: Objects = None,
-    caches: Caches = None,
-    performance: Performance = None,
-    settings: Settings = None,
     out: Out = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -58,7 +46,7 @@ def predict(  # long: one parameter per option
     the prediction. Runs that the folder holds already are not repeated.
     """
     from swarm_forage_env.cli.decision_report import predict_file, predict_runs
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder, split_numbers
+    from swarm_forage_env.cli.scenario_options import default_folder, split_numbers
 
     if (policy is None) == (curves is None):
         raise typer.BadParameter("Expected either --policy or --curves.")
@@ -66,15 +54,8 @@ def predict(  # long: one parameter per option
     held = () if hold is None else split_numbers("--hold", hold, int)
     if curves is not None:
         refuse_options_of_runs(context, _OF_CURVES)
-        predict_file(curves, fitted, held, performance, out, as_json=as_json)
+        predict_file(curves, fitted, held, described.performance, out, as_json=as_json)
         return
-    described = ScenarioOptions(
-        scenario=scenario,
-        objects=objects,
-        caches=caches,
-        performance=performance,
-        horizon=horizon,
-        settings=tuple(settings or ()),
-    )
-    folder = out or default_folder(scenario)
-    predict_runs(described, policy or "", fitted, held, seeds, folder, jobs, as_json=as_json, dry_run=dry_run)
+    folder = out or default_folder(described.scenario)
+    world = replace(described, horizon=horizon)
+    predict_runs(world, policy or "", fitted, held, seeds, folder, jobs, as_json=as_json, dry_run=dry_run)

@@ -9,7 +9,7 @@ from swarm_forage_env.cli.terminal import progress_bar
 from swarm_forage_env.cli.world_options import World, takes_world
 
 
-@takes_world
+@takes_world()
 def record(
     described: World,
     out: Annotated[

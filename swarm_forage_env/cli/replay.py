@@ -23,7 +23,7 @@ _RUN_ID = re.compile(r"[0-9a-f]{16}")
 _OPTIONS_OF_STORED_RUNS = ("run", "out", "beside", "seconds", "frame")
 
 
-@takes_world
+@takes_world()
 def replay(
     context: typer.Context,
     described: World,

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.study.store import RunStore
 
 
-@takes_world
+@takes_world()
 def run(
     described: World,
     policy: Annotated[

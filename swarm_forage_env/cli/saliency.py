@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.study.saliency import Saliency
 
 
-@takes_world
+@takes_world()
 def saliency(
     described: World,
     policy: Annotated[str, typer.Argument(metavar="POLICY", help="A shipped network, or an .npz file of a training.")],

@@ -9,37 +9,31 @@ from swarm_forage_env.cli.options import (
     AsJson,
     Band,
     Budget,
-    Caches,
-    Density,
     Disturbance,
     DryRun,
     Forms,
     Jobs,
     Measures,
-    Objects,
     Out,
-    Performance,
-    Robots,
-    Scenario,
     ScoreHorizon,
     ScoreSeeds,
-    Settings,
-    Side,
     Variants,
     refuse_options_of_runs,
 )
+from swarm_forage_env.cli.world_options import SCORED, World, takes_world
 
 _OF_CURVES = ("curves", "measures", "performance", "variant", "form", "band", "as_json")
 """Options of `score` that go with --curves."""
 
 
-def score(  # long: one parameter per option
+@takes_world(*SCORED)
+def score(
     context: typer.Context,
+    described: World,
     policy: Annotated[str | None, typer.Option(help="Name, or file of a trained policy.")] = None,
     curves: Annotated[
         Path | None, typer.Option(help="Score curves from a CSV or Parquet file instead (docs/scoring.md).")
     ] = None,
-    scenario: Scenario = "warehouse_small",
     measures: Measures = None,
     variant: Variants = "corrected",
     form: Forms = "marginal",
@@ -47,14 +41,7 @@ def score(  # long: one parameter per option
     budget: Budget = "standard",
     seeds: ScoreSeeds = None,
     horizon: ScoreHorizon = None,
-    robots: Robots = None,
-    objects: Objects = None,
-    side: Side = None,
-    density: Density = None,
     disturbance: Disturbance = "throttle",
-    caches: Caches = None,
-    performance: Performance = None,
-    settings: Settings = None,
     out: Out = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -65,7 +52,7 @@ def score(  # long: one parameter per option
     Swarms of several sizes, throttled, noisy and failing robots; one table with intervals and noise floors. Runs that
     the folder holds already are not repeated.
     """
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions, default_folder
+    from swarm_forage_env.cli.scenario_options import default_folder
     from swarm_forage_env.cli.score_options import ScoreOptions, build_plan, score_forms, tables_of_file
     from swarm_forage_env.cli.score_report import run_and_show, show_scores
 
@@ -73,19 +60,9 @@ def score(  # long: one parameter per option
         raise typer.BadParameter("Expected either --policy or --curves.")
     if curves is not None:
         refuse_options_of_runs(context, _OF_CURVES)
-        tables = tables_of_file(curves, measures, performance, score_forms(variant, form))
+        tables = tables_of_file(curves, measures, described.performance, score_forms(variant, form))
         show_scores(tables, None, as_json=as_json, band=band)
         return
-    chosen = ScenarioOptions(
-        scenario=scenario,
-        robots=robots,
-        objects=objects,
-        side=side,
-        density=density,
-        caches=caches,
-        performance=performance,
-        settings=tuple(settings or ()),
-    )
     options = ScoreOptions(
         policies=policy or "",
         measures=measures,
@@ -96,6 +73,6 @@ def score(  # long: one parameter per option
         horizon=horizon,
         disturbance=disturbance,
     )
-    folder = out or default_folder(scenario)
-    plan = build_plan(chosen, options, at_most=1)
+    folder = out or default_folder(described.scenario)
+    plan = build_plan(described, options, at_most=1)
     run_and_show(plan, folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run, band=band)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.study.stuck import StuckRobot
 
 
-@takes_world
+@takes_world()
 def stuck(
     described: World,
     policy: Annotated[

@@ -7,7 +7,7 @@ import typer
 from swarm_forage_env.cli.world_options import World, takes_world
 
 
-@takes_world
+@takes_world()
 def watch(
     described: World,
     policy: Annotated[str, typer.Argument(metavar="POLICY", help="Name, or file of a trained policy.")],
