@@ -108,7 +108,7 @@ def test_results_say_which_sets_and_cells_they_are_of(run):
 def test_sketches_of_theory_are_those_of_the_docs(run):
     pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
     assert run("draw_theory", ".")[0] == 0
-    for name in ("self_organisation.png", "task_graph.png"):
+    for name in ("self_organisation.png", "flexibility.png", "task_graph.png"):
         assert Path(name).read_bytes().startswith(b"\x89PNG")
         assert (ROOT / "docs/images" / name).is_file()
 
