@@ -224,7 +224,7 @@ def every_verdict(results: Results) -> str:
             for one in here
         ]
         later = {one.lacks for one in (*results.waiting, *results.expected_later) if one.claim.name == name}
-        waits = sorted({experiment for lacks in later for experiment, _ in lacks})
+        waits = sorted({experiment for lacks in later for experiment, *_ in lacks})
         words = f"{claim.text} ({claim.figure})"
         parts.append(f"### {name}\n\n{words}" + (f"\n\n{rows(header, lines, right=(4, 5, 6))}" if lines else ""))
         if waits:
@@ -292,7 +292,7 @@ def pictured(results: Results) -> Iterator[tuple[StudyTable, list[StudyFigure]]]
         shown: list[StudyFigure] = []
         for figure in study_figures(panels):
             first = figure.panels[0]
-            here = {(panel.experiment or "", panel.measure) for panel in figure.panels}
+            here = {panel.name for panel in figure.panels}
             names = [name for name, claim in CLAIMS.items() if not here.isdisjoint(claim.panels)]
             base = table.spec.readings[0]
             differs = any(answers.get((name, base)) != answers.get((name, first.reading)) for name in names)
@@ -316,7 +316,7 @@ def figures(results: Results, folder: Path) -> str:
         parts += [f"### {table.spec.name}: {table.spec.title}"] if shown else []
         for figure in shown:
             parts.append(_pictured(figure.name, figure.title, folder, lambda path, it=figure: draw_figure(it, [path])))
-            here = {(panel.experiment or "", panel.measure) for panel in figure.panels}
+            here = {panel.name for panel in figure.panels}
             reading = figure.panels[0].reading
             names = [name for name, claim in CLAIMS.items() if not here.isdisjoint(claim.panels)]
             words = ", ".join(f"{name} {_answer(found.get((name, reading)))}" for name in names)

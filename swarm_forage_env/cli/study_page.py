@@ -224,7 +224,7 @@ def _claims_about(
     """Return the claims that use a panel of the figure, with what was found under its reading."""
     from metrics.scoring.texts import counted, percent
 
-    here = {(panel.experiment, panel.measure) for panel in figure.panels}
+    here = {panel.name for panel in figure.panels}
     reading = figure.panels[0].reading
     found: dict[str, dict[str, Any]] = {}
     for one in (*judged, *waiting):
@@ -233,7 +233,7 @@ def _claims_about(
         entry = found.setdefault(one.claim.name, {"name": one.claim.name, "text": one.claim.text, "found": []})
         verdict = getattr(one, "verdict", None)
         if verdict is None:
-            lacks = ", ".join(" ".join(name).replace("_", " ") for name in getattr(one, "lacks", ()))
+            lacks = ", ".join(name.words for name in getattr(one, "lacks", ()))
             entry["found"].append({"answer": "", "words": f"{one.variant}: waits for {lacks}"})
             continue
         words = f"{one.variant}; by bands {verdict.by_bands}; effect {percent(verdict.effect)}; "
