@@ -56,8 +56,13 @@ def opposite_order(
     better: tuple[int, int] = (1, 1),
     rule: Rule = "intervals",
 ) -> Outcome:
-    """Whether policies have the opposite order in two panels; arguments as in `same_order`."""
-    return same_order(first, second, policies=policies, better=(better[0], -better[1]), rule=rule)
+    """Whether policies have the opposite order in two panels; as `same_order`, below 0 and below minus `LOOSE`."""
+
+    def decide(lower: float, upper: float) -> Answer:
+        most = -LOOSE if rule == "bands" else 0.0
+        return "supported" if upper < most else "contradicted" if lower >= 0.0 else "undecided"
+
+    return _of_tau(first, second, policies, better, rule, decide, "below 0 is the opposite order")
 
 
 def unrelated(first: Panel, second: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:

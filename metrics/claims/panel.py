@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, stdtrit  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
+from scipy.special import gammaln, ndtri, stdtrit  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
 from metrics.checks import CurveError, check_option
 from metrics.curves import FloatArray
@@ -188,12 +188,19 @@ def resampled_means(values: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def resampled_deviations(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the same for standard deviations; resampled ones are sqrt(n / (n - 1)) larger, to be right on average."""
+    """Return the same for standard deviations, made right on average.
+
+    That of four normal numbers is 8 % too small on average, and that of n resampled ones another sqrt((n - 1) / n).
+    Resampled ones are mirrored (the basic bootstrap): few runs show too small a deviation far more often than too large
+    a one, so the true one lies on the side on which resampled ones do not lie.
+    """
     complete = complete_runs(values)
     n_runs = np.isfinite(complete).sum(axis=-1)
-    with np.errstate(divide="ignore"):  # a single run has no deviation
-        drawn = std_over_runs(resampled_runs(values)) * np.sqrt(n_runs / (n_runs - 1.0))
-    return _widened(values, std_over_runs(complete), drawn)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a single run has no deviation
+        share = np.sqrt(2.0 / (n_runs - 1.0)) * np.exp(gammaln(0.5 * n_runs) - gammaln(0.5 * n_runs - 0.5))
+        drawn = std_over_runs(resampled_runs(values)) * np.sqrt(n_runs / (n_runs - 1.0)) / share
+    found, widened = _widened(values, std_over_runs(complete) / share, drawn)
+    return found, 2.0 * found - widened
 
 
 def _widened(values: FloatArray, found: FloatArray, drawn: FloatArray) -> tuple[FloatArray, FloatArray]:

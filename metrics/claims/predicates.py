@@ -284,9 +284,9 @@ def _narrowness(panel: Panel, policy: str, rule: Rule) -> Outcome:
     def judge(part: Panel) -> Outcome:
         (values,) = part.of((policy,))
         found, drawn = resampled_deviations(values)
-        widths = 4.0 * found / part.scale
-        width, n_runs = float(widths.mean()), part.n_runs((policy,))
+        width, n_runs = 4.0 * float(found.mean()) / part.scale, part.n_runs((policy,))
         if rule == "bands":
+            widths = 4.0 * std_over_runs(values) / part.scale
             answer: Answer = "supported" if (widths <= FLAT).mean() > MANY else "contradicted"
             why = f"bands of {policy} are at most {FLAT:g} of the scale wide at {(widths <= FLAT).mean():.0%} of levels"
             return Outcome(answer=answer, statistic=width, effect=width, n_runs=n_runs, why=why)

@@ -91,8 +91,9 @@ def changes_before(panel: Panel, *, first: str, others: Sequence[str], rule: Rul
 def is_linear(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:
     """Whether each policy grows nearly linearly with the level.
 
-    A rising line explains `LINEAR` of the variance between the means; by intervals, with its interval. By bands: the
-    same of the means alone, if the bands of two levels are apart; else nothing is seen to grow, which is undecided.
+    A rising line explains `LINEAR` of the variance between the means; by intervals, with its interval. Contradicted if
+    it explains less, or surely rises by less than `TIE` of the scale over all levels. By bands: the same of the means
+    alone, however little they rise, if the bands of two levels are apart; else nothing is seen to grow: undecided.
     """
     return all_of([_straightness(panel, policy, rule) for policy in policies])
 
@@ -267,7 +268,7 @@ def _straightness(panel: Panel, policy: str, rule: Rule) -> Outcome:
             most = _ratio(rest**0.5 + rests**0.5, total**0.5 - totals**0.5)
             least = _ratio(rest**0.5 - rests**0.5, total**0.5 + totals**0.5)
             answer = "supported" if 1.0 - most >= LINEAR and lower > 0.0 else "undecided"
-            answer = "contradicted" if 1.0 - least < LINEAR or upper <= 0.0 else answer
+            answer = "contradicted" if 1.0 - least < LINEAR or upper <= TIE else answer
             words = f"{1.0 - most:.2f} to {1.0 - least:.2f} with its interval; "
         why = f"a line explains {explained:.2f} of the variance of {policy} ({words}{LINEAR:g} is nearly linear)"
         why = f"{why} and rises by {rise:.2f} of the scale" + ("" if rise > 0.0 else ": it does not grow")

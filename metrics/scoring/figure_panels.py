@@ -46,6 +46,7 @@ _EXPERIMENTS: dict[tuple[Any, ...], str] = {
     ("S2a", 0.0): "S2a still",
     ("S2a", 0.001): "S2a slow",
     ("S2a", 0.051): "S2a fast",
+    ("S2b", 12): "S2b 12",
     ("S2b", 115): "S2b 115",
     ("S2b", 320): "S2b 320",
     ("S2c", 320): "S2c 320",

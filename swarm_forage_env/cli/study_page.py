@@ -237,8 +237,11 @@ def _claims_about(
             entry["found"].append({"answer": "", "words": f"{one.variant}: waits for {lacks}"})
             continue
         words = f"{one.variant}; by bands {verdict.by_bands}; effect {percent(verdict.effect)}; "
-        words += f"{counted(verdict.n_runs, 'run')}; {verdict.why}"
+        words += f"{counted(verdict.n_runs, 'run')}; {'; '.join(verdict.why.splitlines())}"
         entry["found"].append({"answer": verdict.answer, "words": words})
+        entry["found"] += [
+            {"answer": other.answer, "words": f"{one.variant}; {sense}"} for sense, other in verdict.otherwise.items()
+        ]
     return list(found.values())
 
 
