@@ -40,12 +40,13 @@ PAGE, DETAILS = "results.md", "results_in_detail.md"
 COLOURS = 64
 """Of a picture; with more, its file is several times as large and looks the same."""
 ANSWERS = get_args(Answer)
-SIGNS: dict[Answer, str] = {"supported": "✓", "contradicted": "✗", "undecided": "?", "no scores": "–"}
+SIGNS: dict[Answer, str] = {"supported": "✓", "contradicted": "✗", "undecided": "?", "no scores": "-"}
 
 INTRODUCTION = f"""Each claim of the paper is held against these runs, under both [readings](readings.md) of its rules.
-A claim that is contradicted is a result like any other. Some rules were wrong and were changed after runs had been seen:
+A claim that is contradicted is a result like any other. Some rules were wrong and were changed after runs were seen:
 [which, and why](metrics.md#rules-that-changed-after-runs-were-seen). How claims are decided is in
-[metrics.md](metrics.md#the-papers-claims), how studies are run in [studies.md](studies.md); statistics, effects and numbers of runs are in [{DETAILS}]({DETAILS}). `scripts/write_results` writes both pages and their pictures;
+[metrics.md](metrics.md#the-papers-claims), how studies are run in [studies.md](studies.md); statistics, effects and
+numbers of runs are in [{DETAILS}]({DETAILS}). `scripts/write_results` writes both pages and their pictures;
 nothing in them is typed by hand."""
 
 
@@ -210,9 +211,9 @@ def every_verdict(results: Results) -> str:
     """Return each claim with all its verdicts: readings, forms of the measures, both rules."""
     parts = [
         "## Claim by claim\n\nMeasures are as corrected, as printed in the paper, and as in the authors' program "
-        "(`sierra`); behind a colon stands another sense of the claim. The statistic is what was decided on, in words in "
-        "the last column, and of several statements the share that holds; the effect is a share of the largest mean in "
-        "the figure; runs are the fewest behind any number."
+        "(`sierra`); behind a colon stands another sense of the claim. The statistic is what was decided on, in words "
+        "in the last column, and of several statements the share that holds; the effect is a share of the largest mean "
+        "in the figure; runs are the fewest behind any number."
     ]
     header = ("reading", "measures", "by intervals", "by bands", "statistic", "effect", "runs", "why")
     for name, claim in {**CLAIMS, **INTUITIONS}.items():
@@ -274,8 +275,8 @@ def what_hangs_on_what(results: Results) -> str:
     return (
         "## Answers that hang on a slip\n\nThe paper's description and the authors' program differ "
         "([readings.md](readings.md)), and so do the measures as meant, as printed (`paper`) and as programmed "
-        "(`sierra`, [errata.md](errata.md)). Of some claims the paper's text, captions, file names or program leave open "
-        f"what is meant. These answers are not the same in all of them; where there are no scores, nothing is "
+        "(`sierra`, [errata.md](errata.md)). Of some claims the paper's text, captions, file names or program leave "
+        "open what is meant. These answers are not the same in all of them; where there are no scores, nothing is "
         f"compared:\n\n{text}"
     )
 
