@@ -415,7 +415,7 @@ SHOWN = {
     **dict.fromkeys(shown("S1a raw_performance"), (X, four(0.9, 1.0, 0.6, 0.4))),
     **dict.fromkeys(shown("S1b task_emergence"),
                     (np.arange(1.0, 9.0), four(0.06, 0.02, 0.04, np.arange(1.0, 9.0) / 8.0))),
-    **dict.fromkeys(shown("S1b scalability"), (X, four(0.55, 0.50, 0.47, 0.45))),
+    **dict.fromkeys(shown("S1b scalability"), (X, four(0.55, 0.50, 0.47, 0.49))),
     **dict.fromkeys(shown("S1b raw_performance"), (X, four(1.0, 0.9, 0.6, 0.4))),
     **{PanelName(experiment, measure): (X, flexible(above)) for experiment, above in (("S1c", 0.0), ("S1d", 0.3))
        for measure in ("reactivity", "adaptability")},
