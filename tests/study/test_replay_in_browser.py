@@ -1,14 +1,17 @@
 """The replay page in a real browser: it plays, jumps, tells of robots, and asks for nothing."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.replay.capture import record_replay
 from swarm_forage_env.study.replay.files import write_replays
+from swarm_forage_env.study.replay.frames import Replay, Status
 from swarm_forage_env.study.spec import plan_run
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.browser import Browser, chromium
@@ -53,9 +56,22 @@ def pair(replays, tmp_path_factory) -> Path:
     return write_replays(tmp_path_factory.mktemp("page") / "two.html", replays)
 
 
-@pytest.fixture(params=[DESKTOP, PHONE], ids=["desktop", "phone"])
-def shape(request):
-    return request.param
+@pytest.fixture(scope="module")
+def desktop(tmp_path_factory) -> Iterator[Browser]:
+    """One browser for all tests of this file; each opens its page anew."""
+    with Browser(tmp_path_factory.mktemp("desktop"), **DESKTOP) as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def phone(tmp_path_factory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("phone"), **PHONE) as browser:
+        yield browser
+
+
+@pytest.fixture(params=["desktop", "phone"])
+def browser(request) -> Browser:
+    return request.getfixturevalue(request.param)
 
 
 def keep_picture(browser: Browser, name: str) -> None:
@@ -70,85 +86,72 @@ def seek(browser: Browser, time_s: float) -> None:
     browser.ask("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
-def test_play_moves_robots_and_pause_stops_them(page, shape, tmp_path):
-    with Browser(tmp_path, **shape) as browser:
-        browser.open(page)
-        before = browser.ask(PIXELS)
-        browser.click("#play")
-        browser.wait_for("Number(document.getElementById('scrub').value) > 5")
-        assert browser.ask(PIXELS) != before
-        browser.click("#play")
-        seek(browser, 100.0)
-        still = browser.ask(PIXELS)
-        browser.ask("new Promise((done) => setTimeout(done, 200))")
-        assert browser.ask(PIXELS) == still
-        keep_picture(browser, f"play_{shape['width']}")
-        assert (browser.complaints, browser.requests) == ([], [])
+def test_play_moves_robots_and_pause_stops_them(page, browser):
+    browser.open(page)
+    before = browser.ask(PIXELS)
+    browser.click("#play")
+    browser.wait_for("Number(document.getElementById('scrub').value) > 5")
+    assert browser.ask(PIXELS) != before
+    browser.click("#play")
+    seek(browser, 100.0)
+    still = browser.ask(PIXELS)
+    browser.ask("new Promise((done) => setTimeout(done, 200))")
+    assert browser.ask(PIXELS) == still
+    keep_picture(browser, f"play_{browser.width}")
+    assert (browser.complaints, browser.requests) == ([], [])
 
 
-def test_the_end_shows_the_counts_of_the_record(page, replays, shape, tmp_path):
+def test_the_end_shows_the_counts_of_the_record(page, replays, browser):
     delivered = int(replays[0].counters[-1, Counter.COLLECTED])
     assert delivered > 0
-    with Browser(tmp_path, **shape) as browser:
-        browser.open(page)
-        assert browser.ask(NUMBER) == 0
-        seek(browser, 400.0)
-        assert browser.ask(NUMBER) == delivered
-        assert browser.text("#score td") == str(delivered)
-        seek(browser, 200.0)
-        assert browser.ask(NUMBER) == replays[0].counters[200, Counter.COLLECTED]
-        keep_picture(browser, f"end_{shape['width']}")
-        assert (browser.complaints, browser.requests) == ([], [])
+    browser.open(page)
+    assert browser.ask(NUMBER) == 0
+    seek(browser, 400.0)
+    assert browser.ask(NUMBER) == delivered
+    assert browser.text("#score td") == str(delivered)
+    seek(browser, 200.0)
+    assert browser.ask(NUMBER) == replays[0].counters[200, Counter.COLLECTED]
+    keep_picture(browser, f"end_{browser.width}")
+    assert (browser.complaints, browser.requests) == ([], [])
 
 
-def test_nothing_is_wider_than_the_window(pair, shape, tmp_path):
-    with Browser(tmp_path, **shape) as browser:
-        browser.open(pair)
-        assert browser.ask("document.documentElement.scrollWidth") <= shape["width"]
+def test_nothing_is_wider_than_the_window(pair, browser):
+    browser.open(pair)
+    assert browser.ask("document.documentElement.scrollWidth") <= browser.width
 
 
-def test_a_click_chooses_a_robot_and_tells_its_state(pair, replays, tmp_path):
+def test_a_click_chooses_a_robot_and_tells_its_state(pair, replays, desktop):
     replay = replays[0]
-    with Browser(tmp_path, **DESKTOP) as browser:
-        browser.open(pair)
-        seek(browser, 150.0)
-        frame = 150  # one per second
-        robot = next(r for r in range(12) if not replay.status[frame, r] & (8 | 4))
-        left, top, width, height = browser.box(".arena canvas")
-        scale = (min(width, height) - 16) / 8.0
-        x_m, y_m = replay.position_m[frame, robot]
-        browser.click_at(left + width / 2 + scale * (x_m - 4.0), top + height / 2 - scale * (y_m - 4.0))
-        browser.wait_for("document.querySelector('#robot h2') !== null")
-        assert browser.text("#robot h2").startswith("robot ")
-        chosen = int(browser.text("#robot h2").removeprefix("robot ").removesuffix("follow"))
-        assert abs(replay.position_m[frame, chosen] - (x_m, y_m)).max() < 0.3
-        told = browser.text("#robot .told")
-        assert replay.activities[replay.activity[frame, chosen]] in told
-        assert f"{replay.remembered[frame // 5, chosen]} thing" in told
-        browser.press("f")
-        browser.wait_for("document.querySelector('#robot button').ariaPressed === 'true'")
-        keep_picture(browser, "robot")
-        browser.press("Escape")
-        browser.wait_for("document.querySelector('#robot h2') === null")
-        assert (browser.complaints, browser.requests) == ([], [])
+    desktop.open(pair)
+    frame = 150  # one per second
+    robot = next(r for r in range(12) if not replay.status[frame, r] & (8 | 4))
+    choose(desktop, replay, frame, robot)
+    words = desktop.text("#robot .told")
+    assert replay.activities[replay.activity[frame, robot]] in words
+    assert f"{replay.remembered[frame // 5, robot]} thing" in words
+    desktop.press("f")
+    desktop.wait_for("document.querySelector('#robot button').ariaPressed === 'true'")
+    keep_picture(desktop, "robot")
+    desktop.press("Escape")
+    desktop.wait_for("document.querySelector('#robot h2') === null")
+    assert (desktop.complaints, desktop.requests) == ([], [])
 
 
-def test_keys_play_step_and_switch_to_dark(page, tmp_path):
+def test_keys_play_step_and_switch_to_dark(page, desktop):
     value = "Number(document.getElementById('scrub').value)"
-    with Browser(tmp_path, **DESKTOP) as browser:
-        browser.open(page)
-        browser.press("ArrowRight")
-        browser.wait_for(f"{value} === 10")
-        browser.press("End")
-        browser.wait_for(f"{value} === 400")
-        browser.press("Home")
-        browser.press(" ", code="Space")
-        browser.wait_for(f"{value} > 1")
-        browser.press(" ", code="Space")
-        light = browser.ask("getComputedStyle(document.body).backgroundColor")
-        browser.press("t")
-        assert browser.ask("getComputedStyle(document.body).backgroundColor") != light
-        assert browser.complaints == []
+    desktop.open(page)
+    desktop.press("ArrowRight")
+    desktop.wait_for(f"{value} === 10")
+    desktop.press("End")
+    desktop.wait_for(f"{value} === 400")
+    desktop.press("Home")
+    desktop.press(" ", code="Space")
+    desktop.wait_for(f"{value} > 1")
+    desktop.press(" ", code="Space")
+    light = desktop.ask("getComputedStyle(document.body).backgroundColor")
+    desktop.press("t")
+    assert desktop.ask("getComputedStyle(document.body).backgroundColor") != light
+    assert desktop.complaints == []
 
 
 def test_the_system_may_ask_for_dark(page, tmp_path):
@@ -168,32 +171,82 @@ def system_asks_for(browser: Browser, scheme: str) -> None:
     browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
 
-def test_a_click_on_a_curve_jumps_there(page, tmp_path):
-    with Browser(tmp_path, **DESKTOP) as browser:
-        browser.open(page)
-        browser.click(".curve:not([hidden]) canvas")
-        browser.wait_for("Math.abs(Number(document.getElementById('scrub').value) - 200) < 30")
+def test_a_click_on_a_curve_jumps_there(page, desktop):
+    desktop.open(page)
+    desktop.click(".curve:not([hidden]) canvas")
+    desktop.wait_for("Math.abs(Number(document.getElementById('scrub').value) - 200) < 30")
 
 
-def test_two_fingers_zoom(page, tmp_path):
-    with Browser(tmp_path, **PHONE) as browser:
-        browser.open(page)
-        x, y = browser.middle(".arena canvas")
-        before = browser.ask(PIXELS)
-        browser.touch("touchStart", (x - 20, y), (x + 20, y))
-        for reach in (40, 60, 80):
-            browser.touch("touchMove", (x - reach, y), (x + reach, y))
-        browser.touch("touchEnd")
-        browser.wait_for("document.querySelector('.arena canvas').classList.contains('zoomed')")
-        assert browser.ask(PIXELS) != before
-        assert browser.complaints == []
+def test_two_fingers_zoom(page, phone):
+    phone.open(page)
+    x, y = phone.middle(".arena canvas")
+    before = phone.ask(PIXELS)
+    phone.touch("touchStart", (x - 20, y), (x + 20, y))
+    for reach in (40, 60, 80):
+        phone.touch("touchMove", (x - reach, y), (x + reach, y))
+    phone.touch("touchEnd")
+    phone.wait_for("document.querySelector('.arena canvas').classList.contains('zoomed')")
+    assert phone.ask(PIXELS) != before
+    assert phone.complaints == []
 
 
-def test_a_damaged_page_says_so(page, tmp_path):
+def test_a_damaged_page_says_so(page, desktop, tmp_path):
     text = page.read_text()
     start = text.index('class="run">') + 40
     broken = tmp_path / "broken.html"
     broken.write_text(text[:start] + "AAAA" * 20 + text[start + 80 :])
-    with Browser(tmp_path, **DESKTOP) as browser:
-        browser.open(broken, "document.getElementById('loading')?.textContent.includes('cannot be shown')")
-        assert "may be damaged" in browser.text("#loading")
+    desktop.open(broken, "document.getElementById('loading')?.textContent.includes('cannot be shown')")
+    assert "may be damaged" in desktop.text("#loading")
+
+
+def test_robots_that_are_not_yet_born_are_not_called_dead(desktop, tmp_path):
+    births = parse_wrapper("population:initial_robots=2,birth_per_tick=0.02")
+    replay, _ = record_replay(plan_run(WORLD, "random", wrappers=(births,), seed=1), seconds=40.0)
+    absent = replay.has(Status.ABSENT)
+    born = int(np.flatnonzero(absent[0] & ~absent[-1])[0])
+    first = int(np.argmin(absent[:, born]))
+    desktop.open(write_replays(tmp_path / "births.html", replay))
+    assert "in interference" in desktop.text("#legend")
+    assert "dead" not in desktop.text("#legend")
+    choose(desktop, replay, 40, born)
+    assert told(desktop) != "not yet born"
+    seek(desktop, first - 1.0)
+    assert told(desktop) == "not yet born"
+    assert desktop.complaints == []
+
+
+def test_dead_robots_and_those_in_repair_are_told_and_explained(page, replays, desktop):
+    replay = replays[0]
+    absent, repair = replay.has(Status.ABSENT), replay.has(Status.REPAIR)
+    dead = int(np.flatnonzero(absent[-1])[0])
+    frame, broken = (int(place[0]) for place in np.nonzero(repair))
+    desktop.open(page)
+    for name in ("dead", "in repair"):
+        assert name in desktop.text("#legend")
+    choose(desktop, replay, int(np.argmax(absent[:, dead])) - 1, dead)
+    assert told(desktop) != "dead"
+    seek(desktop, 400.0)
+    assert told(desktop) == "dead"
+    choose(desktop, replay, frame, broken)
+    assert told(desktop) == "in repair"
+    assert desktop.complaints == []
+
+
+def place_of(browser: Browser, replay: Replay, frame: int, robot: int) -> tuple[float, float]:
+    """Return where a robot is in the window, in pixels, while the first arena is shown as a whole."""
+    left, top, width, height = browser.box(".arena canvas")
+    scale = (min(width, height) - 16) / 8.0
+    x_m, y_m = replay.position_m[frame, robot]
+    return left + width / 2 + scale * (x_m - 4.0), top + height / 2 - scale * (y_m - 4.0)
+
+
+def choose(browser: Browser, replay: Replay, frame: int, robot: int) -> None:
+    """Go to a frame, one of each second, and click on a robot."""
+    seek(browser, float(frame))
+    browser.click_at(*place_of(browser, replay, frame, robot))
+    browser.wait_for(f"document.querySelector('#robot h2')?.textContent.startsWith('robot {robot}f')")
+
+
+def told(browser: Browser) -> str:
+    """Return the state of the chosen robot, as the page calls it."""
+    return browser.text("#robot td")

@@ -31,11 +31,13 @@ class Browser:
     Attributes:
         complaints: Errors and messages on the console.
         requests: Addresses that the page has asked for, itself aside.
+        width: Width of the window in pixels.
     """
 
     def __init__(self, folder: Path, *, width: int, height: int, touch: bool = False, dark: bool = False) -> None:
         self.complaints: list[str] = []
         self.requests: list[str] = []
+        self.width = width
         self._ids = itertools.count(1)
         self._unread = b""
         self._address = ""
@@ -106,7 +108,12 @@ class Browser:
             self.requests.append(about["request"]["url"])
 
     def open(self, file: Path, ready: str = "document.getElementById('loading')?.hidden === true") -> None:
-        """Open a file and wait until it is ready; by default until its replay is unpacked."""
+        """Open a file and wait until it is ready; by default until its replay is unpacked.
+
+        What was kept of an earlier page is gone.
+        """
+        self.complaints.clear()
+        self.requests.clear()
         self._address = file.resolve().as_uri()
         self.call("Page.navigate", url=self._address)
         self.wait_for(ready)
@@ -150,6 +157,10 @@ class Browser:
         """Press and release the mouse."""
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    def move_to(self, x: float, y: float) -> None:
+        """Move the mouse, with no button down."""
+        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
 
     def press(self, key: str, *, code: str = "") -> None:
         """Press and release a key."""

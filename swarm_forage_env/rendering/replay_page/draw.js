@@ -210,7 +210,7 @@ class Painter {
     for (let robot = 0; robot < run.nRobots; robot++) {
       const state = run.status[robot];
       if (state & ABSENT) {
-        if (run.firstSeen[robot] < run.frame) gone.push(robot);
+        if (run.isDead(robot)) gone.push(robot);
         continue;
       }
       if (state & CARRYING) carrying.push(robot);

@@ -53,6 +53,11 @@ class Run {
     return frame;
   }
 
+  /** Whether a robot that was in the world before a frame is not there any more. One not yet born is not dead. */
+  isDead(robot, frame = this.frame) {
+    return this.firstSeen[robot] < frame && (this.arrays.status[robot * this.nFrames + frame] & ABSENT) !== 0;
+  }
+
   timeOf(frame) {
     return Math.min(frame * this.frameS, this.endS);
   }
