@@ -1,5 +1,6 @@
 """The replay page in a real browser: it plays, jumps, tells of robots, and asks for nothing."""
 
+import dataclasses
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,10 +12,11 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.replay.capture import record_replay
 from swarm_forage_env.study.replay.files import write_replays
-from swarm_forage_env.study.replay.frames import Replay, Status
+from swarm_forage_env.study.replay.frames import Status
 from swarm_forage_env.study.spec import plan_run
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.browser import Browser, chromium
+from tests.support.replay_page import choose, place_of, seek
 
 pytestmark = pytest.mark.compiled
 
@@ -78,12 +80,6 @@ def keep_picture(browser: Browser, name: str) -> None:
     """Write a picture for people to look at, if the environment says where."""
     if "REPLAY_PICTURES" in os.environ:
         browser.picture(Path(os.environ["REPLAY_PICTURES"]) / f"{name}.png")
-
-
-def seek(browser: Browser, time_s: float) -> None:
-    browser.ask(f"document.getElementById('scrub').value = {time_s}")
-    browser.ask("document.getElementById('scrub').dispatchEvent(new Event('input'))")
-    browser.ask("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
 def test_play_moves_robots_and_pause_stops_them(page, browser):
@@ -215,6 +211,68 @@ def test_robots_that_are_not_yet_born_are_not_called_dead(desktop, tmp_path):
     assert desktop.complaints == []
 
 
+def test_pointing_at_a_robot_tells_its_state(page, replays, desktop):
+    replay = replays[0]
+    desktop.open(page)
+    seek(desktop, 150.0)
+    robot = int(np.flatnonzero(~replay.has(Status.ABSENT)[150])[0])
+    x, y = place_of(desktop, replay, 150, robot)
+    desktop.move_to(x, y)
+    desktop.wait_for("!document.getElementById('tip').hidden")
+    lines = desktop.ask("[...document.getElementById('tip').children].map((line) => line.innerText.trim())")
+    assert lines[0] == f"robot {robot}"
+    assert f"activity: {replay.activities[replay.activity[150, robot]]}" in lines
+    x_m, y_m = replay.position_m[150, robot]
+    assert lines[-1] == f"place: {x_m:.1f}, {y_m:.1f} m"
+    desktop.move_to(2.0, 2.0)
+    desktop.wait_for("document.getElementById('tip').hidden")
+    assert desktop.complaints == []
+
+
+def test_following_keeps_the_robot_in_the_middle(page, replays, desktop):
+    replay = replays[0]
+    inner = np.abs(replay.position_m - 4.0).max(axis=2) < 2.0  # near a wall the arena ends before the window does
+    frames = np.array([50, 60])
+    robot = int(np.flatnonzero(inner[frames].all(axis=0) & ~replay.has(Status.ABSENT)[-1])[0])
+    desktop.open(page)
+    choose(desktop, replay, int(frames[0]), robot)
+    desktop.press("f")
+    desktop.wait_for("document.querySelector('.arena canvas').classList.contains('zoomed')")
+    for frame in frames.tolist():
+        seek(desktop, float(frame))
+        desktop.press("Escape")  # lets go; the view stays
+        desktop.click_at(*desktop.middle(".arena canvas"))
+        desktop.wait_for(f"document.querySelector('#robot h2')?.textContent.startsWith('robot {robot}f')")
+        desktop.press("f")
+    assert np.ptp(replay.position_m[frames, robot], axis=0).max() > 0.1, "it has moved"
+
+
+def test_the_throttle_has_a_curve_that_tells_its_value(page, replays, desktop):
+    (throttle,) = replays[0].signals.values()
+    desktop.open(page)
+    values = "[...document.querySelectorAll('.curve')].find((c) => c.querySelector('h2').innerText === 'throttle')"
+    for frame in (40, 150):
+        seek(desktop, float(frame))
+        assert float(desktop.ask(f"{values}.querySelector('.values').innerText")) == pytest.approx(
+            throttle[frame], abs=0.005
+        )
+
+
+def test_a_ring_shows_where_an_object_has_been_delivered(page, replays, desktop, tmp_path):
+    replay = replays[0]
+    silent = write_replays(tmp_path / "silent.html", dataclasses.replace(replay, deliveries=replay.deliveries[:0]))
+    first_s = float(replay.deliveries[0, 0]) * replay.scenario.dt_s
+    pictures = []
+    for file in (page, silent):
+        desktop.open(file)
+        for time_s in (first_s - 1.0, first_s + 0.4):
+            seek(desktop, time_s)
+            pictures.append(desktop.ask(PIXELS))
+    before, after, silent_before, silent_after = pictures
+    assert before == silent_before
+    assert after != silent_after
+
+
 def test_dead_robots_and_those_in_repair_are_told_and_explained(page, replays, desktop):
     replay = replays[0]
     absent, repair = replay.has(Status.ABSENT), replay.has(Status.REPAIR)
@@ -230,21 +288,6 @@ def test_dead_robots_and_those_in_repair_are_told_and_explained(page, replays, d
     choose(desktop, replay, frame, broken)
     assert told(desktop) == "in repair"
     assert desktop.complaints == []
-
-
-def place_of(browser: Browser, replay: Replay, frame: int, robot: int) -> tuple[float, float]:
-    """Return where a robot is in the window, in pixels, while the first arena is shown as a whole."""
-    left, top, width, height = browser.box(".arena canvas")
-    scale = (min(width, height) - 16) / 8.0
-    x_m, y_m = replay.position_m[frame, robot]
-    return left + width / 2 + scale * (x_m - 4.0), top + height / 2 - scale * (y_m - 4.0)
-
-
-def choose(browser: Browser, replay: Replay, frame: int, robot: int) -> None:
-    """Go to a frame, one of each second, and click on a robot."""
-    seek(browser, float(frame))
-    browser.click_at(*place_of(browser, replay, frame, robot))
-    browser.wait_for(f"document.querySelector('#robot h2')?.textContent.startsWith('robot {robot}f')")
 
 
 def told(browser: Browser) -> str:
