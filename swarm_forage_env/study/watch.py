@@ -283,7 +283,8 @@ class Watch:
         if hasattr(policy, "describe_robots"):
             known = policy.describe_robots().n_remembered  # type: ignore[attr-defined] - optional, see Policy
             if known is not None:
-                lines.append(f"remembers: {known[robot]}")
+                shown = ", in thin frames" if hasattr(policy, "remembered_places") else ""
+                lines.append(f"remembers: {known[robot]}{shown}")
         return lines or [f"{self._name} does not tell what its robots are doing"]
 
     def summary(self) -> str:

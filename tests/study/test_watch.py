@@ -151,7 +151,7 @@ def test_the_scene_tells_of_the_chosen_robot(watch):
     assert scene.close_up.shape == (300, 300, 3)
     assert "robot 4 at" in text
     assert watch._policy.describe_robot(4) in text
-    assert "remembers: 0" in text
+    assert "remembers: 0, in thin frames" in text
     assert scene.help == HELP
 
 
