@@ -5,13 +5,13 @@ from scipy.spatial import cKDTree
 
 from swarm_forage_env.contract.codes import Counter, ObjectStatus
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 from swarm_forage_env.wrappers.recorder import TICK_MEANS, TOTALS, RunRecorder
 from tests.support.stage import assert_conserved
 
-DEEPEST = 0.5
-"""Overlap of two robots that is no contact any more but one robot on top of another, as a share of a diameter (our
-choice: far above the 6 % of robots that drive head-on and far below the 90 % of those that pile up, see
-`tests/science/test_physics_convergence.py`)."""
+IN_A_CROWD = 0.12
+"""Overlap in a crowd that pushes, beyond what comes from one substep, as a share of a diameter: twice the 6 % that
+`tests/science/test_physics_convergence.py` finds. Robots that pile up overlap by 90 %."""
 
 
 def look_at(env: ForageEnv, obs: np.ndarray) -> float:
@@ -39,8 +39,20 @@ def _deepest_overlap(env: ForageEnv, position: np.ndarray) -> float:
         return 0.0
     nearest = cKDTree(position).query(position, k=2)[0][:, 1].min()
     overlap = max(0.0, 1.0 - float(nearest) / (2 * env.scenario.robots.radius_m))
-    assert overlap <= DEEPEST, f"one robot is on top of another: {overlap:.0%} of a diameter"
+    assert overlap <= tolerated_overlap(env), f"one robot is on top of another: {overlap:.0%} of a diameter"
     return overlap
+
+
+def tolerated_overlap(env: ForageEnv) -> float:
+    """How deep two robots may be in each other when a tick ends, as a share of a diameter.
+
+    A contact is met one substep late, in which two robots come nearer by twice their speed, and a crowd undoes it
+    another one later.
+    """
+    config = env.scenario
+    speed = min(config.robots.max_speed_mps, WHEEL_SCALE_MPS)
+    closing_m = 2 * speed * config.dt_s / len(config.physics_substeps)
+    return IN_A_CROWD + 2 * closing_m / (2 * config.robots.radius_m)
 
 
 def look_at_record(recorder: RunRecorder, first_counters: np.ndarray) -> None:
@@ -67,7 +79,7 @@ def look_at_record(recorder: RunRecorder, first_counters: np.ndarray) -> None:
     assert taken == put + carried, "what is taken is put somewhere or still carried"
     changed = totals["caches_created"] - totals["caches_depleted"] + int(first_counters[Counter.CACHES_CREATED])
     assert changed == np.count_nonzero(env.caches.alive), "caches that were created stand until they are depleted"
-    assert totals["first_picked"] <= totals["free_pickups"]
+    assert totals["first_picked"] <= taken, "static caches hold objects that nobody has carried"
     assert totals["displaced_drops"] <= totals["floor_drops"]
     assert np.all(columns["n_carrying"] <= columns["n_active"])
     assert np.all(columns["n_active"] <= columns["n_present"])

@@ -53,7 +53,7 @@ def misuse_before_reset(stack: RunRecorder) -> int:
         "a snapshot": stack.snapshot,
         "columns": stack.columns,
         "a reset with a negative seed": lambda: stack.reset_batch(-1),
-        "a reset with a seed of text": lambda: stack.reset(seed="one"),  # type: ignore[arg-type] - that is the point
+        "a reset with a seed of text": lambda: stack.reset(seed="one"),
         "a reset with an option": lambda: stack.reset(options={"speed": 1}),
     }
     return sum(refused(call, f"{name} before the first reset") for name, call in calls.items())
@@ -71,13 +71,13 @@ def misuse(stack: RunRecorder, random: Random) -> int:
     calls: dict[str, Callable[[], Any]] = {
         "actions without a row": lambda: stack.step_batch(good[1:]),
         "actions with a column more": lambda: stack.step_batch(np.zeros((n_robots, 4), np.float32)),
-        "one number for actions": lambda: stack.step_batch(np.float32(0.0)),  # type: ignore[arg-type] - that is the point
-        "text for actions": lambda: stack.step_batch([["a"] * 3] * n_robots),  # type: ignore[arg-type] - likewise
-        "no actions": lambda: stack.step_batch(None),  # type: ignore[arg-type] - likewise
+        "one number for actions": lambda: stack.step_batch(np.float32(0.0)),
+        "text for actions": lambda: stack.step_batch([["a"] * 3] * n_robots),
+        "no actions": lambda: stack.step_batch(None),
         "a gain of another shape": lambda: stack.step_batch(good, wheel_gain=np.ones(n_robots + 1)),
         "a reset with a negative seed": lambda: stack.reset_batch(-1),
         "a reset with an option": lambda: stack.reset(seed=1, options={"speed": 1}),
-        "something else for a snapshot": lambda: stack.restore_batch(b"snapshot"),  # type: ignore[arg-type] - likewise
+        "something else for a snapshot": lambda: stack.restore_batch(b"snapshot"),
         "a population of another shape": lambda: env.set_population(active=np.ones(n_robots + 1, bool),
                                                                     present=np.ones(n_robots, bool)),
         "robots at work that are not there": lambda: env.set_population(active=np.ones(n_robots, bool),
@@ -89,7 +89,7 @@ def misuse(stack: RunRecorder, random: Random) -> int:
         calls |= {
             "an agent without an action": lambda: stack.step(dict.fromkeys(agents[1:], good[0])),
             "an action of two numbers": lambda: stack.step({**by_agent, agents[0]: good[0, :2]}),
-            "a list for actions": lambda: stack.step([good[0]] * len(agents)),  # type: ignore[arg-type] - that is the point
+            "a list for actions": lambda: stack.step([good[0]] * len(agents)),
         }
     if len(workers):
         some[random.choice(workers.tolist()), random.randrange(3)] = random.choice((np.nan, np.inf, -np.inf))

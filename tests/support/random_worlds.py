@@ -103,14 +103,14 @@ def random_world(random: Random, *, most_ticks: int = 400) -> RandomWorld:
 def _scenario(random: Random, driver: str, most_ticks: int) -> ScenarioConfig:
     name = random.choice(SCENARIO_NAMES)
     given: dict[str, Any] = {
-        "n_robots": random.choice((1, 2, random.randint(3, 30), random.randint(30, 80))),
+        "n_robots": random.choice((1, 2, *random.choices(range(3, 30), k=3), random.randint(30, 80), 150)),
         "n_objects": round(10 ** random.uniform(0.0, 2.7)),
         "caches": SCRIPTED.get(driver, random.choice(CACHE_KINDS)),
         "physics": random.choice(PHYSICS_ENGINES),
         "side_share": random.choice((0.03, 0.05, 0.2, random.uniform(0.01, 0.5))),
     }
     dt_s = random.choice((0.2, 0.2, 0.2, 0.05, 0.5))
-    n_ticks = random.randint(20, most_ticks)
+    n_ticks = random.choice((random.randint(20, most_ticks), most_ticks))
     n_intervals = random.randint(1, 4)
     interval_ticks = max(1, n_ticks // n_intervals)
     given |= {"dt_s": dt_s, "interval_s": interval_ticks * dt_s, "horizon_s": n_intervals * interval_ticks * dt_s}
