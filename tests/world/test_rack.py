@@ -94,6 +94,14 @@ def test_arenas_together_are_those_alone(wrappers, fields, chosen_ways):
     assert n_ended >= 6
 
 
+def test_arenas_with_other_weights_are_not_paid_together():
+    batch = ArenaBatch(plan(), 2)
+    batch.reset([0, 1], [None, {"scenario": {"first_pickup": 3.0}}])
+    assert ways(batch) == (False, True, False, True)
+    batch.reset([0, 1], [{"scenario": {"first_pickup": 3.0}}, None])
+    assert ways(batch) == (True,) * 4
+
+
 def test_one_arena_alone_takes_the_same_way():
     batch, other = ArenaBatch(plan(nest_progress=0.1), 1), OneByOne(plan(nest_progress=0.1), 1)
     np.testing.assert_array_equal(batch.reset([3], [None])[0], other.reset([3], [None])[0])
@@ -181,6 +189,13 @@ def test_a_seat_may_stay_be_stepped_alone_begin_anew_and_go_back():
                 arena.step(now[2])
         for one, other in zip(ours, theirs, strict=True):
             assert_same(one, other)
+
+
+def test_with_nothing_to_step_nothing_happens():
+    ours, theirs = arenas(2), arenas(2)
+    assert not Rack(ours).step({}, np.zeros((2, N_ROBOTS, 3), np.float32))
+    for one, other in zip(ours, theirs, strict=True):
+        assert_same(one, other)
 
 
 def test_more_room_in_one_seat_is_room_in_all(monkeypatch):
