@@ -252,7 +252,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self._require_reset()
         expected = self._actions.shape
         try:
-            # Kernels are compiled for contiguous float32 only; another type would start a compilation of a minute.
+            # Kernels are compiled for contiguous float32 only; another type would have all compiled anew.
             checked = np.ascontiguousarray(actions, np.float32)
         except (TypeError, ValueError) as error:
             raise ActionError(f"Expected actions with shape (n_robots, 3) = {expected}: {error}.") from error
