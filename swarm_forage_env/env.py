@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 BatchStep: TypeAlias = tuple[ObsArray, np.ndarray, BoolArray, bool]
 """Observations (N, D), rewards (N,) float32, terminated (N,), truncated."""
 
-_STATE = ("_last_obs", "_rewards", "_seeds", "_terminated", "agents", "seed_value")
+_STATE = ("_rewards", "_seeds", "_terminated", "agents", "seed_value")
 """Attributes of a ForageEnv that are state; the arena holds the rest."""
 
 
@@ -184,6 +184,11 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         return self.arena.tick
 
     @property
+    def last_obs(self) -> ObsArray:
+        """(N, D) observations as they are since the last reset, step or restore; another buffer after a restore."""
+        return self._world.obs
+
+    @property
     def terminated(self) -> BoolArray:
         """(N,) robots that are dead for good; read only."""
         return self._terminated
@@ -233,7 +238,6 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self.seed_value = seed
         self._terminated[:] = False
         self.agents = list(self.possible_agents)
-        self._last_obs = obs
         if self._window is not None:
             self.render()
         return obs
@@ -248,7 +252,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self._require_reset()
         expected = self._actions.shape
         try:
-            # Kernels are compiled for contiguous float32 only; another type would start a compilation of a minute.
+            # Kernels are compiled for contiguous float32 only; another type would have all compiled anew.
             checked = np.ascontiguousarray(actions, np.float32)
         except (TypeError, ValueError) as error:
             raise ActionError(f"Expected actions with shape (n_robots, 3) = {expected}: {error}.") from error
@@ -325,15 +329,13 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
     def end_step(self, tasks: CodeArray | None = None) -> BatchStep:
         """Return the result of a step, after the arena's; see `step_batch`. `tasks` is for wrappers."""
-        self._last_obs = self.arena.obs
         if self._window is not None:
             self.render()
-        return self._last_obs, self._rewards.reward(), self._terminated, self.arena.tick >= self.max_cycles
+        return self.arena.obs, self._rewards.reward(), self._terminated, self.arena.tick >= self.max_cycles
 
     def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
         """Let a compiled policy drive the swarm for some ticks; see `ForagingArena.run`. Rewards are not computed."""
         self._world.run(policy, n_ticks, task_shares)
-        self._last_obs = self.arena.obs
 
     # Snapshots
 
@@ -362,7 +364,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     def restore_batch(self, snapshot: Snapshot) -> ObsArray:
         """Restore at array level: as `restore`, but returns observations (N, D), a buffer that the next step reuses."""
         self.restore_through(snapshot, ())
-        return self._last_obs
+        return self.last_obs
 
     def snapshot_through(self, wrappers: Sequence[Any]) -> Snapshot:
         """Return a snapshot of a stack: this environment and the wrappers around it, outermost first."""

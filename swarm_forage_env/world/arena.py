@@ -22,7 +22,7 @@ from swarm_forage_env.world.caches import (
     n_cache_slots,
     restore_static_caches,
 )
-from swarm_forage_env.world.compiled import CompiledTick, new_world
+from swarm_forage_env.world.compiled import CompiledTick, new_world, tasks_of
 from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
@@ -73,7 +73,6 @@ class ForagingArena:
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
         self._unit_gain = np.ones((config.robots.n_robots, 2))
         self._nothing = np.zeros((1, config.robots.n_robots))
-        self._no_tasks = np.zeros(0, np.int8)
         self.tick = 0
 
     def reset(self, seed: int) -> ObsArray:
@@ -254,7 +253,7 @@ class ForagingArena:
             RuntimeError: bodies that are not compiled.
         """
         bodies, n_left = self.bodies, n_ticks
-        tasks = policy.task if policy.task is not None else self._no_tasks
+        tasks = tasks_of(policy)
         run_compiled: Callable[..., tuple[int, int, bool]] | None = None
         while n_left:
             first = self.tick + 1

@@ -81,6 +81,23 @@ class SwarmWrapper(BaseParallelWrapper):
         """The ForageEnv at the bottom of the stack."""
         return self._unwrapped  # stored, because every hook of every tick needs it
 
+    @property
+    def last_obs(self) -> ObsArray:
+        """(N, D) what the wrappers outside see since the last reset, step or restore; see `ForageEnv.last_obs`.
+
+        Raises:
+            RuntimeError: before the first reset of this wrapper.
+        """
+        self._require_reset()
+        return self._last_obs
+
+    def _require_reset(self) -> None:
+        if not hasattr(self, "_last_obs"):
+            raise RuntimeError(
+                f"Expected a reset of the outermost wrapper first, got none, or one of what is inside of "
+                f"{type(self).__name__} alone; call reset of what you step."
+            )
+
     def on_reset(self, seed: int) -> None:
         """Prepare for a new run, after the environment was reset.
 
@@ -165,11 +182,7 @@ class SwarmWrapper(BaseParallelWrapper):
 
     def _before(self, actions: ActionArray, wheel_gain: FloatArray | None) -> tuple[ActionArray, FloatArray | None]:
         actions = self.unwrapped.checked_actions(actions)
-        if not hasattr(self, "_last_obs"):
-            raise RuntimeError(
-                f"Expected a reset of the outermost wrapper before its first step, got one of what is inside of "
-                f"{type(self).__name__} alone; call reset of what you step."
-            )
+        self._require_reset()
         if self._is_outermost:  # before any wrapper draws a number or lets a robot die
             self.unwrapped.refuse_bad_step(actions, wheel_gain)
         self.before_step()
