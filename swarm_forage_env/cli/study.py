@@ -32,12 +32,14 @@ study = typer.Typer(
 
 
 @study.command("list")
-def list_studies() -> None:
-    """List the experiment sets of the paper, with what they take at its budget."""
+def list_studies(
+    budget: Annotated[str, typer.Option("--budget", help="smoke, reduced or paper.")] = "paper",
+) -> None:
+    """List the experiment sets of the paper: what they take, and what a budget leaves out."""
     from swarm_forage_env.cli.study_report import table_of_sets
     from swarm_forage_env.cli.terminal import output
 
-    output().print(table_of_sets())
+    output().print(table_of_sets(budget))
 
 
 @study.command()
