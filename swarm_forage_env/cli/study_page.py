@@ -122,6 +122,7 @@ def page_of(tables: "Sequence[StudyTable]", scored: "Sequence[StudyPanels]", ver
             "studies": [
                 _study(table, panels, judged, waiting, band) for table, panels in zip(tables, scored, strict=True)
             ],
+            "theory": _theory(tables, judged),
             "cost": [_cost(table) for table in tables],
             "version_names": names,
             "versions": [
@@ -227,10 +228,13 @@ def _figure(
 ) -> dict[str, Any]:
     """Return a figure, and below it those of the measure's other forms, if claims are judged by them."""
     from metrics.scoring.policy_pairs import policy_pairs
-    from swarm_forage_env.cli.study_plot import written
+    from swarm_forage_env.cli.study_plot import drawn_by
 
     def drawn(one: "StudyFigure") -> list[dict[str, str]]:
-        return _pictures(one.title, lambda folder: written(one, folder, band), ("curves", "heat maps"))
+        draws = drawn_by(one, band).values()
+        return [
+            _picture(f"{one.title}, {kind}", draw) for kind, draw in zip(("curves", "heat maps"), draws, strict=False)
+        ]
 
     frame = figure.to_frame()
     claims = _claims_about(figure, judged, waiting)
@@ -245,32 +249,57 @@ def _figure(
 
 
 def _model(figure: "ModelFigure") -> dict[str, Any]:
-    from swarm_forage_env.cli.study_plot import models_written
+    from metrics.scoring.model_plots import draw_models
 
     return {
         "title": figure.title,
-        "pictures": _pictures(figure.title, lambda folder: models_written(figure, folder), ("runs and models",)),
+        "pictures": [_picture(f"{figure.title}, runs and models", lambda paths: draw_models(figure, paths))],
         "facts": _numbers(figure.facts()),
     }
+
+
+def _theory(tables: "Sequence[StudyTable]", judged: "Sequence[Judged]") -> list[dict[str, Any]]:
+    """Return the figures that need no runs, all of them where claims are judged, with the claims about formulas."""
+    from swarm_forage_env.cli.theory import draw_theory, theory_figures, theory_of
+
+    figures = theory_figures() if judged else [figure for table in tables for figure in theory_of(table.spec)]
+    formulas = [one for one in judged if not one.claim.panels]
+    return [
+        {
+            "title": figure.title,
+            "pictures": [_picture(figure.title, lambda paths, it=figure: draw_theory(it, paths))],
+            "claims": [
+                {
+                    "name": one.claim.name,
+                    "text": one.claim.text,
+                    "found": [{"where": "formula", **_numbers_of(one.verdict)}],
+                }
+                for one in formulas
+                if figure.kind == "availability"
+            ],
+            "numbers": _numbers(figure.numbers),
+        }
+        for figure in {figure.title: figure for figure in figures}.values()
+    ]
 
 
 def _numbers(frame: "pl.DataFrame") -> dict[str, Any]:
     """Return a table as the page shows it; the heading already tells the reading where there is one of them."""
     if not len(frame):
         return {"header": [], "rows": []}
-    shown = frame.drop("reading") if frame["reading"].n_unique() < 2 else frame
+    is_one = "reading" in frame.columns and frame["reading"].n_unique() < 2
+    shown = frame.drop("reading") if is_one else frame
     return {"header": [name.replace("_", " ") for name in shown.columns], "rows": shown.rows()}
 
 
-def _pictures(title: str, write: "Callable[[Path], list[Path]]", kinds: Sequence[str]) -> list[dict[str, str]]:
+def _picture(words: str, draw: "Callable[[Sequence[Path]], None]") -> dict[str, str]:
+    """Return a picture as the page holds it; only SVG is drawn."""
     from swarm_forage_env.rendering.report import picture_address
 
     with tempfile.TemporaryDirectory() as folder:
-        files = [file for file in write(Path(folder)) if file.suffix == ".svg"]
-        return [
-            {"address": picture_address(file.read_bytes()), "words": f"{title}, {kind}"}
-            for file, kind in zip(files, kinds, strict=False)
-        ]
+        file = Path(folder, "picture.svg")
+        draw([file])
+        return {"address": picture_address(file.read_bytes()), "words": words}
 
 
 def _claims_about(

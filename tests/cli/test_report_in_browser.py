@@ -54,7 +54,7 @@ def test_it_fits_and_asks_for_nothing(written, tmp_path, width):
         assert browser.ask("document.documentElement.scrollWidth") <= width, "unfolded, too"
         browser.wait_for("[...document.images].every((image) => image.naturalWidth > 100)")
         shown = "[...document.images].filter((image) => !image.closest('details')).length"
-        assert browser.ask(shown) == 12, "twice four figures, four of them with a map"
+        assert browser.ask(shown) == 16, "twice four figures, four of them with a map, and four of theory"
 
 
 def test_tables_are_sorted_by_a_click(written, tmp_path):
@@ -62,9 +62,7 @@ def test_tables_are_sorted_by_a_click(written, tmp_path):
     with Browser(tmp_path, width=1280, height=900) as browser:
         browser.open(written, LOADED)
         before = browser.ask(names)
-        below = (
-            "[...document.querySelectorAll('#verdicts tbody')].map((part) => part.innerText.split('numbers of ')[1])"
-        )
+        below = "[...document.querySelectorAll('#verdicts tbody')].map((part) => part.rows[1].innerText.match(/[A-Z][0-9]+/)[0])"
         browser.click("#verdicts th button")
         assert browser.ask(names) == browser.ask(below) == sorted(before, key=in_order)
         browser.click("#verdicts th button")
@@ -122,6 +120,16 @@ def test_every_claim_is_listed_with_what_stands_behind_its_answers():
     assert re.search(r"supported.*by bands \w+, statistic [-\d.]+, effect [\d.]+ %, 6 runs: \w", told)
     assert "waits for S1b task emergence" in claims["E5"]
     assert "<b>formula</b>" in claims["V1"]
+
+
+def test_what_follows_from_formulas_stands_beside_its_curves():
+    theory = page(made_study()).split('id="theory"')[1].split("</section>")[0]
+    articles = {part.split("</h3>")[0].split("<h3>")[1]: part for part in theory.split("<article")[1:]}
+    (availability,) = (part for title, part in articles.items() if "availability" in title)
+    assert re.findall(r"<strong>(\w+)</strong>", theory) == re.findall(r"<strong>(\w+)</strong>", availability)
+    assert re.findall(r"<strong>(\w+)</strong>", availability) == ["V1", "V2"]
+    assert re.search(r"<b>formula</b> .*supported.*statistic 0\.402", availability)
+    assert len(articles) == 4, "self-organisation, flexibility, availability, the task graph"
 
 
 def test_other_forms_of_a_measure_are_drawn_where_claims_are_judged_by_them():
