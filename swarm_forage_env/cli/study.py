@@ -62,11 +62,13 @@ def run(  # long: one parameter per option
     reading: Reading = "file",
     shard: Annotated[str, typer.Option("--shard", metavar="I/N", help="Only the I-th of N equal parts.")] = "1/1",
     workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Processes, or jobs of slurm; default one per core.")
+        int | None, typer.Option("--workers", min=1, help="Processes, or jobs of slurm-jobs; default one per core.")
     ] = None,
     cluster: Annotated[
         str | None,
-        typer.Option("--cluster", help="Run by Dask: local, slurm, or the address of a scheduler (docs/studies.md)."),
+        typer.Option(
+            "--cluster", help="Run by Dask: local, slurm, slurm-jobs, or the address of a scheduler (docs/studies.md)."
+        ),
     ] = None,
     dry_run: DryRun = False,
 ) -> None:
