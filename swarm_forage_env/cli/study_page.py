@@ -202,6 +202,7 @@ def _study(
             others.setdefault((first.reading, first.measure), []).append(figure)
     notes().print(f"fitting models to {table.spec.name}")
     return {
+        "snapshot": _snapshot(table),
         "name": table.spec.name,
         "anchor": f"study-{table.spec.study_id}",
         "title": table.spec.title,
@@ -290,6 +291,16 @@ def _numbers(frame: "pl.DataFrame") -> dict[str, Any]:
     is_one = "reading" in frame.columns and frame["reading"].n_unique() < 2
     shown = frame.drop("reading") if is_one else frame
     return {"header": [name.replace("_", " ") for name in shown.columns], "rows": shown.rows()}
+
+
+def _snapshot(table: "StudyTable") -> dict[str, str]:
+    from swarm_forage_env.cli.study_plot import snapshot_written
+    from swarm_forage_env.rendering.report import picture_address
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = snapshot_written(table.spec, Path(folder, "snapshot.png"))
+        words = f"{table.spec.name}: the arena when a run begins"
+        return {"address": picture_address(file.read_bytes(), "image/png"), "words": words}
 
 
 def _picture(words: str, draw: "Callable[[Sequence[Path]], None]") -> dict[str, str]:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from metrics.scoring.study_models import ModelFigure
     from metrics.scoring.study_plots import StudyFigure
     from swarm_forage_env.cli.theory import TheoryFigure
+    from swarm_forage_env.study.studies import StudySpec
 
     Draw: TypeAlias = Callable[[Sequence[Path]], None]
 
@@ -33,8 +34,9 @@ def plot(
     """Draw the figures of a study as SVG, PNG and tables in CSV: each measure over what is varied, and models.
 
     Models are laws and a mean field where swarm sizes vary, the queue where robots leave and come. theory_... has what
-    follows without runs: availability curves, and sketches of the measures. NAME_cells.csv has how runs of each cell
-    spread and how many broke down, ..._pairs.csv which policy is better how often.
+    follows without runs: availability curves, and sketches of the measures. NAME_snapshot.png is the arena when a run
+    begins. NAME_cells.csv has how runs of each cell spread and how many broke down, ..._pairs.csv which policy is
+    better how often.
     """
     from metrics.scoring.cell_distributions import cell_distributions
     from metrics.scoring.figure_panels import study_panels
@@ -59,6 +61,7 @@ def plot(
     for sketch in theory_of(table.spec):
         for file in theory_written(sketch, folder):
             typer.echo(file)
+    typer.echo(snapshot_written(table.spec, folder / f"{table.spec.name}_snapshot.png"))
     cells = folder / f"{table.spec.name}_cells.csv"
     cell_distributions(table).write_csv(cells)
     typer.echo(cells)
@@ -135,6 +138,21 @@ def theory_written(figure: "TheoryFigure", folder: Path) -> list[Path]:
 
     tables = {f"{figure.name}.csv": figure.numbers}
     return _written(figure.name, folder, lambda paths: draw_theory(figure, paths), tables)
+
+
+def snapshot_written(spec: "StudySpec", file: Path) -> Path:
+    """Draw the arena of a study, as it is when a run begins, into a picture file; returns the file.
+
+    Raises:
+        ImportError: Pillow is not installed.
+    """
+    from swarm_forage_env.study.snapshot import snapshot
+
+    picture = snapshot(spec)
+    from PIL import Image  # after the frame, which says what to install without it
+
+    Image.fromarray(picture).save(file, optimize=True)
+    return file
 
 
 def _written(name: str, folder: Path, draw: "Draw", tables: "Mapping[str, pl.DataFrame]") -> list[Path]:

@@ -124,6 +124,11 @@ def test_every_claim_is_listed_with_what_stands_behind_its_answers():
     assert "<b>formula</b>" in claims["V1"]
 
 
+def test_a_study_shows_its_arena():
+    (words,) = re.findall(r'<img src="data:image/png;base64,[^"]+" alt="([^"]+)">', page(made_study()))
+    assert words == "S1a: the arena when a run begins"
+
+
 def test_what_follows_from_formulas_stands_beside_its_curves():
     theory = page(made_study()).split('id="theory"')[1].split("</section>")[0]
     articles = {part.split("</h3>")[0].split("<h3>")[1]: part for part in theory.split("<article")[1:]}
