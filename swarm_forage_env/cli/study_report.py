@@ -29,12 +29,10 @@ def table_of_sets(budget: str = PAPER) -> Table:
         title=f"experiment sets of the paper{'' if budget == PAPER else f', budget {budget}'}",
         caption=f"of four controllers at budget {budget}, for each of the two readings",
     )
-    for name in ("set", "about"):
-        table.add_column(name)
-    if budget != PAPER:
-        table.add_column("left out")
-        table.add_column("runs of a cell", justify="right")
-        table.add_column("length, s", justify="right")
+    table.add_column("set")
+    table.add_column("about" if budget == PAPER else "left out")
+    for name in () if budget == PAPER else ("runs of a cell", "length, s"):
+        table.add_column(name, justify="right")
     for name in ("experiments", "runs", "robot-ticks"):
         table.add_column(name, justify="right")
     totals = [0, 0, 0]
@@ -42,10 +40,12 @@ def table_of_sets(budget: str = PAPER) -> Table:
         spec = load_study(name, budget, readings=("described",))
         numbers = [spec.n_experiments, spec.n_runs, spec.robot_ticks]
         totals = [total + number for total, number in zip(totals, numbers, strict=True)]
-        between = () if budget == PAPER else (left_out_words(spec), str(len(spec.seeds)), f"{spec.horizon_s:,g}")
-        table.add_row(spec.name, spec.title, *between, *_numbers(numbers))
+        words = (spec.title,)
+        if budget != PAPER:
+            words = (left_out_words(spec), str(len(spec.seeds)), f"{spec.horizon_s:,g}")
+        table.add_row(spec.name, *words, *_numbers(numbers))
     table.add_section()
-    table.add_row("all", "", *(() if budget == PAPER else ("", "", "")), *_numbers(totals))
+    table.add_row("all", *[""] * (1 if budget == PAPER else 3), *_numbers(totals))
     return table
 
 
