@@ -1,6 +1,7 @@
 """The report on studies in a real browser: it fits, sorts, and asks for nothing."""
 
 import re
+from functools import cache
 
 import pytest
 
@@ -25,7 +26,9 @@ def in_order(name):
     return name[0], int(name[1:])
 
 
+@cache
 def page(*specs):
+    """The page about studies; several tests read the same one."""
     tables = [made_table(spec, by_policy) for spec in specs]
     scored = [study_panels(table, VARIANTS) for table in tables]
     expected = judge_claims(tables, scored, ("corrected",), INTUITIONS)
