@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-from metrics.catalog import METRICS
 from metrics.curves import Form
 
 from .checking import Place, Statement, named
@@ -59,4 +58,4 @@ def better(
 
 def direction_of(measure: str) -> int:
     """1 if higher is better, -1 if lower is."""
-    return 1 if METRICS[measure].higher_is_better else -1
+    return -1 if measure in (R, A, N) else 1

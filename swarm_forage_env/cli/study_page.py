@@ -179,7 +179,7 @@ def _numbers_of(verdict: "Verdict") -> dict[str, str]:
 
 def lacking(waits: "Waiting") -> str:
     """Return what a claim waits for, in words, and why that is missing where its study is there."""
-    names = ", ".join(" ".join(name).replace("_", " ") for name in waits.lacks)
+    names = ", ".join(name.words for name in waits.lacks)
     return f"{names} ({'; '.join(waits.reasons)})" if waits.reasons else names
 
 
