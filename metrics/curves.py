@@ -19,6 +19,8 @@ IntArray: TypeAlias = NDArray[np.int64]
 
 Variant: TypeAlias = Literal["paper", "corrected", "sierra"]
 """`paper`: as printed; `corrected`: with the printing errors corrected; `sierra`: as the authors' program computed."""
+Form: TypeAlias = Literal["marginal", "interactive"]
+"""With what a swarm size is compared: the next smaller size, or N robots that each work alone."""
 Reduction: TypeAlias = Literal["sum", "mean", "last", "total"]
 """How intervals become one number: sum, mean or last value of the measure, or the measure of the summed curves."""
 

@@ -14,11 +14,12 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 from PIL import Image
 
 from metrics.claims import CLAIMS, INTUITIONS
+from metrics.claims.outcomes import Answer
 from metrics.scoring import Judged, StudyFigure, StudyPanels, Waiting, draw_figure, judge_claims, study_figures
 from metrics.scoring.cell_distributions import cell_distributions
 from metrics.scoring.model_plots import draw_models
@@ -45,13 +46,14 @@ PICTURES = Path("images/results")
 PAGE, DETAILS = "results.md", "results_in_detail.md"
 COLOURS = 64
 """Of a picture; with more, its file is several times as large and looks the same."""
-ANSWERS = ("supported", "contradicted", "undecided")
-SIGNS = {"supported": "✓", "contradicted": "✗", "undecided": "?"}
+ANSWERS = get_args(Answer)
+SIGNS: dict[Answer, str] = {"supported": "✓", "contradicted": "✗", "undecided": "?", "no scores": "-"}
 
 INTRODUCTION = f"""Each claim of the paper is held against these runs, under both [readings](readings.md) of its rules.
-A claim that is contradicted is a result like any other: no threshold was moved after the runs were seen. How claims are
-decided is in [metrics.md](metrics.md#the-papers-claims), how studies are run in [studies.md](studies.md); statistics,
-effects and numbers of runs are in [{DETAILS}]({DETAILS}). `scripts/write_results` writes both pages and their pictures;
+A claim that is contradicted is a result like any other. Some rules were wrong and were changed after runs were seen:
+[which, and why](metrics.md#rules-that-changed-after-runs-were-seen). How claims are decided is in
+[metrics.md](metrics.md#the-papers-claims), how studies are run in [studies.md](studies.md); statistics, effects and
+numbers of runs are in [{DETAILS}]({DETAILS}). `scripts/write_results` writes both pages and their pictures;
 nothing in them is typed by hand."""
 
 
@@ -187,7 +189,7 @@ def answers(results: Results) -> str:
         lines.append((f"[{name}]({DETAILS}#{name.lower()})", claim.text, *cells))
     return (
         "## The answers\n\n"
-        f"{rows(('reading', *ANSWERS, 'waiting for runs'), counts, right=range(1, 5))}\n\n"
+        f"{rows(('reading', *ANSWERS, 'waiting for runs'), counts, right=range(1, 2 + len(ANSWERS)))}\n\n"
         "An answer is by intervals of paired runs, our rule, with the measures corrected. In brackets stands the "
         "answer by the paper's rule, overlapping bands of two standard deviations, where it is another."
         f"{_otherwise(results)}{_on_fewer_values(results)}\n\n{rows(('claim', 'text', *results.readings), lines)}"
@@ -195,13 +197,18 @@ def answers(results: Results) -> str:
 
 
 def _otherwise(results: Results) -> str:
-    """A sentence on the claims to which another form of the measures gives another answer; empty if there are none."""
+    """A sentence on the claims to which another form or sense gives another answer; empty if there are none."""
     given: dict[tuple[str, str], set[str]] = {}
     for one in results.judged:
-        given.setdefault((one.claim.name, one.reading), set()).add(one.verdict.answer)
+        answers_here = given.setdefault((one.claim.name, one.reading), set())
+        answers_here |= {verdict.answer for verdict in (one.verdict, *one.verdict.otherwise.values())} - {"no scores"}
     names = [name for name in CLAIMS if any(len(given.get((name, reading), ())) > 1 for reading in results.readings)]
-    words = f"[those of the paper or its program]({DETAILS}#answers-that-hang-on-a-slip) give another answer"
-    return f" With other forms of the measures, {words} to {', '.join(names)}." if names else ""
+    words = f"[some of them]({DETAILS}#answers-that-hang-on-a-slip) give another answer"
+    return (
+        f" With other forms of the measures, or in another sense of the paper's words, {words} to {', '.join(names)}."
+        if names
+        else ""
+    )
 
 
 def _on_fewer_values(results: Results) -> str:
@@ -230,7 +237,7 @@ def in_short(results: Results) -> str:
             lines.append((reading, variant, *counts, *by_bands, waiting))
     header = ("reading", "measures", *ANSWERS, *(f"{word} by bands" for word in ANSWERS), "waiting")
     return (
-        f"## How many\n\n{rows(header, lines, right=range(2, 9))}\n\n"
+        f"## How many\n\n{rows(header, lines, right=range(2, 3 + 2 * len(ANSWERS)))}\n\n"
         "Claims that follow from formulas alone, V1 and V2, are not counted."
     )
 
@@ -239,8 +246,9 @@ def every_verdict(results: Results) -> str:
     """Return each claim with all its verdicts: readings, forms of the measures, both rules."""
     parts = [
         "## Claim by claim\n\nMeasures are as corrected, as printed in the paper, and as in the authors' program "
-        "(`sierra`). The statistic is what was decided on, in words in the last column; the effect is a share of the "
-        "largest mean in the figure; runs are the fewest behind any number."
+        "(`sierra`); behind a colon stands another sense of the claim. The statistic is what was decided on, in words "
+        "in the last column, and of several statements the share that holds; the effect is a share of the largest mean "
+        "in the figure; runs are the fewest behind any number."
     ]
     header = ("reading", "measures", "by intervals", "by bands", "statistic", "effect", "runs", "why")
     for name, claim in {**CLAIMS, **INTUITIONS}.items():
@@ -248,18 +256,19 @@ def every_verdict(results: Results) -> str:
         lines = [
             (
                 one.reading or "-",
-                one.variant if one.reading else "-",
-                one.verdict.answer,
-                one.verdict.by_bands,
-                number(one.verdict.statistic),
-                percent(one.verdict.effect),
-                one.verdict.n_runs,
-                one.verdict.why,
+                (f"{one.variant}: {sense}" if sense else one.variant) if one.reading else "-",
+                verdict.answer,
+                verdict.by_bands,
+                number(verdict.statistic),
+                percent(verdict.effect),
+                verdict.n_runs,
+                "<br>".join(verdict.why.splitlines()),
             )
             for one in here
+            for sense, verdict in {"": one.verdict, **one.verdict.otherwise}.items()
         ]
         later = {one.lacks for one in (*results.waiting, *results.expected_later) if one.claim.name == name}
-        waits = sorted({experiment for lacks in later for experiment, _ in lacks})
+        waits = sorted({experiment for lacks in later for experiment, *_ in lacks})
         words = f"{claim.text} ({claim.figure})"
         parts.append(f"### {name}\n\n{words}" + (f"\n\n{rows(header, lines, right=(4, 5, 6))}" if lines else ""))
         if waits:
@@ -268,8 +277,12 @@ def every_verdict(results: Results) -> str:
 
 
 def what_hangs_on_what(results: Results) -> str:
-    """Return the claims whose answer depends on the reading, on the form of the measures or on the rule."""
-    found = {(one.claim.name, one.reading, one.variant): one.verdict for one in results.judged if one.reading}
+    """Return the claims whose answer depends on the reading, on the form, on what is meant or on the rule."""
+    found = {
+        (one.claim.name, one.reading, one.variant): one.verdict
+        for one in results.judged
+        if one.reading and one.verdict.answer != "no scores"
+    }
     lines: list[tuple[str, ...]] = []
     for name in CLAIMS:
         here = {key[1:]: verdict.answer for key, verdict in found.items() if key[0] == name}
@@ -284,14 +297,22 @@ def what_hangs_on_what(results: Results) -> str:
             if others:
                 words = ", ".join(f"{variant}: {answer}" for variant, answer in {"corrected": base, **others}.items())
                 lines.append((name, f"the form of the measure ({reading})", words))
-            by_bands = found[name, reading, "corrected"].by_bands
-            if by_bands != base:
+            verdict = found[name, reading, "corrected"]
+            lines += [
+                (name, f"what is meant ({reading})", f"as judged: {base}, {sense}: {other.answer}")
+                for sense, other in verdict.otherwise.items()
+                if other.answer != base
+            ]
+            by_bands = verdict.by_bands
+            if by_bands not in (base, "no scores"):
                 lines.append((name, f"the rule ({reading})", f"intervals: {base}, bands: {by_bands}"))
     text = rows(("claim", "hangs on", "answers"), lines) if lines else "No answer does."
     return (
         "## Answers that hang on a slip\n\nThe paper's description and the authors' program differ "
         "([readings.md](readings.md)), and so do the measures as meant, as printed (`paper`) and as programmed "
-        f"(`sierra`, [errata.md](errata.md)). These answers are not the same in all of them:\n\n{text}"
+        "(`sierra`, [errata.md](errata.md)). Of some claims the paper's text, captions, file names or program leave "
+        "open what is meant. These answers are not the same in all of them; where there are no scores, nothing is "
+        f"compared:\n\n{text}"
     )
 
 
@@ -327,7 +348,7 @@ def pictured(results: Results) -> Iterator[tuple[StudyTable, list[StudyFigure]]]
         shown: list[StudyFigure] = []
         for figure in study_figures(panels):
             first = figure.panels[0]
-            here = {(panel.experiment or "", panel.measure) for panel in figure.panels}
+            here = {panel.name for panel in figure.panels}
             names = [name for name, claim in CLAIMS.items() if not here.isdisjoint(claim.panels)]
             base = table.spec.readings[0]
             differs = any(answers.get((name, base)) != answers.get((name, first.reading)) for name in names)
@@ -351,7 +372,7 @@ def figures(results: Results, folder: Path) -> str:
         parts += [f"### {table.spec.name}: {table.spec.title}"] if shown else []
         for figure in shown:
             parts.append(_pictured(figure.name, figure.title, folder, lambda path, it=figure: draw_figure(it, [path])))
-            here = {(panel.experiment or "", panel.measure) for panel in figure.panels}
+            here = {panel.name for panel in figure.panels}
             reading = figure.panels[0].reading
             names = [name for name, claim in CLAIMS.items() if not here.isdisjoint(claim.panels)]
             words = ", ".join(f"{name} {_answer(found.get((name, reading)))}" for name in names)

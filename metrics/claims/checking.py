@@ -1,16 +1,39 @@
 """Claims held against scores: which statements a claim makes of which panels, and the verdict on it."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, NamedTuple, TypeAlias
 
-import numpy as np
+from metrics.curves import Form
 
+from .outcomes import Answer, Outcome, all_of, most_of, without_scores
 from .panel import Panel, Rule
-from .predicates import Answer, Outcome, all_of, most_of
 
-PanelName: TypeAlias = tuple[str, str]
-"""Experiment, a name in `EXPERIMENTS`, and measure, a name in `METRICS`."""
+
+class PanelName(NamedTuple):
+    """What a panel shows."""
+
+    experiment: str
+    """In `EXPERIMENTS`."""
+    measure: str
+    """In `METRICS`."""
+    form: Form = "marginal"
+    """Of a measure that compares two sizes."""
+
+    @property
+    def words(self) -> str:
+        """The name for people."""
+        words = (self.experiment, self.measure, "" if self.form == "marginal" else self.form)
+        return " ".join(word for word in words if word).replace("_", " ")
+
+
+Place: TypeAlias = tuple[str, str] | tuple[str, str, Form]
+"""A panel: experiment, measure and, if it is not the marginal one, form."""
+
+
+def named(place: Place) -> PanelName:
+    """Return the name of a panel."""
+    return PanelName(place[0], place[1], place[2] if len(place) == 3 else "marginal")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,16 +48,22 @@ class Statement:
     """Applied to each panel first, in this order: its rise, its slope, ..."""
 
     def outcome(self, panels: Mapping[PanelName, Panel], rule: Rule) -> Outcome:
-        """Return what comes of it; undecided where scores are missing."""
-        absent = [" ".join(name) for name in self.panels if name not in panels]
+        """Return what comes of it, with the names of the panels in its reason."""
+        absent = [name.words for name in self.panels if name not in panels]
         if absent:
-            why = f"no scores of {', '.join(absent)}"
-            return Outcome(answer="undecided", statistic=np.nan, effect=np.nan, n_runs=0, why=why)
+            return without_scores(", ".join(absent))
         seen = [panels[name] for name in self.panels]
         for view in self.views:
             seen = [view(panel) for panel in seen]
         rules = {"rule": rule} if seen else {}  # what follows from formulas alone has no runs to compare
-        return self.predicate(*seen, **self.parameters, **rules)
+        outcome = self.predicate(*seen, **self.parameters, **rules)
+        return _placed(outcome, " and ".join(name.words for name in self.panels)) if seen else outcome
+
+
+def _placed(outcome: Outcome, where: str) -> Outcome:
+    """Return the outcome with the place before its reason, or that of each of its parts."""
+    parts = tuple(_placed(part, where) for part in outcome.parts)
+    return replace(outcome, parts=parts, why=outcome.why if parts else f"{where}: {outcome.why}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,11 +78,24 @@ class Claim:
     statements: tuple[Statement, ...]
     needs: Literal["all", "most"] = "all"
     """How many of the statements must hold."""
+    otherwise: Mapping[str, tuple[Statement, ...]] = field(default_factory=dict[str, tuple[Statement, ...]])
+    """Where the paper's words, its captions, its file names or its program disagree on what was meant: what else the
+    claim may mean, in words -> statements of that."""
 
     @property
     def panels(self) -> tuple[PanelName, ...]:
-        """Experiments and measures that are needed, each once."""
-        return tuple(dict.fromkeys(name for statement in self.statements for name in statement.panels))
+        """Panels that are needed, each once; without those of `otherwise`."""
+        return _panels_of(self.statements)
+
+    @property
+    def other_panels(self) -> tuple[PanelName, ...]:
+        """Panels that only `otherwise` needs."""
+        needed = _panels_of([statement for statements in self.otherwise.values() for statement in statements])
+        return tuple(name for name in needed if name not in self.panels)
+
+
+def _panels_of(statements: Iterable[Statement]) -> tuple[PanelName, ...]:
+    return tuple(dict.fromkeys(name for statement in statements for name in statement.panels))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,31 +104,42 @@ class Verdict:
 
     claim: str
     answer: Answer
-    """By paired bootstrap intervals, our rule."""
+    """By intervals of paired runs, our rule."""
     by_bands: Answer
     """By overlapping bands of two standard deviations, the paper's rule."""
     statistic: float
-    """What was decided on, by our rule; `why` says what it is."""
+    """What was decided on, by our rule, and `why` says what it is; of several statements the share that holds."""
     effect: float
-    """Size of the difference or change, as a share of the largest mean in the panel; NaN where there is none."""
+    """Size of the difference or change, as a share of the largest mean in the panel; of several statements the median
+    of those with this answer; NaN where there is none."""
     n_runs: int
     """Smallest number of runs behind any number that was used; 0 for formulas and missing scores."""
     why: str
+    """What was found and the limit that it was held against; one line per statement."""
+    otherwise: Mapping[str, "Verdict"] = field(default_factory=dict[str, "Verdict"])
+    """Verdicts on what else the claim may mean; those without any scores are left out."""
 
 
-def check_claim(claim: Claim, panels: Mapping[PanelName, Panel]) -> Verdict:
+def check_claim(claim: Claim, panels: Mapping[PanelName, Panel] | Mapping[tuple[str, str], Panel]) -> Verdict:
     """Hold one claim against scores.
 
     Args:
         claim: One of `CLAIMS`, or of your own.
-        panels: (experiment, measure) -> scores of all policies. Statements whose panels are missing are undecided.
+        panels: (experiment, measure) or (experiment, measure, form) -> scores of all policies.
 
     Raises:
         CurveError: A panel lacks a policy that the claim speaks of.
     """
+    by_name = {named(name): panel for name, panel in panels.items()}
+    others = {words: _verdict(claim, statements, by_name) for words, statements in claim.otherwise.items()}
+    scored = {words: verdict for words, verdict in others.items() if verdict.answer != "no scores"}
+    return replace(_verdict(claim, claim.statements, by_name), otherwise=scored)
+
+
+def _verdict(claim: Claim, statements: tuple[Statement, ...], panels: Mapping[PanelName, Panel]) -> Verdict:
     join = all_of if claim.needs == "all" else most_of
     rules: tuple[Rule, Rule] = ("intervals", "bands")
-    ours, bands = (join([statement.outcome(panels, rule) for statement in claim.statements]) for rule in rules)
+    ours, bands = (join([statement.outcome(panels, rule) for statement in statements]) for rule in rules)
     return Verdict(
         claim=claim.name,
         answer=ours.answer,
@@ -94,5 +147,5 @@ def check_claim(claim: Claim, panels: Mapping[PanelName, Panel]) -> Verdict:
         statistic=ours.statistic,
         effect=ours.effect,
         n_runs=ours.n_runs,
-        why=ours.why,
+        why="\n".join(ours.lines),
     )

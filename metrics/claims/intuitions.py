@@ -6,26 +6,24 @@ one of these, worse than both others; modest lies between. That is our choice, m
 intuition is left out: that STOCHM is congested near its caches. No measure says where time is lost.
 """
 
-from .checking import Claim, Statement
+from .checking import Claim, Place, Statement
 from .predicates import is_not_higher, stays_alike
-from .stating import E_S, E_T, SIMPLE, STEADY, UNSTEADY, A, C, D, N, P, R, best_of, better, states
+from .stating import E_T, SIMPLE, STEADY, UNSTEADY, A, C, D, N, P, R, best_of, better, spatial, states
 
-_SPATIAL = (("S1a", E_S), ("S1b", E_S))
+_SPATIAL = (spatial("S1a"), spatial("S1b"))
 _FLEXIBLE = tuple((experiment, measure) for measure in (R, A) for experiment in ("S1c", "S1d"))
 _SCALING = (("S1a", C), ("S1b", C))
-_SELF_2 = (("S2a still", E_T), ("S2a slow", E_S))
+_SELF_2 = (("S2a still", E_T), spatial("S2a slow"))
 _FLEXIBLE_2 = (("S2b 115", R), ("S2b 320", A))
 _NOISE_2 = (("S2c 320", N),)
 _POPULATION_2 = (("S2d 115", D),)
 
 
-def _all_better(
-    panels: tuple[tuple[str, str], ...], winners: tuple[str, ...], losers: tuple[str, ...]
-) -> tuple[Statement, ...]:
-    return tuple(better(*panel, winners, losers) for panel in panels)
+def _all_better(panels: tuple[Place, ...], winners: tuple[str, ...], losers: tuple[str, ...]) -> tuple[Statement, ...]:
+    return tuple(better(panel, winners, losers) for panel in panels)
 
 
-def _between(panels: tuple[tuple[str, str], ...], above: str, middle: str, below: str) -> tuple[Statement, ...]:
+def _between(panels: tuple[Place, ...], above: str, middle: str, below: str) -> tuple[Statement, ...]:
     return (*_all_better(panels, (above,), (middle,)), *_all_better(panels, (middle,), (below,)))
 
 
@@ -57,20 +55,20 @@ _WRITTEN: tuple[tuple[int, str, str, tuple[Statement, ...]], ...] = (
     ),
     (1, "STOCHM", "More reactive and adaptable than DPO.", _all_better(_FLEXIBLE, ("stochm",), ("dpo",))),
     (1, "STOCHM", "Less scalable than CRW and DPO.", _all_better(_SCALING, SIMPLE, ("stochm",))),
-    (1, "STOCHX", "High spatial self-organisation.", tuple(best_of(*panel, "stochx") for panel in _SPATIAL)),
-    (1, "STOCHX", "High reactivity and adaptability.", tuple(best_of(*panel, "stochx") for panel in _FLEXIBLE)),
+    (1, "STOCHX", "High spatial self-organisation.", tuple(best_of(panel, "stochx") for panel in _SPATIAL)),
+    (1, "STOCHX", "High reactivity and adaptability.", tuple(best_of(panel, "stochx") for panel in _FLEXIBLE)),
     (
         1,
         "STOCHX",
         "High robustness to malfunctions and repairs.",
-        tuple(best_of(experiment, D, "stochx") for experiment in ("S1g", "S1h")),
+        tuple(best_of((experiment, D), "stochx") for experiment in ("S1g", "S1h")),
     ),
     (
         1,
         "STOCHX",
         "Task self-organisation in the medium warehouse, where objects lie everywhere, not in the small one.",
         (
-            best_of("S1b", E_T, "stochx"),
+            best_of(("S1b", E_T), "stochx"),
             *(states(is_not_higher, ("S1a", E_T), first="stochx", second=other) for other in SIMPLE),
         ),
     ),

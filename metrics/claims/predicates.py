@@ -1,74 +1,98 @@
-"""What a claim can say of curves in a figure: few general statements, each with one of three answers.
+"""What a claim can say of the heights of curves in a figure: few general statements, each with an answer.
 
 A statement about several levels is supported if it holds at more than half of them and contradicted if it fails at more
-than half; else it is undecided. The thresholds are the same for every claim, and none was chosen with results in view.
+than half; else it is undecided. The thresholds are the same for every claim.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from metrics.checks import check_option
 from metrics.curves import FloatArray
 
+from .outcomes import (
+    Answer,
+    BoolArray,
+    Outcome,
+    against_limit,
+    all_of,
+    by_majority,
+    contrary,
+    where_scored,
+    within_limit,
+    without_scores,
+)
 from .panel import (
-    MIN_PAIRS,
+    CONFIDENCE,
+    LEAST_RUNS,
+    MANY,
+    TIE,
     Levels,
     Panel,
     Rule,
     bounds,
+    interval_of,
     mean_over_runs,
     of_equal_runs,
-    resampled_runs,
+    resampled_deviations,
+    resampled_means,
     signs,
     std_over_runs,
 )
 
-Answer: TypeAlias = Literal["supported", "contradicted", "undecided"]
-BoolArray: TypeAlias = NDArray[np.bool_]
 Pairs: TypeAlias = Sequence[tuple[str, str]]
 
 FLAT = 0.25
-"""Largest spread of a curve that is roughly constant, and largest width of a narrow band, as a share of the panel's
-scale (our choice)."""
-LINEAR = 0.9
-"""Share of the variance between levels that a line explains where growth is nearly linear (our choice)."""
-MANY = 0.5
-"""Share of levels that is most of them."""
+"""Largest spread of a curve that is roughly constant, largest width of a narrow band, and largest lead that is a small
+one, as a share of the panel's scale (our choice)."""
 MORE = 0.1
 """Share of comparisons by which one panel has more differences than another (our choice)."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """What came of one statement."""
-
-    answer: Answer
-    statistic: float
-    """What was decided on; `why` says what it is."""
-    effect: float
-    """Size of the difference or change, as a share of the panel's scale; NaN where a statement has none."""
-    n_runs: int
-    """Smallest number of runs behind any number that was used."""
-    why: str
+WIDER = 1.5
+"""Ratio of the widths of two bands from which on one looks wider (our choice)."""
 
 
 def ties(panel: Panel, *, pairs: Pairs, levels: Levels = "all", rule: Rule = "intervals") -> Outcome:
     """Whether pairs of policies mostly tie: at more than half of the levels, all pairs counted together."""
     part = panel.part(levels)
+    names = sorted({name for pair in pairs for name in pair})
+    if not part.n_runs(names):
+        return without_scores(" and ".join(names))
     found = np.array([signs(part, first, second, rule) for first, second in pairs])
-    gaps = np.array([part.scores[a] - part.scores[b] for a, b in pairs])
-    return _by_majority(
+    return by_majority(
         found == 0.0,
         np.abs(found) == 1.0,
-        "comparisons tie",
-        effect=float(mean_over_runs(np.abs(mean_over_runs(gaps)).ravel())) / part.scale,
-        n_runs=part.n_runs({name for pair in pairs for name in pair}),
+        f"comparisons of {' and '.join(names)} tie",
+        effect=_gap(part, pairs),
+        n_runs=part.n_runs(names),
     )
+
+
+def never_differ(panel: Panel, *, pairs: Pairs, rule: Rule = "intervals") -> Outcome:
+    """Whether no pair of policies differs at any level.
+
+    Supported if all comparisons tie. Contradicted if one differs: by intervals after Bonferroni's correction, so that
+    one difference by chance among many comparisons does not count.
+    """
+    names = sorted({name for pair in pairs for name in pair})
+    if not panel.n_runs(names):
+        return without_scores(" and ".join(names))
+    confidence = 1.0 - (1.0 - CONFIDENCE) / (len(pairs) * panel.levels.size)
+    found = np.array([signs(panel, first, second, rule, confidence) for first, second in pairs])
+    n_tied, n_apart = int((found == 0.0).sum()), int((np.abs(found) == 1.0).sum())
+    answer: Answer = "contradicted" if n_apart else "supported" if n_tied == found.size else "undecided"
+    why = f"{n_apart} of {found.size} comparisons differ, {n_tied} tie, {found.size - n_apart - n_tied} open"
+    return Outcome(
+        answer=answer, statistic=n_apart / found.size, effect=_gap(panel, pairs), n_runs=panel.n_runs(names), why=why
+    )
+
+
+def _gap(panel: Panel, pairs: Pairs) -> float:
+    """Mean distance of the means of pairs, as a share of the scale."""
+    gaps = np.array([panel.scores[a] - panel.scores[b] for a, b in pairs])
+    return float(mean_over_runs(np.abs(mean_over_runs(gaps)).ravel())) / panel.scale
 
 
 def stays_alike(first: Panel, second: Panel, *, policy: str, rule: Rule = "intervals") -> Outcome:
@@ -91,15 +115,56 @@ def is_higher(
     A level speaks against it if one of the pairs ties or is the other way round.
     """
     part = panel.part(levels)
+    names = (*upper, *lower)
+    if not part.n_runs(names):
+        return without_scores(" and ".join(names))
     found = np.array([signs(part, above, below, rule) for above in upper for below in lower])
     gap = mean_over_runs(part.of(upper)).mean(axis=0) - mean_over_runs(part.of(lower)).mean(axis=0)
-    return _by_majority(
+    return by_majority(
         np.all(found == 1.0, axis=0),
         np.any(found <= 0.0, axis=0),
         f"levels have {' and '.join(upper)} above {' and '.join(lower)}",
         effect=float(mean_over_runs(gap)) / part.scale,
-        n_runs=part.n_runs((*upper, *lower)),
+        n_runs=part.n_runs(names),
     )
+
+
+def leads_by_little(
+    panel: Panel, *, leader: str, others: Sequence[str], levels: Levels = "all", rule: Rule = "intervals"
+) -> Outcome:
+    """Whether a policy is highest by a little, at more than half of the levels.
+
+    Its lead over each of others must be sure but may be smaller than `TIE`, and its lead over the best of them must be
+    at most `FLAT` of the scale. A level speaks against it if one of the others is surely higher, or the lead is surely
+    larger. By intervals "surely" means the whole interval; by bands that bands do not overlap, and the lead is that of
+    the means.
+    """
+    part = panel.part(levels)
+    names = (leader, *others)
+    if not part.n_runs(names):
+        return without_scores(" and ".join(names))
+    leads = np.array([_leads(part, leader, other, rule) for other in others])  # (others, L, 2)
+    lower, upper = leads[..., 0], leads[..., 1]
+    limit = FLAT * part.scale
+    means = mean_over_runs(part.of(names))
+    smallest = float(mean_over_runs((means[0] - means[1:]).min(axis=0))) / part.scale
+    return by_majority(
+        np.all(lower > 0.0, axis=0) & (upper.min(axis=0) <= limit),
+        np.any(upper < 0.0, axis=0) | np.all(lower > limit, axis=0),
+        f"levels have {leader} above {' and '.join(others)} by at most {FLAT:g} of the scale",
+        effect=smallest,
+        n_runs=part.n_runs(names),
+    )
+
+
+def _leads(panel: Panel, leader: str, other: str, rule: Rule) -> FloatArray:
+    """Bounds of the lead at each level, (L, 2): NaN where there are too few runs."""
+    a, b = panel.of((leader, other))
+    if rule == "intervals":
+        return np.array([interval_of(level[np.isfinite(level)]) for level in a - b])
+    gap = mean_over_runs(a) - mean_over_runs(b)
+    apart = signs(panel, leader, other, rule)
+    return np.stack([np.where(apart > 0.0, gap, -np.inf), np.where(apart < 0.0, gap, np.maximum(gap, 0.0))], axis=1)
 
 
 def is_not_higher(
@@ -107,9 +172,11 @@ def is_not_higher(
 ) -> Outcome:
     """Whether a policy is no higher than another: lower or tied at more than half of the levels."""
     part = panel.part(levels)
+    if not part.n_runs((first, second)):
+        return without_scores(f"{first} and {second}")
     found = signs(part, first, second, rule)
     gap = mean_over_runs(part.scores[first]) - mean_over_runs(part.scores[second])
-    return _by_majority(
+    return by_majority(
         found <= 0.0,
         found == 1.0,
         f"levels have {first} no higher than {second}",
@@ -133,7 +200,10 @@ def varies(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -
 
 
 def is_narrow(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether the bands of policies, four standard deviations wide, are at most `FLAT` of the scale, mean of levels."""
+    """Whether the bands of policies, four standard deviations wide, are at most `FLAT` of the scale, mean of levels.
+
+    By bands: at more than half of the levels.
+    """
     return all_of([_narrowness(panel, policy, rule) for policy in policies])
 
 
@@ -143,17 +213,21 @@ def is_wide(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") 
 
 
 def is_wider(panel: Panel, *, upper: Sequence[str], lower: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether each of some policies scatters more between runs than each of others."""
-    return all_of([_compared(panel, a, b, std_over_runs, "scatter", rule) for a in upper for b in lower])
+    """Whether each of some policies scatters more between runs than each of others.
+
+    By intervals: mean over the levels. By bands: at more than half of the levels the band is `WIDER` times as wide;
+    contradicted if that holds of the other policy, else undecided.
+    """
+    return all_of([_more_scatter(panel, a, b, rule) for a in upper for b in lower])
 
 
 def reaches_higher(panel: Panel, *, upper: Sequence[str], lower: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether the upper edges of the bands of some policies are above those of others."""
+    """Whether the upper edges of the bands of some policies are above those of others.
 
-    def edge(values: FloatArray) -> FloatArray:
-        return mean_over_runs(values) + 2.0 * std_over_runs(values)
-
-    return all_of([_compared(panel, a, b, edge, "upper edge", rule) for a in upper for b in lower])
+    By intervals: mean over the levels. By bands: at more than half of the levels the edge is above the other by `TIE`
+    of the scale; contradicted if that holds of the other policy, else undecided.
+    """
+    return all_of([_higher_edge(panel, a, b, rule) for a in upper for b in lower])
 
 
 def differs_more(few: Panel, many: Panel, *, pairs: Pairs, rule: Rule = "intervals") -> Outcome:
@@ -162,6 +236,8 @@ def differs_more(few: Panel, many: Panel, *, pairs: Pairs, rule: Rule = "interva
     Of both, equally many runs are looked at: as many as the panel with fewer of them has.
     """
     names = {name for pair in pairs for name in pair}
+    if not few.n_runs(names) or not many.n_runs(names):
+        return without_scores(" and ".join(sorted(names)))
     shares: list[float] = []
     equal = of_equal_runs(few, many, names)
     for panel in equal:
@@ -169,114 +245,107 @@ def differs_more(few: Panel, many: Panel, *, pairs: Pairs, rule: Rule = "interva
         shares.append(float((np.abs(found) == 1.0).mean()))
     gain, n_runs = shares[1] - shares[0], equal[0].n_runs(names)
     answer: Answer = "supported" if gain >= MORE else "contradicted" if gain <= -MORE else "undecided"
-    if n_runs < (2 if rule == "bands" else MIN_PAIRS):
+    if n_runs < LEAST_RUNS[rule]:
         answer = "undecided"
-    why = f"{shares[1]:.0%} of the comparisons differ, {shares[0]:.0%} in the first panel, of {n_runs} runs each"
-    return Outcome(answer=answer, statistic=gain, effect=np.nan, n_runs=n_runs, why=why)
-
-
-def against_limit(resampled: FloatArray, limit: float) -> Answer:
-    """Return whether the interval of a resampled number is at or below a limit (supported) or above (contradicted)."""
-    lower, upper = bounds(resampled)
-    return "supported" if upper <= limit else "contradicted" if lower > limit else "undecided"
-
-
-def contrary(outcome: Outcome) -> Outcome:
-    """Return the outcome of the contrary statement; what is undecided stays so."""
-    turned: dict[Answer, Answer] = {"supported": "contradicted", "contradicted": "supported", "undecided": "undecided"}
-    return replace(outcome, answer=turned[outcome.answer])
-
-
-def all_of(outcomes: Sequence[Outcome]) -> Outcome:
-    """Return one outcome for several statements that must all hold: one that fails contradicts them."""
-    answers = [outcome.answer for outcome in outcomes]
-    answer: Answer = "supported" if set(answers) == {"supported"} else "undecided"
-    return _joined(outcomes, "contradicted" if "contradicted" in answers else answer)
-
-
-def most_of(outcomes: Sequence[Outcome]) -> Outcome:
-    """Return one outcome for several statements of which more than half must hold."""
-    answers = [outcome.answer for outcome in outcomes]
-    choices: tuple[Answer, Answer] = ("supported", "contradicted")
-    most: list[Answer] = [choice for choice in choices if answers.count(choice) > MANY * len(answers)]
-    answer: Answer = most[0] if most else "undecided"
-    return _joined(outcomes, answer)
-
-
-def _joined(outcomes: Sequence[Outcome], answer: Answer) -> Outcome:
-    """The outcome that speaks loudest for the answer, with the reasons of all."""
-    if len(outcomes) == 1:
-        return outcomes[0]
-    speaking = [outcome for outcome in outcomes if outcome.answer == answer] or list(outcomes)
-    return Outcome(
-        answer=answer,
-        statistic=sum(outcome.answer == "supported" for outcome in outcomes) / len(outcomes),
-        effect=speaking[0].effect,
-        n_runs=min(outcome.n_runs for outcome in outcomes),
-        why="; ".join(f"{outcome.answer}: {outcome.why}" for outcome in outcomes),
+    why = (
+        f"{shares[1]:.0%} of the comparisons differ, {shares[0]:.0%} in the first panel, of {n_runs} runs each; "
+        f"{MORE:.0%} more count as more"
     )
-
-
-def _by_majority(holds: BoolArray, fails: BoolArray, what: str, *, effect: float, n_runs: int) -> Outcome:
-    """Outcome of a statement from where it holds and where it fails, boolean arrays of the same shape."""
-    total, n_for, n_against = holds.size, int(holds.sum()), int(fails.sum())
-    answer: Answer = "supported" if n_for > MANY * total else "undecided"
-    if n_against > MANY * total:
-        answer = "contradicted"
-    why = f"{n_for} of {total} {what}, {n_against} do not, {total - n_for - n_against} open"
-    return Outcome(answer=answer, statistic=n_for / total, effect=effect, n_runs=n_runs, why=why)
-
-
-def _constancy(panel: Panel, policy: str, rule: Rule) -> Outcome:
-    check_option("rule", rule, Rule)
-    (values,) = panel.of((policy,))
-    means, deviations = mean_over_runs(values), std_over_runs(values)
-    spread = float(means.max() - means.min()) / panel.scale
-    n_runs = panel.n_runs((policy,))
-    answer: Answer = "undecided"
-    if rule == "bands" and n_runs > 1:
-        is_flat = (means - 2.0 * deviations).max() <= (means + 2.0 * deviations).min()
-        answer = "supported" if is_flat else "contradicted"
-    elif rule == "intervals" and (drawn := resampled_runs(values)) is not None:
-        resampled = mean_over_runs(drawn)
-        answer = against_limit((resampled.max(axis=1) - resampled.min(axis=1)) / panel.scale, FLAT)
-    why = f"means of {policy} spread over {spread:.2f} of the scale"
-    return Outcome(answer=answer, statistic=spread, effect=spread, n_runs=n_runs, why=why)
-
-
-def _narrowness(panel: Panel, policy: str, rule: Rule) -> Outcome:
-    check_option("rule", rule, Rule)
-    (values,) = panel.of((policy,))
-    widths = 4.0 * std_over_runs(values) / panel.scale
-    width, n_runs = float(widths.mean()), panel.n_runs((policy,))
-    answer: Answer = "undecided"
-    if rule == "bands" and n_runs > 1:
-        answer = "supported" if (widths <= FLAT).mean() > MANY else "contradicted"
-    elif rule == "intervals" and (drawn := resampled_runs(values)) is not None:
-        answer = against_limit(4.0 * std_over_runs(drawn).mean(axis=1) / panel.scale, FLAT)
-    why = f"bands of {policy} are {width:.2f} of the scale wide"
-    return Outcome(answer=answer, statistic=width, effect=width, n_runs=n_runs, why=why)
-
-
-def _compared(
-    panel: Panel, first: str, second: str, of_runs: Callable[[FloatArray], FloatArray], what: str, rule: Rule
-) -> Outcome:
-    """Whether a statistic of the runs is larger for the first policy; by intervals its mean over the levels."""
-    check_option("rule", rule, Rule)
-    both = panel.of((first, second))
-    at_levels = of_runs(both)
-    gap = float((at_levels[0] - at_levels[1]).mean()) / panel.scale
-    n_runs = panel.n_runs((first, second))
-    answer: Answer = "undecided"
-    if rule == "bands" and n_runs > 1:
-        answer = "supported" if (at_levels[0] > at_levels[1]).mean() > MANY else "contradicted"
-    elif rule == "intervals" and (drawn := resampled_runs(both)) is not None:
-        resampled = of_runs(drawn).mean(axis=2)
-        answer = against_limit((resampled[:, 1] - resampled[:, 0]) / panel.scale, 0.0)
-    why = f"{what} of {first} less that of {second} is {gap:.2f} of the scale"
-    return Outcome(answer=answer, statistic=gap, effect=gap, n_runs=n_runs, why=why)
+    return Outcome(answer=answer, statistic=gain, effect=np.nan, n_runs=n_runs, why=why)
 
 
 def every_pair(policies: Sequence[str]) -> Pairs:
     """Return all pairs of policies."""
     return tuple(combinations(policies, 2))
+
+
+def _constancy(panel: Panel, policy: str, rule: Rule) -> Outcome:
+    def judge(part: Panel) -> Outcome:
+        (values,) = part.of((policy,))
+        means, drawn = resampled_means(values)
+        spread, n_runs = float(np.ptp(means)) / part.scale, part.n_runs((policy,))
+        if rule == "bands":
+            reach = 2.0 * std_over_runs(values)
+            lowest, highest = float((means + reach).min()), float((means - reach).max())
+            answer: Answer = "supported" if highest <= lowest else "contradicted"
+            why = f"the bands of {policy} have " + ("a height in common" if highest <= lowest else "no common height")
+            return Outcome(answer=answer, statistic=spread, effect=spread, n_runs=n_runs, why=why)
+        # The spread of noisy means is too large, so its percentiles would be, too. The spread of what the runs add by
+        # chance bounds it from both sides.
+        chance = float(np.quantile(np.ptp(drawn - means, axis=-1), CONFIDENCE)) / part.scale
+        interval = (max(0.0, spread - chance), spread + chance)
+        why = f"means of {policy} spread over {spread:.2f} of the scale ({_ends(interval)}); {FLAT:g} is still constant"
+        return Outcome(answer=within_limit(interval, FLAT), statistic=spread, effect=spread, n_runs=n_runs, why=why)
+
+    return where_scored(panel, (policy,), rule, judge)
+
+
+def _narrowness(panel: Panel, policy: str, rule: Rule) -> Outcome:
+    def judge(part: Panel) -> Outcome:
+        (values,) = part.of((policy,))
+        found, drawn = resampled_deviations(values)
+        width, n_runs = 4.0 * float(found.mean()) / part.scale, part.n_runs((policy,))
+        if rule == "bands":
+            widths = 4.0 * std_over_runs(values) / part.scale
+            answer: Answer = "supported" if (widths <= FLAT).mean() > MANY else "contradicted"
+            why = f"bands of {policy} are at most {FLAT:g} of the scale wide at {(widths <= FLAT).mean():.0%} of levels"
+            return Outcome(answer=answer, statistic=width, effect=width, n_runs=n_runs, why=why)
+        of_draws = 4.0 * drawn.mean(axis=-1) / part.scale
+        interval = bounds(of_draws)
+        why = f"bands of {policy} are {width:.2f} of the scale wide ({_ends(interval)}); {FLAT:g} is still narrow"
+        return Outcome(answer=against_limit(of_draws, FLAT), statistic=width, effect=width, n_runs=n_runs, why=why)
+
+    return where_scored(panel, (policy,), rule, judge)
+
+
+def _more_scatter(panel: Panel, first: str, second: str, rule: Rule) -> Outcome:
+    def judge(part: Panel) -> Outcome:
+        found, drawn = resampled_deviations(part.of((first, second)))
+        if rule == "bands":
+            wider, narrower = found[0] >= WIDER * found[1], found[1] >= WIDER * found[0]
+            what = f"levels have the band of {first} {WIDER:g} times as wide as that of {second}"
+            return _by_sight(part, (first, second), found, wider, narrower, what)
+        return _by_draws(part, (first, second), found, drawn, "scatter")
+
+    return where_scored(panel, (first, second), rule, judge)
+
+
+def _higher_edge(panel: Panel, first: str, second: str, rule: Rule) -> Outcome:
+    def judge(part: Panel) -> Outcome:
+        both = part.of((first, second))
+        (means, drawn_means), (widths, drawn_widths) = resampled_means(both), resampled_deviations(both)
+        edges = means + 2.0 * widths
+        if rule == "bands":
+            gap, limit = edges[0] - edges[1], TIE * part.scale
+            what = f"levels have the upper edge of {first} {TIE:g} of the scale above that of {second}"
+            return _by_sight(part, (first, second), edges, gap >= limit, gap <= -limit, what)
+        return _by_draws(part, (first, second), edges, drawn_means + 2.0 * drawn_widths, "upper edge")
+
+    return where_scored(panel, (first, second), rule, judge)
+
+
+def _by_sight(
+    panel: Panel,
+    names: tuple[str, str],
+    found: FloatArray,
+    holds: BoolArray,
+    fails: BoolArray,
+    what: str,
+) -> Outcome:
+    """Whether something is seen at most levels, or its reverse; `found` is what is compared, (2, L)."""
+    gap = float((found[0] - found[1]).mean()) / panel.scale
+    return by_majority(holds, fails, what, effect=gap, n_runs=panel.n_runs(names), against="the reverse")
+
+
+def _by_draws(panel: Panel, names: tuple[str, str], found: FloatArray, drawn: FloatArray, what: str) -> Outcome:
+    """Whether a statistic at levels, (2, L), is larger for the first of two policies, in the mean over levels."""
+    gap = float((found[0] - found[1]).mean()) / panel.scale
+    lower, upper = bounds((drawn[:, 0] - drawn[:, 1]).mean(axis=-1) / panel.scale)
+    answer: Answer = "supported" if lower >= 0.0 else "contradicted" if upper < 0.0 else "undecided"
+    ends = _ends((lower, upper))
+    why = f"{what} of {names[0]} less that of {names[1]} is {gap:.2f} of the scale ({ends}); above 0 it is larger"
+    return Outcome(answer=answer, statistic=gap, effect=gap, n_runs=panel.n_runs(names), why=why)
+
+
+def _ends(interval: tuple[float, float]) -> str:
+    return f"{interval[0]:.2f} to {interval[1]:.2f}"

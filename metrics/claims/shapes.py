@@ -1,17 +1,22 @@
-"""Statements about the shape of curves: from where on they change, how steep and how straight they are, their order."""
+"""Statements about the shape of curves: from where on they change, how steep and how straight they are."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from metrics.checks import CurveError, check_option
+from metrics.checks import CurveError
 from metrics.curves import FloatArray
 
-from .panel import CONFIDENCE, TIE, Panel, Rule, bounds, mean_over_runs, resampled_runs, std_over_runs
-from .predicates import LINEAR, Answer, Outcome, all_of, contrary
+from .outcomes import Answer, Outcome, all_of, where_scored
+from .panel import CONFIDENCE, TIE, Panel, Rule, bounds, mean_over_runs, resampled_means, std_over_runs
 
+ROUNDING = 1e-9
+"""Share by which a level may be off its place in the ladder."""
 ZERO = "zero"
 """Name of the policy that `with_zero` adds."""
+LINEAR = 0.9
+"""Share of the variance between levels that a line explains where growth is nearly linear (our choice)."""
 MIN_LEVELS = 4
 """A broken line needs two levels on either side of its bend, which may share one, and one more to be judged by."""
 
@@ -62,75 +67,35 @@ def _reduced(panel: Panel, scores: Mapping[str, FloatArray]) -> Panel:
 def changes_within(
     panel: Panel, *, policies: Sequence[str], between: tuple[float, float], rule: Rule = "intervals"
 ) -> Outcome:
-    """Whether each policy changes its behaviour from a level between two values on.
+    """Whether each policy changes its behaviour from a level between two values on, both included.
 
     By intervals: two lines that meet at one of the inner levels are fitted to the means. The change must be real (the
     slope differs before and after, with its interval), and 95 % of the resamples must have the bend between the two
     values; it is contradicted if at most 5 % have it there, or if the slope changes by less than `TIE`. By bands: the
     first level whose band does not overlap that of the first level lies between the values.
+
+    Where the change is real, its place is undecided if the levels cannot tell it: to support it, one level below the
+    two values and one above must have been possible; to contradict it, one between them.
     """
     return all_of([_change(panel, policy, between, rule) for policy in policies])
 
 
 def changes_before(panel: Panel, *, first: str, others: Sequence[str], rule: Rule = "intervals") -> Outcome:
-    """Whether a policy changes at a lower level than each of others; where each changes is as in `changes_within`."""
+    """Whether a policy changes at a lower level than each of others; where each changes is as in `changes_within`.
+
+    Undecided if one of the two does not change for sure.
+    """
     return all_of([_earlier(panel, first, other, rule) for other in others])
 
 
 def is_linear(panel: Panel, *, policies: Sequence[str], rule: Rule = "intervals") -> Outcome:
     """Whether each policy grows nearly linearly with the level.
 
-    A rising line explains `LINEAR` of the variance between the means; by intervals with its interval, by bands alone.
+    A rising line explains `LINEAR` of the variance between the means; by intervals, with its interval. Contradicted if
+    it explains less, or surely rises by less than `TIE` of the scale over all levels. By bands: the same of the means
+    alone, however little they rise, if the bands of two levels are apart; else nothing is seen to grow: undecided.
     """
     return all_of([_straightness(panel, policy, rule) for policy in policies])
-
-
-def same_order(
-    first: Panel,
-    second: Panel,
-    *,
-    policies: Sequence[str],
-    better: tuple[int, int] = (1, 1),
-    rule: Rule = "intervals",
-) -> Outcome:
-    """Whether policies have the same order in two panels: Kendall's tau of their mean ranks over levels is above 0.
-
-    By intervals: its interval over resampled runs is above 0, contradicted if none of it is. By bands: the tau itself
-    is above 0.5, contradicted if it is at most 0.
-
-    Args:
-        first: One panel.
-        second: The other; levels and runs may differ.
-        policies: Policies to order, two or more.
-        better: 1 or -1 for each panel: whether higher or lower is better there.
-        rule: As everywhere.
-    """
-    check_option("rule", rule, Rule)
-    panels = [panel.of(policies) * side for panel, side in zip((first, second), better, strict=True)]
-    tau = float(_tau(*(_mean_ranks(mean_over_runs(values)) for values in panels)))
-    drawn = [resampled_runs(values) for values in panels]
-    n_runs = min(first.n_runs(policies), second.n_runs(policies))
-    answer: Answer = "undecided"
-    if rule == "bands" and n_runs > 1:
-        answer = "supported" if tau > 0.5 else "contradicted" if tau <= 0.0 else "undecided"
-    elif rule == "intervals" and drawn[0] is not None and drawn[1] is not None:
-        resampled = _tau(*(_mean_ranks(mean_over_runs(values)) for values in drawn if values is not None))
-        lower, upper = bounds(resampled)
-        answer = "supported" if lower > 0.0 else "contradicted" if upper <= 0.0 else "undecided"
-    why = f"Kendall's tau of the two orders is {tau:.2f}"
-    return Outcome(answer=answer, statistic=tau, effect=np.nan, n_runs=n_runs, why=why)
-
-
-def not_same_order(
-    first: Panel,
-    second: Panel,
-    *,
-    policies: Sequence[str],
-    better: tuple[int, int] = (1, 1),
-    rule: Rule = "intervals",
-) -> Outcome:
-    """Whether the order in one panel says nothing of that in the other; the contrary of `same_order`."""
-    return contrary(same_order(first, second, policies=policies, better=better, rule=rule))
 
 
 def broken_line(levels: FloatArray, means: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -162,98 +127,164 @@ def _onset(panel: Panel, policy: str) -> float:
     return float(panel.levels[apart][0]) if apart.any() else np.inf
 
 
-def _bends(panel: Panel, policy: str) -> tuple[FloatArray, FloatArray] | None:
-    """Bends and changes of slope over the span, as shares of the scale, of resampled curves; None: too few levels."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Bends:
+    """Where the mean curve of a policy bends, with its resamples."""
+
+    places: FloatArray
+    """Level of the bend in each resample, (B,)."""
+    change: float
+    """Of the slope, over the span of levels, as a share of the scale."""
+    chance: float
+    """How much the runs may have added to it by chance, at `CONFIDENCE`."""
+
+    @property
+    def is_real(self) -> bool:
+        return abs(self.change) > self.chance
+
+    @property
+    def is_none(self) -> bool:
+        return abs(self.change) + self.chance <= TIE
+
+
+def _bends(panel: Panel, policy: str) -> _Bends:
     (values,) = panel.of((policy,))
-    drawn = resampled_runs(values)
-    if drawn is None or panel.levels.size < MIN_LEVELS:
+    means, drawn = resampled_means(values)
+    unit = (panel.levels[-1] - panel.levels[0]) / panel.scale
+    _, change = broken_line(panel.levels, means[None])
+    places, _ = broken_line(panel.levels, drawn)
+    # The bend is put where it fits best, so chance may add what it adds at its best place.
+    _, by_chance = broken_line(panel.levels, drawn - means)
+    chance = float(np.quantile(np.abs(by_chance), CONFIDENCE)) * unit
+    return _Bends(places=places, change=float(change[0]) * unit, chance=chance)
+
+
+def _few_levels(panel: Panel, policies: Sequence[str]) -> Outcome | None:
+    """The outcome if there are too few levels for a broken line."""
+    if panel.levels.size >= MIN_LEVELS:
         return None
-    bends, changes = broken_line(panel.levels, mean_over_runs(drawn))
-    return bends, changes * (panel.levels[-1] - panel.levels[0]) / panel.scale
+    why = f"{panel.levels.size} levels of {' and '.join(policies)}, {MIN_LEVELS} are needed for a bend"
+    n_runs = panel.n_runs(policies)
+    return Outcome(answer="undecided", statistic=np.nan, effect=np.nan, n_runs=n_runs, why=why)
+
+
+def _located(answer: Answer, possible: FloatArray, between: tuple[float, float]) -> tuple[Answer, str]:
+    """Return the answer as far as the levels can tell it, and why not if they cannot."""
+    low, high = between
+    where = f"{low:.3g} to {high:.3g}"
+    if answer == "contradicted" and not ((possible >= low) & (possible <= high)).any():
+        return "undecided", f"no level that was run could show a change at {where}"
+    lacking = [word for word, has in (("below", possible < low), ("above", possible > high)) if not has.any()]
+    if answer == "supported" and lacking:
+        return "undecided", f"no level that was run could show a change {' or '.join(lacking)} {where}"
+    return answer, ""
+
+
+def _rounded(between: tuple[float, float]) -> tuple[float, float]:
+    """Bounds moved apart by what rounding may do to a level."""
+    return between[0] * (1.0 - ROUNDING), between[1] * (1.0 + ROUNDING)
 
 
 def _change(panel: Panel, policy: str, between: tuple[float, float], rule: Rule) -> Outcome:
-    check_option("rule", rule, Rule)
-    n_runs = panel.n_runs((policy,))
-    low, high = between
-    if rule == "bands":
-        onset = _onset(panel, policy)
-        answer: Answer = "undecided" if n_runs < 2 else "supported" if low <= onset <= high else "contradicted"
+    low, high = _rounded(between)
+
+    def by_bands(part: Panel) -> Outcome:
+        onset = _onset(part, policy)
+        answer: Answer = "supported" if low <= onset <= high else "contradicted"
         why = f"band of {policy} leaves that of the first level at {onset:.3g}"
+        if np.isinf(onset):
+            why = f"band of {policy} never leaves that of the first level"
+        else:
+            answer, reason = _located(answer, part.levels[1:], (low, high))
+            why = f"{why}; {reason}" if reason else why
+        n_runs = part.n_runs((policy,))
         return Outcome(answer=answer, statistic=onset, effect=np.nan, n_runs=n_runs, why=why)
-    found = _bends(panel, policy)
-    if found is None:
-        why = f"too few levels or runs of {policy}"
-        return Outcome(answer="undecided", statistic=np.nan, effect=np.nan, n_runs=n_runs, why=why)
-    bends, changes = found
-    inside = float(((bends >= low) & (bends <= high)).mean())
-    lower, upper = bounds(changes)
-    if lower >= -TIE and upper <= TIE:
-        answer = "contradicted"
-    elif lower <= 0.0 <= upper:
-        answer = "undecided"
-    else:
-        answer = "supported" if inside >= CONFIDENCE else "contradicted" if inside <= 1.0 - CONFIDENCE else "undecided"
-    middle, effect = float(np.median(bends)), float(np.median(changes))
-    why = f"slope of {policy} changes at {middle:.3g}, in {inside:.0%} of the resamples between {low:g} and {high:g}"
-    return Outcome(answer=answer, statistic=middle, effect=effect, n_runs=n_runs, why=why)
+
+    def by_intervals(part: Panel) -> Outcome:
+        if few := _few_levels(part, (policy,)):
+            return few
+        found = _bends(part, policy)
+        middle, n_runs = float(np.median(found.places)), part.n_runs((policy,))
+        inside = float(((found.places >= low) & (found.places <= high)).mean())
+        reason = ""
+        answer: Answer = "undecided"
+        why = f"slope of {policy} changes by {found.change:.2f} of the scale, by chance alone up to {found.chance:.2f}"
+        if found.is_none:
+            answer, why = "contradicted", f"{why}: no change, {TIE:g} would be one"
+        elif found.is_real:
+            answer = "supported" if inside >= CONFIDENCE else answer
+            answer = "contradicted" if inside <= 1.0 - CONFIDENCE else answer
+            answer, reason = _located(answer, part.levels[1:-1], (low, high))
+            where = f"at {middle:.3g}, in {inside:.0%} of the resamples between {between[0]:.3g} and {between[1]:.3g}"
+            why = f"slope of {policy} changes {where}" + (f"; {reason}" if reason else "")
+        return Outcome(answer=answer, statistic=middle, effect=found.change, n_runs=n_runs, why=why)
+
+    return where_scored(panel, (policy,), rule, by_bands if rule == "bands" else by_intervals)
 
 
 def _earlier(panel: Panel, first: str, second: str, rule: Rule) -> Outcome:
-    check_option("rule", rule, Rule)
-    n_runs = panel.n_runs((first, second))
-    answer: Answer = "undecided"
-    if rule == "bands":
-        onsets = _onset(panel, first), _onset(panel, second)
-        if n_runs > 1:
-            answer = "supported" if onsets[0] < onsets[1] else "contradicted"
-        why = f"band of {first} leaves that of the first level at {onsets[0]:.3g}, that of {second} at {onsets[1]:.3g}"
-        return Outcome(answer=answer, statistic=onsets[0], effect=np.nan, n_runs=n_runs, why=why)
-    mine, theirs = _bends(panel, first), _bends(panel, second)
-    if mine is None or theirs is None:
-        why = f"too few levels or runs of {first} or {second}"
-        return Outcome(answer=answer, statistic=np.nan, effect=np.nan, n_runs=n_runs, why=why)
-    before = float((mine[0] < theirs[0]).mean())
-    answer = "supported" if before >= CONFIDENCE else "contradicted" if before <= 1.0 - CONFIDENCE else "undecided"
-    why = f"{first} changes before {second} in {before:.0%} of the resamples"
-    return Outcome(answer=answer, statistic=before, effect=np.nan, n_runs=n_runs, why=why)
+    def by_bands(part: Panel) -> Outcome:
+        mine, theirs = _onset(part, first), _onset(part, second)
+        n_runs = part.n_runs((first, second))
+        answer: Answer = "supported" if mine < theirs else "contradicted"
+        why = f"band of {first} leaves that of the first level at {mine:.3g}, that of {second} at {theirs:.3g}"
+        if still := [name for name, onset in ((first, mine), (second, theirs)) if np.isinf(onset)]:
+            answer, why = "undecided", f"bands of {' and '.join(still)} never leave that of the first level"
+        return Outcome(answer=answer, statistic=mine, effect=np.nan, n_runs=n_runs, why=why)
+
+    def by_intervals(part: Panel) -> Outcome:
+        if few := _few_levels(part, (first, second)):
+            return few
+        mine, theirs = _bends(part, first), _bends(part, second)
+        before, n_runs = float((mine.places < theirs.places).mean()), part.n_runs((first, second))
+        answer: Answer = "undecided"
+        if unsure := [name for name, found in ((first, mine), (second, theirs)) if not found.is_real]:
+            why = f"no change of {' and '.join(unsure)} that chance could not make"
+        else:
+            answer = "supported" if before >= CONFIDENCE else "contradicted" if before <= 1.0 - CONFIDENCE else answer
+            why = f"{first} changes before {second} in {before:.0%} of the resamples"
+        return Outcome(answer=answer, statistic=before, effect=np.nan, n_runs=n_runs, why=why)
+
+    return where_scored(panel, (first, second), rule, by_bands if rule == "bands" else by_intervals)
 
 
 def _straightness(panel: Panel, policy: str, rule: Rule) -> Outcome:
-    check_option("rule", rule, Rule)
-    (values,) = panel.of((policy,))
-    explained, rise = _line(panel.levels, mean_over_runs(values)[None])
-    n_runs = panel.n_runs((policy,))
-    answer: Answer = "undecided"
-    if rule == "bands" and n_runs > 1:
-        answer = "supported" if explained[0] >= LINEAR and rise[0] > 0.0 else "contradicted"
-    elif rule == "intervals" and (drawn := resampled_runs(values)) is not None:
-        share, rises = _line(panel.levels, mean_over_runs(drawn))
-        (low, high), (flattest, steepest) = bounds(share), bounds(rises)
-        answer = "supported" if low >= LINEAR and flattest > 0.0 else "undecided"
-        if high < LINEAR or steepest <= 0.0:
-            answer = "contradicted"
-    why = f"a line explains {explained[0]:.2f} of the variance of {policy}"
-    return Outcome(
-        answer=answer, statistic=float(explained[0]), effect=float(rise[0]) / panel.scale, n_runs=n_runs, why=why
-    )
+    def judge(part: Panel) -> Outcome:
+        (values,) = part.of((policy,))
+        means, drawn = resampled_means(values)
+        rest, total, rise = (float(one[0]) for one in _line(part.levels, means[None]))
+        explained = 1.0 - rest / total if total > 0.0 else 0.0
+        rise, n_runs = rise / part.scale, part.n_runs((policy,))
+        if rule == "bands":
+            reach = 2.0 * std_over_runs(values)
+            is_seen = float((means - reach).max()) > float((means + reach).min())
+            is_line = explained >= LINEAR and rise > 0.0
+            answer: Answer = "undecided" if not is_seen else "supported" if is_line else "contradicted"
+            words = "" if is_seen else f"no two bands of {policy} are apart; "
+        else:
+            rests, totals, _ = (np.quantile(one, CONFIDENCE) for one in _line(part.levels, drawn - means))
+            lower, upper = bounds(_line(part.levels, drawn)[2] / part.scale)
+            # Square roots of sums of squares are lengths: what chance adds changes them by its own length at most.
+            most = _ratio(rest**0.5 + rests**0.5, total**0.5 - totals**0.5)
+            least = _ratio(rest**0.5 - rests**0.5, total**0.5 + totals**0.5)
+            answer = "supported" if 1.0 - most >= LINEAR and lower > 0.0 else "undecided"
+            answer = "contradicted" if 1.0 - least < LINEAR or upper <= TIE else answer
+            words = f"{1.0 - most:.2f} to {1.0 - least:.2f} with its interval; "
+        why = f"a line explains {explained:.2f} of the variance of {policy} ({words}{LINEAR:g} is nearly linear)"
+        why = f"{why} and rises by {rise:.2f} of the scale" + ("" if rise > 0.0 else ": it does not grow")
+        return Outcome(answer=answer, statistic=explained, effect=rise, n_runs=n_runs, why=why)
+
+    return where_scored(panel, (policy,), rule, judge)
 
 
-def _line(levels: FloatArray, means: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Share of variance that a line explains, and its rise over the span, of curves (B, L); (B,) each."""
+def _ratio(above: float, below: float) -> float:
+    """Square of a ratio of two lengths, from 0 to 1; a length below 0 is none."""
+    return min(1.0, (max(0.0, above) / below) ** 2) if below > 0.0 else 1.0
+
+
+def _line(levels: FloatArray, means: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Fit a line to curves (B, L): sum of squares that it leaves, that of the curve, and rise over the span; (B,)."""
     x, y = levels - levels.mean(), means - means.mean(axis=1, keepdims=True)
     slope = y @ x / (x @ x)
-    with np.errstate(divide="ignore", invalid="ignore"):  # a curve without any variance
-        return slope**2 * (x @ x) / (y**2).sum(axis=1), slope * (levels[-1] - levels[0])
-
-
-def _mean_ranks(means: FloatArray) -> FloatArray:
-    """Rank of each policy, mean over levels; (..., P, L) to (..., P)."""
-    return (means[..., :, None, :] > means[..., None, :, :]).sum(axis=-2).mean(axis=-1)
-
-
-def _tau(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Kendall's tau of two orders, (..., P) each to (...); pairs that tie in one of them count 0."""
-    above, below = np.triu_indices(first.shape[-1], k=1)
-    agree = np.sign(first[..., above] - first[..., below]) * np.sign(second[..., above] - second[..., below])
-    return agree.mean(axis=-1)
+    total = (y**2).sum(axis=1)
+    return np.maximum(0.0, total - slope**2 * (x @ x)), total, slope * (levels[-1] - levels[0])

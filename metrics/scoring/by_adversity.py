@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from metrics.checks import PopulationError
-from metrics.curves import FloatArray, Variant
+from metrics.curves import FloatArray, Form, Variant
 from metrics.distance import noise_floor
 from metrics.environment import environment_distance
 from metrics.flexibility import adaptability, reactivity
@@ -24,7 +24,7 @@ from metrics.statistics import Summary
 
 from .columns import HANDLING, NOISE, POPULATION, THROTTLE
 from .draft import ScoreDraft, Uncomputable
-from .measures import DISTURBANCES, MEASURE_CRITERIA, Form
+from .measures import DISTURBANCES, MEASURE_CRITERIA
 from .studies import RunCurves, StudyCurves, common_runs
 from .table import Score
 

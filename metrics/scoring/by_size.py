@@ -4,14 +4,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
-from metrics.curves import FloatArray, Variant
+from metrics.curves import FloatArray, Form, Variant
 from metrics.emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
 from metrics.interference import performance_lost
 from metrics.scaling import efficiency, raw_performance, scalability
 
 from .columns import SIZE
 from .draft import ScoreDraft, Uncomputable, Values
-from .measures import MEASURE_VARIANTS, Form
+from .measures import MEASURE_VARIANTS
 from .studies import RunCurves, StudyCurves, common_runs
 from .table import Score
 

@@ -8,10 +8,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metrics.curves import FloatArray, Variant
+from metrics.curves import FloatArray, Form, Variant
 from metrics.statistics import Summary, aggregate, bootstrap_measure
 
-from .measures import Form
 from .studies import RunCurves, common_runs
 from .table import Score
 

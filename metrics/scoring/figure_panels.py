@@ -11,11 +11,11 @@ import numpy as np
 
 from metrics.catalog import METRICS
 from metrics.checks import CurveError
-from metrics.claims import Panel
-from metrics.curves import FloatArray, Variant
+from metrics.claims import Panel, PanelName
+from metrics.curves import FloatArray, Form, Variant
 
 from .columns import THROTTLE
-from .measures import DISTURBANCES, MEASURE_CRITERIA, MEASURE_VARIANTS, ScoreForms
+from .measures import DISTURBANCES, MEASURE_CRITERIA, MEASURE_VARIANTS, ScoreForms, label_of
 from .studies import StudyCurves
 from .study_scores import score_study
 from .study_tables import StudyLine, study_lines
@@ -36,12 +36,17 @@ FIGURE_MEASURES = (
     "population_robustness",
 )
 """Measures that the paper's figures show."""
+FIGURE_FORMS: dict[str, tuple[Form, ...]] = {"spatial_emergence": ("interactive", "marginal")}
+"""Measure -> forms that the figures show, where it is not the marginal one alone: in the warehouses a swarm is held
+beside as many robots that work alone, in search and rescue, where no robot works alone, beside the next smaller swarm.
+"""
 
 _EXPERIMENTS: dict[tuple[Any, ...], str] = {
     **{(name,): name for name in ("S1a", "S1b", "S1c", "S1d", "S1e", "S1f", "S1g", "S1h")},
     ("S2a", 0.0): "S2a still",
     ("S2a", 0.001): "S2a slow",
     ("S2a", 0.051): "S2a fast",
+    ("S2b", 12): "S2b 12",
     ("S2b", 115): "S2b 115",
     ("S2b", 320): "S2b 320",
     ("S2c", 320): "S2c 320",
@@ -66,6 +71,8 @@ class StudyPanel:
     measure: str
     """Name in `METRICS`."""
     variant: Variant
+    form: Form
+    """With what a swarm size is compared; "marginal" for measures that compare none."""
     criterion: str
     """What is varied along x."""
     x: FloatArray
@@ -84,6 +91,11 @@ class StudyPanel:
         return experiment_of(self.study, tuple(self.others.values()))
 
     @property
+    def name(self) -> PanelName:
+        """Its name in claims; without an experiment if they are not about it."""
+        return PanelName(self.experiment or "", self.measure, self.form)
+
+    @property
     def higher_is_better(self) -> bool:
         """Direction of the measure."""
         return METRICS[self.measure].higher_is_better
@@ -99,7 +111,7 @@ class StudyPanels:
 
     panels: tuple[StudyPanel, ...]
     missing: Mapping[tuple[str, str], str]
-    """Measure and variant -> why it could not be computed, for what the study varies."""
+    """Measure (in a form of it) and variant -> why it could not be computed, for what the study varies."""
 
 
 def experiment_of(study: str, others: "Sequence[Value]") -> str | None:
@@ -110,7 +122,7 @@ def experiment_of(study: str, others: "Sequence[Value]") -> str | None:
 def study_panels(
     table: "StudyTable", variants: Sequence[Variant] = ("corrected",), measures: Sequence[str] = FIGURE_MEASURES
 ) -> StudyPanels:
-    """Score a study and return its panels, by reading, other axes, variant and measure.
+    """Score a study and return its panels, by reading, other axes, variant, measure and form.
 
     A study whose last axis is no criterion of these measures has panels of its performance, where the axis has numbers.
 
@@ -131,42 +143,51 @@ def study_panels(
     is_scored = bool(table.spec.axes) and table.spec.axes[-1].is_criterion
     for together in lines.values() if is_scored else ():
         for variant in variants:
-            for measure in _measures_in(measures, variant, together[0].curves):
+            for measure, form in _measures_in(measures, variant, together[0].curves):
                 found: dict[str, tuple[Score, ...]] = {}
                 for line in together:
-                    scores, why = _scores(line.curves, measure, variant)
+                    scores, why = _scores(line.curves, measure, variant, form)
                     found[line.policy] = scores
                     if why:
-                        missing[measure, variant] = why
+                        missing[label_of(measure, "corrected", form), variant] = why
                 if any(found.values()):
-                    panels.append(_panel(table, together[0], variant, found))
+                    panels.append(_panel(table, together[0], variant, form, found))
     if not panels and "raw_performance" in measures:
         panels = _performance_panels(table, list(lines.values()))
     return StudyPanels(panels=tuple(panels), missing=missing)
 
 
-def _measures_in(measures: Sequence[str], variant: Variant, curves: StudyCurves) -> list[str]:
-    """Return the measures that have a variant, and whose criterion is varied."""
+def _measures_in(measures: Sequence[str], variant: Variant, curves: StudyCurves) -> list[tuple[str, Form]]:
+    """Return the measures that have a variant, and whose criterion is varied, in each form that figures show.
+
+    The interactive form is left out where no robot works alone: it cannot be computed, and no figure shows it.
+    """
     varied = {experiment.criterion for experiment in curves.experiments}
     if varied & set(DISTURBANCES):
         varied.add(THROTTLE)
+    sizes = curves.sizes()
+    has_lone_robot = bool(sizes) and sizes[0].n_robots == 1
     return [
-        measure
+        (measure, form)
         for measure in measures
+        for form in FIGURE_FORMS.get(measure, ("marginal",))
+        if form == "marginal" or has_lone_robot
         if MEASURE_CRITERIA[measure] in varied and variant in MEASURE_VARIANTS.get(measure, ("corrected",))
     ]
 
 
-def _scores(curves: StudyCurves, measure: str, variant: Variant) -> tuple[tuple[Score, ...], str]:
+def _scores(curves: StudyCurves, measure: str, variant: Variant, form: Form) -> tuple[tuple[Score, ...], str]:
     """Return the scores of one line, or why there are none."""
     try:
-        scores, missing = score_study(curves, (measure,), ScoreForms(variants=(variant,)))
+        scores, missing = score_study(curves, (measure,), ScoreForms(variants=(variant,), forms=(form,)))
     except CurveError as error:
         return (), str(error)
     return scores, "; ".join(missing.values())
 
 
-def _panel(table: "StudyTable", line: StudyLine, variant: Variant, found: Mapping[str, Sequence[Score]]) -> StudyPanel:
+def _panel(
+    table: "StudyTable", line: StudyLine, variant: Variant, form: Form, found: Mapping[str, Sequence[Score]]
+) -> StudyPanel:
     """Put the scores of several policies beside each other."""
     scores = [score for of_policy in found.values() for score in of_policy]
     x = sorted({score.x for score in scores})
@@ -183,6 +204,7 @@ def _panel(table: "StudyTable", line: StudyLine, variant: Variant, found: Mappin
         words=line.words,
         measure=scores[0].measure,
         variant=variant,
+        form=form,
         criterion=scores[0].criterion,
         x=np.array(x),
         levels=_places(x, scores),
@@ -218,6 +240,7 @@ def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine
                 words=first.words,
                 measure="raw_performance",
                 variant="corrected",
+                form="marginal",
                 criterion=table.spec.axes[-1].name,
                 x=x,
                 levels=x,

@@ -3,16 +3,13 @@
 import difflib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, get_args
+from typing import get_args
 
 from metrics.catalog import METRICS
 from metrics.checks import CurveError
-from metrics.curves import Variant
+from metrics.curves import Form, Variant
 
 from .columns import HANDLING, NOISE, POPULATION, SIZE, THROTTLE
-
-Form: TypeAlias = Literal["marginal", "interactive"]
-"""With what a swarm size is compared: the next smaller size, or N robots that each work alone."""
 
 MEASURE_CRITERIA: dict[str, str] = {
     "raw_performance": SIZE,

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 
 from metrics.catalog import METRICS
+from metrics.claims import PanelName
 from metrics.curves import FloatArray
 from metrics.statistics import Summary, aggregate
 
 from .columns import SIZE
 from .figure_panels import StudyPanel, StudyPanels
+from .measures import label_of
 from .plots import COLOURS, PANELS_PER_ROW, X_LABELS, Panel
 from .texts import number, unread
 
@@ -35,15 +37,17 @@ MANY_DOTS = 500
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StudyFigure:
-    """Panels of one measure in one variant and reading: one per value of the axes before the last."""
+    """Panels of one measure in one form, variant and reading: one per value of the axes before the last."""
 
     panels: tuple[StudyPanel, ...]
 
     @property
     def name(self) -> str:
-        """Name of its files: study, measure, reading, and the variant if it is not the corrected one."""
+        """Name of its files: study, measure, reading; the form and the variant if it is not the usual one."""
         first = self.panels[0]
-        words = (first.study, first.measure, first.reading, "" if first.variant == "corrected" else first.variant)
+        form = "" if first.form == "marginal" else first.form
+        variant = "" if first.variant == "corrected" else first.variant
+        words = (first.study, first.measure, form, first.reading, variant)
         return "_".join(word for word in words if word)
 
     @property
@@ -51,7 +55,8 @@ class StudyFigure:
         """Headline."""
         first = self.panels[0]
         arrow = "higher" if first.higher_is_better else "lower"
-        words = f"{first.measure.replace('_', ' ')} ({arrow} is better), reading {first.reading}"
+        measure = label_of(first.measure, "corrected", first.form).replace("_", " ")
+        words = f"{measure} ({arrow} is better), reading {first.reading}"
         return f"{first.study}: {words}" + ("" if first.variant == "corrected" else f", measure {first.variant}")
 
     @property
@@ -81,10 +86,10 @@ class StudyFigure:
 
 def study_figures(scored: StudyPanels) -> tuple[StudyFigure, ...]:
     """Return the figures of a study, those without a single score left out."""
-    groups: dict[tuple[str, str, str], list[StudyPanel]] = {}
+    groups: dict[tuple[str, str, PanelName], list[StudyPanel]] = {}
     for panel in scored.panels:
         if any(np.isfinite(scores).any() for scores in panel.scores.values()):
-            groups.setdefault((panel.reading, panel.variant, panel.measure), []).append(panel)
+            groups.setdefault((panel.reading, panel.variant, panel.name._replace(experiment="")), []).append(panel)
     return tuple(StudyFigure(panels=tuple(panels)) for panels in groups.values())
 
 

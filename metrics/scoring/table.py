@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from metrics.catalog import METRICS
-from metrics.curves import Variant
+from metrics.curves import Form, Variant
 from metrics.statistics import Summary, aggregate
 
 from .forecast import FORECAST_HEADER, FORECAST_TITLE, PopulationForecast
-from .measures import Form, label_of
+from .measures import label_of
 from .texts import aligned, bounds, counted, interval, limits, number, paragraph, percent, plain
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from metrics.claims.stating import POLICIES
 from metrics.curves import Variant
 
 from .figure_panels import StudyPanel, StudyPanels
-from .measures import MEASURE_VARIANTS
+from .measures import MEASURE_VARIANTS, label_of
 from .texts import plain
 
 if TYPE_CHECKING:
@@ -32,20 +32,26 @@ class Judged:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return it as plain values; numbers that JSON does not have are None."""
-        verdict = self.verdict
         return {
             "claim": self.claim.name,
             "text": self.claim.text,
             "figure": self.claim.figure,
             "reading": self.reading,
             "variant": self.variant,
-            "answer": verdict.answer,
-            "by_bands": verdict.by_bands,
-            "statistic": plain(verdict.statistic),
-            "effect": plain(verdict.effect),
-            "n_runs": verdict.n_runs,
-            "why": verdict.why,
+            **_plain(self.verdict),
+            "otherwise": {words: _plain(verdict) for words, verdict in self.verdict.otherwise.items()},
         }
+
+
+def _plain(verdict: Verdict) -> dict[str, Any]:
+    return {
+        "answer": verdict.answer,
+        "by_bands": verdict.by_bands,
+        "statistic": plain(verdict.statistic),
+        "effect": plain(verdict.effect),
+        "n_runs": verdict.n_runs,
+        "why": verdict.why,
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +62,7 @@ class Waiting:
     reading: str
     variant: Variant
     lacks: tuple[PanelName, ...]
-    """Experiments and measures without scores."""
+    """Panels without scores."""
     reasons: tuple[str, ...]
     """Why they have none, where their study is there."""
 
@@ -74,7 +80,7 @@ class Waiting:
 
 def why_no_claims(table: "StudyTable") -> str:
     """Return why the claims cannot be held against a study; empty if they can."""
-    sets = {name.split()[0] for claim in CLAIMS.values() for name, _ in claim.panels}
+    sets = {name.split()[0] for claim in CLAIMS.values() for name, *_ in claim.panels}
     name = table.spec.name
     if name not in sets:
         return (
@@ -116,11 +122,7 @@ def judge_claims(
     for reason in filter(None, map(why_no_claims, tables)):
         raise CurveError(reason)
     found = _Found(
-        panels={
-            (panel.reading, panel.variant, panel.experiment or "", panel.measure): panel
-            for one in scored
-            for panel in one.panels
-        },
+        panels={(panel.reading, panel.variant, panel.name): panel for one in scored for panel in one.panels},
         reasons={
             (name, *key): why for name, one in zip(names, scored, strict=True) for key, why in one.missing.items()
         },
@@ -133,7 +135,7 @@ def judge_claims(
     waiting: list[Waiting] = []
     readings = dict.fromkeys(reading for table in tables for reading in table.spec.readings)
     for reading, variant, claim in product(readings, variants, claims.values()):
-        if claim.panels and any(_variant_of(measure, variant) == variant for _, measure in claim.panels):
+        if claim.panels and any(_variant_of(name.measure, variant) == variant for name in claim.panels):
             outcome = _judge(claim, reading, variant, found)
             if isinstance(outcome, Judged):
                 judged.append(outcome)
@@ -146,10 +148,10 @@ def judge_claims(
 class _Found:
     """What studies have."""
 
-    panels: Mapping[tuple[str, str, str, str], StudyPanel]
-    """By reading, variant, experiment and measure."""
+    panels: Mapping[tuple[str, Variant, PanelName], StudyPanel]
+    """By reading, variant and name."""
     reasons: Mapping[tuple[str, str, str], str]
-    """Study, measure and variant -> why there are no scores."""
+    """Study, measure in a form of it, and variant -> why there are no scores."""
 
 
 def _variant_of(measure: str, variant: Variant) -> Variant:
@@ -158,14 +160,16 @@ def _variant_of(measure: str, variant: Variant) -> Variant:
 
 
 def _judge(claim: Claim, reading: str, variant: Variant, found: _Found) -> Judged | Waiting:
-    places = {
-        (experiment, measure): (reading, _variant_of(measure, variant), experiment, measure)
-        for experiment, measure in claim.panels
+    places: dict[PanelName, tuple[str, Variant, PanelName]] = {
+        name: (reading, _variant_of(name.measure, variant), name) for name in (*claim.panels, *claim.other_panels)
     }
-    lacks = tuple(name for name, place in places.items() if place not in found.panels)
+    lacks = tuple(name for name in claim.panels if places[name] not in found.panels)
     if not lacks:
-        panels = {name: found.panels[place].for_claims() for name, place in places.items()}
+        panels = {name: found.panels[place].for_claims() for name, place in places.items() if place in found.panels}
         return Judged(claim=claim, reading=reading, variant=variant, verdict=check_claim(claim, panels))
-    keys = [(experiment.split()[0], measure, _variant_of(measure, variant)) for experiment, measure in lacks]
+    keys = [
+        (name.experiment.split()[0], label_of(name.measure, "corrected", name.form), _variant_of(name.measure, variant))
+        for name in lacks
+    ]
     reasons = tuple(dict.fromkeys(found.reasons[key] for key in keys if key in found.reasons))
     return Waiting(claim=claim, reading=reading, variant=variant, lacks=lacks, reasons=reasons)

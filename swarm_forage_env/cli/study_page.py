@@ -179,7 +179,7 @@ def _numbers_of(verdict: "Verdict") -> dict[str, str]:
 
 def lacking(waits: "Waiting") -> str:
     """Return what a claim waits for, in words, and why that is missing where its study is there."""
-    names = ", ".join(" ".join(name).replace("_", " ") for name in waits.lacks)
+    names = ", ".join(name.words for name in waits.lacks)
     return f"{names} ({'; '.join(waits.reasons)})" if waits.reasons else names
 
 
@@ -319,7 +319,7 @@ def _claims_about(
     """Return the claims that use a panel of the figure, with what was found under its reading."""
     from metrics.scoring.verdicts import Waiting
 
-    here = {(panel.experiment, panel.measure) for panel in figure.panels}
+    here = {panel.name for panel in figure.panels}
     reading = figure.panels[0].reading
     found: dict[str, dict[str, Any]] = {}
     for one in (*judged, *waiting):
@@ -332,6 +332,10 @@ def _claims_about(
             else _numbers_of(one.verdict)
         )
         entry["found"].append({**told, "where": one.variant})
+        senses = {} if isinstance(one, Waiting) else one.verdict.otherwise
+        entry["found"] += [
+            {**_numbers_of(other), "where": f"{one.variant}; {sense}"} for sense, other in senses.items()
+        ]
     return list(found.values())
 
 

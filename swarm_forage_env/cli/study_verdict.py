@@ -107,7 +107,7 @@ def waiting_lines(waiting: "Sequence[Waiting]") -> list[str]:
     """Return which claims wait for what, those that wait for the same in one line."""
     claims: dict[str, dict[str, None]] = {}
     for one in waiting:
-        words = f"for {', '.join(dict.fromkeys(experiment for experiment, _ in one.lacks))}"
+        words = f"for {', '.join(dict.fromkeys(name.experiment for name in one.lacks))}"
         if one.reasons:
             words += f" ({one.reading}, {one.variant}: {'; '.join(one.reasons)})"
         claims.setdefault(words, {})[one.claim.name] = None

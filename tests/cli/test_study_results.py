@@ -51,7 +51,7 @@ def test_claims_are_held_against_a_study(ran):
     assert code == 0
     assert "from formulas alone" in out
     assert "reading described, measures sierra" in out
-    assert "E4, E5, E6, C1, C2, C3, P1, X3, H1, H3" in out, "claims and intuitions that wait for S1b"
+    assert "E4, E5, E6, C1, C2, C3, P1, H1, H3" in out, "claims and intuitions that wait for S1b"
     assert "scoring S1a" in err
     assert "note: S1a has the name of one of the paper's sets and other settings" in err
     document = json.loads(Path("there/verdict.json").read_text())

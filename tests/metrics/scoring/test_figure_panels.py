@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 from metrics import CurveError
-from metrics.claims import EXPERIMENTS
+from metrics.claims import EXPERIMENTS, INTUITIONS, PanelName
 from metrics.scoring import judge_claims, study_panels
 from metrics.scoring.figure_panels import experiment_of
 from metrics.scoring.verdicts import VARIANTS
@@ -72,6 +72,18 @@ def test_a_panel_per_value_of_the_first_axis():
     assert only(scored.panels, "spatial_emergence", experiment="S2a slow").x.tolist() == [4.0], "without one robot"
 
 
+def test_spatial_emergence_has_a_panel_beside_robots_alone_and_one_beside_the_next_smaller_swarm():
+    table = made_table(made_study(), lambda cell: 10.0 * cell.values[-1] ** 2)
+    panels = [one for one in study_panels(table).panels if one.measure == "spatial_emergence"]
+    assert [one.name for one in panels] == [
+        PanelName("S1a", "spatial_emergence", "interactive"),
+        PanelName("S1a", "spatial_emergence", "marginal"),
+    ]
+    alone, smaller = (one.scores["crw"] for one in panels)
+    np.testing.assert_allclose(alone[0], smaller[0])  # the smaller swarm is one robot
+    assert not np.allclose(alone[1], smaller[1])
+
+
 def test_throttles_are_placed_by_the_distance_of_conditions():
     axis = Axis(name="throttle", values=(0.0, 0.2, 0.4))
     spec = made_study("S1c", axis, reference=0.0, settings={"n_objects": 20, "n_robots": 4})
@@ -97,7 +109,7 @@ def test_a_measure_has_a_panel_in_each_variant_that_it_has(of_sizes):
 
 def test_every_experiment_of_the_claims_is_in_a_set():
     """By name, and by the value on the first axis where a set has two."""
-    specs = [load_study(name, "reduced", readings=("described",)) for name in set_names()]
+    specs = [load_study(name, "paper", readings=("described",)) for name in set_names()]
     found = {experiment_of(spec.name, cell.values[:-1]) for spec in specs for cell in spec.cells}
     assert found - {None} == set(EXPERIMENTS)
 
@@ -114,7 +126,7 @@ def test_claims_are_answered_in_each_reading_and_variant():
         assert answers["P2", reading, "corrected"] == answers["P2", reading, "sierra"] == "supported"
         assert [key[2] for key in answers if key[:2] == ("E3", reading)] == [*VARIANTS]
     lacking = {one.claim.name: one.lacks for one in waiting if (one.reading, one.variant) == ("program", "corrected")}
-    assert lacking["D2"] == (("S1h", "population_robustness"), ("S1b", "task_emergence"))
+    assert lacking["D2"] == (PanelName("S1h", "population_robustness"), PanelName("S1b", "task_emergence"))
     assert not {"V1", "V2", "P2"} & {one.claim.name for one in waiting}
 
 
@@ -127,8 +139,9 @@ def test_the_opposite_order_contradicts():
 
 def test_a_claim_may_need_two_studies():
     tables = [made_table(made_study(name), by_policy) for name in ("S1a", "S1b")]
-    judged, _ = judge_claims(tables, [study_panels(table) for table in tables], ("corrected",))
-    assert {"P1", "P2", "X3"} <= {one.claim.name for one in judged}
+    panels = [study_panels(table) for table in tables]
+    judged, _ = judge_claims(tables, panels, ("corrected",), INTUITIONS)
+    assert {"H1", "H3", "H12"} <= {one.claim.name for one in judged}
     assert {one.to_mapping()["claim"] for one in judged} == {one.claim.name for one in judged}
 
 
@@ -166,4 +179,4 @@ def test_a_study_without_a_finished_run_decides_nothing():
     table = made_table(spec, by_policy)
     nothing = StudyTable(spec=spec, frame=table.frame.with_columns(state=pl.lit("missing")), versions=())
     judged, _ = judge_claims([nothing], [study_panels(nothing)], ("corrected",))
-    assert {one.claim.name: one.verdict.answer for one in judged}["P2"] == "undecided"
+    assert {one.claim.name: one.verdict.answer for one in judged}["P2"] == "no scores"

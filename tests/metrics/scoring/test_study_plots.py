@@ -30,8 +30,12 @@ def texts(path):
 
 def test_a_study_has_a_figure_per_measure_and_reading():
     names = [figure.name for figure in figures(readings=("described", "program"))]
-    assert names[:2] == ["S1a_raw_performance_described", "S1a_spatial_emergence_described"]
-    assert len(names) == 8
+    assert names[:3] == [
+        "S1a_raw_performance_described",
+        "S1a_spatial_emergence_interactive_described",
+        "S1a_spatial_emergence_described",
+    ]
+    assert len(names) == 10
 
 
 def test_the_numbers_behind_a_figure():

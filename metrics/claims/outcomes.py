@@ -1,0 +1,142 @@
+"""The answer to one statement, and how the answers to several become one."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.checks import check_option
+from metrics.curves import FloatArray
+
+from .panel import LEAST_RUNS, MANY, Panel, Rule, bounds
+
+Answer: TypeAlias = Literal["supported", "contradicted", "undecided", "no scores"]
+"""`undecided`: the runs leave it open. `no scores`: there was nothing to judge, because runs are missing or a measure
+has no finite value."""
+BoolArray: TypeAlias = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What came of one statement, or of several."""
+
+    answer: Answer
+    statistic: float
+    """What was decided on; `why` says what it is."""
+    effect: float
+    """Size of the difference or change, as a share of the panel's scale; NaN where a statement has none."""
+    n_runs: int
+    """Smallest number of runs behind any number that was used."""
+    why: str
+    """What was found and what it was held against."""
+    parts: tuple["Outcome", ...] = field(default=(), repr=False)
+    """Of several statements, those that they consist of."""
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The reasons: one line, or one per part with its answer."""
+        return tuple(f"{part.answer}: {part.why}" for part in self.parts) or (self.why,)
+
+
+def without_scores(what: str) -> Outcome:
+    """Return the outcome of a statement about something that has no scores."""
+    return Outcome(answer="no scores", statistic=np.nan, effect=np.nan, n_runs=0, why=f"no scores of {what}")
+
+
+def scored_levels(panel: Panel, policies: Sequence[str], rule: Rule) -> Panel | Outcome:
+    """Return the panel with the levels at which all of some policies have enough runs, if they are most of the levels.
+
+    Args:
+        panel: All levels.
+        policies: Which must have scores.
+        rule: Says how many runs are enough.
+
+    Returns:
+        The panel, or the outcome of a statement about it if half of the levels or more have too few runs.
+    """
+    check_option("rule", rule, Rule)
+    counts = panel.runs_at_levels(policies)
+    enough = counts >= LEAST_RUNS[rule]
+    names = " and ".join(policies)
+    if not counts.any():
+        return without_scores(names)
+    if enough.mean() > MANY:
+        return panel.at(enough)
+    why = f"{(~enough).sum()} of {enough.size} levels have fewer than {LEAST_RUNS[rule]} runs with a score of {names}"
+    n_runs = panel.n_runs(policies)
+    return Outcome(answer="undecided", statistic=np.nan, effect=np.nan, n_runs=n_runs, why=why)
+
+
+def where_scored(panel: Panel, policies: Sequence[str], rule: Rule, judge: Callable[[Panel], Outcome]) -> Outcome:
+    """Return what `judge` finds of the `scored_levels`; says how many levels that leaves out."""
+    part = scored_levels(panel, policies, rule)
+    if isinstance(part, Outcome):
+        return part
+    outcome, n_out = judge(part), panel.levels.size - part.levels.size
+    if n_out == 0:
+        return outcome
+    return replace(outcome, why=f"{outcome.why}; {n_out} of {panel.levels.size} levels left out: too few scores")
+
+
+def against_limit(resampled: FloatArray, limit: float) -> Answer:
+    """Return whether the interval of a resampled number is at or below a limit (supported) or above (contradicted)."""
+    return within_limit(bounds(resampled), limit)
+
+
+def within_limit(interval: tuple[float, float], limit: float) -> Answer:
+    """The same of the bounds themselves."""
+    lower, upper = interval
+    return "supported" if upper <= limit else "contradicted" if lower > limit else "undecided"
+
+
+def contrary(outcome: Outcome) -> Outcome:
+    """Return the outcome of the contrary statement; what is undecided or without scores stays so."""
+    turned: dict[Answer, Answer] = {"supported": "contradicted", "contradicted": "supported"}
+    return replace(outcome, answer=turned.get(outcome.answer, outcome.answer))
+
+
+def all_of(outcomes: Sequence[Outcome]) -> Outcome:
+    """Return one outcome for several statements that must all hold: one that fails contradicts them."""
+    answers = [outcome.answer for outcome in outcomes]
+    order: tuple[Answer, ...] = ("contradicted", "no scores", "undecided", "supported")
+    return _joined(outcomes, next(answer for answer in order if answer in answers))
+
+
+def most_of(outcomes: Sequence[Outcome]) -> Outcome:
+    """Return one outcome for several statements of which more than half must hold."""
+    answers = [outcome.answer for outcome in outcomes]
+    choices: tuple[Answer, ...] = ("supported", "contradicted")
+    most: list[Answer] = [choice for choice in choices if answers.count(choice) > MANY * len(answers)]
+    answer: Answer = "no scores" if "no scores" in answers else "undecided"
+    return _joined(outcomes, most[0] if most else answer)
+
+
+def _joined(outcomes: Sequence[Outcome], answer: Answer) -> Outcome:
+    """One outcome: its statistic is the share of what is supported, its effect the median of what gave the answer."""
+    if len(outcomes) == 1:
+        return outcomes[0]
+    parts = tuple(leaf for outcome in outcomes for leaf in outcome.parts or (outcome,))
+    effects = [part.effect for part in parts if part.answer == answer and np.isfinite(part.effect)]
+    n_supported = sum(part.answer == "supported" for part in parts)
+    return Outcome(
+        answer=answer,
+        statistic=n_supported / len(parts),
+        effect=float(np.median(effects)) if effects else np.nan,
+        n_runs=min(part.n_runs for part in parts),
+        why=f"{n_supported} of {len(parts)} statements hold",
+        parts=parts,
+    )
+
+
+def by_majority(
+    holds: BoolArray, fails: BoolArray, what: str, *, effect: float, n_runs: int, against: str = "do not"
+) -> Outcome:
+    """Outcome of a statement from where it holds and where it fails, boolean arrays of the same shape."""
+    total, n_for, n_against = holds.size, int(holds.sum()), int(fails.sum())
+    answer: Answer = "supported" if n_for > MANY * total else "undecided"
+    if n_against > MANY * total:
+        answer = "contradicted"
+    why = f"{n_for} of {total} {what}, {n_against} {against}, {total - n_for - n_against} open"
+    return Outcome(answer=answer, statistic=n_for / total, effect=effect, n_runs=n_runs, why=why)
