@@ -29,9 +29,9 @@ FAMILY_ERROR = 0.05
 """Probability that one or more differences are called significant by chance."""
 TEST = (
     "Means over the intervals of a run are compared. Studies of the same seeds are paired by seed, others by Welch's "
-    "test. A line is all cells of a policy in a reading, each in shares of its own mean, so that a small change "
-    "everywhere is found, too. * = significant: p at most 0.05 after Holm's correction over all tests of cells and "
-    "lines together. Intervals are Student's, 95 %."
+    "test. A line is all cells of a policy in a reading that can be tested, and identical ones, each in shares of its "
+    "own mean, so that a small change everywhere is found, too. * = significant: p at most 0.05 after Holm's "
+    "correction over all tests of cells and lines together. Intervals are Student's, 95 %."
 )
 """How studies are compared, as a text for readers."""
 _LEVEL = 0.975
