@@ -11,7 +11,7 @@ from pettingzoo import ParallelEnv
 from swarm_forage_env._internal.fields import as_whole, instance, switch
 from swarm_forage_env.contract.calls import is_over, no_options
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, SwarmSpec
+from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, SwarmSpec, refused_action
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.arena import ForagingArena
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 BatchStep: TypeAlias = tuple[ObsArray, np.ndarray, BoolArray, bool]
 """Observations (N, D), rewards (N,) float32, terminated (N,), truncated."""
 
-_STATE = ("_last_obs", "_rewards", "_seeds", "_terminated", "agents", "seed_value")
+_STATE = ("_rewards", "_seeds", "_terminated", "agents", "seed_value")
 """Attributes of a ForageEnv that are state; the arena holds the rest."""
 
 
@@ -184,6 +184,11 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         return self.arena.tick
 
     @property
+    def last_obs(self) -> ObsArray:
+        """(N, D) observations as they are since the last reset, step or restore; another buffer after a restore."""
+        return self._world.obs
+
+    @property
     def terminated(self) -> BoolArray:
         """(N,) robots that are dead for good; read only."""
         return self._terminated
@@ -233,7 +238,6 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self.seed_value = seed
         self._terminated[:] = False
         self.agents = list(self.possible_agents)
-        self._last_obs = obs
         if self._window is not None:
             self.render()
         return obs
@@ -248,7 +252,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self._require_reset()
         expected = self._actions.shape
         try:
-            # Kernels are compiled for contiguous float32 only; another type would start a compilation of a minute.
+            # Kernels are compiled for contiguous float32 only; another type would have all compiled anew.
             checked = np.ascontiguousarray(actions, np.float32)
         except (TypeError, ValueError) as error:
             raise ActionError(f"Expected actions with shape (n_robots, 3) = {expected}: {error}.") from error
@@ -258,6 +262,31 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
                 "pass one row per robot, inactive ones included."
             )
         return checked
+
+    def refuse_bad_step(self, actions: ActionArray, wheel_gain: FloatArray | None) -> None:
+        """Refuse what the arena would refuse, for wrappers, which have to know it before they do anything.
+
+        Args:
+            actions: (N, 3) as `checked_actions` returns them.
+            wheel_gain: As in `step_batch`.
+
+        Raises:
+            ActionError: a gain of the wrong shape, or an action or gain of an active robot that is not finite.
+        """
+        gain = self._checked_gain(wheel_gain)
+        if np.isfinite(actions).all() and (gain is None or np.isfinite(gain).all()):
+            return
+        gain = np.ones((len(actions), 2)) if gain is None else gain
+        bad = self.active & ~(np.isfinite(actions).all(axis=1) & np.isfinite(gain).all(axis=1))
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise refused_action(row, actions[row], gain[row])
+
+    def _checked_gain(self, wheel_gain: FloatArray | None) -> FloatArray | None:
+        expected = (len(self._actions), 2)
+        if wheel_gain is not None and np.shape(wheel_gain) != expected:
+            raise ActionError(f"Expected wheel_gain with shape (n_robots, 2) = {expected}, got {np.shape(wheel_gain)}.")
+        return wheel_gain
 
     def step_batch(
         self,
@@ -294,24 +323,19 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         (`world.rack`).
         """
         actions = self.checked_actions(actions)
-        if wheel_gain is not None and wheel_gain.shape != (len(actions), 2):
-            raise ActionError(
-                f"Expected wheel_gain with shape (n_robots, 2) = {(len(actions), 2)}, got {wheel_gain.shape}."
-            )
+        wheel_gain = self._checked_gain(wheel_gain)
         self._rewards.remember()
         return actions, wheel_gain
 
     def end_step(self, tasks: CodeArray | None = None) -> BatchStep:
         """Return the result of a step, after the arena's; see `step_batch`. `tasks` is for wrappers."""
-        self._last_obs = self.arena.obs
         if self._window is not None:
             self.render()
-        return self._last_obs, self._rewards.reward(), self._terminated, self.arena.tick >= self.max_cycles
+        return self.arena.obs, self._rewards.reward(), self._terminated, self.arena.tick >= self.max_cycles
 
     def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
         """Let a compiled policy drive the swarm for some ticks; see `ForagingArena.run`. Rewards are not computed."""
         self._world.run(policy, n_ticks, task_shares)
-        self._last_obs = self.arena.obs
 
     # Snapshots
 
@@ -340,7 +364,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     def restore_batch(self, snapshot: Snapshot) -> ObsArray:
         """Restore at array level: as `restore`, but returns observations (N, D), a buffer that the next step reuses."""
         self.restore_through(snapshot, ())
-        return self._last_obs
+        return self.last_obs
 
     def snapshot_through(self, wrappers: Sequence[Any]) -> Snapshot:
         """Return a snapshot of a stack: this environment and the wrappers around it, outermost first."""

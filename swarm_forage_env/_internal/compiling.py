@@ -166,7 +166,10 @@ class _Cache(FunctionCache):
             _say(f"{_NOT_KEPT} ({error.strerror}: {self.cache_path}). {_WAY_OUT}")
 
 
-_NOT_KEPT = "Compiled functions cannot be kept, so every process spends half a minute or more on them"
+_DURATION = "about half a minute"
+"""Of compiling all that a run needs; `docs/speed.md` has the measurement."""
+_FIRST_RUN = f"First run: compiling for {_DURATION}. The result is kept."
+_NOT_KEPT = f"Compiled functions cannot be kept, so every process spends {_DURATION} or more on them"
 _WAY_OUT = "Set NUMBA_CACHE_DIR to a folder that can be written to."
 
 
@@ -182,9 +185,17 @@ def _new_cache(function: Callable[..., Any]) -> _Cache | None:
 
 
 @functools.cache
-def _say(text: str) -> None:
+def _say(text: str, level: int = logging.WARNING) -> None:
     """Say something once in a process; without settings of the user, loggers print one line on stderr."""
-    logging.getLogger("swarm_forage_env").warning(text)
+    logging.getLogger("swarm_forage_env").log(level, text)
+
+
+def tell_of_first_run() -> None:
+    """Tell, once in a process, that it is being compiled what is then kept.
+
+    It is no warning: the console command shows it, and scripts do if they set up `logging` for level INFO.
+    """
+    _say(_FIRST_RUN, logging.INFO)
 
 
 def is_compiled(function: Callable[..., Any]) -> bool:
@@ -204,6 +215,8 @@ def direct(function: F, *example: Any) -> F:
         return function
     key = function, tuple(_kind_of(argument) for argument in example)
     if key not in _entry_points:
+        if is_new(function, *example):
+            tell_of_first_run()
         with _collector_off():
             _entry_points[key] = compiled(tuple(_type_of(argument) for argument in example))
     return cast(F, _entry_points[key])

@@ -3,9 +3,11 @@
 A command has a file of its own and imports what it needs when it runs, so that `--help` answers at once.
 """
 
+import logging
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Annotated, Any
 
 import typer
@@ -88,12 +90,26 @@ def _show_warning(message: Warning | str, category: type[Warning], *rest: Any) -
         _show_in_full(message, category, *rest)
 
 
+@contextmanager
+def _news_shown() -> Iterator[None]:
+    """Have the package print on stderr what is no warning, such as that it compiles; Python leaves that out."""
+    tellers = [logging.getLogger(__name__.partition(".")[0]), *([logging.lastResort] if logging.lastResort else [])]
+    levels = [teller.level for teller in tellers]
+    for teller in tellers:
+        teller.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        for teller, level in zip(tellers, levels, strict=True):
+            teller.setLevel(level)
+
+
 def main() -> None:
     """Run the command line and exit; an error is one line on stderr, and `ending` says which exit code it has."""
     from swarm_forage_env.cli.interrupts import terminated_as_interrupted
 
     show_any_text()
-    with terminated_as_interrupted() as came:
+    with terminated_as_interrupted() as came, _news_shown():
         code = _outcome()
     if came and code == EXIT_INTERRUPTED:
         code = EXIT_TERMINATED

@@ -23,6 +23,14 @@ class ActionError(ValueError):
     """Actions of the wrong shape, or not finite."""
 
 
+def refused_action(row: int, action: ActionArray, gain: FloatArray) -> ActionError:
+    """Return the error about a robot whose action (3,) or wheel gain (2,) is not finite."""
+    return ActionError(
+        f"Expected finite actions and wheel gains, got {action.tolist()} and {gain.tolist()} for robot_{row}; the "
+        "world was not stepped."
+    )
+
+
 def refused_tasks(tasks: CodeArray, n_robots: int) -> ValueError:
     """Return the error about tasks that are not one code of `Task` per robot."""
     return ValueError(

@@ -87,14 +87,17 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
 
     Args:
         replay: The run. Robots count at its frames; pick-ups that are undone before the next frame are missing.
-        side_m: Side of a square, default two cells.
+        side_m: Side of a square, default two cells. Where the arena is no multiple of it, the squares at its upper and
+            right border are cut off there, and their numbers are per m² of what is left of them.
 
     Raises:
         ConfigError: `side_m` is smaller than a cell, or larger than the arena.
     """
     arena = replay.scenario.arena
     number("side_m", side_m, at_least=CELL_M, at_most=max(arena.width_m, arena.height_m))
-    edges = [np.arange(0.0, extent + side_m - 1e-9, side_m) for extent in (arena.height_m, arena.width_m)]
+    extents = arena.height_m, arena.width_m
+    edges = [np.arange(0.0, extent + side_m - 1e-9, side_m) for extent in extents]
+    area_m2 = np.outer(*(_sides(side_m, len(marks) - 1, extent) for marks, extent in zip(edges, extents, strict=True)))
 
     def count(places_m: FloatArray) -> FloatArray:
         inside = np.clip(places_m, 0.0, [arena.width_m, arena.height_m])
@@ -103,8 +106,8 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
     active = ~(replay.has(Status.ABSENT) | replay.has(Status.REPAIR))
     position_m = replay.position_m
     _, signs, places_m = replay.handovers
-    of_frames = 1.0 / (side_m**2 * replay.n_frames)
-    of_events = 1000.0 / (side_m**2 * float(replay.times_s[-1]))
+    of_frames = 1.0 / (area_m2 * replay.n_frames)
+    of_events = 1000.0 / (area_m2 * float(replay.times_s[-1]))
     return FloorMaps(
         label=replay.label,
         side_m=side_m,
@@ -117,6 +120,11 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
             "drops": count(places_m[signs < 0]) * of_events,
         },
     )
+
+
+def _sides(side_m: float, n: int, extent_m: float) -> FloatArray:
+    """Return the sides of squares along one axis, (n,) m: the last is what is left of the arena."""
+    return np.append(np.full(n - 1, side_m), min(side_m, extent_m - (n - 1) * side_m))
 
 
 def mean_maps(maps: Sequence[FloorMaps], label: str) -> FloorMaps:

@@ -92,7 +92,7 @@ class RunProgress:
         if not left:
             return "all done" + failures
         if not ran:
-            return "no estimate yet (the first run after an installation compiles for about half a minute)" + failures
+            return "no estimate yet" + failures
         share_left = left / ran if not self._work_done else (self._work - self._work_done) / self._work_done
         seconds = (time.monotonic() - self._started) * share_left
         return f"about {duration(seconds)} left{failures}"

@@ -25,6 +25,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, TypeAlias
 
+from swarm_forage_env._internal.compiling import tell_of_first_run
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env._internal.files import check_folder
 from swarm_forage_env.study.first_run import (
@@ -357,6 +358,7 @@ def _compiled_together(pool: Executor, spec: RunSpec) -> bool:
         return False
     if asked.exception() is not None or not asked.result():
         return True
+    tell_of_first_run()
     try:
         halves = [pool.submit(compile_half, spec.scenario, half) for half in (0, 1)]
         if any([_is_broken_by(future) for future in halves]):  # noqa: C419 - a list: all are waited for

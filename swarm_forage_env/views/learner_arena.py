@@ -126,7 +126,6 @@ class LearnerArena:
         self.env = env
         self.forage_env: ForageEnv = env.unwrapped
         self.interface = LearnerInterface(self._plan.interface, self.forage_env.swarm_spec)
-        self._obs: ObsArray | None = None  # of the environment, (N, D)
 
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
         """Start a run.
@@ -149,7 +148,7 @@ class LearnerArena:
             seed = int(self._seeds.integers(2**31))
         else:
             self._seeds = np.random.default_rng(seed)
-        self._obs = self.env.reset_batch(seed)
+        self.env.reset_batch(seed)
 
     def step(self, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
         """Carry out a decision: step until its ticks are done or the run ends.
@@ -174,11 +173,11 @@ class LearnerArena:
 
     def command(self, actions: np.ndarray) -> ActionArray:
         """Return the commands of the next tick, (N, 3) in a reused buffer; see `LearnerInterface.command`."""
-        return self.interface.command(actions, self._last_obs)
+        return self.interface.command(actions, self.env.last_obs)
 
     def take(self, tick: BatchStep, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
         """Take over what a tick of `env` has brought; arguments and result as those of `step`."""
-        self._obs, reward, dead, truncated = tick
+        _, reward, dead, truncated = tick
         rewards += reward
         return dead, bool(dead[0] and dead.all()), truncated
 
@@ -217,26 +216,19 @@ class LearnerArena:
             )
         is_same = snapshot.overrides == self._overrides
         env = self.env if is_same else self._plan.build(snapshot.overrides)
-        obs = env.restore_batch(snapshot.stack)
+        env.restore_batch(snapshot.stack)
         if not is_same:
             self._adopt(env)
             self._overrides = dict(snapshot.overrides)
-        self._obs = obs
         self._seeds.bit_generator.state = snapshot.seeds
 
     def observe(self, out: ObsArray | None = None) -> ObsArray:
         """Return what the learner sees now, (N, d): a new array, or `out`."""
-        return self.interface.observe(self._last_obs, out)
+        return self.interface.observe(self.env.last_obs, out)
 
     def mask(self) -> BoolArray:
         """Return which discrete actions make sense now, (N, number of actions); see `LearnerInterface.mask`."""
-        return self.interface.mask(self._last_obs)
-
-    @property
-    def _last_obs(self) -> ObsArray:
-        if self._obs is None:
-            raise RuntimeError("Call reset first: there is no run yet.")
-        return self._obs
+        return self.interface.mask(self.env.last_obs)
 
 
 _FIXED = ("interface", "wrappers")

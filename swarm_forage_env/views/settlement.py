@@ -11,9 +11,8 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.world.kernels.many import book_each, pay_each
 from swarm_forage_env.world.kernels.rows import Robots
-from swarm_forage_env.world.rack import addresses
+from swarm_forage_env.world.rack import addresses, are_others
 from swarm_forage_env.world.rewards import RewardModel
-from swarm_forage_env.world.state import SwarmState
 
 
 def can_settle() -> bool:
@@ -25,15 +24,16 @@ class Settlement:
     """Compiled calls for all arenas of a batch. What they do is bit for bit what the arenas do one by one.
 
     Attributes:
-        pays: Whether `pay` can be called: no wrapper, no function of Python and no window takes part in a step.
+        pays: Whether `pay` can be called: no wrapper, no function of Python and no window takes part in a step, and
+            all arenas weigh their rewards alike.
         copies: Whether `book` writes the observations: learners see the rows of the environment as they are.
     """
 
     def __init__(self, arenas: Sequence[LearnerArena]) -> None:
-        """Take the arenas; all must have been reset, and have robots of one number."""
+        """Take the arenas; all must have been reset, and have observations of one shape."""
         self._arenas = tuple(arenas)
         self._n_terminated = np.zeros(len(arenas), np.int64)
-        self._all_seats = np.arange(len(arenas))
+        self._all_seats = np.arange(len(arenas), dtype=np.int64)
         self._pay: Callable[..., None] | None = None
         self._book: Callable[..., None] | None = None
         self._note_addresses()
@@ -47,7 +47,7 @@ class Settlement:
 
     def follow(self) -> None:
         """Find the arrays again where a reset or a snapshot has replaced them; call it before each step."""
-        if any(map(_has_moved, self._arenas, self._swarms)):
+        if are_others([arena.forage_env.arena.swarm for arena in self._arenas], self._swarms):
             self._note_addresses()
 
     def _note_addresses(self) -> None:
@@ -56,7 +56,8 @@ class Settlement:
         self._models: list[RewardModel] = [env.reward_model for env in environments]
         plain = all(type(arena.env) is ForageEnv and arena.env.render_mode != "human" for arena in self._arenas)
         payments = [payment for model in self._models if (payment := model.payment) is not None]
-        self.pays = plain and len(payments) == len(environments)
+        kinds = {(payment.weights, payment.is_dense) for payment in payments}  # for all there is that of the first
+        self.pays = plain and len(payments) == len(environments) and len(kinds) == 1
         self._payments = payments[:1], np.array([addresses(payment) for payment in payments], np.intp)
         self.copies = plain and all(arena.interface.shows_all for arena in self._arenas)
         robots = [Robots(env.terminated, env.swarm.present, env.swarm.active, env.arena.obs) for env in environments]
@@ -71,7 +72,7 @@ class Settlement:
     def pay(self, seats: Sequence[int], rewards: ObsArray) -> None:
         """Add the rewards of a tick to `rewards` (A, N) float32, for the arenas that were stepped."""
         (payment,), payments_at = self._payments
-        rows = self._all_seats if len(seats) == len(self._arenas) else np.array(seats)
+        rows = self._all_seats if len(seats) == len(self._arenas) else np.array(seats, np.int64)
         arguments = payment, payments_at, rows, rewards
         if self._pay is None:
             self._pay = direct(pay_each, *arguments)
@@ -98,7 +99,3 @@ class Settlement:
             self._book = direct(book_each, *arguments)
         self._book(*arguments)
         return n_terminated.tolist()
-
-
-def _has_moved(arena: LearnerArena, swarm: SwarmState) -> bool:
-    return arena.forage_env.arena.swarm is not swarm

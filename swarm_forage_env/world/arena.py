@@ -11,7 +11,7 @@ from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.own import OwnSensor, own_sensor
-from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, layout_for, refused_tasks
+from swarm_forage_env.contract.policy import CompiledPolicy, layout_for, refused_action, refused_tasks
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
 from swarm_forage_env.scenarios.units import CELLS_PER_M
@@ -22,7 +22,7 @@ from swarm_forage_env.world.caches import (
     n_cache_slots,
     restore_static_caches,
 )
-from swarm_forage_env.world.compiled import CompiledTick, new_world
+from swarm_forage_env.world.compiled import CompiledTick, new_world, tasks_of
 from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
@@ -73,7 +73,6 @@ class ForagingArena:
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
         self._unit_gain = np.ones((config.robots.n_robots, 2))
         self._nothing = np.zeros((1, config.robots.n_robots))
-        self._no_tasks = np.zeros(0, np.int8)
         self.tick = 0
 
     def reset(self, seed: int) -> ObsArray:
@@ -224,10 +223,7 @@ class ForagingArena:
             ActionError: see `step`.
         """
         if outcome >= 0:
-            raise ActionError(
-                f"Expected finite actions and wheel gains, got {actions[outcome].tolist()} and "
-                f"{gain[outcome].tolist()} for robot_{outcome}; the world was not stepped."
-            )
+            raise refused_action(outcome, actions[outcome], gain[outcome])
         self.tick, self.has_changed = self.tick + 1, False
         if outcome != DONE:
             self._finish(outcome, actions, tasks)
@@ -257,7 +253,7 @@ class ForagingArena:
             RuntimeError: bodies that are not compiled.
         """
         bodies, n_left = self.bodies, n_ticks
-        tasks = policy.task if policy.task is not None else self._no_tasks
+        tasks = tasks_of(policy)
         run_compiled: Callable[..., tuple[int, int, bool]] | None = None
         while n_left:
             first = self.tick + 1

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from swarm_forage_env._internal.compiling import direct
-from swarm_forage_env.contract.types import ActionArray, FloatArray
+from swarm_forage_env.contract.policy import CompiledPolicy
+from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.actuators import drive_limits
 from swarm_forage_env.world.contact import TOUCH_SLACK_M, new_memory
@@ -15,6 +17,64 @@ from swarm_forage_env.world.kernels import tick
 from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.world import Sensors, Wandering, World
 from swarm_forage_env.world.state import StepEvents, SwarmState
+
+Call = tuple[Callable[..., Any], *tuple[Any, ...]]
+"""A kernel and arguments of the types that it is called with."""
+
+
+class ExampleCalls:
+    """A call of each function of `kernels.tick`, as runs make it: what is compiled beforehand is what they ask for."""
+
+    def __init__(self, world: World, bodies: BodyState | None) -> None:
+        """Take world and bodies (None where Chipmunk has them) from a run, or empty ones; only types matter."""
+        n_robots = len(world.present)
+        self.actions: ActionArray = np.zeros((n_robots, 3), np.float32)
+        self.draws: FloatArray = np.zeros(n_robots)
+        self._world, self._bodies = world, bodies
+        self._gain: FloatArray = np.zeros((n_robots, 2))
+
+    @property
+    def bodies(self) -> BodyState:
+        """The compiled bodies."""
+        assert self._bodies is not None, "Chipmunk moves its bodies itself"
+        return self._bodies
+
+    @property
+    def observe(self) -> Call:
+        """Of `kernels.tick.observe`."""
+        return tick.observe, self._world
+
+    @property
+    def set_out(self) -> Call:
+        """Of `kernels.tick.set_out`."""
+        return tick.set_out, self._world, self.actions, self._gain, 0, False
+
+    @property
+    def meet_and_close(self) -> Call:
+        """Of `kernels.tick.meet_and_close`."""
+        return tick.meet_and_close, self._world, self.actions, 0, self.draws, self.draws
+
+    @property
+    def close(self) -> Call:
+        """Of `kernels.tick.close`."""
+        return tick.close, self._world, self.draws
+
+    @property
+    def whole(self) -> Call:
+        """Of `kernels.tick.whole`; for compiled bodies only."""
+        return tick.whole, self._world, self.bodies, self.actions, self._gain, 0, False, self.draws, self.draws
+
+    def run(self, policy: CompiledPolicy) -> Call:
+        """Of `kernels.tick.run`, for a policy that has been reset; for compiled bodies only."""
+        rows = self.draws[None]
+        of_policy = policy.callback, policy.state, 0, rows[None]
+        tasks = tasks_of(policy), np.zeros(1)
+        return tick.run, self._world, self.bodies, self._gain, 0, 0, False, *of_policy, rows, rows, *tasks
+
+
+def tasks_of(policy: CompiledPolicy) -> CodeArray:
+    """Return where a policy writes its tasks, (N,), or (0,) for a policy without tasks."""
+    return policy.task if policy.task is not None else np.zeros(0, np.int8)
 
 
 class CompiledTick:
@@ -30,38 +90,32 @@ class CompiledTick:
             world: State and constants of the run.
             bodies: Compiled bodies, None where Chipmunk has them.
         """
-        n_robots = len(world.present)
-        self._world, self._bodies = world, bodies
-        self._actions: ActionArray = np.zeros((n_robots, 3), np.float32)
-        self._gain: FloatArray = np.zeros((n_robots, 2))
-        self._draws: FloatArray = np.zeros(n_robots)
+        self._calls = ExampleCalls(world, bodies)
 
     @cached_property
     def observe(self) -> Callable[[World], None]:
         """See `kernels.tick.observe`."""
-        return direct(tick.observe, self._world)
+        return direct(*self._calls.observe)
 
     @cached_property
     def set_out(self) -> Callable[[World, ActionArray, FloatArray, int, bool], int]:
         """See `kernels.tick.set_out`."""
-        return direct(tick.set_out, self._world, self._actions, self._gain, 0, False)
+        return direct(*self._calls.set_out)
 
     @cached_property
     def meet_and_close(self) -> Callable[[World, ActionArray, int, FloatArray, FloatArray], int]:
         """See `kernels.tick.meet_and_close`."""
-        return direct(tick.meet_and_close, self._world, self._actions, 0, self._draws, self._draws)
+        return direct(*self._calls.meet_and_close)
 
     @cached_property
     def close(self) -> Callable[[World, FloatArray], None]:
         """See `kernels.tick.close`."""
-        return direct(tick.close, self._world, self._draws)
+        return direct(*self._calls.close)
 
     @cached_property
     def whole(self) -> Callable[[World, BodyState, ActionArray, FloatArray, int, bool, FloatArray, FloatArray], int]:
         """See `kernels.tick.whole`; for compiled bodies only."""
-        assert self._bodies is not None, "Chipmunk moves its bodies itself"
-        draws = self._draws, self._draws
-        return direct(tick.whole, self._world, self._bodies, self._actions, self._gain, 0, False, *draws)
+        return direct(*self._calls.whole)
 
 
 def new_world(

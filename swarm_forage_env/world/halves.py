@@ -5,9 +5,6 @@ which is made of both, is compiled afterwards and finds its parts in the cache. 
 order. `study.first_run` decides when this pays.
 """
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
 from swarm_forage_env._internal.compiling import compile_part, direct, is_new
@@ -15,7 +12,7 @@ from swarm_forage_env.contract.policy import CompiledPolicy, layout_for
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.caches import n_cache_slots
-from swarm_forage_env.world.compiled import new_world
+from swarm_forage_env.world.compiled import Call, ExampleCalls, new_world
 from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels import tick
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
@@ -23,9 +20,6 @@ from swarm_forage_env.world.kernels.interact import serve
 from swarm_forage_env.world.kernels.world import World
 from swarm_forage_env.world.sensors import new_sensors
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
-
-Call = tuple[Callable[..., Any], *tuple[Any, ...]]
-"""A kernel and arguments of the types that it is called with."""
 
 
 def _empty_parts(config: ScenarioConfig) -> tuple[World, BodyState | None]:
@@ -55,11 +49,10 @@ def compile_half(config: ScenarioConfig, half: int) -> None:
 def parts_of(config: ScenarioConfig, half: int) -> tuple[Call, ...]:
     """Return the outer kernels of a half: what robots see and how they set out (0); what they do, and bodies (1)."""
     world, bodies = _empty_parts(config)
-    actions, draws = _actions_and_draws(config)
+    calls = ExampleCalls(world, bodies)
     if half == 0:
-        setting_out = tick.set_out, world, actions, np.ones((len(actions), 2)), 1, False
-        return (tick.close, world, draws), setting_out
-    serving = serve, world.state, world.rules, actions, 1, draws
+        return calls.close, calls.set_out
+    serving = serve, world.state, world.rules, calls.actions, 0, calls.draws
     if bodies is None:
         return (serving,)
     poses = bodies.poses, world.present, world.state.position, world.heading, world.facing
@@ -73,24 +66,12 @@ def outermost(config: ScenarioConfig, policy: CompiledPolicy | None) -> Call:
         config: The scenario.
         policy: The policy of a run without Python between the ticks, None for other runs.
     """
-    world, bodies = _empty_parts(config)
-    actions, draws = _actions_and_draws(config)
-    gain = np.ones((len(actions), 2))
-    if bodies is None:
-        return tick.meet_and_close, world, actions, 1, draws, draws
-    if policy is None:
-        return tick.whole, world, bodies, actions, gain, 1, False, draws, draws
-    rows = draws[None]
-    tasks = policy.task if policy.task is not None else np.zeros(0, np.int8)
-    policy_call = policy.callback, policy.state, 1, rows[None]
-    return tick.run, world, bodies, gain, 1, 1, False, *policy_call, rows, rows, tasks, np.zeros(1)
+    calls = ExampleCalls(*_empty_parts(config))
+    if config.physics == "chipmunk":
+        return calls.meet_and_close
+    return calls.whole if policy is None else calls.run(policy)
 
 
 def is_first(config: ScenarioConfig) -> bool:
     """Return whether not even a reset of this scenario is compiled yet, and what is compiled can be kept."""
-    return is_new(tick.observe, _empty_parts(config)[0])
-
-
-def _actions_and_draws(config: ScenarioConfig) -> tuple[np.ndarray, np.ndarray]:
-    n_robots = config.robots.n_robots
-    return np.zeros((n_robots, 3), np.float32), np.zeros(n_robots)
+    return is_new(*ExampleCalls(*_empty_parts(config)).observe)

@@ -54,7 +54,7 @@ class Rack:
         self._walks = np.zeros((n_seats, config.objects.n_objects if self._draws_walks else n_robots))
         self._outcomes = np.zeros(n_seats, np.int64)
         self._rows = self._gain, self._ticks, self._has_changed, self._picks, self._walks, self._outcomes
-        self._all_seats = np.arange(n_seats)
+        self._all_seats = np.arange(n_seats, dtype=np.int64)
         self._step_each: Callable[..., None] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -68,17 +68,18 @@ class Rack:
         """Advance arenas by one tick; their observations are in `ForagingArena.obs`.
 
         Args:
-            gains: Seat of each arena to be stepped -> (N, 2) factor on the wheels' speeds, or None. The others stay.
+            gains: Seat of each arena to be stepped -> (N, 2) factor on the wheels' speeds, or None. The others stay;
+                there may be nothing to step.
             actions: (B, N, 3) float32, contiguous, for all B seats; see `ForagingArena.step`.
 
         Returns:
             Seat -> why the arena was not stepped: an active robot's action or gain is NaN or infinite.
         """
-        if not self._seated or any(map(_has_moved, self.arenas, self._seated)):
+        if not self._seated or any(map(are_others, (arena.parts for arena in self.arenas), self._seated)):
             self._note_addresses()
         for seat, gain in gains.items():
             self._prepare(seat, gain)
-        seats = self._all_seats if len(gains) == len(self.arenas) else np.array(list(gains))
+        seats = self._all_seats if len(gains) == len(self.arenas) else np.array(list(gains), np.int64)
         arguments = (*self._places, seats, actions, *self._rows)
         if self._step_each is None:
             self._step_each = direct(whole_each, *arguments)
@@ -115,9 +116,9 @@ class Rack:
         self._places = (*self._seated[0], worlds_at, bodies_at)
 
 
-def _has_moved(arena: ForagingArena, seated: tuple[World, BodyState]) -> bool:
-    world, bodies = arena.parts
-    return world is not seated[0] or bodies is not seated[1]
+def are_others(now: Sequence[object], noted: Sequence[object]) -> bool:
+    """Whether an arena has other objects now than when the addresses of their arrays were noted."""
+    return any(one is not other for one, other in zip(now, noted, strict=True))
 
 
 def addresses(value: Any) -> list[int]:

@@ -69,6 +69,9 @@ class SwarmWrapper(BaseParallelWrapper):
                 f"each at most once, is {', '.join(STACK_ORDER)}."
             )
         super().__init__(env)
+        if isinstance(env, SwarmWrapper):
+            env._is_outermost = False
+        self._is_outermost = True
         self.made_from = config
         self._inner = env
         self._unwrapped: ForageEnv = env.unwrapped
@@ -77,6 +80,23 @@ class SwarmWrapper(BaseParallelWrapper):
     def unwrapped(self) -> ForageEnv:
         """The ForageEnv at the bottom of the stack."""
         return self._unwrapped  # stored, because every hook of every tick needs it
+
+    @property
+    def last_obs(self) -> ObsArray:
+        """(N, D) what the wrappers outside see since the last reset, step or restore; see `ForageEnv.last_obs`.
+
+        Raises:
+            RuntimeError: before the first reset of this wrapper.
+        """
+        self._require_reset()
+        return self._last_obs
+
+    def _require_reset(self) -> None:
+        if not hasattr(self, "_last_obs"):
+            raise RuntimeError(
+                f"Expected a reset of the outermost wrapper first, got none, or one of what is inside of "
+                f"{type(self).__name__} alone; call reset of what you step."
+            )
 
     def on_reset(self, seed: int) -> None:
         """Prepare for a new run, after the environment was reset.
@@ -144,7 +164,8 @@ class SwarmWrapper(BaseParallelWrapper):
             tasks: (N,) int8 `contract.codes.Task` codes, None = the policy has no tasks.
 
         Raises:
-            ActionError: as `ForageEnv.step_batch`; for a wrong shape before any wrapper has done anything.
+            ActionError: as `ForageEnv.step_batch`, before any wrapper has done anything. Only a robot that comes back
+                to work in this very tick is looked at later.
         """
         actions, gain = self._before(actions, wheel_gain)
         return self._after(self._inner.step_batch(actions, wheel_gain=gain, tasks=tasks), tasks)
@@ -161,11 +182,9 @@ class SwarmWrapper(BaseParallelWrapper):
 
     def _before(self, actions: ActionArray, wheel_gain: FloatArray | None) -> tuple[ActionArray, FloatArray | None]:
         actions = self.unwrapped.checked_actions(actions)
-        if not hasattr(self, "_last_obs"):
-            raise RuntimeError(
-                f"Expected a reset of the outermost wrapper before its first step, got one of what is inside of "
-                f"{type(self).__name__} alone; call reset of what you step."
-            )
+        self._require_reset()
+        if self._is_outermost:  # before any wrapper draws a number or lets a robot die
+            self.unwrapped.refuse_bad_step(actions, wheel_gain)
         self.before_step()
         return actions, self.gain(actions, wheel_gain)
 

@@ -40,14 +40,33 @@ def test_what_is_compiled_beforehand_is_what_a_run_calls(physics, policy, outerm
     assert outermost.signatures == before
 
 
+HALVES_THEN_THE_WHOLE = """
+import sys
+from swarm_forage_env.study.first_run import compile_outermost
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.world.halves import compile_half, parts_of
+spec = RunSpec.from_json(sys.stdin.read())
+parts = [function.get_overload.__self__ for half in (0, 1) for function, *_ in parts_of(spec.scenario, half)]
+for half in (0, 1):
+    compile_half(spec.scenario, half)
+assert not sum(sum(part.stats.cache_hits.values()) for part in parts), "something was kept before"
+compile_outermost(spec)
+for part in parts:
+    print(part.__name__, len(part.signatures))
+"""
+
+
 @compiled_only
-@pytest.mark.parametrize("half", [0, 1])
-def test_the_halves_are_what_the_whole_is_made_of(half):
+@pytest.mark.slow
+def test_the_halves_are_what_the_whole_is_made_of(monkeypatch, tmp_path):
+    """With an empty cache: what others have kept would hide that a half is compiled for arguments of other types."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     spec = run_of("compiled")
-    compile_outermost(spec)
-    for function, *example in parts_of(spec.scenario, half):
-        part = function.get_overload.__self__
-        assert not is_new(part, *example), f"{function.__name__} was compiled for arguments of other types"
+    program = [sys.executable, "-c", HALVES_THEN_THE_WHOLE]
+    ran = subprocess.run(program, input=spec.to_json(), capture_output=True, text=True, check=True)
+    signatures = dict(line.split() for line in ran.stdout.splitlines())
+    names = {function.__name__ for half in (0, 1) for function, *_ in parts_of(spec.scenario, half)}
+    assert signatures == dict.fromkeys(names, "1"), "the whole asked for other types than those of the halves"
 
 
 @compiled_only

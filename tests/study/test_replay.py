@@ -181,7 +181,7 @@ def test_tasks_activities_and_memories_are_those_of_the_policy():
             said = policy.describe_robot(robot)
             assert ("exploring" in words) == (said.startswith(("acquire", "transport")) and "goal (" not in said
                                               and "start of a search" not in said)  # fmt: skip
-            assert (words == "going home") == said.startswith("homing,") or "homing;" in said
+            assert (words == "going home") == (said.startswith("homing,") or "homing;" in said)
         if frame % kept.remembered_frames == 0:
             remembered = kept.remembered[frame // kept.remembered_frames]
             assert np.array_equal(remembered, policy.n_known + policy.n_caches)

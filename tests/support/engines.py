@@ -1,9 +1,10 @@
 """Bodies in either engine, without an arena around them; which engine a test's arenas have."""
 
 import numpy as np
+import pytest
 
 from swarm_forage_env.contract.layout import observation_layout
-from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
 from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.kernels.beams import proximity
 from swarm_forage_env.world.kernels.neighbours import bin_robots
@@ -13,6 +14,19 @@ from swarm_forage_env.world.state import SwarmState
 
 CHOSEN = "chipmunk"
 """What `stage.tidy_world` makes; the fixture `each_engine` changes it for a test."""
+
+
+@pytest.fixture(params=PHYSICS_ENGINES)
+def each_engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run a test once with each engine in the arenas of `stage.tidy_world` and in `CHOSEN`.
+
+    A `conftest.py` beside the tests has to import it.
+    """
+    monkeypatch.setattr("tests.support.engines.CHOSEN", request.param)
+
+
+in_each_engine = pytest.mark.usefixtures("each_engine")
+"""For a file of tests, or for those of its tests whose world has bodies that could make a difference."""
 
 
 class SensedBodies(Bodies):

@@ -6,6 +6,7 @@ say in the changelog which ones and why.
 
 import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,8 @@ from swarm_forage_env.views.learner_arena import plan_arena
 from tests.support.foraging import mild_wrappers, quick_world
 
 FILE = Path(__file__).with_suffix(".json")
+COMPILED_POLICIES = ("crw", "stochx")
+"""Those that also run with compiled bodies. The other policies do nothing with bodies that these two do not do."""
 POLICIES = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
 READINGS = {"described": Quirks(), "program": AUTHORS_PROGRAM}
 WRAPPERS = {"calm": (), "adverse": mild_wrappers()}
@@ -35,7 +38,10 @@ INTERFACES: dict[str, dict[str, Any]] = {
 
 
 def golden_specs() -> dict[str, RunSpec]:
-    """One run for each preset, controller, reading and set of wrappers, by a name that tells them."""
+    """One run for each preset, controller, reading and set of wrappers, by a name that tells them.
+
+    All of them have Chipmunk's bodies; a part of those by the description has compiled bodies as well.
+    """
     specs = {}
     for scenario in SCENARIO_NAMES:
         for policy in POLICIES:
@@ -44,6 +50,9 @@ def golden_specs() -> dict[str, RunSpec]:
                     world = quick_world(scenario, quirks=quirks, interval_s=60.0, **FAR.get(scenario, {}))
                     name = f"{scenario}/{policy}/{reading}/{adversity}"
                     specs[name] = plan_run(world, policy, wrappers=wrappers, seed=7)
+                    if policy in COMPILED_POLICIES and reading == "described":
+                        compiled = replace(world, physics="compiled")
+                        specs[f"{name}/compiled"] = plan_run(compiled, policy, wrappers=wrappers, seed=7)
     return specs
 
 
@@ -56,10 +65,22 @@ def run_fingerprint(spec: RunSpec) -> str:
     return seen.hexdigest()[:16]
 
 
-def batch_fingerprint(interface: dict[str, Any]) -> str:
+def golden_batches() -> dict[str, tuple[dict[str, Any], dict[str, Any]]]:
+    """Return scenario fields and the interface of each batch, by a name that tells them.
+
+    Those with compiled bodies are crowded: while nobody touches anybody, both engines are the same.
+    """
+    batches = {}
+    for name, interface in INTERFACES.items():
+        batches[f"batch/{name}"] = {"n_robots": 20}, interface
+        batches[f"batch/{name}/compiled"] = {"n_robots": 100, "physics": "compiled"}, interface
+    return batches
+
+
+def batch_fingerprint(fields: dict[str, Any], interface: dict[str, Any]) -> str:
     """Fingerprint of all that a learner meets in two arenas, deaths and new starts included."""
     plan = plan_arena(
-        quick_world("warehouse_small", n_robots=20, horizon_s=40.0, interval_s=40.0),
+        quick_world("warehouse_small", **fields, horizon_s=40.0, interval_s=40.0),
         {},
         interface=interface,
         wrappers=mild_wrappers(),
@@ -86,7 +107,7 @@ def _action(space: Any, chance: np.random.Generator) -> Any:
 def write_all() -> None:
     """Run everything and write the file of fingerprints."""
     runs = {name: run_fingerprint(spec) for name, spec in golden_specs().items()}
-    runs |= {f"batch/{name}": batch_fingerprint(interface) for name, interface in INTERFACES.items()}
+    runs |= {name: batch_fingerprint(*batch) for name, batch in golden_batches().items()}
     FILE.write_text(json.dumps({"made_with": made_with(), "fingerprints": runs}, indent=1) + "\n", encoding="utf-8")
 
 

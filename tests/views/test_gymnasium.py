@@ -130,7 +130,7 @@ def test_a_curriculum_keeps_the_interface():
 
 
 def test_there_is_nothing_to_step_before_a_reset():
-    with pytest.raises(RuntimeError, match="Call reset first"):
+    with pytest.raises(RuntimeError, match="There is no world before the first reset"):
         JointForageEnv(n_robots=4).step(np.zeros((4, 3), np.float32))
 
 

@@ -19,6 +19,7 @@ from swarm_forage_env.world.caches import (
 )
 from swarm_forage_env.world.placement import static_cache_centres
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents
+from tests.support.engines import in_each_engine
 from tests.support.stage import act, assert_conserved, build_cache, clear, lay, load, stand, tidy_world
 
 STATIC_CENTRE = (72, 40)
@@ -76,6 +77,7 @@ def test_quad_source_absorbs_what_lies_on_its_squares():
     assert_conserved(env)
 
 
+@in_each_engine
 def test_first_objects_in_row_order_from_outside_of_every_square():
     env = tidy_world(n_objects=8, caches="static")
     lay(env, 0, (STATIC_CENTRE[0] - 15, STATIC_CENTRE[1] - 15))  # on the square: absorbed, but not taken
@@ -121,6 +123,7 @@ def test_restoration_probability():
     assert restoration_probability(3, 7, 0.0) == 0.0
 
 
+@in_each_engine
 def test_users_are_counted_by_task_or_by_where_their_cargo_came_from():
     env = tidy_world(n_robots=6, caches="static")
     tasks = np.array(
@@ -161,6 +164,7 @@ def test_missing_caches_are_restored_at_the_published_rate():
     assert abs(restored - expected) < 4 * math.sqrt(expected)
 
 
+@in_each_engine
 def test_nothing_is_drawn_while_every_cache_stands():
     env = missing_world()
     build_cache(env, [0, 1], STATIC_CENTRE)
@@ -170,6 +174,7 @@ def test_nothing_is_drawn_while_every_cache_stands():
     assert rng.bit_generator.state == before
 
 
+@in_each_engine
 def test_steps_restore_from_the_tasks_that_the_policy_tells():
     actions = np.zeros((15, 3), np.float32)
     waits = []
@@ -185,6 +190,7 @@ def test_steps_restore_from_the_tasks_that_the_policy_tells():
     assert waits[1] == 300, "nobody carries anything"
 
 
+@in_each_engine
 def test_without_tasks_the_cargo_tells_who_harvests():
     env = missing_world()
     actions = np.zeros((15, 3), np.float32)
@@ -198,6 +204,7 @@ def test_without_tasks_the_cargo_tells_who_harvests():
     assert_conserved(env)
 
 
+@in_each_engine
 def test_a_restored_cache_takes_the_orphan_too():
     env = missing_world()
     build_cache(env, [3, 4], STATIC_CENTRE)

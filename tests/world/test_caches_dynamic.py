@@ -12,6 +12,7 @@ from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.regions import overlap_cells, square_box
 from swarm_forage_env.world.caches import MAX_PASSES, cache_members, clear_centre, protected_boxes
 from swarm_forage_env.world.placement import Source, place_objects
+from tests.support.engines import in_each_engine
 from tests.support.stage import act, assert_conserved, build_cache, clear, depot, lay, lift, load, stand, tidy_world
 
 MIDDLE = (70, 40)
@@ -33,6 +34,7 @@ def contents(env: ForageEnv, slot: int) -> list[int]:
     return np.flatnonzero(env.objects.cache_slot == slot).tolist()
 
 
+@in_each_engine
 def test_a_cache_forms_from_the_objects_around_at_their_mean():
     env = tidy_world(caches="dynamic")
     for row, cell in enumerate([(60, 40), (64, 40), (69, 44)], start=1):
@@ -46,6 +48,7 @@ def test_a_cache_forms_from_the_objects_around_at_their_mean():
     assert np.all(env.objects.cell[:4] == (64, 41))
 
 
+@in_each_engine
 def test_a_site_drop_creates_nothing():
     env = tidy_world(caches="dynamic")
     lay(env, 1, (61, 40))
@@ -53,12 +56,14 @@ def test_a_site_drop_creates_nothing():
     assert env.objects.status[0] == ObjectStatus.FREE
 
 
+@in_each_engine
 def test_a_lone_object_creates_nothing():
     env = tidy_world(caches="dynamic")
     assert found_at(env, MIDDLE) == []
     assert env.objects.cell[0].tolist() == list(MIDDLE)
 
 
+@in_each_engine
 @pytest.mark.parametrize(
     ("offset", "joins"),
     [((16, 0), True), ((0, -16), True), ((17, 0), False), ((11, 11), True), ((12, 11), False)],
@@ -71,6 +76,7 @@ def test_members_lie_within_min_dist_of_the_dropped_object(offset, joins):
     assert bool(slots) == joins
 
 
+@in_each_engine
 def test_distance_is_to_the_dropped_object_not_between_members():
     env = tidy_world(caches="dynamic")
     for row, x in enumerate([MIDDLE[0] - 15, MIDDLE[0] + 15], start=1):
@@ -90,6 +96,7 @@ def test_distances_are_compared_in_whole_cells():
     assert cache_members(0, config, env.objects, []).tolist() == [0, 1]
 
 
+@in_each_engine
 def test_objects_on_the_square_join_although_they_are_far_or_alone():
     env = tidy_world(caches="dynamic")
     lay(env, 1, (MIDDLE[0] + 2, MIDDLE[1]))
@@ -100,12 +107,14 @@ def test_objects_on_the_square_join_although_they_are_far_or_alone():
     assert env.objects.status[3] == ObjectStatus.FREE
 
 
+@in_each_engine
 def test_the_source_strip_creates_nothing():
     env = tidy_world(caches="dynamic")
     lay(env, 1, (STRIP_CELL[0] - 1, STRIP_CELL[1]))
     assert found_at(env, STRIP_CELL) == []
 
 
+@in_each_engine
 def test_objects_of_the_source_strip_do_not_join():
     env = tidy_world(caches="dynamic")
     for row, cell in ((1, (103, 40)), (2, (120, 40))):
@@ -115,6 +124,7 @@ def test_objects_of_the_source_strip_do_not_join():
     assert env.objects.status[2] == ObjectStatus.FREE
 
 
+@in_each_engine
 @pytest.mark.parametrize("strip_cell", [STRIP_CELL, (30, 60)], ids=["right", "left"])
 def test_both_strips_of_a_dual_source_create_nothing(strip_cell):
     env = tidy_world(caches="dynamic", placement="dual_source", nest_centre_m=(16.0, 8.0))
@@ -122,6 +132,7 @@ def test_both_strips_of_a_dual_source_create_nothing(strip_cell):
     assert found_at(env, strip_cell) == []
 
 
+@in_each_engine
 @pytest.mark.parametrize(("x", "centre"), [(103, 104), (54, 55)])
 def test_a_cache_fits_between_the_nest_and_each_strip_of_a_dual_source(x, centre):
     # The nest has the columns 72 .. 87, the strips 24 .. 39 and 120 .. 135: 32 columns between them for a side of 31.
@@ -169,6 +180,7 @@ def test_random_placement_protects_nothing():
     assert env.caches.count[slot] > 20
 
 
+@in_each_engine
 def test_the_centre_keeps_a_nominal_side_from_the_border():
     env = tidy_world(caches="dynamic")
     lay(env, 1, (70, 13))
@@ -177,6 +189,7 @@ def test_the_centre_keeps_a_nominal_side_from_the_border():
     assert env.caches.cell[slot].tolist() == [71, 32]
 
 
+@in_each_engine
 @pytest.mark.parametrize(("x", "clear_x"), [(37, range(39, 128)), (106, range(32, 105))])
 def test_the_square_is_pushed_clear_of_nest_and_source(x, clear_x):
     env = tidy_world(caches="dynamic")
@@ -187,6 +200,7 @@ def test_the_square_is_pushed_clear_of_nest_and_source(x, clear_x):
     assert contents(env, slot) == [0, 1]
 
 
+@in_each_engine
 def test_a_second_cache_stands_clear_of_the_first():
     # Caches this close are refused to robots; two CREATE_CACHE drops that finish in the same tick can still come close.
     env = tidy_world(n_robots=2, caches="dynamic")
@@ -202,6 +216,7 @@ def test_a_second_cache_stands_clear_of_the_first():
     assert_conserved(env)  # no two squares overlap
 
 
+@in_each_engine
 def test_two_founders_of_one_group_make_one_cache():
     env = tidy_world(n_robots=2, caches="dynamic")
     for robot, cell in enumerate([(70, 40), (76, 40)]):
@@ -215,6 +230,7 @@ def test_two_founders_of_one_group_make_one_cache():
     assert_conserved(env)
 
 
+@in_each_engine
 def test_a_create_cache_drop_without_a_free_cell_creates_nothing():
     env = tidy_world(caches="dynamic")
     lay(env, 1, MIDDLE)
@@ -446,6 +462,7 @@ def test_quirk_never_forms_a_cache_in_random_placement():
     assert found_at(env, (50, 120)) == []
 
 
+@in_each_engine
 def test_serials_are_never_used_again():
     env = tidy_world(n_robots=1, caches="dynamic")
     serials = []

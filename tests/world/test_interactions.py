@@ -9,6 +9,7 @@ from swarm_forage_env.contract.codes import CELL_EMPTY, Counter, Event, Grip, Ob
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.kernels.interact import CREATE_CACHE, DELIVER_ONLY, GRASP, RELEASE, SITE, band_of, serve
+from tests.support.engines import in_each_engine
 from tests.support.stage import (
     BASE_CELL,
     CORNER_CACHE,
@@ -63,6 +64,7 @@ def test_bands(grip, band):
 # Empty robots
 
 
+@in_each_engine
 def test_grasping_over_an_object_picks_it_up_one_tick_later():
     env = tidy_world()
     stand(env, 0, OPEN_CELL)
@@ -82,6 +84,7 @@ def test_grasping_over_an_object_picks_it_up_one_tick_later():
     assert_conserved(env)
 
 
+@in_each_engine
 def test_grasping_in_a_cache_takes_from_the_cache():
     env = tidy_world(caches="static")
     slot = build_cache(env, [1, 3, 5], BASE_CELL)
@@ -97,6 +100,7 @@ def test_grasping_in_a_cache_takes_from_the_cache():
     assert_conserved(env)
 
 
+@in_each_engine
 @pytest.mark.parametrize("cell", [OPEN_CELL, NEST_CELL, WALL_CELL])
 def test_grasping_over_nothing_is_refused_at_once_and_every_time(cell):
     env = tidy_world()
@@ -105,6 +109,7 @@ def test_grasping_over_nothing_is_refused_at_once_and_every_time(cell):
     assert env.events.event_object[0] == -1
 
 
+@in_each_engine
 @pytest.mark.parametrize("grip", ANY_RELEASE)
 def test_empty_robots_have_nothing_to_release(grip):
     env = tidy_world(caches="dynamic")
@@ -119,6 +124,7 @@ def test_empty_robots_have_nothing_to_release(grip):
 # Carrying robots
 
 
+@in_each_engine
 @pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
 @pytest.mark.parametrize("grip", ANY_RELEASE)
 def test_any_release_in_the_nest_delivers_one_tick_later(grip, caches):
@@ -140,6 +146,7 @@ def test_any_release_in_the_nest_delivers_one_tick_later(grip, caches):
     assert_conserved(env)
 
 
+@in_each_engine
 def test_the_nest_is_a_closed_rectangle():
     env = tidy_world(n_robots=5)
     x_low, y_low, x_high, y_high = env.scenario.arena.nest_box_m
@@ -150,6 +157,7 @@ def test_the_nest_is_a_closed_rectangle():
     assert act(env, dict.fromkeys(range(4), Grip.DELIVER))[:4] == [DELIVERED, DELIVERED, DELIVERED, NOTHING_HERE]
 
 
+@in_each_engine
 @pytest.mark.parametrize("caches", ["static", "dynamic"])
 @pytest.mark.parametrize("grip", ANY_RELEASE)
 def test_any_release_in_a_cache_joins_it_one_tick_later(grip, caches):
@@ -165,6 +173,7 @@ def test_any_release_in_a_cache_joins_it_one_tick_later(grip, caches):
     assert_conserved(env)
 
 
+@in_each_engine
 def test_release_over_open_floor_acts_at_once():
     env = tidy_world()
     stand(env, 0, OPEN_CELL)
@@ -178,6 +187,7 @@ def test_release_over_open_floor_acts_at_once():
     assert_conserved(env)
 
 
+@in_each_engine
 @pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
 def test_deliver_acts_nowhere_else(caches):
     env = tidy_world(caches=caches)
@@ -188,6 +198,7 @@ def test_deliver_acts_nowhere_else(caches):
     assert env.swarm.carried_object[0] == 4
 
 
+@in_each_engine
 @pytest.mark.parametrize("grip", [Grip.SITE, Grip.CREATE_CACHE])
 def test_site_and_found_take_a_tick_in_dynamic_worlds(grip):
     env = tidy_world(caches="dynamic")
@@ -199,6 +210,7 @@ def test_site_and_found_take_a_tick_in_dynamic_worlds(grip):
     assert_conserved(env)
 
 
+@in_each_engine
 @pytest.mark.parametrize("caches", ["none", "static"])
 @pytest.mark.parametrize("grip", [Grip.SITE, Grip.CREATE_CACHE])
 def test_site_and_found_are_release_in_other_worlds(grip, caches):
@@ -210,6 +222,7 @@ def test_site_and_found_are_release_in_other_worlds(grip, caches):
     assert not env.caches.alive.any()
 
 
+@in_each_engine
 @pytest.mark.parametrize("grip", [Grip.SITE, Grip.CREATE_CACHE])
 def test_site_and_found_are_refused_near_a_cache(grip):
     env = tidy_world(caches="dynamic")
@@ -225,6 +238,7 @@ def test_site_and_found_are_refused_near_a_cache(grip):
     assert events_of(env, grip, 2) == [NONE, DROPPED]
 
 
+@in_each_engine
 def test_release_near_a_cache_is_never_refused():
     env = tidy_world(caches="dynamic")
     build_cache(env, [0, 1], CORNER_CACHE)
@@ -233,6 +247,7 @@ def test_release_near_a_cache_is_never_refused():
     assert act(env, {0: Grip.RELEASE})[0] == DROPPED
 
 
+@in_each_engine
 @pytest.mark.parametrize(
     ("place", "why"),
     [(OPEN_CELL, "another object lies there"), (WALL_CELL, "no object may lie there")],
@@ -319,6 +334,7 @@ def test_objects_without_any_free_cell_wait_and_come_back():
 # Caches in use
 
 
+@in_each_engine
 def test_the_last_pair_dissolves_the_cache_and_the_orphan_lies_on_the_centre():
     env = tidy_world(caches="static")
     slot = build_cache(env, [0, 1], BASE_CELL)
@@ -361,6 +377,7 @@ def test_an_object_leaves_a_cache_uniformly():
 # First pick-ups
 
 
+@in_each_engine
 def test_a_first_pick_up_is_one_since_the_object_was_placed():
     env = tidy_world()
     stand(env, 0, OPEN_CELL)
@@ -380,6 +397,7 @@ def test_a_first_pick_up_is_one_since_the_object_was_placed():
     assert count(env, Counter.FIRST_PICKED) == 2, "delivered and placed anew"
 
 
+@in_each_engine
 def test_an_object_taken_from_a_cache_can_be_a_first_pick_up():
     env = tidy_world(caches="static")
     build_cache(env, [0, 1, 2], BASE_CELL)

@@ -7,6 +7,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.quirks import Quirks
+from tests.support.engines import in_each_engine
 from tests.support.stage import (
     BASE_CELL,
     CORNER_CACHE,
@@ -25,6 +26,8 @@ from tests.support.stage import (
     stand,
     tidy_world,
 )
+
+pytestmark = in_each_engine
 
 NONE, PICKED_UP, PICKED_FROM_CACHE = Event.NONE, Event.PICKED_UP, Event.PICKED_FROM_CACHE
 DELIVERED, DROPPED, JOINED = Event.DELIVERED, Event.DROPPED, Event.JOINED_CACHE

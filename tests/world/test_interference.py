@@ -10,6 +10,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from tests.reference import sensing
+from tests.support.engines import in_each_engine
 from tests.support.stage import act, lay, load, put, stand, tidy_world
 
 PAIR = ((16.0, 8.0, 0.0), (16.25, 8.0, math.pi))
@@ -24,6 +25,7 @@ def met(env: ForageEnv, *rows: int) -> None:
         put(env, robot, *place)
 
 
+@in_each_engine
 def test_robots_that_meet_interfere_and_others_do_not():
     env = tidy_world()
     met(env, 1, 3)
@@ -33,6 +35,7 @@ def test_robots_that_meet_interfere_and_others_do_not():
     assert env.events.interference_sum[0] == pytest.approx(2 / 4)
 
 
+@in_each_engine
 @pytest.mark.parametrize("quirks", [Quirks(), Quirks(obstacle_behind_counts=True)], ids=["described", "program"])
 def test_who_is_behind_interferes_in_the_program_only(quirks):
     env = tidy_world(quirks=quirks)
@@ -42,6 +45,7 @@ def test_who_is_behind_interferes_in_the_program_only(quirks):
     assert env.events.interfering.tolist() == [True, quirks.obstacle_behind_counts, False, False]
 
 
+@in_each_engine
 def test_walls_interfere_too():
     env = tidy_world()
     put(env, 0, 31.6 - 0.1, 8.0)
@@ -49,6 +53,7 @@ def test_walls_interfere_too():
     assert env.events.interfering.tolist() == [True, False, False, False]
 
 
+@in_each_engine
 def test_every_state_counts():
     env = tidy_world()
     met(env, 0, 1)
@@ -62,6 +67,7 @@ def test_every_state_counts():
     assert env.events.interfering.tolist() == [True, True, False, False], "waiting and carrying robots as well"
 
 
+@in_each_engine
 def test_robots_in_repair_are_obstacles_but_never_interfere():
     env = tidy_world()
     met(env, 0, 1)
@@ -72,6 +78,7 @@ def test_robots_in_repair_are_obstacles_but_never_interfere():
     assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [3, 4]
 
 
+@in_each_engine
 def test_robots_at_work_that_carry_are_counted_in_each_tick():
     """Robots 0 to 2 hold an object; robot 2 is in repair; robot 0 lets go, which is seen from the next tick on."""
     env = tidy_world()
@@ -85,6 +92,7 @@ def test_robots_at_work_that_carry_are_counted_in_each_tick():
     assert counted == [2, 4, 5]
 
 
+@in_each_engine
 def test_absent_robots_are_no_obstacles():
     env = tidy_world()
     met(env, 0, 1)
@@ -95,6 +103,7 @@ def test_absent_robots_are_no_obstacles():
     assert [int(env.events.counters[c]) for c in (Counter.ACTIVE, Counter.PRESENT)] == [3, 3]
 
 
+@in_each_engine
 def test_nobody_active_is_no_interference():
     env = tidy_world()
     met(env, 0, 1)
@@ -104,6 +113,7 @@ def test_nobody_active_is_no_interference():
     assert not env.events.interfering.any()
 
 
+@in_each_engine
 def test_counters_are_sums_over_ticks():
     env = tidy_world()
     met(env, 0, 1)

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -93,6 +94,14 @@ def test_arenas_together_are_those_alone(wrappers, fields, chosen_ways):
     assert n_ended >= 6
 
 
+def test_arenas_with_other_weights_are_not_paid_together():
+    batch = ArenaBatch(plan(), 2)
+    batch.reset([0, 1], [None, {"scenario": {"first_pickup": 3.0}}])
+    assert ways(batch) == (False, True, False, True)
+    batch.reset([0, 1], [{"scenario": {"first_pickup": 3.0}}, None])
+    assert ways(batch) == (True,) * 4
+
+
 def test_one_arena_alone_takes_the_same_way():
     batch, other = ArenaBatch(plan(nest_progress=0.1), 1), OneByOne(plan(nest_progress=0.1), 1)
     np.testing.assert_array_equal(batch.reset([3], [None])[0], other.reset([3], [None])[0])
@@ -103,24 +112,40 @@ def test_one_arena_alone_takes_the_same_way():
     assert ways(batch) == (True,) * 4
 
 
-def test_the_arrays_of_a_snapshot_are_found():
-    batches = [each(plan(nest_progress=0.1), 2) for each in (ArenaBatch, OneByOne)]
+def through_the_arena(batch: ArenaBatch) -> Callable[[], None]:
+    """Take a snapshot of the second arena; returns what goes back to it."""
+    snapshot = batch.arenas[1].snapshot()
+    return lambda: batch.arenas[1].restore(snapshot)
+
+
+def through_the_batch(batch: ArenaBatch) -> Callable[[], object]:
+    """Do the same in the way of a user of vector environments, who has only methods of environments."""
+    (snapshot,) = batch.call_method("snapshot", [1])
+    return lambda: batch.call_method("restore_batch", [1], snapshot)
+
+
+@pytest.mark.parametrize("way", [through_the_arena, through_the_batch])
+@pytest.mark.parametrize(
+    "interface", [InterfaceConfig(), InterfaceConfig(observation="compact"), DRIVEN], ids=["full", "compact", "driven"]
+)
+def test_the_arrays_of_a_snapshot_are_found(interface, way):
+    batches = [each(plan(interface=interface, nest_progress=0.1), 2) for each in (ArenaBatch, OneByOne)]
     for batch in batches:
         batch.reset([0, 1], [None] * 2)
-    actions = drawn(30, 2)
-    for now in actions[:10]:
-        for batch in batches:
+    shape = batches[0].interface.action_space.shape
+    assert shape is not None
+    actions = drawn(5, 2)[..., : shape[0]]
+    for batch in batches:
+        for now in actions[:2]:
             batch.step(now)
-    kept = [batch.arenas[1].snapshot() for batch in batches]
-    for now in actions[10:20]:
-        for batch in batches:
-            batch.step(now)
-    for batch, snapshot in zip(batches, kept, strict=True):
-        batch.arenas[1].restore(snapshot)
-    for now in actions[20:]:
-        ours, theirs = (batch.step(now) for batch in batches)
-        np.testing.assert_array_equal(ours.obs, theirs.obs)
-        np.testing.assert_array_equal(ours.rewards, theirs.rewards)
+        go_back = way(batch)
+        before = [batch.step(now) for now in actions[2:]]
+        go_back()
+        for now, first in zip(actions[2:], before, strict=True):
+            again = batch.step(now)
+            np.testing.assert_array_equal(again.obs[N_ROBOTS:], first.obs[N_ROBOTS:])
+            np.testing.assert_array_equal(again.rewards[N_ROBOTS:], first.rewards[N_ROBOTS:])
+    assert ways(batches[0])[:3] == (True,) * 3
 
 
 def arenas(n: int) -> list[ForagingArena]:
@@ -164,6 +189,13 @@ def test_a_seat_may_stay_be_stepped_alone_begin_anew_and_go_back():
                 arena.step(now[2])
         for one, other in zip(ours, theirs, strict=True):
             assert_same(one, other)
+
+
+def test_with_nothing_to_step_nothing_happens():
+    ours, theirs = arenas(2), arenas(2)
+    assert not Rack(ours).step({}, np.zeros((2, N_ROBOTS, 3), np.float32))
+    for one, other in zip(ours, theirs, strict=True):
+        assert_same(one, other)
 
 
 def test_more_room_in_one_seat_is_room_in_all(monkeypatch):

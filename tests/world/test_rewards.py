@@ -9,7 +9,10 @@ from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import RewardConfig
 from swarm_forage_env.scenarios.presets import scenario
+from tests.support.engines import in_each_engine
 from tests.support.stage import NEST_CELL, OPEN_CELL, act, lay, load, put, stand, tidy_world
+
+pytestmark = in_each_engine
 
 NOTHING = RewardConfig(delivery=0.0, first_pickup=0.0)
 

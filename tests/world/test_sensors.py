@@ -13,6 +13,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.world.kernels.beams import proximity_reading
 from tests.reference import sensing
+from tests.support.engines import in_each_engine
 from tests.support.stage import act, build_cache, cell_centre, lay, load, put, stand, tidy_world
 
 MODELLED = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
@@ -95,6 +96,7 @@ def crowding(name: str) -> dict[str, object]:
     return {"n_objects": 80} if name == "search_and_rescue" else {"n_objects": 300}
 
 
+@in_each_engine
 def test_events_and_cargo_are_seen_in_the_step_that_brings_them():
     env = tidy_world(n_robots=3, caches="static")
     slot = build_cache(env, [4, 5, 6], (60, 40))
@@ -145,6 +147,7 @@ def test_light_is_brightest_ahead_and_dark_behind():
     np.testing.assert_array_equal(lit[6:19], np.zeros(13))
 
 
+@in_each_engine
 def test_rows_of_absent_robots_are_zero_and_those_in_repair_are_not():
     env = tidy_world(n_robots=3)
     for robot in range(3):
@@ -158,6 +161,7 @@ def test_rows_of_absent_robots_are_zero_and_those_in_repair_are_not():
     assert_matches_twin(env, obs)
 
 
+@in_each_engine
 def test_nearest_four_caches_are_listed_nearest_first():
     env = tidy_world(n_robots=1, n_objects=12, caches="static", side_share=0.00625, static_size=2)
     assert env.scenario.cache_side_cells == 1

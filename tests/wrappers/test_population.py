@@ -15,6 +15,8 @@ from swarm_forage_env.wrappers.population import (
 )
 from swarm_forage_env.wrappers.population_process import simulate_population
 from swarm_forage_env.wrappers.recorder import RunRecorder
+from tests.support import engines
+from tests.support.engines import in_each_engine
 from tests.support.stage import assert_same_world, begin, cell_centre, lay, load, put, snapshot, stand, tidy_world
 
 
@@ -54,6 +56,7 @@ def lone_carrier():
     return at_hand(env)
 
 
+@in_each_engine
 def test_a_robot_in_repair_stops_but_stays(lone_carrier):
     env = lone_carrier.unwrapped
     lone_carrier.step_batch(hold(env, 0.5))
@@ -76,6 +79,7 @@ def test_a_robot_in_repair_stops_but_stays(lone_carrier):
     assert env.swarm.position[0, 0] > where[0, 0]
 
 
+@in_each_engine
 def test_a_running_interaction_completes_in_repair():
     env = tidy_world(n_robots=1)
     stand(env, 0, (60, 40))
@@ -89,6 +93,7 @@ def test_a_running_interaction_completes_in_repair():
     assert not env.active[0]
 
 
+@in_each_engine
 def test_a_robot_in_repair_is_seen_and_in_the_way_but_never_interferes():
     env = tidy_world(n_robots=2)
     put(env, 0, 16.0, 8.0)
@@ -108,6 +113,7 @@ def test_a_robot_in_repair_is_seen_and_in_the_way_but_never_interferes():
 # Death
 
 
+@in_each_engine
 @pytest.mark.parametrize(
     ("place", "status", "event"),
     [
@@ -136,6 +142,7 @@ def test_the_dead_lose_their_cargo_and_their_body(place, status, event, deaths):
     assert np.all(env.arena._physics.poses()[0, :2] < 0.0), "parked outside"
 
 
+@in_each_engine
 def test_a_dead_robot_is_out_of_the_way():
     env = tidy_world(n_robots=2)
     put(env, 0, 16.0, 8.0)
@@ -152,7 +159,7 @@ def test_a_dead_robot_is_out_of_the_way():
 
 def kill_all(deaths: str) -> list[tuple[list[str], dict[str, bool]]]:
     """Agents and terminations of each step while three robots die, one per step."""
-    env = ForageEnv(scenario("warehouse_small", n_robots=3, n_objects=20))
+    env = ForageEnv(scenario("warehouse_small", n_robots=3, n_objects=20, physics=engines.CHOSEN))
     stack = at_hand(env, deaths=deaths)
     stack.reset(seed=0)
     seen = []
@@ -168,6 +175,7 @@ def kill_all(deaths: str) -> list[tuple[list[str], dict[str, bool]]]:
     return seen
 
 
+@in_each_engine
 def test_permanent_death_terminates_the_agent():
     agents = [f"robot_{row}" for row in range(3)]
     seen = kill_all("terminate")
@@ -178,6 +186,7 @@ def test_permanent_death_terminates_the_agent():
         agents = left
 
 
+@in_each_engine
 def test_absorbing_deaths_keep_every_agent_until_the_last_death():
     agents = [f"robot_{row}" for row in range(3)]
     assert kill_all("absorbing") == [
@@ -187,9 +196,11 @@ def test_absorbing_deaths_keep_every_agent_until_the_last_death():
     ]
 
 
+@in_each_engine
 @pytest.mark.parametrize("lives_on", [False, True])
 def test_both_ways_of_death_are_the_same_world_and_record(lives_on):
-    config = scenario("warehouse_small", n_robots=6, n_objects=60, caches="static", horizon_s=60.0, interval_s=10.0)
+    world = {"n_robots": 6, "n_objects": 60, "caches": "static", "physics": engines.CHOSEN}
+    config = scenario("warehouse_small", **world, horizon_s=60.0, interval_s=10.0)
     rate = 0.01 if lives_on else 0.2
     results = []
     for deaths in ("terminate", "absorbing"):
@@ -218,10 +229,11 @@ def test_both_ways_of_death_are_the_same_world_and_record(lives_on):
 
 
 def nursery(n_robots: int = 6, *, initial_robots: int = 2, **fields) -> PopulationDynamics:
-    env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, n_objects=50))
+    env = ForageEnv(scenario("warehouse_small", n_robots=n_robots, n_objects=50, physics=engines.CHOSEN))
     return at_hand(env, initial_robots=initial_robots, birth_per_tick=1e-12, **fields)
 
 
+@in_each_engine
 def test_the_unborn_are_agents_without_a_body_from_the_reset_on():
     stack = nursery()
     env = stack.unwrapped
@@ -247,6 +259,7 @@ def test_nobody_sees_the_unborn_at_reset():
     assert not proximity.any()
 
 
+@in_each_engine
 def test_births_bring_working_robots_at_free_places():
     stack = nursery(n_robots=40, initial_robots=1)
     env = stack.unwrapped
@@ -271,6 +284,7 @@ def test_births_bring_working_robots_at_free_places():
     assert env.active.all(), "nobody is left to be born"
 
 
+@in_each_engine
 def test_a_birth_waits_until_there_is_a_place():
     stack = nursery()
     env = stack.unwrapped
@@ -285,6 +299,7 @@ def test_a_birth_waits_until_there_is_a_place():
     assert env.swarm.present.sum() == 3
 
 
+@in_each_engine
 def test_nobody_is_born_while_enough_are_here():
     stack = nursery(max_robots=3)
     stack.reset_batch(0)

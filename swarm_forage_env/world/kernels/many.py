@@ -1,6 +1,9 @@
 """Several worlds of one scenario, stepped by one call. Each stays where it is; a table tells where its arrays are.
 
 B is the number of worlds. Worlds know nothing of each other: each is stepped by the function that steps a single one.
+Only arrays have addresses. Everything else, such as rules, columns and other constants, is that of the world that is
+given for all, so all must be of one scenario. Numbers in brackets are places in a row of the table, which has the
+arrays in the order of the fields; `tests/world/test_many.py` compares field by field.
 """
 
 from typing import Any
