@@ -11,6 +11,8 @@ from swarm_forage_env.scenarios.presets import SCENARIO_NAMES
 from swarm_forage_env.study.replay.files import FORMAT_VERSION
 from swarm_forage_env.wrappers.registry import WRAPPERS
 
+MOST_BYTES = 6
+"""Per robot and frame: 3 MB for 50 robots in a whole run, 30 MB for the five million poses of the largest replays."""
 DISTURBED = {exhibit.name: exhibit.wrapper.partition(":")[0] for exhibit in EXHIBITS}
 
 
@@ -42,3 +44,13 @@ def test_stored_replays_have_the_runs_and_the_present_page(exhibit):
     for name in (*SCRIPTS, "replay.css"):
         present = parts.joinpath(name).read_text(encoding="utf-8")
         assert present in text, f"{name} is another one: python scripts/make_gallery.py --pages"
+
+
+@pytest.mark.parametrize("exhibit", EXHIBITS, ids=lambda exhibit: exhibit.name)
+def test_stored_replays_are_small(exhibit):
+    text = (FOLDER / f"{exhibit.name}.html").read_text()
+    header, blocks = take_page_apart(text)
+    poses = sum(run["n_robots"] * run["n_frames"] for run in header["runs"])
+    in_base64 = sum(len(block) for block in blocks) * 4 / 3
+    assert 0.5 * poses < in_base64 < MOST_BYTES * poses
+    assert len(text) - in_base64 < 200_000, "style sheet, scripts, header"

@@ -70,7 +70,7 @@ def record_replay(
     step = _ticks_between_frames(scenario, end, frame_s)
     policy = load_policy(spec.policy, spec.parameters) if policy is None else policy
     recorder = build_stack(scenario, spec.wrappers, reads=getattr(policy, "reads", None))
-    run = LiveRun(recorder, policy, spec.seed)
+    run = LiveRun(recorder, policy, spec.seed, by_ticks=True)
     env = run.forage_env
     album = _Album(env, policy, 1 + math.ceil(end / step))
     album.look()
