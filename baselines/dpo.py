@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.contract.policy import RememberedPlaces, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 
 from .machines import (
@@ -123,6 +123,10 @@ class DPOPolicy(ScriptedPolicy):
     def n_remembered(self) -> IntArray:
         """(N,) the same: a robot remembers objects only."""
         return self.n_known
+
+    def remembered_places(self, row: int) -> RememberedPlaces:
+        """Return where one robot remembers objects, in m."""
+        return RememberedPlaces.of_cells((x, y) for x, y, _ in self.remembered(row).values())
 
     def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
         """Return what one robot remembers: object row -> (cell x, cell y, pheromone density)."""

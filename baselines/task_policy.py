@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.contract.policy import RememberedPlaces, SwarmSpec
 from swarm_forage_env.contract.types import CodeArray, FloatArray, IntArray
 
 from .cache_memory import new_task_memory
@@ -136,6 +136,13 @@ class TaskPolicy(ScriptedPolicy):
     def n_remembered(self) -> IntArray:
         """(N,) number of objects and caches that each robot remembers."""
         return self._robots["n_known"] + self._robots["n_caches"]
+
+    def remembered_places(self, row: int) -> RememberedPlaces:
+        """Return where one robot remembers objects and caches, in m."""
+        return RememberedPlaces.of_cells(
+            objects=((x, y) for x, y, _ in self.remembered(row).values()),
+            caches=((x, y) for x, y, *_ in self.remembered_caches(row).values()),
+        )
 
     def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
         """Return the objects that one robot remembers: object row -> (cell x, cell y, pheromone density)."""

@@ -35,7 +35,7 @@ myst_heading_anchors = 4
 nb_execution_mode = "force"
 nb_execution_in_temp = True
 nb_execution_show_tb = True
-nb_execution_timeout = 120
+nb_execution_timeout = 1200  # seconds for a cell; slow machines and cold kernels need some
 nb_merge_streams = True
 
 # Docstrings are Google style; `name` in them is code.

@@ -1,15 +1,9 @@
 """Laws of performance over swarm size: what each says, and how it is fitted to measured means.
 
-    linear       P(N) = a N
-    contention   P(N) = a N / (1 + s (N - 1))
-    universal    P(N) = a N / (1 + s (N - 1) + k N (N - 1)),    largest at N = sqrt((1 - s) / k)
-    power        P(N) = a N^b
-    hamann       P(N) = a N^b exp(c N),                         largest at N = -b / c
-
-a is the performance of one robot (nearly, for the last law), s (contention) the share of work that robots do one at a
-time, k (coherency) the cost per pair of robots. b tells what robots gain from each other, more than their number above
-1; c <= 0 tells how much they hinder each other. With a = 2, s = 0.1, k = 0.01, ten robots deliver
-20 / (1 + 0.9 + 0.9) = 7.14 objects, and a swarm of sqrt(0.9 / 0.01) = 9.49 robots delivers most.
+`LAW_WORDS` has the formulas. In them a is the performance of one robot (nearly, for the last law), s (contention) the
+share of work that robots do one at a time, k (coherency) the cost per pair of robots. b tells what robots gain from
+each other, more than their number above 1; c <= 0 tells how much they hinder each other. With a = 2, s = 0.1, k = 0.01,
+ten robots deliver 20 / (1 + 0.9 + 0.9) = 7.14 objects, and a swarm of sqrt(0.9 / 0.01) = 9.49 robots delivers most.
 
 Sources: Amdahl 1967 for contention, whose serial fraction the paper's scalability, Eq. (4), estimates; Gunther 1993 for
 the universal law, which contains the two before it; Hamann 2013 for cooperation times interference, N^b exp(c N).
@@ -21,7 +15,7 @@ grows with their mean, and the variance of their square roots does not.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, cast, get_args
+from typing import Literal, NamedTuple, TypeAlias, cast, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,6 +36,28 @@ PARAMETERS: dict[LawName, tuple[str, ...]] = {
     "hamann": ("a", "exponent", "decay"),
 }
 """Law -> the fields of `SizeLaw` that are fitted."""
+SYMBOLS = {"a": "a", "contention": "s", "coherency": "k", "exponent": "b", "decay": "c"}
+"""Field of `SizeLaw` -> its letter in a formula."""
+
+
+class LawWords(NamedTuple):
+    """A law as readers see it."""
+
+    formula: str
+    """P(N)."""
+    largest_at: str
+    """Swarm size of the largest performance; a dash where it only grows."""
+    says: str
+    """What it says of robots."""
+
+
+LAW_WORDS: dict[LawName, LawWords] = {
+    "linear": LawWords("a N", "-", "robots do not affect each other"),
+    "contention": LawWords("a N / (1 + s (N - 1))", "-", "they wait for one another (Amdahl)"),
+    "universal": LawWords("a N / (1 + s (N - 1) + k N (N - 1))", "sqrt((1 - s) / k)", "and every pair costs (Gunther)"),
+    "power": LawWords("a N^b", "-", "b < 1 sublinear, b > 1 superlinear"),
+    "hamann": LawWords("a N^b exp(c N)", "-b / c", "cooperation times interference (Hamann)"),
+}
 MIN_SIZES = 4
 """Three sizes fix the universal law; a fourth is needed to judge a law by."""
 _MAX_STEPS = 50

@@ -1,8 +1,11 @@
-"""Measure the project's speed targets: medians over repeats on one core, through the public runner.
+"""Measure speed where one version says enough: large swarms, wrappers, learning, pictures, the first run.
 
-    scripts/bench             all cases
-    scripts/bench --quick     fewer repeats, shorter runs
-    scripts/bench --only crw  cases whose name contains "crw"
+    scripts/bench                   all cases
+    scripts/bench --quick           fewer repeats, shorter runs
+    scripts/bench --only wrappers   cases whose name contains "wrappers"
+
+`scripts/compare_speed.py` has the speed of runs, as ratios to another version; `scripts/tick_phases.py` has the phases
+of a tick. Bodies are compiled unless a row says otherwise.
 
 A robot-tick is one robot for one control step of 0.2 s. Times are processor time of the one measuring process, so that
 other work on the machine counts as little as possible. Machines differ: compare ratios within one table, not single
@@ -35,16 +38,13 @@ from speed_cases import WRAPPERS, large_world
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
-from swarm_forage_env.scenarios.presets import warehouse_medium, warehouse_small
-from swarm_forage_env.study.run import LiveRun, build_stack, run_one
+from swarm_forage_env.scenarios.presets import warehouse_medium
+from swarm_forage_env.study.run import LiveRun, build_stack
 from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.pettingzoo import parallel_env
-from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.kernels.gaussian import to_normal
 from swarm_forage_env.wrappers.registry import parse_wrapper
-
-PHASES = ("drive and contact", "physics", "sensing and interactions", "policy", "recording", "rest")
 
 
 @dataclass(frozen=True)
@@ -65,18 +65,6 @@ def run_spec(scenario: ScenarioConfig, policy: str, ticks: int) -> RunSpec:
     return plan_run(with_overrides(scenario, horizon_s=seconds, interval_s=seconds), policy)
 
 
-def robot_ticks_per_second(scenario: ScenarioConfig, policy: str, ticks: int, repeats: int) -> float:
-    """Median robot-ticks per second of `run_one`, without compilation, with building the environment."""
-    run_one(run_spec(scenario, policy, 5))
-    spec = run_spec(scenario, policy, ticks)
-    rates = []
-    for _ in range(repeats):
-        started = time.process_time()
-        run_one(spec)
-        rates.append(ticks * scenario.robots.n_robots / (time.process_time() - started))
-    return statistics.median(rates)
-
-
 @contextmanager
 def stopwatch(owner: Any, name: str, total: list[float]) -> Iterator[None]:
     """Add the time spent in `owner.name` to total[0] while the context lasts."""
@@ -95,62 +83,19 @@ def stopwatch(owner: Any, name: str, total: list[float]) -> Iterator[None]:
         setattr(owner, name, original)
 
 
-def tick_shares(scenario: ScenarioConfig, policy_name: str, ticks: int) -> dict[str, float]:
-    """Microseconds per tick spent in each phase; the stopwatches themselves cost a few of them."""
-    spec = run_spec(scenario, policy_name, ticks)
-    policy = load_policy(policy_name)
-    recorder = build_stack(spec.scenario, reads=getattr(policy, "reads", None))
-    run = LiveRun(recorder, policy, seed=0)
-    arena = recorder.unwrapped.arena
-    compiled = arena._compiled
-    spent: dict[str, list[float]] = {phase: [0.0] for phase in PHASES}
-    with (
-        stopwatch(Physics, "advance", spent["physics"]),
-        stopwatch(compiled, "set_out", spent["drive and contact"]),
-        stopwatch(compiled, "meet_and_close", spent["sensing and interactions"]),
-        stopwatch(compiled, "close", spent["sensing and interactions"]),
-        stopwatch(policy, "act", spent["policy"]),
-        stopwatch(recorder, "after_step", spent["recording"]),
-    ):
-        started = time.process_time()
-        run.advance()
-        total = time.process_time() - started
-    spent["rest"][0] = total - sum(seconds[0] for seconds in spent.values())
-    return {phase: seconds[0] / ticks * 1e6 for phase, seconds in spent.items()}
-
-
-def dict_rows(ticks: int, repeats: int) -> Iterator[Row]:
-    """Agent-steps through the dict API, with actions drawn beforehand, 200 robots."""
-    ticks //= 4
-    env = parallel_env("warehouse_medium")
-    env.reset(seed=0)
-    rng = np.random.default_rng(0)
-    drawn = [{agent: rng.uniform(-1, 1, 3).astype(np.float32) for agent in env.agents} for _ in range(min(ticks, 50))]
-    env.step(drawn[0])
-    rates = []
-    for _ in range(repeats):
-        started = time.process_time()
-        for tick in range(ticks):
-            env.step(drawn[tick % len(drawn)])
-        rates.append(ticks * env.num_agents / (time.process_time() - started))
-    rate = statistics.median(rates)
-    yield Row("PettingZoo dict API, N = 200", rate / 1e3, "k agent-steps/s", ">= 150", rate >= 150_000)
-
-
 def learning_rows(ticks: int, repeats: int) -> Iterator[Row]:
     """The vector environment of stable-baselines3 with random actions, and what PPO adds around it, 50 robots."""
     ticks //= 2
+    case = "VecEnv, N = 50, random actions"
     if importlib.util.find_spec("stable_baselines3") is None:
-        yield Row(
-            "VecEnv, N = 50, random actions", math.nan, "k robot-steps/s", ">= 400", None, "needs the train extra"
-        )
+        yield Row(case, math.nan, "k robot-steps/s", "-", None, "needs the train extra")
         return
     import torch
     from stable_baselines3 import PPO
 
     from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, SwarmVecEnv
 
-    env = SwarmVecEnv("warehouse_small")
+    env = SwarmVecEnv("warehouse_small", physics="compiled")
     env.seed(0)
     env.reset()
     drawn = np.random.default_rng(0).uniform(-1, 1, (100, env.num_envs, 3)).astype(np.float32)
@@ -162,7 +107,7 @@ def learning_rows(ticks: int, repeats: int) -> Iterator[Row]:
             env.step(drawn[tick % len(drawn)])
         rates.append(ticks * env.num_envs / (time.process_time() - started))
     rate = statistics.median(rates)
-    yield Row("VecEnv, N = 50, random actions", rate / 1e3, "k robot-steps/s", ">= 400", rate >= 400_000)
+    yield Row(case, rate / 1e3, "k robot-steps/s", "-", None)
 
     torch.set_num_threads(1)  # processor time of two threads would count twice
     n_steps = max(128, ticks // 10)
@@ -185,28 +130,21 @@ def learning_rows(ticks: int, repeats: int) -> Iterator[Row]:
     yield Row("PPO on it", n_steps * env.num_envs / total / 1e3, "k robot-steps/s", "-", None, note)
 
 
-FIRST_TICK = """
-import time
-started = time.process_time()
-from swarm_forage_env.study.run import warm_up
-from swarm_forage_env.study.spec import plan_run
-from swarm_forage_env.scenarios.presets import warehouse_small
-warm_up(plan_run(warehouse_small(), "crw"))
-print(time.process_time() - started)
-"""
 IMPORT = """
 import time
 started = time.process_time()
 import swarm_forage_env
 print(time.process_time() - started)
 """
+FIRST_RUN = ("run", "--policy", "crw", "--robots", "50", "--horizon", "200", "--seeds", "1", "--jobs", "1")
+"""Words of the command whose first run is timed; `--jobs 1` compiles in two processes where two cores are free."""
 PEAK_MEMORY = """
 import resource, sys
 sys.path.insert(0, {scripts!r})
 from bench import run_spec
 from speed_cases import large_world
 from swarm_forage_env import run_one, scenario
-run_one(run_spec(scenario("warehouse_medium", **large_world(16384)), "crw", 20))
+run_one(run_spec(scenario("warehouse_medium", physics="compiled", **large_world(16384)), "crw", 20))
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
 """
 
@@ -219,56 +157,54 @@ def in_fresh_process(program: str, **environment: str) -> float:
     return float(output.stdout.split()[-1])
 
 
-def rate_row(case: str, scenario: ScenarioConfig, policy: str, target: float | None, ticks: int, repeats: int) -> Row:
-    """Throughput of one case with the shares of a tick."""
-    rate = robot_ticks_per_second(scenario, policy, ticks, repeats) / 1e6
-    shares = tick_shares(scenario, policy, ticks)
-    total = sum(shares.values())
-    note = ", ".join(f"{phase} {share / total:.0%}" for phase, share in shares.items())
-    goal = "-" if target is None else f">= {target:g}"
-    return Row(case, rate, "M robot-ticks/s", goal, None if target is None else rate >= target, note)
-
-
 def scaling_rows(ticks: int, repeats: int) -> Iterator[Row]:
     """Cost per robot-tick of large swarms and of 200 robots, measured in turn."""
-    worlds = [warehouse_medium(), *(warehouse_medium(**large_world(n_robots)) for n_robots in (4096, 16_384))]
+    large = (warehouse_medium(physics="compiled", **large_world(n_robots)) for n_robots in (4096, 16_384))
+    worlds = [warehouse_medium(physics="compiled"), *large]
     costs: dict[int, list[float]] = {200: [], 4096: [], 16_384: []}
     for _ in range(repeats):
         for scenario in worlds:
             n_robots = scenario.robots.n_robots
-            costs[n_robots].append(_cost_per_robot_tick(scenario, max(20, ticks * 200 // n_robots)))
+            costs[n_robots].append(_cost_of_a_run(scenario, max(20, ticks * 200 // n_robots)))
     base = costs[200]
     yield Row("CRW, N = 200, as reference", statistics.median(base), "us per robot-tick", "-", None)
     for n_robots in (4096, 16_384):
         ratio = statistics.median(cost / reference for cost, reference in zip(costs[n_robots], base, strict=True))
         note = f"{statistics.median(costs[n_robots]):.2f} us per robot-tick"
-        yield Row(f"CRW, N = {n_robots:,}, cost over N = 200", ratio, "x", "<= 1.5", ratio <= 1.5, note)
+        yield Row(f"CRW, N = {n_robots:,}, cost over N = 200", ratio, "x", "<= 1.3", ratio <= 1.3, note)
     scripts = str(Path(__file__).resolve().parent)
     memory = in_fresh_process(PEAK_MEMORY.format(scripts=scripts))
     yield Row("CRW, N = 16,384, peak memory", memory, "GiB", "< 2", memory < 2)
 
 
-def _cost_per_robot_tick(
-    scenario: ScenarioConfig,
-    ticks: int,
-    wrappers: Sequence[WrapperConfig] = (),
-    beside: Callable[[], object] | None = None,
-) -> float:
-    """Microseconds per robot-tick of the loop alone, after a short run-in; `beside` is called in every tick, too."""
+def _cost_of_a_run(scenario: ScenarioConfig, ticks: int) -> float:
+    """Microseconds per robot-tick of a run under CRW, after a short run-in."""
     policy = load_policy("crw")
     spec = run_spec(scenario, "crw", ticks + 20)
-    act = policy.act
-
-    def act_beside(obs: np.ndarray, active: np.ndarray) -> np.ndarray:
-        if beside is not None:
-            beside()
-        return act(obs, active)
-
-    policy.act = act_beside
-    run = LiveRun(build_stack(spec.scenario, wrappers, reads=getattr(policy, "reads", None)), policy, seed=0)
+    run = LiveRun(build_stack(spec.scenario, reads=getattr(policy, "reads", None)), policy, seed=0)
     run.advance(to_tick=20)
     started = time.process_time()
     run.advance()
+    return (time.process_time() - started) / ticks / scenario.robots.n_robots * 1e6
+
+
+def _cost_of_steps(
+    scenario: ScenarioConfig,
+    ticks: int,
+    wrappers: Sequence[WrapperConfig] = (),
+    beside: Callable[[], object] = lambda: None,
+) -> float:
+    """Microseconds per robot-tick of a stack that is stepped with CRW's actions; `beside` is called in every tick."""
+    policy = load_policy("crw")
+    stack = build_stack(run_spec(scenario, "crw", ticks + 20).scenario, wrappers)
+    policy.reset(stack.unwrapped.swarm_spec, np.random.default_rng(0))
+    obs = stack.reset_batch(0)
+    started = 0.0
+    for tick in range(ticks + 20):
+        if tick == 20:
+            started = time.process_time()
+        beside()
+        obs = stack.step_batch(policy.act(obs, stack.unwrapped.active))[0]
     return (time.process_time() - started) / ticks / scenario.robots.n_robots * 1e6
 
 
@@ -279,8 +215,12 @@ def wrapper_rows(ticks: int, repeats: int) -> Iterator[Row]:
     rest of the tick costs the same. The draws are measured in a run without wrappers that draws the same numbers in
     every tick.
     """
-    wrappers = [parse_wrapper(text) for text in WRAPPERS]
-    scenario, rng = warehouse_medium(), np.random.default_rng(0)
+    for physics in ("chipmunk", "compiled"):
+        yield from _wrapper_rows_of(warehouse_medium(physics=physics), ticks, repeats)
+
+
+def _wrapper_rows_of(scenario: ScenarioConfig, ticks: int, repeats: int) -> Iterator[Row]:
+    wrappers, rng = [parse_wrapper(text) for text in WRAPPERS], np.random.default_rng(0)
     columns = sum(part.size for part in parallel_env(scenario).layout if part.noise_group) - 1  # heading: one angle
     readings, wheels = np.zeros((200, columns), np.float32), np.zeros((200, 2), np.float32)
 
@@ -289,18 +229,18 @@ def wrapper_rows(ticks: int, repeats: int) -> Iterator[Row]:
             rng.random(out=numbers, dtype=np.float32)
             to_normal(numbers)
 
-    _cost_per_robot_tick(scenario, 5, wrappers)
-    shares: list[tuple[float, float]] = []
+    _cost_of_steps(scenario, 5, wrappers)
+    costs: list[tuple[float, float, float]] = []
     for _ in range(repeats):
-        bare = _cost_per_robot_tick(scenario, ticks)
-        drawing = _cost_per_robot_tick(scenario, ticks, beside=draw)
-        wrapped = _cost_per_robot_tick(scenario, ticks, wrappers)
-        shares.append((drawing / bare - 1.0, wrapped / bare - 1.0))
-    beyond = statistics.median(wrapped - drawing for drawing, wrapped in shares)
-    drawing, wrapped = (statistics.median(column) for column in zip(*shares, strict=True))
-    yield Row("four wrappers, N = 200, over none", 100 * wrapped, "%", "-", None)
-    yield Row("random draws of the wrappers alone", 100 * drawing, "%", "-", None)
-    yield Row("four wrappers beyond their draws", 100 * beyond, "%", "<= 10", beyond <= 0.1)
+        bare = _cost_of_steps(scenario, ticks)
+        costs.append((bare, _cost_of_steps(scenario, ticks, beside=draw), _cost_of_steps(scenario, ticks, wrappers)))
+    drawing = statistics.median(drawn / bare - 1.0 for bare, drawn, _ in costs)
+    wrapped = statistics.median(full / bare - 1.0 for bare, _, full in costs)
+    beyond = statistics.median((full - drawn) / bare for bare, drawn, full in costs)
+    note = f"{statistics.median(bare for bare, _, _ in costs):.3f} us per robot-tick without them"
+    yield Row(f"{scenario.physics}: four wrappers over none", 100 * wrapped, "%", "-", None, note)
+    yield Row(f"{scenario.physics}: their random draws alone", 100 * drawing, "%", "-", None)
+    yield Row(f"{scenario.physics}: four wrappers beyond their draws", 100 * beyond, "%", "<= 10", beyond <= 0.1)
 
 
 def site_rows(ticks: int, repeats: int) -> Iterator[Row]:
@@ -311,14 +251,25 @@ def site_rows(ticks: int, repeats: int) -> Iterator[Row]:
 
 
 def start_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a case like the others; ticks are few
-    """Import and first ticks, those of the first pick-up included, each in fresh interpreters."""
+    """Import, and the first run of a command after an installation; by the clock, because two processes compile."""
     seconds = statistics.median(in_fresh_process(IMPORT) for _ in range(repeats))
     yield Row("import swarm_forage_env", seconds, "s", "< 0.3", seconds < 0.3)
-    with tempfile.TemporaryDirectory() as folder:
-        seconds = in_fresh_process(FIRST_TICK, NUMBA_CACHE_DIR=folder)
-        yield Row("import to first ticks, nothing compiled yet", seconds, "s", "< 30", seconds < 30)
-        seconds = statistics.median(in_fresh_process(FIRST_TICK, NUMBA_CACHE_DIR=folder) for _ in range(repeats))
-        yield Row("import to first ticks, later", seconds, "s", "< 2", seconds < 2)
+    for physics in ("chipmunk", "compiled"):
+        with tempfile.TemporaryDirectory() as folder:
+            first = _seconds_of_first_run(physics, folder)
+            later = statistics.median(_seconds_of_first_run(physics, folder) for _ in range(3))
+        note = f"{first:.1f} s by the clock, of which {later:.1f} s are a later run"
+        yield Row(f"{physics}: compiling in the first run", first - later, "s", "< 20", first - later < 20, note)
+
+
+def _seconds_of_first_run(physics: str, folder: str) -> float:
+    """Seconds by the clock of a short run whose compiled kernels are kept in a folder."""
+    command = [str(Path(sys.executable).with_name("swarm-forage")), *FIRST_RUN, "--set", f"physics={physics}"]
+    started = time.perf_counter()
+    with tempfile.TemporaryDirectory() as results:
+        kept = {**os.environ, "NUMBA_CACHE_DIR": folder}
+        subprocess.run([*command, "--out", results], check=True, capture_output=True, env=kept)
+    return time.perf_counter() - started
 
 
 def frame_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a case like the others; ticks are few
@@ -380,24 +331,13 @@ Case = Callable[[int, int], Iterable[Row]]
 
 def cases() -> dict[str, Case]:
     """Name -> what it measures, in the order of the table."""
-
-    def rate(name: str, scenario: ScenarioConfig, policy: str, target: float | None) -> tuple[str, Case]:
-        return name, lambda ticks, repeats: [rate_row(name, scenario, policy, target, ticks, repeats)]
-
-    rates = (
-        rate("CRW, N = 50, warehouse_small", warehouse_small(), "crw", 0.5),
-        rate("CRW, N = 200, warehouse_medium", warehouse_medium(), "crw", 1.5),
-        rate("DPO, N = 200, warehouse_medium", warehouse_medium(), "dpo", None),
-        rate("STOCHX, N = 200, warehouse_medium", warehouse_medium(caches="dynamic"), "stochx", 0.8),
-    )
-    return dict(rates) | {
+    return {
         "scaling: CRW, N = 4,096 and 16,384": scaling_rows,
         "four wrappers, N = 200": wrapper_rows,
         "search for cache sites: STOCHX, N = 200": site_rows,
-        "PettingZoo dict API, N = 200": dict_rows,
         "learning: VecEnv and PPO": learning_rows,
         "pictures: rgb_array and window": frame_rows,
-        "start: import and first ticks": start_rows,
+        "start: import and first run": start_rows,
     }
 
 
@@ -417,7 +357,7 @@ def main() -> None:
     ticks, repeats = (2_000, 3) if arguments.quick else (10_000, 7)
     console = Console(width=150)
     table = Table(title=f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, one core")
-    for heading in ("case", "measured", "unit", "target", "met", "where the time goes"):
+    for heading in ("case", "measured", "unit", "target", "met", "note"):
         table.add_column(heading, justify="right" if heading in ("measured", "target") else "left")
     for row in itertools.chain.from_iterable(case(ticks, repeats) for case in chosen.values()):
         met = "" if row.met is None else ("yes" if row.met else "NO")

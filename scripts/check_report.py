@@ -1,40 +1,68 @@
-"""Say what a report on studies of swarm sizes lacks: figures of the paper's measures, claims, intuitions.
+"""Say what a report on studies of swarm sizes lacks: figures of the paper's measures, claims, answers.
 
-    python scripts/check_report.py report.html S1a S2a
+    python scripts/check_report.py report.html S1a "S2a still" "S2a fast"
 
-Exit code 1 if something is missing.
+The names are the experiments that were run. Every claim and intuition must be listed, and those about these experiments
+alone must have an answer, with its numbers, in both readings. Exit code 1 if something is missing.
 """
 
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from metrics.claims import CLAIMS, INTUITIONS
 from metrics.scoring.figure_panels import FIGURE_MEASURES
 from metrics.scoring.measures import MEASURE_CRITERIA
+from swarm_forage_env.study.studies import READING_NAMES
+
+TABLES = {"verdicts": (CLAIMS, ", corrected"), "intuitions": (INTUITIONS, "")}
+"""Table of the page -> what it lists, and what stands behind a reading in the headings of its columns."""
 
 
-def missing_in(page: str, studies: list[str]) -> list[str]:
+def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
     """Return what is missing in a report on studies whose last axis is the swarm size, in words."""
     drawn = re.findall(r'<img src="data:image/svg\+xml;base64,[^"]+" alt="([^"]+), curves">', page)
     measures = [name for name in FIGURE_MEASURES if MEASURE_CRITERIA[name] == "population_size"]
-    headings = [f"{study}: {measure.replace('_', ' ')} (" for study in studies for measure in measures]
-    figures = [
-        f"figure {heading[:-2]}" for heading in headings if not any(words.startswith(heading) for words in drawn)
+    studies = dict.fromkeys(name.split()[0] for name in experiments)
+    missing = [
+        f"figure {study}: {measure.replace('_', ' ')}, reading {reading}"
+        for study in studies
+        for measure in measures
+        for reading in READING_NAMES
+        if not any(
+            words.startswith(f"{study}: {measure.replace('_', ' ')} (") and words.endswith(f"reading {reading}")
+            for words in drawn
+        )
     ]
-    words = re.sub(r'base64,[^"]+', "", page)  # pictures as text may have any two letters in them
-    claims = [f"claim {name}" for name in (*CLAIMS, *INTUITIONS) if not re.search(rf"\b{name}\b", words)]
-    return [*figures, *claims]
+    for table, (claims, form) in TABLES.items():
+        rows = _rows(page, table)
+        for name, claim in claims.items():
+            if name not in rows:
+                missing.append(f"claim {name}")
+            elif {panel[0] for panel in claim.panels} <= {*experiments}:
+                missing += [
+                    f"the answer to {name}, reading {reading}"
+                    for reading in (READING_NAMES if claim.panels else ())
+                    if not re.search(rf"<b>{reading}{form}</b> <span class=\"answer \w+\">.*statistic", rows[name])
+                ]
+    return missing
+
+
+def _rows(page: str, table: str) -> dict[str, str]:
+    """Return claim -> its part of a table."""
+    (text,) = re.findall(rf'<table[^>]* id="{table}">(.*?)</table>', page, re.DOTALL) or [""]
+    return {name: part for part in text.split("<tbody>")[1:] for name in re.findall(r'class="name">(\w+)<', part)}
 
 
 def main() -> int:
     """Check the report that the command line names; returns the exit code."""
-    page, *studies = sys.argv[1:]
-    missing = missing_in(Path(page).read_text(encoding="utf-8"), studies)
+    page, *experiments = sys.argv[1:]
+    missing = missing_in(Path(page).read_text(encoding="utf-8"), experiments)
     for words in missing:
         print(f"{page}: {words} is missing")
     if not missing:
-        print(f"{page}: has every figure of {', '.join(studies)}, claim and intuition")
+        print(f"{page}: has every figure and every answer of {', '.join(experiments)}, and every claim and intuition")
     return 1 if missing else 0
 
 

@@ -22,11 +22,20 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.progress import Progress
-from speed_cases import CASES
+from speed_cases import CASES, GOALS
 from timed_process import TimedProcess, ratio_cell
 
 ROOT = Path(__file__).resolve().parents[1]
 CASES_FILE = Path(__file__).with_name("speed_cases.py")
+HEADINGS = (
+    "case",
+    "other, µs per robot-tick",
+    "this, Chipmunk",
+    "this, compiled",
+    "ratio, Chipmunk",
+    "ratio, compiled",
+    "wanted against 0.1.0",
+)
 OTHER, CHIPMUNK, COMPILED = "other", "chipmunk", "compiled"
 
 
@@ -75,8 +84,16 @@ def rounds_of(case: str, other: Version, this: Version, repeats: int) -> list[di
 def row(case: str, rounds: Sequence[dict[str, float]]) -> str:
     """Return the line of a case."""
     cells = [case, *(f"{statistics.median(times[who] for times in rounds):.3g}" for who in (OTHER, CHIPMUNK, COMPILED))]
-    cells += [ratio_cell([times[OTHER] / times[engine] for times in rounds]) for engine in (CHIPMUNK, COMPILED)]
+    ratios = {engine: [times[OTHER] / times[engine] for times in rounds] for engine in (CHIPMUNK, COMPILED)}
+    cells += [ratio_cell(ratios[CHIPMUNK]), ratio_cell(ratios[COMPILED]), wanted(case, ratios[COMPILED])]
     return f"| {' | '.join(cells)} |"
+
+
+def wanted(case: str, ratios: Sequence[float]) -> str:
+    """Return the ratio that we want of a case, and whether the median reaches it; nothing where none is set."""
+    if case not in GOALS:
+        return ""
+    return f"{GOALS[case]:g}, {'reached' if statistics.median(ratios) >= GOALS[case] else 'missed'}"
 
 
 def cases(text: str) -> list[str]:
@@ -110,8 +127,8 @@ def main() -> None:
         parser.error(str(error))
     except KeyboardInterrupt:
         print("Interrupted; these cases are done:", file=sys.stderr)
-    print("| case | other, µs per robot-tick | this, Chipmunk | this, compiled | ratio, Chipmunk | ratio, compiled |")
-    print("|---|--:|--:|--:|--:|--:|")
+    print(f"| {' | '.join(HEADINGS)} |")
+    print(f"|---|{'--:|' * (len(HEADINGS) - 2)}---|")
     print("\n".join(rows))
 
 

@@ -1,14 +1,18 @@
-"""What laws and a mean-field model say of swarms of 1 to 128 robots, beside what they do: two tables and a picture.
+"""What laws and a mean-field model say of swarms beside what they do: tables and a picture for docs/laws.md.
 
-    python scripts/laws_beside_data.py            the tables of docs/laws.md, and docs/images/laws.png
-    python scripts/laws_beside_data.py --sizes 1 2 4 8 16 --seeds 4 --horizon 1000
+    swarm-forage study run scripts/laws.toml --out results/laws
+    python scripts/laws_beside_data.py results/laws                 write the blocks of the page, and its picture
+    python scripts/laws_beside_data.py results/laws --out FOLDER    the same in a copy of the page
 
-The model knows swarms of one robot and of --small robots only. Runs are kept in --out and not repeated.
+Takes the first line of any study of swarm sizes that the model holds for. The model knows swarms of one robot and of
+the smallest other size that delivered enough. Needs the plots extra.
 """
 
 import argparse
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import re
+import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -16,121 +20,105 @@ from typing import Any
 
 import numpy as np
 
-from metrics import ForagingRates, Ladder, Summary, aggregate, estimate_rates, fit_ladder, mean_field
+from metrics import ForagingRates, Ladder, Summary, aggregate, fit_ladder
+from metrics.laws import LAW_WORDS, SYMBOLS
 from metrics.scoring.plots import COLOURS
-from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.experiments import SIZE_SWEEP_OBJECTS
-from swarm_forage_env.study.record import RunRecord
-from swarm_forage_env.study.runner import run_all
-from swarm_forage_env.study.spec import plan_run
-from swarm_forage_env.study.store import RunStore
+from metrics.scoring.study_models import DRAWN_LAWS, ForagingRuns, foraging_runs
+from metrics.scoring.study_tables import study_lines
+from swarm_forage_env.study.study_table import read_study
 
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+PAGE, PICTURE = "laws.md", "images/laws.png"
+BLOCK = re.compile(
+    r"(<!-- generated: laws\.(?P<name>\w+) by scripts/laws_beside_data\.py -->).*?(<!-- end -->)", re.DOTALL
+)
 N_RESAMPLES = 100
 SEED = 1
-LAW_WORDS = {
-    "linear": "a N",
-    "contention": "a N / (1 + s (N - 1))",
-    "universal": "a N / (1 + s (N - 1) + k N (N - 1))",
-    "power": "a N^b",
-    "hamann": "a N^b exp(c N)",
-}
-SYMBOLS = {"a": "a", "contention": "s", "coherency": "k", "exponent": "b", "decay": "c"}
-DRAWN = ("linear", "contention", "universal", "hamann")
+"""Fixed, so that the same runs give the same intervals."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Data:
-    """Runs by swarm size."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Beside:
+    """Runs, laws and the model."""
 
-    records: Mapping[int, Sequence[RunRecord]]
+    runs: ForagingRuns
     small: int
-    """Swarm size from which rates are estimated, beside one robot."""
-    n_objects: int
-    horizon_s: float
+    rates: ForagingRates
+    ladder: Ladder
+    at: np.ndarray
+    """Swarm sizes at which the model is solved: those of the runs, and between them, (K,)."""
+    model: np.ndarray
+    """Deliveries and share of time lost, (K, 2)."""
+    bounds: np.ndarray
+    """Of their 95 % intervals, (2, K, 2)."""
 
-    def totals(self, size: int) -> list[float]:
-        """Objects delivered in each run."""
-        return [float(record.collected.sum()) for record in self.records[size]]
+    @property
+    def sizes(self) -> list[int]:
+        """Those that were run."""
+        return list(self.runs.columns)
 
-    def interference(self, size: int) -> Summary:
+    def delivered(self, size: int) -> Summary:
+        """Objects delivered, over runs."""
+        return aggregate(self.runs.columns[size]["collected"].sum(axis=-1))
+
+    def lost(self, size: int) -> Summary:
         """Share of robot time that is lost, over runs."""
-        return aggregate([float(record.interference_fraction.mean()) for record in self.records[size]])
+        return aggregate(self.runs.columns[size]["interference_fraction"].mean(axis=-1))
 
 
-def recorded(chosen: argparse.Namespace) -> Data:
-    """Make the runs, or read them."""
-    n_objects = SIZE_SWEEP_OBJECTS["warehouse_small"]
-    specs = {
-        size: [
-            plan_run(
-                scenario(
-                    "warehouse_small",
-                    n_robots=size,
-                    n_objects=n_objects,
-                    horizon_s=chosen.horizon,
-                    physics="compiled",
-                ),
-                chosen.policy,
-                seed=seed,
-            )
-            # Small swarms deliver little, and the model rests on these two.
-            for seed in range(chosen.small_seeds if size in (1, chosen.small) else chosen.seeds)
-        ]
-        for size in chosen.sizes
-    }
-    planned = [spec for of_size in specs.values() for spec in of_size]
-    found = run_all(planned, store=RunStore(chosen.out), jobs=chosen.jobs, progress=True)
-    records = {record.run_id: record for record in found.records}
-    by_size = {size: [records[spec.run_id] for spec in of_size] for size, of_size in specs.items()}
-    return Data(records=by_size, small=chosen.small, n_objects=n_objects, horizon_s=chosen.horizon)
+def beside(runs: ForagingRuns) -> Beside:
+    """Fit laws to all sizes, and continue the model from small swarms.
 
-
-def estimated(data: Data, small: int, rng: np.random.Generator | None = None) -> ForagingRates:
-    """Rates of swarms of `small` robots and of one; from resampled runs if `rng` is given."""
-
-    def drawn(size: int) -> list[RunRecord]:
-        runs = list(data.records[size])
-        return runs if rng is None else [runs[k] for k in rng.integers(len(runs), size=len(runs))]
-
-    few, lone = drawn(small), drawn(1)
-    return estimate_rates(
-        small,
-        pickups=[record.free_pickups for record in few],
-        deliveries=[record.collected for record in few],
-        n_carrying=[record.n_carrying for record in few],
-        interference=[record.interference_fraction for record in few],
-        interval_s=float(few[0].t_end_s[0]),
-        n_objects=data.n_objects,
-        lone_interference=[record.interference_fraction for record in lone],
+    Raises:
+        ValueError: too few objects were delivered to estimate rates, or too few sizes for laws.
+    """
+    sizes, small = list(runs.columns), runs.small
+    if small is None:
+        raise ValueError("Expected a swarm of two robots or more that delivered 50 objects in all runs, got none.")
+    at = np.unique([*sizes, *(round(math.sqrt(low * high)) for low, high in pairwise(sizes))])
+    rng = np.random.default_rng(SEED)
+    rates = runs.rates(small)
+    spread = np.array([runs.predicted(runs.rates(small, rng), at.tolist()) for _ in range(N_RESAMPLES)])
+    return Beside(
+        runs=runs,
+        small=small,
+        rates=rates,
+        ladder=fit_ladder(sizes, [columns["collected"].sum(axis=-1) for columns in runs.columns.values()], seed=SEED),
+        at=at,
+        model=runs.predicted(rates, at.tolist()),
+        bounds=np.quantile(spread, [0.025, 0.975], axis=0),
     )
 
 
-def predicted(rates: ForagingRates, sizes: Sequence[int], horizon_s: float) -> np.ndarray:
-    """Objects delivered and mean interference of the model for each size, (S, 2)."""
-    solved = [mean_field(rates, size, horizon_s) for size in sizes]
-    return np.array([(each.delivered[-1], each.interference.mean()) for each in solved])
+def kinds_lines() -> Iterator[str]:
+    """Yield the table of what laws say."""
+    yield "| law | P(N) | largest at | what it says |"
+    yield "|---|---|---|---|"
+    for name, words in LAW_WORDS.items():
+        yield f"| `{name}` | {words.formula} | {words.largest_at} | {words.says} |"
 
 
-def size_lines(data: Data, model: np.ndarray, bounds: np.ndarray) -> Iterator[str]:
+def size_lines(found: Beside) -> Iterator[str]:
     """Yield the table of sizes: measured and by the model, and the two rates that the model takes to be constant."""
     yield "| robots | runs | delivered | mean field | time lost, % | mean field | finds per 1,000 s searched | s home |"
     yield "|--:|--:|---|---|---|---|--:|--:|"
-    for k, size in enumerate(data.records):
-        totals, lost = aggregate(data.totals(size)), data.interference(size)
-        (delivered, share), (low, high), own = model[k], bounds[:, k], estimated(data, size)
+    for size in found.sizes:
+        k = int(np.searchsorted(found.at, size))
+        totals, lost, own = found.delivered(size), found.lost(size), found.runs.rates(size)
+        (delivered, share), (low, high) = found.model[k], found.bounds[:, k]
         yield (
             f"| {size} | {totals.n_used} | {totals.mean:.1f} ± {totals.upper - totals.mean:.1f} "
             f"| {delivered:.1f} ({low[0]:.1f} to {high[0]:.1f}) "
             f"| {100 * lost.mean:.2f} ± {100 * (lost.upper - lost.mean):.2f} "
             f"| {100 * share:.2f} ({100 * low[1]:.2f} to {100 * high[1]:.2f}) "
-            f"| {1000 * own.finding * data.n_objects:.3f} | {own.homing_s:.0f} |"
+            f"| {1000 * own.finding * found.runs.n_objects:.3f} | {own.homing_s:.0f} |"
         )
 
 
 def law_lines(ladder: Ladder) -> Iterator[str]:
-    """Yield the table of laws: parameters, critical size and error."""
-    yield "| law | P(N) | parameters | largest at | error |"
-    yield "|---|---|---|---|--:|"
+    """Yield the table of fitted laws: parameters, critical size and error."""
+    yield "| law | parameters | largest at | error |"
+    yield "|---|---|---|--:|"
     for name, fit in ladder.laws.items():
         parameters = ", ".join(
             f"{SYMBOLS[field]} = {found.value:.3g} ({found.lower:.3g} to {found.upper:.3g})"
@@ -138,45 +126,39 @@ def law_lines(ladder: Ladder) -> Iterator[str]:
         )
         peak = fit.peak
         place = "-" if math.isinf(peak.lower) else f"{peak.value:.3g} ({peak.lower:.3g} to {peak.upper:.3g})"
-        yield f"| `{name}` | {LAW_WORDS[name]} | {parameters} | {place} | {fit.error:.3f} |"
+        yield f"| `{name}` | {parameters} | {place} | {fit.error:.3f} |"
     b = ladder.exponent
     yield ""
     yield f"Exponent up to the best size: {b.value:.3f} ({b.lower:.3f} to {b.upper:.3f}), {ladder.scaling}."
 
 
-def draw(data: Data, ladder: Ladder, curve: np.ndarray, bounds: np.ndarray, at: np.ndarray, path: Path) -> None:
+def draw(found: Beside, path: Path) -> None:
     """Draw deliveries, deliveries per robot and time lost over the swarm size."""
     from matplotlib.figure import Figure  # not pyplot: no global state, no window system
 
     figure: Any = Figure(figsize=(12.6, 4.2), layout="constrained")
     total, each, lost = figure.subplots(1, 3)
-    sizes = list(data.records)
-    measured = [aggregate(data.totals(size)) for size in sizes]
+    sizes, at = found.sizes, found.at
+    measured = [found.delivered(size) for size in sizes]
     for panel, divisor, curve_divisor in ((total, np.ones(len(sizes)), np.ones(at.size)), (each, np.array(sizes), at)):
+        for name, colour in zip(DRAWN_LAWS, COLOURS[1:], strict=False):
+            law = found.ladder.laws[name].law
+            panel.plot(at, law.performance(at) / curve_divisor, "--", color=colour, linewidth=1.2, label=f"law: {name}")
+        words = f"mean field, from 1 and {found.small} robots"
+        panel.plot(at, found.model[:, 0] / curve_divisor, color=COLOURS[0], label=words)
+        low, high = found.bounds[:, :, 0] / curve_divisor
+        panel.fill_between(at, low, high, color=COLOURS[0], alpha=0.15, linewidth=0)
         means = np.array([summary.mean for summary in measured]) / divisor
         half = np.array([summary.upper - summary.mean for summary in measured]) / divisor
-        for name, colour in zip(DRAWN, COLOURS[1:], strict=False):
-            law = ladder.laws[name].law
-            panel.plot(at, law.performance(at) / curve_divisor, "--", color=colour, linewidth=1.2, label=f"law: {name}")
-        panel.plot(
-            at, curve[:, 0] / curve_divisor, color=COLOURS[0], label=f"mean field, from 1 and {data.small} robots"
-        )
-        panel.fill_between(
-            at,
-            bounds[0, :, 0] / curve_divisor,
-            bounds[1, :, 0] / curve_divisor,
-            color=COLOURS[0],
-            alpha=0.15,
-            linewidth=0,
-        )
         panel.errorbar(sizes, means, yerr=half, fmt="ko", markersize=4, capsize=2, label="runs, mean and 95 % interval")
-    seen = [data.interference(size) for size in sizes]
-    lost.plot(at, 100 * curve[:, 1], color=COLOURS[0])
-    lost.fill_between(at, 100 * bounds[0, :, 1], 100 * bounds[1, :, 1], color=COLOURS[0], alpha=0.15, linewidth=0)
+    seen = [found.lost(size) for size in sizes]
+    lost.plot(at, 100 * found.model[:, 1], color=COLOURS[0])
+    low, high = 100 * found.bounds[:, :, 1]
+    lost.fill_between(at, low, high, color=COLOURS[0], alpha=0.15, linewidth=0)
     half = [100 * (summary.upper - summary.mean) for summary in seen]
     lost.errorbar(sizes, [100 * summary.mean for summary in seen], yerr=half, fmt="ko", markersize=4, capsize=2)
     total.set_yscale("log")
-    words = (f"objects delivered in {data.horizon_s:,.0f} s", "objects delivered per robot", "robot time lost, %")
+    words = (f"objects delivered in {found.runs.horizon_s:,.0f} s", "objects delivered per robot", "robot time lost, %")
     for panel, word in zip((total, each, lost), words, strict=True):
         panel.set_xscale("log", base=2)
         panel.set_xticks(sizes, [str(size) for size in sizes])
@@ -192,36 +174,42 @@ def draw(data: Data, ladder: Ladder, curve: np.ndarray, bounds: np.ndarray, at: 
     figure.savefig(path, dpi=150)
 
 
-def main() -> None:
-    """Print the tables and draw the picture."""
+def main() -> int:
+    """Write the blocks and the picture; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--policy", default="crw")
-    parser.add_argument("--sizes", nargs="+", type=int, default=[1, 2, 4, 8, 16, 32, 64, 128])
-    parser.add_argument("--small", type=int, default=4, help="swarm size from which rates are estimated")
-    parser.add_argument("--seeds", type=int, default=8, help="runs per size")
-    parser.add_argument("--small-seeds", type=int, default=48, help="runs of one robot and of --small robots")
-    parser.add_argument("--horizon", type=float, default=2000.0, help="simulated seconds per run")
-    parser.add_argument("--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--out", type=Path, default=Path("results/laws"), help="folder for records")
-    parser.add_argument("--picture", type=Path, default=Path("docs/images/laws.png"))
+    parser.add_argument("place", type=Path, metavar="DIR|FILE", help="a study of swarm sizes")
+    parser.add_argument("--out", type=Path, default=DOCS, metavar="FOLDER", help="default docs")
     chosen = parser.parse_args()
-    data = recorded(chosen)
-    sizes = list(data.records)
-    between = [round(math.sqrt(small * large)) for small, large in pairwise(sizes)]
-    at = np.unique([*sizes, *between])
-    rng = np.random.default_rng(SEED)
-    rates = estimated(data, chosen.small)
-    resampled = [estimated(data, chosen.small, rng) for _ in range(N_RESAMPLES)]
-    curve = predicted(rates, at.tolist(), data.horizon_s)
-    spread = np.array([predicted(each, at.tolist(), data.horizon_s) for each in resampled])
-    bounds = np.quantile(spread, [0.025, 0.975], axis=0)
-    is_run = np.isin(at, sizes)
-    ladder = fit_ladder(sizes, [data.totals(size) for size in sizes], seed=SEED)
-    print(rates, end="\n\n")
-    print("\n".join(size_lines(data, curve[is_run], bounds[:, is_run])), end="\n\n")
-    print("\n".join(law_lines(ladder)))
-    draw(data, ladder, curve, bounds, at, chosen.picture)
+    try:
+        table = read_study(chosen.place)
+        runs = foraging_runs(table, study_lines(table)[0])
+        if runs is None:
+            raise ValueError(f"Expected a study of swarm sizes without caches, got {table.spec.name}.")
+        found = beside(runs)
+    except ValueError as error:
+        print(f"laws_beside_data: {error}", file=sys.stderr)
+        return 2
+    n_runs = {len(columns["collected"]) for columns in runs.columns.values()}
+    about = (
+        f"Swarms of {min(found.sizes)} to {max(found.sizes)} {table.spec.policies[0].label.upper()} robots, "
+        f"{runs.n_objects} objects, {runs.horizon_s:,.0f} s, {' or '.join(map(str, sorted(n_runs)))} runs each. The "
+        f"model knows the runs of one and of {found.small} robots. Intervals are 95 %; those of the model are from "
+        "resampled runs of these two sizes."
+    )
+    blocks = {
+        "kinds": [*kinds_lines()],
+        "about": [about],
+        "sizes": [*size_lines(found)],
+        "laws": [*law_lines(found.ladder)],
+    }
+    page = (DOCS / PAGE).read_text(encoding="utf-8")
+    text = BLOCK.sub(lambda match: "\n".join([match[1], "", *blocks[match["name"]], "", match[3]]), page)
+    (chosen.out / PICTURE).parent.mkdir(parents=True, exist_ok=True)
+    (chosen.out / PAGE).write_text(text, encoding="utf-8")
+    draw(found, chosen.out / PICTURE)
+    print(f"written {chosen.out / PAGE} and {chosen.out / PICTURE}")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

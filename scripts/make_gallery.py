@@ -1,9 +1,10 @@
 """Make docs/gallery.md: short replays of every scenario, controller and kind of adversity, a picture of each; films.
 
-    python scripts/make_gallery.py [NAME ...]
+    python scripts/make_gallery.py [NAME ... | --pages]
 
 The films are those of README.md, whose table is written, too. Without names, everything is made. A NAME is that of a
-replay or of a film. Needs the render extra.
+replay or of a film. `--pages` makes no run: it puts the present style sheet and scripts around the runs of the stored
+replays, which is enough after a change of the page. Needs the render extra.
 """
 
 import re
@@ -17,7 +18,7 @@ from swarm_forage_env import RunSpec, load_policy, parse_wrapper, plan_run, scen
 from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.study.film import record_run
 from swarm_forage_env.study.replay.capture import record_replay
-from swarm_forage_env.study.replay.files import write_replays
+from swarm_forage_env.study.replay.files import read_replays, write_replays
 from swarm_forage_env.study.run import LiveRun, build_env
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -103,6 +104,14 @@ EXHIBITS = (
         wrapper="sensor_noise:sigma=0.05",
     ),
     Exhibit(
+        "actuator_noise",
+        "warehouse_small",
+        ("dpo", "dpo"),
+        "Actuator noise: wheels of the second run turn faster or slower than they should, so that robots never drive "
+        "quite straight.",
+        wrapper="actuator_noise:sigma=0.5",
+    ),
+    Exhibit(
         "population",
         "warehouse_small",
         ("dpo", "dpo"),
@@ -132,14 +141,16 @@ FILMS = (
     Film("film_stochx", "STOCHX: dynamic caches", "warehouse_small", 3),
     Film("film_trained", "a trained policy", "trained_policy"),
     Film("film_throttle", "throttled robots", "throttle"),
+    Film("film_handling_cost", "long pick-ups and drops", "handling_cost"),
     Film("film_sensor_noise", "sensor noise", "sensor_noise"),
+    Film("film_actuator_noise", "noisy wheels", "actuator_noise"),
     Film("film_population", "failures and deaths", "population"),
     Film("film_medium", "objects anywhere", "warehouse_medium", seconds=240.0),
     Film("film_quad", "four sources", "warehouse_quad", seconds=240.0),
     Film("film_search_and_rescue", "search and rescue", "search_and_rescue"),
     Film("film_dual", "two sources", "warehouse_dual", 1),
 )
-FILM_COLUMNS = 4
+FILM_COLUMNS = 5
 FILM_SPEEDUP = 30.0
 FILM_FPS = 6.0
 FILM_PX = 300
@@ -170,6 +181,12 @@ def show(exhibit: Exhibit) -> None:
     path = write_replays(FOLDER / f"{exhibit.name}.html", replays)
     draw(exhibit)
     print(f"{path.name}: {path.stat().st_size / 1e3:.0f} kB")
+
+
+def renew(exhibit: Exhibit) -> None:
+    """Write the replay of an exhibit with the present page around its stored runs."""
+    path = FOLDER / f"{exhibit.name}.html"
+    write_replays(path, read_replays(path))
 
 
 def page() -> str:
@@ -225,12 +242,12 @@ def table_of_films() -> str:
     return "\n".join(f"| {' | '.join(cells)} |" for cells in lines) + "\n"
 
 
-def main(names: list[str]) -> None:
-    """Make the exhibits and films of these names, all if there is none; then the page, and the table in README.md."""
+def make(names: list[str]) -> None:
+    """Make the exhibits and films of these names, all if there is none."""
     unknown = {*names} - {one.name for one in (*EXHIBITS, *FILMS)}
     if unknown:
         known = ", ".join(one.name for one in (*EXHIBITS, *FILMS))
-        sys.exit(f"Expected names among {known}, got {', '.join(sorted(unknown))}.")
+        sys.exit(f"Expected names among {known}, or --pages, got {', '.join(sorted(unknown))}.")
     FOLDER.mkdir(exist_ok=True)
     for exhibit in EXHIBITS:
         if not names or exhibit.name in names:
@@ -238,6 +255,15 @@ def main(names: list[str]) -> None:
     for film in FILMS:
         if not names or film.name in names:
             shoot(film)
+
+
+def main(words: list[str]) -> None:
+    """Make what is asked for, or renew its pages; then write the page of the gallery, and the table in README.md."""
+    if words == ["--pages"]:
+        for exhibit in EXHIBITS:
+            renew(exhibit)
+    else:
+        make(words)
     (DOCS / "gallery.md").write_text(page(), encoding="utf-8")
     text = README.read_text(encoding="utf-8")
     README.write_text(_TABLE.sub(lambda found: found[1] + table_of_films() + found[2], text), encoding="utf-8")

@@ -56,6 +56,8 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("crw", "policy"),
     ),
     "sets": (("swarm-forage study list",), ()),
+    "smoke": (("swarm-forage study list --budget smoke",), ()),
+    "reduced": (("swarm-forage study list --budget reduced",), ()),
 }
 """Name -> commands, of which the last prints the table, and what its rows are called in blocks."""
 

@@ -29,7 +29,14 @@ from swarm_forage_env import read_study
 from swarm_forage_env.cli.study_page import command_of
 from swarm_forage_env.cli.study_verdict import scored_studies, waiting_lines
 from swarm_forage_env.study.studies import StudySpec
-from swarm_forage_env.study.study_file import budget_names, is_set_of_paper, load_study, set_names
+from swarm_forage_env.study.study_file import (
+    PAPER,
+    budget_names,
+    is_set_of_paper,
+    left_out_words,
+    load_study,
+    set_names,
+)
 from swarm_forage_env.study.study_run import DONE
 from swarm_forage_env.study.study_table import StudyTable
 
@@ -134,7 +141,8 @@ def what_ran(results: Results) -> str:
             (*where, f"{sum(done):,} of {plan_of(table).n_runs:,}", min(done), f"{table.spec.horizon_s:,.0f}", took)
         )
     known = [table.wall_time_s for table in results.tables if table.wall_time_s is not None]
-    total = f"\n\nAll runs together took {sum(known) / 3600.0:.1f} hours." if known else ""
+    total = f"\n\nAll runs together took {sum(known) / 3600.0:.1f} hours of one core.{what_the_rest_takes(results)}"
+    total = total if known else ""
     header = ("set", "about", "budget", "readings", "runs", "fewest per cell", "length, s", "hours")
     return (
         "## What was run\n\n"
@@ -142,6 +150,26 @@ def what_ran(results: Results) -> str:
         "Hours are those of one core by the clock, other work of the machine included; a dash where only a packed file "
         "was at hand, which does not keep them. Fewer than four runs of a cell decide nothing by intervals." + total
     )
+
+
+def what_the_rest_takes(results: Results) -> str:
+    """Return what whole sets take at the rate of these runs, in proportion to robots times ticks; "" if unknown."""
+    timed = [table for table in results.tables if table.wall_time_s]
+    done = sum(
+        state.n_runs[DONE] * table.spec.specs_of(state.cell)[0].robot_ticks
+        for table in timed
+        for state in table.cell_states()
+    )
+    if not done:
+        return ""
+    rate_h = sum(table.wall_time_s or 0.0 for table in timed) / done / 3600.0
+    budgets = dict.fromkeys((*(table.spec.budget for table in timed), PAPER))
+    ticks = {
+        budget: sum(load_study(name, budget).robot_ticks for name in set_names() if budget in budget_names(name))
+        for budget in budgets
+    }
+    words = " and ".join(f"{number(rate_h * n)} at budget `{budget}`" for budget, n in ticks.items() if n)
+    return f" In proportion to robots times ticks, all {len(set_names())} sets take {words}, in core-hours."
 
 
 def answers(results: Results) -> str:
@@ -162,7 +190,7 @@ def answers(results: Results) -> str:
         f"{rows(('reading', *ANSWERS, 'waiting for runs'), counts, right=range(1, 5))}\n\n"
         "An answer is by intervals of paired runs, our rule, with the measures corrected. In brackets stands the "
         "answer by the paper's rule, overlapping bands of two standard deviations, where it is another."
-        f"{_otherwise(results)}\n\n{rows(('claim', 'text', *results.readings), lines)}"
+        f"{_otherwise(results)}{_on_fewer_values(results)}\n\n{rows(('claim', 'text', *results.readings), lines)}"
     )
 
 
@@ -174,6 +202,13 @@ def _otherwise(results: Results) -> str:
     names = [name for name in CLAIMS if any(len(given.get((name, reading), ())) > 1 for reading in results.readings)]
     words = f"[those of the paper or its program]({DETAILS}#answers-that-hang-on-a-slip) give another answer"
     return f" With other forms of the measures, {words} to {', '.join(names)}." if names else ""
+
+
+def _on_fewer_values(results: Results) -> str:
+    """A sentence on the claims that are judged on fewer values than in the paper; empty if there are none."""
+    names = {name for table in results.tables if left_out_words(table.spec) for name in claims_of(table.spec.name)}
+    words = ", ".join(name for name in CLAIMS if name in names)
+    return f" Judged [on fewer values than the paper's](#what-is-left-out): {words}." if words else ""
 
 
 def _answer(verdict: Any) -> str:
@@ -371,19 +406,31 @@ def left_out(results: Results) -> str:
     for table, panels in zip(results.tables, results.scored, strict=True):
         missing = {f"{measure}, {variant}: {why}" for (measure, variant), why in panels.missing.items()}
         lines += [f"- {table.spec.name}, {words}" for words in sorted(missing)]
-    of_reduced = all(table.spec.budget == "reduced" for table in results.tables)
-    budget = (
-        "Budget `reduced` has fewer runs and values than the paper: [studies.md](studies.md#the-sets-of-the-paper); "
-        "search and rescue ends at 320 robots.\n\n"
-        if of_reduced
-        else ""
-    )
     commands = "\n".join(command_of(table) for table in results.tables)
     return (
-        f"## What is left out\n\n{budget}"
+        f"## What is left out\n\n{fewer_values(results)}"
         + ("\n".join(lines) or "Nothing waits.")
         + f"\n\n## To run it again\n\n```bash\n{commands}\nscripts/write_results results/studies/*_reduced\n```"
     )
+
+
+def fewer_values(results: Results) -> str:
+    """Return what these studies have less of than the paper's, and and the claims judged without it; "" if nothing."""
+    lines: list[tuple[str, ...]] = []
+    for table in results.tables:
+        spec = table.spec
+        n_paper = len(load_study(spec.name, PAPER).seeds) if is_set_of_paper(spec) else len(spec.seeds)
+        words = left_out_words(spec)
+        if words or len(spec.seeds) < n_paper:
+            runs = f"{len(spec.seeds)} of {n_paper}"
+            lines.append((f"`{spec.name}`", words or "-", runs, ", ".join(claims_of(spec.name)) if words else "-"))
+    header = ("set", "values of the paper that are left out", "runs of a cell", "claims judged without these values")
+    return f"Fewer runs and values than in the paper:\n\n{rows(header, lines)}\n\n" if lines else ""
+
+
+def claims_of(name: str) -> list[str]:
+    """Return the claims that a set has a figure of."""
+    return [claim.name for claim in CLAIMS.values() if any(panel[0].split()[0] == name for panel in claim.panels)]
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -11,7 +11,7 @@ from pettingzoo import ParallelEnv
 from swarm_forage_env._internal.fields import as_whole, instance, switch
 from swarm_forage_env.contract.calls import is_over, no_options
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, SwarmSpec
+from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, SwarmSpec, refused_action
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.arena import ForagingArena
@@ -263,6 +263,31 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             )
         return checked
 
+    def refuse_bad_step(self, actions: ActionArray, wheel_gain: FloatArray | None) -> None:
+        """Refuse what the arena would refuse, for wrappers, which have to know it before they do anything.
+
+        Args:
+            actions: (N, 3) as `checked_actions` returns them.
+            wheel_gain: As in `step_batch`.
+
+        Raises:
+            ActionError: a gain of the wrong shape, or an action or gain of an active robot that is not finite.
+        """
+        gain = self._checked_gain(wheel_gain)
+        if np.isfinite(actions).all() and (gain is None or np.isfinite(gain).all()):
+            return
+        gain = np.ones((len(actions), 2)) if gain is None else gain
+        bad = self.active & ~(np.isfinite(actions).all(axis=1) & np.isfinite(gain).all(axis=1))
+        if bad.any():
+            row = int(np.argmax(bad))
+            raise refused_action(row, actions[row], gain[row])
+
+    def _checked_gain(self, wheel_gain: FloatArray | None) -> FloatArray | None:
+        expected = (len(self._actions), 2)
+        if wheel_gain is not None and np.shape(wheel_gain) != expected:
+            raise ActionError(f"Expected wheel_gain with shape (n_robots, 2) = {expected}, got {np.shape(wheel_gain)}.")
+        return wheel_gain
+
     def step_batch(
         self,
         actions: ActionArray,
@@ -298,10 +323,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         (`world.rack`).
         """
         actions = self.checked_actions(actions)
-        if wheel_gain is not None and wheel_gain.shape != (len(actions), 2):
-            raise ActionError(
-                f"Expected wheel_gain with shape (n_robots, 2) = {(len(actions), 2)}, got {wheel_gain.shape}."
-            )
+        wheel_gain = self._checked_gain(wheel_gain)
         self._rewards.remember()
         return actions, wheel_gain
 

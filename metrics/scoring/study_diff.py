@@ -177,7 +177,7 @@ def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[st
     unknown = [name for name in columns if name not in first.frame.columns or name not in second.frame.columns]
     if unknown:
         raise CurveError(f"Expected columns that both studies have, got {unknown[0]!r}; see 'swarm-forage schema'.")
-    cells: list[tuple[Cell, int, list[tuple[Shift, _Sample]]]] = []
+    cells: list[_Compared] = []
     lacking: list[Lacking] = []
     places = first.spec.place_words(second.spec)
     for cell, place in places.items():
@@ -187,24 +187,25 @@ def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[st
             continue
         n_identical, is_same = _identical(cell, first, second)
         tests = [] if is_same else [_tested(cell, place, column, first, second) for column in columns]
-        cells.append((cell, n_identical, [test for test in tests if test is not None]))
+        found = [test for test in tests if test is not None]
+        cells.append(_Compared(cell=cell, n_identical=n_identical, is_same=is_same, tests=found))
     if not cells:
         raise CurveError("Expected two studies with finished runs of the same cells, got none that both have.")
     lines = _lines(cells, columns)
-    every = [*lines, *(shift for _, _, found in cells for shift, _ in found)]
+    every = [*lines, *(shift for one in cells for shift, _ in one.tests)]
     corrected = iter(holm(np.array([shift.p for shift in every])).tolist())
     lines = tuple(replace(line, p_holm=next(corrected)) for line in lines)
     return StudyDiff(
         cells=tuple(
             CellDiff(
-                cell=cell,
-                place=places[cell],
-                state=_state(shifts),
-                n_identical=n_identical,
+                cell=one.cell,
+                place=places[one.cell],
+                state=_state(shifts, is_same=one.is_same),
+                n_identical=one.n_identical,
                 shifts=shifts,
             )
-            for cell, n_identical, found in cells
-            for shifts in (tuple(replace(shift, p_holm=next(corrected)) for shift, _ in found),)
+            for one in cells
+            for shifts in (tuple(replace(shift, p_holm=next(corrected)) for shift, _ in one.tests),)
         ),
         lines=lines,
         lacking=tuple(lacking),
@@ -222,6 +223,18 @@ class _Sample:
     """Of the mean difference."""
     freedom: float
     """Degrees of freedom of the variance."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Compared:
+    """A cell of both studies with its tests, before the correction."""
+
+    cell: "Cell"
+    n_identical: int
+    is_same: bool
+    """Whether all runs on both sides are the same to the last bit."""
+    tests: list[tuple[Shift, _Sample]]
+    """Of the columns that the runs have; none if they are the same."""
 
 
 def _check_alike(first: "StudyTable", second: "StudyTable") -> None:
@@ -320,29 +333,28 @@ def _test(difference: float, variance: float, freedom: float, *, scale: float, n
     return 2.0 * float(stdtr(freedom, -abs(difference) / error)), float(stdtrit(freedom, _LEVEL)) * error
 
 
-def _lines(
-    cells: "Sequence[tuple[Cell, int, list[tuple[Shift, _Sample]]]]", columns: Sequence[str]
-) -> tuple[Shift, ...]:
-    """One test per reading, policy and column over all cells; identical ones count with a difference of 0."""
-    groups: dict[tuple[str, str], list[list[tuple[Shift, _Sample]]]] = {}
-    for cell, _, found in cells:
-        groups.setdefault((cell.reading, cell.policy), []).append(found)
+def _lines(cells: Sequence[_Compared], columns: Sequence[str]) -> tuple[Shift, ...]:
+    """One test per reading, policy and column over all cells that can be tested; identical ones count with 0."""
+    groups: dict[tuple[str, str], list[_Compared]] = {}
+    for one in cells:
+        groups.setdefault((one.cell.reading, one.cell.policy), []).append(one)
     lines = [
         line
         for place, together in groups.items()
         for column in columns
-        if (line := _line(place, column, [t for found in together for t in found if t[0].column == column], together))
-        is not None
+        if (line := _line(place, column, together)) is not None
     ]
     return tuple(lines)
 
 
-def _line(
-    place: tuple[str, str], column: str, found: Sequence[tuple[Shift, _Sample]], together: Sequence[object]
-) -> Shift | None:
-    """The mean over cells of the difference, in shares of each cell's mean; None where no cell can be tested."""
+def _line(place: tuple[str, str], column: str, together: Sequence[_Compared]) -> Shift | None:
+    """The mean over cells of the difference, in shares of each cell's mean; None where no cell can be tested.
+
+    Cells that nobody can test, those of one run or of mean 0, say nothing and are left out.
+    """
+    found = [test for one in together for test in one.tests if test[0].column == column]
     usable = [(shift, sample) for shift, sample in found if sample.variance >= 0.0 and sample.scale > 0.0]
-    n_cells = len(together)
+    n_cells = len(usable) + sum(one.is_same for one in together)
     if not usable or n_cells < 2:
         return None
     difference = sum(shift.difference / sample.scale for shift, sample in usable) / n_cells
@@ -366,8 +378,8 @@ def _line(
     )
 
 
-def _state(shifts: tuple[Shift, ...]) -> State:
-    if not shifts:
+def _state(shifts: tuple[Shift, ...], *, is_same: bool) -> State:
+    if is_same:
         return "identical"
     if all(math.isnan(shift.p) for shift in shifts):
         return "open"

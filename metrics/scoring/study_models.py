@@ -12,7 +12,7 @@ import numpy as np
 
 from metrics.checks import CurveError
 from metrics.curves import FloatArray
-from metrics.foraging_model import estimate_rates, mean_field
+from metrics.foraging_model import ForagingRates, estimate_rates, mean_field
 from metrics.ladder import Ladder, fit_ladder
 from metrics.queues import PopulationComparison, compare_population
 from metrics.statistics import aggregate
@@ -32,6 +32,8 @@ DRAWN_LAWS = ("linear", "contention", "universal", "hamann")
 MEAN_FIELD = "mean field"
 LEAST_DELIVERED = 50.0
 """Objects that the runs of the small swarm delivered together: enough for rates within 15 % (our choice)."""
+FORAGING_COLUMNS = ("free_pickups", "collected", "n_carrying", "interference_fraction")
+"""Recorded columns from which the rates of the mean-field model are estimated."""
 MIN_SIZES, MIN_RUNS = 4, 2
 """What a ladder of laws takes at least."""
 _SEED = 1
@@ -183,7 +185,7 @@ def _law_panel(table: "StudyTable", line: StudyLine) -> ModelPanel | None:
         upper=np.array([mean.upper for mean in means]) / n,
     )
     laws = [Curve(name=name, x=at, y=ladder.laws[name].law.performance(at) / at) for name in DRAWN_LAWS]
-    continued, knows = _mean_field(table, line, sizes)
+    continued, knows = _mean_field(foraging_runs(table, line), sizes)
     return ModelPanel(
         place=_place(line),
         words=_words(line),
@@ -217,50 +219,96 @@ def _law_rows(ladder: Ladder) -> Iterator[dict[str, Any]]:
     }
 
 
-def _mean_field(
-    table: "StudyTable", line: StudyLine, sizes: list[int]
-) -> tuple[tuple[Curve, ...], tuple[dict[str, Any], ...]]:
-    """What small swarms promise larger ones; nothing where the model does not hold.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ForagingRuns:
+    """Runs of several swarm sizes in one world that the mean-field model holds for."""
 
-    That is with caches, in arenas that grow, for another performance than deliveries, and for mixed swarms.
-    """
-    worlds = [table.spec.specs_of(cell)[0].scenario for cell in line.cells]
-    arenas = {(world.arena.width_m, world.arena.height_m) for world in worlds}
-    if any(world.performance != "collected" for world in worlds) or line.policy.startswith("mixed:"):
-        return (), ()
-    if len(arenas) > 1 or any(world.caches != "none" for world in worlds) or 1 not in sizes:
-        return (), ()
-    found: dict[int, tuple[RunCurves, dict[str, FloatArray]]] = {}
-    columns = ("free_pickups", "collected", "n_carrying", "interference_fraction")
-    for cell, runs in zip(line.cells, line.curves.experiments, strict=True):
-        found[runs.n_robots] = (runs, table.curves(cell, *columns)[1])
-    small = next(
-        (
-            size
-            for size in sizes
-            if size > 1
-            and set(columns) <= found[size][1].keys()
-            and found[size][1]["collected"].sum() >= LEAST_DELIVERED
-        ),
-        None,
-    )
-    if small is None or "interference_fraction" not in found[1][1]:
-        return (), ()
-    mine, alone = found[small][1], found[1][1]["interference_fraction"]
-    try:
-        rates = estimate_rates(
-            small,
+    columns: Mapping[int, Mapping[str, FloatArray]]
+    """Swarm size -> what is recorded of its runs, each (R, T), of `FORAGING_COLUMNS`."""
+    interval_s: float
+    horizon_s: float
+    n_objects: int
+
+    @property
+    def small(self) -> int | None:
+        """The smallest swarm of several robots whose runs delivered enough for its rates; None if none did."""
+        enough = (
+            size for size, runs in self.columns.items() if size > 1 and runs["collected"].sum() >= LEAST_DELIVERED
+        )
+        return min(enough, default=None)
+
+    def rates(self, size: int, rng: np.random.Generator | None = None) -> ForagingRates:
+        """Return the rates of swarms of one size; robots alone show how many encounters are with walls.
+
+        Args:
+            size: One that was run.
+            rng: Draws the runs anew; default each run once.
+
+        Raises:
+            CurveError: robots that never search, or always avoid, have none.
+        """
+        mine, alone = (self._drawn(n, rng) for n in (size, 1))
+        return estimate_rates(
+            size,
             pickups=mine["free_pickups"],
             deliveries=mine["collected"],
             n_carrying=mine["n_carrying"],
             interference=mine["interference_fraction"],
-            interval_s=table.spec.interval_s,
-            n_objects=worlds[0].objects.n_objects,
-            lone_interference=alone,
+            interval_s=self.interval_s,
+            n_objects=self.n_objects,
+            lone_interference=alone["interference_fraction"],
         )
+
+    def _drawn(self, size: int, rng: np.random.Generator | None) -> Mapping[str, FloatArray]:
+        runs = self.columns[size]
+        if rng is None:
+            return runs
+        n_runs = len(runs["collected"])
+        drawn = rng.integers(n_runs, size=n_runs)
+        return {name: values[drawn] for name, values in runs.items()}
+
+    def predicted(self, rates: ForagingRates, sizes: Sequence[int]) -> FloatArray:
+        """Return objects delivered and the mean share of time lost of such robots, (S, 2)."""
+        solved = [mean_field(rates, size, self.horizon_s) for size in sizes]
+        return np.array([(each.delivered[-1], each.interference.mean()) for each in solved])
+
+
+def foraging_runs(table: "StudyTable", line: StudyLine) -> ForagingRuns | None:
+    """Return the runs of a line over swarm sizes for the mean-field model; None where the model does not hold.
+
+    That is with caches, in arenas that grow, for another performance than deliveries, for mixed swarms, and without
+    runs of one robot.
+    """
+    worlds = [table.spec.specs_of(cell)[0].scenario for cell in line.cells]
+    arenas = {(world.arena.width_m, world.arena.height_m) for world in worlds}
+    if any(world.performance != "collected" for world in worlds) or line.policy.startswith("mixed:"):
+        return None
+    if len(arenas) > 1 or any(world.caches != "none" for world in worlds):
+        return None
+    columns: dict[int, Mapping[str, FloatArray]] = {}
+    for cell, runs in zip(line.cells, line.curves.experiments, strict=True):
+        found = table.curves(cell, *FORAGING_COLUMNS)[1]
+        if found.keys() >= {*FORAGING_COLUMNS} and len(found["collected"]):
+            columns[runs.n_robots] = found
+    if 1 not in columns:
+        return None
+    return ForagingRuns(
+        columns=columns,
+        interval_s=table.spec.interval_s,
+        horizon_s=table.spec.horizon_s,
+        n_objects=worlds[0].objects.n_objects,
+    )
+
+
+def _mean_field(runs: ForagingRuns | None, sizes: list[int]) -> tuple[tuple[Curve, ...], tuple[dict[str, Any], ...]]:
+    """What small swarms promise larger ones; nothing where the model does not hold, or the runs give no rates."""
+    small = None if runs is None else runs.small
+    if runs is None or small is None:
+        return (), ()
+    try:
+        rates = runs.rates(small)
     except CurveError:  # robots that never search, or always avoid: no rates
         return (), ()
-    delivered = [float(mean_field(rates, size, table.spec.horizon_s).delivered[-1]) / size for size in sizes]
     values = {
         "finding": rates.finding,
         "homing_s": rates.homing_s,
@@ -269,8 +317,8 @@ def _mean_field(
     }
     facts = [{"model": MEAN_FIELD, "parameter": name, "value": value} for name, value in values.items()]
     facts.append({"model": MEAN_FIELD, "parameter": "robots that it knows", "value": float(small)})
-    curve = Curve(name=MEAN_FIELD, x=np.array(sizes, dtype=np.float64), y=np.array(delivered))
-    return (curve,), tuple(facts)
+    n = np.array(sizes, dtype=np.float64)
+    return (Curve(name=MEAN_FIELD, x=n, y=runs.predicted(rates, sizes)[:, 0] / n),), tuple(facts)
 
 
 def _population_panels(lines: Sequence[StudyLine]) -> list[ModelPanel]:

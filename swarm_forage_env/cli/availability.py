@@ -27,6 +27,7 @@ def availability(
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.cli.scenario_options import split_numbers
     from swarm_forage_env.cli.terminal import notes, output
+    from swarm_forage_env.cli.theory import availability_figure, draw_theory
 
     sizes = split_numbers("--robots", robots, int)
     means = split_numbers("--teams", teams, float)
@@ -39,19 +40,17 @@ def availability(
             for n in sizes
             for team, curve in zip(means, availability_curves(n, means, demands).tolist(), strict=True)
         ]
-        curves = {} if out is None else {n: availability_curves(n, means) for n in sizes}
+        figure = None if out is None else availability_figure(sizes, means)
     except ValueError as error:  # a size or a team that cannot be
         raise ConfigError(str(error)) from error
     if as_json:
         typer.echo(json.dumps({"curves": rows, "picture": None if out is None else str(out)}))
     else:
         output().print(_table(rows, demands))
-    if out is not None:
-        from swarm_forage_env.rendering.plots import draw_availability
-
+    if out is not None and figure is not None:
         out.parent.mkdir(parents=True, exist_ok=True)
         try:
-            draw_availability(out, curves, means)
+            draw_theory(figure, [out])
         except ImportError as error:
             raise ImportError(NO_PICTURE) from error
         notes().print(f"picture {out}")

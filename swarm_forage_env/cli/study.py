@@ -32,12 +32,14 @@ study = typer.Typer(
 
 
 @study.command("list")
-def list_studies() -> None:
-    """List the experiment sets of the paper, with what they take at its budget."""
+def list_studies(
+    budget: Annotated[str, typer.Option("--budget", help="smoke, reduced or paper.")] = "paper",
+) -> None:
+    """List the experiment sets of the paper: what they take, and what a budget leaves out."""
     from swarm_forage_env.cli.study_report import table_of_sets
     from swarm_forage_env.cli.terminal import output
 
-    output().print(table_of_sets())
+    output().print(table_of_sets(budget))
 
 
 @study.command()
@@ -60,11 +62,13 @@ def run(  # long: one parameter per option
     reading: Reading = "file",
     shard: Annotated[str, typer.Option("--shard", metavar="I/N", help="Only the I-th of N equal parts.")] = "1/1",
     workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Processes, or jobs of slurm; default one per core.")
+        int | None, typer.Option("--workers", min=1, help="Processes, or jobs of slurm-jobs; default one per core.")
     ] = None,
     cluster: Annotated[
         str | None,
-        typer.Option("--cluster", help="Run by Dask: local, slurm, or the address of a scheduler (docs/studies.md)."),
+        typer.Option(
+            "--cluster", help="Run by Dask: local, slurm, slurm-jobs, or the address of a scheduler (docs/studies.md)."
+        ),
     ] = None,
     dry_run: DryRun = False,
 ) -> None:

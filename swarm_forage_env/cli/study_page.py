@@ -1,5 +1,6 @@
 """The command `study report`: studies, their figures and the claims about them as one page."""
 
+import math
 import tempfile
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -9,20 +10,27 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, get_args
 import typer
 
 from swarm_forage_env._internal.extras import install_command
-from swarm_forage_env.cli.study_verdict import Places, scored_studies, waiting_lines
+from swarm_forage_env.cli.study_verdict import Places, scored_studies
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     import polars as pl
 
-    from metrics.claims import Claim
+    from metrics.claims import Claim, Verdict
     from metrics.scoring.figure_panels import StudyPanels
     from metrics.scoring.study_models import ModelFigure
     from metrics.scoring.study_plots import StudyFigure
     from metrics.scoring.verdicts import Judged, Waiting
     from swarm_forage_env.study.study_table import StudyTable
 
+WAITS = "waits"
+"""What stands in place of an answer for which runs are missing."""
+FORMS = {
+    "paper": "The same, measured as printed in the paper",
+    "sierra": "The same, measured as in the authors' program",
+}
+"""Variant of a measure -> the words above its picture."""
 NO_REPORT = f"No report without matplotlib and Jinja2: {install_command('plots')}."
 
 
@@ -89,13 +97,18 @@ def page_of(tables: "Sequence[StudyTable]", scored: "Sequence[StudyPanels]", ver
     names = sorted({name for table in tables for made in table.versions for name in made})
     answers = get_args(Answer)
     counts = Counter((one.reading, one.variant, one.verdict.answer) for one in judged)
+    waits = Counter((one.reading, one.variant, WAITS) for one in waiting)
     return build_report(
         {
             "title": f"Swarm foraging: {', '.join(table.spec.name for table in tables)}",
-            "answers": answers,
+            "answers": (*answers, WAITS),
             "columns": [{"reading": reading, "variant": variant} for reading, variant in columns],
             "counts": [
-                {"reading": reading, "variant": variant, "counts": [counts[reading, variant, word] for word in answers]}
+                {
+                    "reading": reading,
+                    "variant": variant,
+                    "counts": [(counts + waits)[reading, variant, word] for word in (*answers, WAITS)],
+                }
                 for reading, variant in columns
             ],
             "claims": _claim_rows(CLAIMS, columns, judged, waiting),
@@ -106,10 +119,10 @@ def page_of(tables: "Sequence[StudyTable]", scored: "Sequence[StudyPanels]", ver
                 expected,
                 expected_later,
             ),
-            "waiting": [line.strip() for line in waiting_lines((*waiting, *expected_later))[1:]],
             "studies": [
                 _study(table, panels, judged, waiting, band) for table, panels in zip(tables, scored, strict=True)
             ],
+            "theory": _theory(tables, judged),
             "cost": [_cost(table) for table in tables],
             "version_names": names,
             "versions": [
@@ -128,23 +141,46 @@ def _claim_rows(
     judged: "Sequence[Judged]",
     waiting: "Sequence[Waiting]",
 ) -> list[dict[str, Any]]:
-    """Return one row per claim that is answered somewhere, with a cell per column."""
+    """Return one row per claim, with a cell per column, and what stands behind its answers."""
+    if not columns:
+        return []
     found = {(one.claim.name, one.reading, one.variant): one.verdict for one in judged}
-    waits = {(one.claim.name, one.reading, one.variant) for one in waiting}
+    waits = {(one.claim.name, one.reading, one.variant): one for one in waiting}
     rows: list[dict[str, Any]] = []
-    for name in (name for name in claims if name in {one.claim.name for one in judged}):
-        formula = found.get((name, "", "corrected"))
+    for name, claim in claims.items():
         cells: list[dict[str, Any]] = []
-        for column in columns if formula is None else [("", "corrected")]:
-            verdict = found.get((name, *column))
-            span = 1 if formula is None else len(columns)
-            if verdict is None:
-                why = "waits" if (name, *column) in waits else "no such form"
-                cells.append({"answer": "", "by_bands": "", "why": why, "span": span})
-            else:
+        behind: list[dict[str, Any]] = []
+        of_formula = not claim.panels
+        for column in [("", "corrected")] if of_formula else columns:
+            span = len(columns) if of_formula else 1
+            where = "formula" if of_formula else ", ".join(column)
+            verdict, later = found.get((name, *column)), waits.get((name, *column))
+            if verdict is not None:
                 cells.append({"answer": verdict.answer, "by_bands": verdict.by_bands, "why": "", "span": span})
-        rows.append({"name": name, "text": claims[name].text, "where": claims[name].figure, "cells": cells})
+                behind.append({"where": where, **_numbers_of(verdict)})
+            else:
+                why = "no such form" if later is None else WAITS
+                cells.append({"answer": "", "by_bands": "", "why": why, "span": span})
+                if later is not None:
+                    behind.append({"where": where, "answer": "", "words": f"waits for {lacking(later)}"})
+        rows.append({"name": name, "text": claim.text, "where": claim.figure, "cells": cells, "behind": behind})
     return rows
+
+
+def _numbers_of(verdict: "Verdict") -> dict[str, str]:
+    """Return what stands behind an answer, as texts."""
+    from metrics.scoring.texts import counted, number, percent
+
+    numbers = [f"by bands {verdict.by_bands}", f"statistic {number(verdict.statistic)}"]
+    numbers += [f"effect {percent(verdict.effect)}"] if math.isfinite(verdict.effect) else []
+    numbers += [counted(verdict.n_runs, "run")] if verdict.n_runs else []
+    return {"answer": verdict.answer, "words": f"{', '.join(numbers)}: {verdict.why}"}
+
+
+def lacking(waits: "Waiting") -> str:
+    """Return what a claim waits for, in words, and why that is missing where its study is there."""
+    names = ", ".join(" ".join(name).replace("_", " ") for name in waits.lacks)
+    return f"{names} ({'; '.join(waits.reasons)})" if waits.reasons else names
 
 
 def _study(
@@ -156,14 +192,25 @@ def _study(
     from swarm_forage_env.cli.study_report import described, status_report
     from swarm_forage_env.cli.terminal import notes
 
-    figures = [figure for figure in study_figures(panels) if figure.panels[0].variant == "corrected"]
+    others: dict[tuple[str, str], list[StudyFigure]] = {}
+    figures: list[StudyFigure] = []
+    for figure in study_figures(panels):
+        first = figure.panels[0]
+        if first.variant == "corrected":
+            figures.append(figure)
+        else:
+            others.setdefault((first.reading, first.measure), []).append(figure)
     notes().print(f"fitting models to {table.spec.name}")
     return {
+        "snapshot": _snapshot(table),
         "name": table.spec.name,
         "anchor": f"study-{table.spec.study_id}",
         "title": table.spec.title,
         "state": status_report(table).splitlines()[0],
-        "figures": [_figure(figure, judged, waiting, band) for figure in figures],
+        "figures": [
+            _figure(figure, others.get((figure.panels[0].reading, figure.panels[0].measure), ()), judged, waiting, band)
+            for figure in figures
+        ],
         "models": [_model(figure) for figure in model_figures(table)],
         "cells": _numbers(cell_distributions(table)),
         "missing": [
@@ -174,55 +221,103 @@ def _study(
 
 
 def _figure(
-    figure: "StudyFigure", judged: "Sequence[Judged]", waiting: "Sequence[Waiting]", band: str
+    figure: "StudyFigure",
+    others: "Sequence[StudyFigure]",
+    judged: "Sequence[Judged]",
+    waiting: "Sequence[Waiting]",
+    band: str,
 ) -> dict[str, Any]:
+    """Return a figure, and below it those of the measure's other forms, if claims are judged by them."""
     from metrics.scoring.policy_pairs import policy_pairs
-    from swarm_forage_env.cli.study_plot import written
+    from swarm_forage_env.cli.study_plot import drawn_by
+
+    def drawn(one: "StudyFigure") -> list[dict[str, str]]:
+        draws = drawn_by(one, band).values()
+        return [
+            _picture(f"{one.title}, {kind}", draw) for kind, draw in zip(("curves", "heat maps"), draws, strict=False)
+        ]
 
     frame = figure.to_frame()
+    claims = _claims_about(figure, judged, waiting)
     return {
         "title": figure.title,
-        "pictures": _pictures(figure.title, lambda folder: written(figure, folder, band), ("curves", "heat maps")),
-        "claims": _claims_about(figure, judged, waiting),
+        "pictures": drawn(figure),
+        "others": [{"words": FORMS[one.panels[0].variant], "pictures": drawn(one)} for one in others] if claims else [],
+        "claims": claims,
         "numbers": _numbers(frame.select([name for name in frame.columns if not name.startswith("seed_")])),
         "pairs": _numbers(policy_pairs(figure.panels)),
     }
 
 
 def _model(figure: "ModelFigure") -> dict[str, Any]:
-    from swarm_forage_env.cli.study_plot import models_written
+    from metrics.scoring.model_plots import draw_models
 
     return {
         "title": figure.title,
-        "pictures": _pictures(figure.title, lambda folder: models_written(figure, folder), ("runs and models",)),
+        "pictures": [_picture(f"{figure.title}, runs and models", lambda paths: draw_models(figure, paths))],
         "facts": _numbers(figure.facts()),
     }
+
+
+def _theory(tables: "Sequence[StudyTable]", judged: "Sequence[Judged]") -> list[dict[str, Any]]:
+    """Return the figures that need no runs, all of them where claims are judged, with the claims about formulas."""
+    from swarm_forage_env.cli.theory import draw_theory, theory_figures, theory_of
+
+    figures = theory_figures() if judged else [figure for table in tables for figure in theory_of(table.spec)]
+    formulas = [one for one in judged if not one.claim.panels]
+    return [
+        {
+            "title": figure.title,
+            "pictures": [_picture(figure.title, lambda paths, it=figure: draw_theory(it, paths))],
+            "claims": [
+                {
+                    "name": one.claim.name,
+                    "text": one.claim.text,
+                    "found": [{"where": "formula", **_numbers_of(one.verdict)}],
+                }
+                for one in formulas
+                if figure.kind == "availability"
+            ],
+            "numbers": _numbers(figure.numbers),
+        }
+        for figure in {figure.title: figure for figure in figures}.values()
+    ]
 
 
 def _numbers(frame: "pl.DataFrame") -> dict[str, Any]:
     """Return a table as the page shows it; the heading already tells the reading where there is one of them."""
     if not len(frame):
         return {"header": [], "rows": []}
-    shown = frame.drop("reading") if frame["reading"].n_unique() < 2 else frame
+    is_one = "reading" in frame.columns and frame["reading"].n_unique() < 2
+    shown = frame.drop("reading") if is_one else frame
     return {"header": [name.replace("_", " ") for name in shown.columns], "rows": shown.rows()}
 
 
-def _pictures(title: str, write: "Callable[[Path], list[Path]]", kinds: Sequence[str]) -> list[dict[str, str]]:
+def _snapshot(table: "StudyTable") -> dict[str, str]:
+    from swarm_forage_env.cli.study_plot import snapshot_written
     from swarm_forage_env.rendering.report import picture_address
 
     with tempfile.TemporaryDirectory() as folder:
-        files = [file for file in write(Path(folder)) if file.suffix == ".svg"]
-        return [
-            {"address": picture_address(file.read_bytes()), "words": f"{title}, {kind}"}
-            for file, kind in zip(files, kinds, strict=False)
-        ]
+        file = snapshot_written(table.spec, Path(folder, "snapshot.png"))
+        words = f"{table.spec.name}: the arena when a run begins"
+        return {"address": picture_address(file.read_bytes(), "image/png"), "words": words}
+
+
+def _picture(words: str, draw: "Callable[[Sequence[Path]], None]") -> dict[str, str]:
+    """Return a picture as the page holds it; only SVG is drawn."""
+    from swarm_forage_env.rendering.report import picture_address
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "picture.svg")
+        draw([file])
+        return {"address": picture_address(file.read_bytes()), "words": words}
 
 
 def _claims_about(
     figure: "StudyFigure", judged: "Sequence[Judged]", waiting: "Sequence[Waiting]"
 ) -> list[dict[str, Any]]:
     """Return the claims that use a panel of the figure, with what was found under its reading."""
-    from metrics.scoring.texts import counted, percent
+    from metrics.scoring.verdicts import Waiting
 
     here = {(panel.experiment, panel.measure) for panel in figure.panels}
     reading = figure.panels[0].reading
@@ -231,14 +326,12 @@ def _claims_about(
         if one.reading != reading or here.isdisjoint(one.claim.panels):
             continue
         entry = found.setdefault(one.claim.name, {"name": one.claim.name, "text": one.claim.text, "found": []})
-        verdict = getattr(one, "verdict", None)
-        if verdict is None:
-            lacks = ", ".join(" ".join(name).replace("_", " ") for name in getattr(one, "lacks", ()))
-            entry["found"].append({"answer": "", "words": f"{one.variant}: waits for {lacks}"})
-            continue
-        words = f"{one.variant}; by bands {verdict.by_bands}; effect {percent(verdict.effect)}; "
-        words += f"{counted(verdict.n_runs, 'run')}; {verdict.why}"
-        entry["found"].append({"answer": verdict.answer, "words": words})
+        told = (
+            {"answer": "", "words": f"waits for {lacking(one)}"}
+            if isinstance(one, Waiting)
+            else _numbers_of(one.verdict)
+        )
+        entry["found"].append({**told, "where": one.variant})
     return list(found.values())
 
 

@@ -1,16 +1,24 @@
 """The command `study plot`: the figures of a study, each with the numbers behind it."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
 from swarm_forage_env.cli.options import NO_PICTURE, Variants
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    import polars as pl
+
     from metrics.scoring.figure_panels import StudyPanels
     from metrics.scoring.study_models import ModelFigure
     from metrics.scoring.study_plots import StudyFigure
+    from swarm_forage_env.cli.theory import TheoryFigure
+    from swarm_forage_env.study.studies import StudySpec
+
+    Draw: TypeAlias = Callable[[Sequence[Path]], None]
 
 FORMATS = (".svg", ".png")
 
@@ -25,14 +33,17 @@ def plot(
 ) -> None:
     """Draw the figures of a study as SVG, PNG and tables in CSV: each measure over what is varied, and models.
 
-    Models are laws and a mean field where swarm sizes vary, the queue where robots leave and come. NAME_cells.csv has
-    how runs of each cell spread and how many broke down, ..._pairs.csv which policy is better how often.
+    Models are laws and a mean field where swarm sizes vary, the queue where robots leave and come. theory_... has what
+    follows without runs: availability curves, and sketches of the measures. NAME_snapshot.png is the arena when a run
+    begins. NAME_cells.csv has how runs of each cell spread and how many broke down, ..._pairs.csv which policy is
+    better how often.
     """
     from metrics.scoring.cell_distributions import cell_distributions
     from metrics.scoring.figure_panels import study_panels
     from metrics.scoring.study_models import model_figures
     from swarm_forage_env._internal.fields import known_name
     from swarm_forage_env.cli.score_options import score_forms
+    from swarm_forage_env.cli.theory import theory_of
     from swarm_forage_env.study.study_table import read_study
 
     known_name("band", band, ("ci", "sd"))
@@ -47,6 +58,10 @@ def plot(
     for model in model_figures(table):
         for file in models_written(model, folder):
             typer.echo(file)
+    for sketch in theory_of(table.spec):
+        for file in theory_written(sketch, folder):
+            typer.echo(file)
+    typer.echo(snapshot_written(table.spec, folder / f"{table.spec.name}_snapshot.png"))
     cells = folder / f"{table.spec.name}_cells.csv"
     cell_distributions(table).write_csv(cells)
     typer.echo(cells)
@@ -80,28 +95,25 @@ def written(figure: "StudyFigure", folder: Path, band: Any) -> list[Path]:
         ImportError: matplotlib is not installed.
     """
     from metrics.scoring.policy_pairs import policy_pairs
-    from metrics.scoring.study_plots import draw_figure, draw_map
 
-    folder.mkdir(parents=True, exist_ok=True)
-    names = [figure.name, f"{figure.name}_map"] if figure.has_map else [figure.name]
     files: list[Path] = []
-    for name in names:
-        pictures = [folder / f"{name}{suffix}" for suffix in FORMATS]
-        try:
-            if name == figure.name:
-                draw_figure(figure, pictures, band=band)
-            else:
-                draw_map(figure, pictures)
-        except ImportError as error:
-            raise ImportError(NO_PICTURE) from error
-        numbers = folder / f"{name}.csv"
-        figure.to_frame().write_csv(numbers)
-        files += [*pictures, numbers]
+    for name, draw in drawn_by(figure, band).items():
+        files += _written(name, folder, draw, {f"{name}.csv": figure.to_frame()})
     pairs = policy_pairs(figure.panels)
     if len(pairs):
         files.append(folder / f"{figure.name}_pairs.csv")
         pairs.write_csv(files[-1])
     return files
+
+
+def drawn_by(figure: "StudyFigure", band: Any) -> "dict[str, Draw]":
+    """Return name -> what draws it, of the curves of a figure and of its heat maps, if it has them."""
+    from metrics.scoring.study_plots import draw_figure, draw_map
+
+    draws: dict[str, Draw] = {figure.name: lambda paths: draw_figure(figure, paths, band=band)}
+    if figure.has_map:
+        draws[f"{figure.name}_map"] = lambda paths: draw_map(figure, paths)
+    return draws
 
 
 def models_written(figure: "ModelFigure", folder: Path) -> list[Path]:
@@ -112,13 +124,44 @@ def models_written(figure: "ModelFigure", folder: Path) -> list[Path]:
     """
     from metrics.scoring.model_plots import draw_models
 
+    tables = {f"{figure.name}.csv": figure.to_frame(), f"{figure.name}_facts.csv": figure.facts()}
+    return _written(figure.name, folder, lambda paths: draw_models(figure, paths), tables)
+
+
+def theory_written(figure: "TheoryFigure", folder: Path) -> list[Path]:
+    """Draw a figure of theory into a folder, and write its numbers beside it; returns the files.
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    from swarm_forage_env.cli.theory import draw_theory
+
+    tables = {f"{figure.name}.csv": figure.numbers}
+    return _written(figure.name, folder, lambda paths: draw_theory(figure, paths), tables)
+
+
+def snapshot_written(spec: "StudySpec", file: Path) -> Path:
+    """Draw the arena of a study, as it is when a run begins, into a picture file; returns the file.
+
+    Raises:
+        ImportError: Pillow is not installed.
+    """
+    from swarm_forage_env.study.snapshot import snapshot
+
+    picture = snapshot(spec)
+    from PIL import Image  # after the frame, which says what to install without it
+
+    Image.fromarray(picture).save(file, optimize=True)
+    return file
+
+
+def _written(name: str, folder: Path, draw: "Draw", tables: "Mapping[str, pl.DataFrame]") -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
-    pictures = [folder / f"{figure.name}{suffix}" for suffix in FORMATS]
+    pictures = [folder / f"{name}{suffix}" for suffix in FORMATS]
     try:
-        draw_models(figure, pictures)
+        draw(pictures)
     except ImportError as error:
         raise ImportError(NO_PICTURE) from error
-    tables = {f"{figure.name}.csv": figure.to_frame(), f"{figure.name}_facts.csv": figure.facts()}
-    for name, frame in tables.items():
-        frame.write_csv(folder / name)
-    return [*pictures, *(folder / name for name in tables)]
+    for file, frame in tables.items():
+        frame.write_csv(folder / file)
+    return [*pictures, *(folder / file for file in tables)]

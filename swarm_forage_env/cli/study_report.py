@@ -11,7 +11,7 @@ from swarm_forage_env.study.calibration import calibrate, kind_of
 from swarm_forage_env.study.progress import duration
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.studies import StudySpec, value_words
-from swarm_forage_env.study.study_file import PAPER, load_study, set_names
+from swarm_forage_env.study.study_file import PAPER, left_out_words, load_study, set_names
 from swarm_forage_env.study.study_run import DONE, FAILED, MISSING, STATES, StudyFolder, StudyState, shard
 from swarm_forage_env.study.study_table import StudyTable
 
@@ -19,24 +19,33 @@ FAILURES_SHOWN = 10
 """Failed runs that are named; the packed file and `--json` have all."""
 
 
-def table_of_sets() -> Table:
-    """Return the sets of the paper with what they take, for one of the two readings."""
+def table_of_sets(budget: str = PAPER) -> Table:
+    """Return the sets of the paper with what they take at a budget, for one of the two readings.
+
+    Of another budget than the paper's it also has how many runs each cell has, how long they are, and which of the
+    paper's values are left out.
+    """
     table = Table(
-        title="experiment sets of the paper",
-        caption="of four controllers at budget paper, for each of the two readings",
+        title=f"experiment sets of the paper{'' if budget == PAPER else f', budget {budget}'}",
+        caption=f"of four controllers at budget {budget}, for each of the two readings",
     )
-    for name in ("set", "about"):
-        table.add_column(name)
+    table.add_column("set")
+    table.add_column("about" if budget == PAPER else "left out")
+    for name in () if budget == PAPER else ("runs of a cell", "length, s"):
+        table.add_column(name, justify="right")
     for name in ("experiments", "runs", "robot-ticks"):
         table.add_column(name, justify="right")
     totals = [0, 0, 0]
     for name in set_names():
-        spec = load_study(name, PAPER, readings=("described",))
+        spec = load_study(name, budget, readings=("described",))
         numbers = [spec.n_experiments, spec.n_runs, spec.robot_ticks]
         totals = [total + number for total, number in zip(totals, numbers, strict=True)]
-        table.add_row(spec.name, spec.title, *_numbers(numbers))
+        words = (spec.title,)
+        if budget != PAPER:
+            words = (left_out_words(spec), str(len(spec.seeds)), f"{spec.horizon_s:,g}")
+        table.add_row(spec.name, *words, *_numbers(numbers))
     table.add_section()
-    table.add_row("all", "", *_numbers(totals))
+    table.add_row("all", *[""] * (1 if budget == PAPER else 3), *_numbers(totals))
     return table
 
 
@@ -58,6 +67,8 @@ def described(spec: StudySpec) -> str:
         ("runs", f"{spec.n_runs:,} in {counted(len(spec.cells), 'cell')}, {spec.robot_ticks:.3g} robot-ticks"),
         ("identity", spec.study_id),
     ]
+    absent = left_out_words(spec)
+    rows += [("left out", f"of the paper's values: {absent}")] if absent else []
     return "\n".join(f"{name:<10}{words}" for name, words in rows)
 
 

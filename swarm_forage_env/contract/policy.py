@@ -4,6 +4,7 @@ A policy, scripted or trained, sees observations and never the state of the worl
 `Quirks`, and the tools `compiling`, `rng` and `spelling`, and nothing else of `swarm_forage_env`.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -20,6 +21,14 @@ from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, WHEEL_SCALE_MP
 
 class ActionError(ValueError):
     """Actions of the wrong shape, or not finite."""
+
+
+def refused_action(row: int, action: ActionArray, gain: FloatArray) -> ActionError:
+    """Return the error about a robot whose action (3,) or wheel gain (2,) is not finite."""
+    return ActionError(
+        f"Expected finite actions and wheel gains, got {action.tolist()} and {gain.tolist()} for robot_{row}; the "
+        "world was not stepped."
+    )
 
 
 def refused_tasks(tasks: CodeArray, n_robots: int) -> ValueError:
@@ -130,6 +139,23 @@ class RobotStates(NamedTuple):
     """(N,) number of things that a robot remembers, None for robots without memory."""
 
 
+class RememberedPlaces(NamedTuple):
+    """Where one robot remembers things, for people; see `Policy`."""
+
+    objects_m: FloatArray
+    """(K, 2) m, middles of the cells of remembered objects."""
+    caches_m: FloatArray
+    """(C, 2) m, middles of remembered caches."""
+
+    @classmethod
+    def of_cells(cls, objects: Iterable[tuple[int, int]], caches: Iterable[tuple[int, int]] = ()) -> "RememberedPlaces":
+        """Return the places of cells x, y."""
+        objects_m, caches_m = (
+            (np.array([*cells], np.float64).reshape(-1, 2) + 0.5) / CELLS_PER_M for cells in (objects, caches)
+        )
+        return cls(objects_m, caches_m)
+
+
 class CompiledPolicy(Protocol):
     """A policy whose ticks can be run without Python in between. Policies offer it by a method `compiled`."""
 
@@ -166,7 +192,8 @@ class Policy(Protocol):
 
     Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
     doing, for people (`study.stuck` shows it); `describe_robots() -> RobotStates`, the same of all robots as arrays
-    (`study.replay` keeps it); `part_rows`, slices of rows that the record tells apart, set by `reset` (of mixed
+    (`study.replay` keeps it); `remembered_places(row) -> RememberedPlaces`, where one robot remembers things (the
+    window shows it); `part_rows`, slices of rows that the record tells apart, set by `reset` (of mixed
     swarms, whose runs are counted tick by tick); `compiled() -> CompiledPolicy | None`, for runs without Python
     between ticks; the class attributes `caches` ("none", "static", "dynamic": those that
     the policy is made for) and `reads` (names of the slices it looks at; default all;

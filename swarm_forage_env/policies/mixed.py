@@ -8,7 +8,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, table
 from swarm_forage_env.contract.codes import Task
-from swarm_forage_env.contract.policy import Policy, RobotStates, SwarmSpec
+from swarm_forage_env.contract.policy import Policy, RememberedPlaces, RobotStates, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, IntArray, ObsArray
 from swarm_forage_env.policies.mixture import mixture_parts, part_sizes
 from swarm_forage_env.policies.registry import load_policy, part_labels
@@ -98,11 +98,24 @@ class MixedPolicy:
 
     def describe_robot(self, row: int) -> str:
         """Return which part a robot belongs to, and what it is doing, if its policy tells."""
-        place = next(place for place, rows in enumerate(self.part_rows) if rows.start <= row < rows.stop)
+        place, own_row = self._place_of(row)
         policy: Any = self._policies[place]
         if not hasattr(policy, "describe_robot"):
             return self.labels[place]
-        return f"{self.labels[place]}: {policy.describe_robot(row - self.part_rows[place].start)}"
+        return f"{self.labels[place]}: {policy.describe_robot(own_row)}"
+
+    def remembered_places(self, row: int) -> RememberedPlaces:
+        """Return where a robot remembers things; nowhere, if its part does not tell."""
+        place, own_row = self._place_of(row)
+        policy: Any = self._policies[place]
+        if not hasattr(policy, "remembered_places"):
+            return RememberedPlaces.of_cells(())
+        return policy.remembered_places(own_row)
+
+    def _place_of(self, row: int) -> tuple[int, int]:
+        """Return the part to which a robot belongs, and its row within that part."""
+        place = next(place for place, rows in enumerate(self.part_rows) if rows.start <= row < rows.stop)
+        return place, row - self.part_rows[place].start
 
     def describe_robots(self) -> RobotStates:
         """Return what all robots are up to; words begin with the part that a robot belongs to."""

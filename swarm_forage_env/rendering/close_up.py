@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import WINDOW_CELLS, ObservationLayout
+from swarm_forage_env.contract.policy import RememberedPlaces
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.rendering.paint import (
     Canvas,
@@ -32,6 +33,7 @@ from swarm_forage_env.world.state import CacheState, ObjectState, SwarmState
 _GAP_AT_FULL_READING_M = 0.01
 """A reading r tells of a gap of about this / r."""
 _FAINT = 0.35
+_MEMORY_LINE_PX = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +68,7 @@ def render_close_up(
     robot: int,
     obs: ObsArray,
     layout: ObservationLayout,
+    remembered: RememberedPlaces | None = None,
     side_m: float = 1.6,
     size_px: int = 300,
     theme: str = "dark",
@@ -74,7 +77,8 @@ def render_close_up(
 
     Everything has its true size. Beams of the proximity sensor are lines from the body: faint where nothing is near,
     and else red, as long as the gap that the robot reads. The line-of-sight window is a square of 5 x 5 cells; objects
-    that the robot sees in it are bright, others are pale.
+    that the robot sees in it are bright, others are pale. A frame is around each cell in which the robot remembers an
+    object, and around each cache that it remembers, whether it is still there or not.
 
     Args:
         scenario: The configuration.
@@ -84,6 +88,7 @@ def render_close_up(
         robot: Row of the robot.
         obs: (D,) what it observes, noise included.
         layout: Columns of `obs`.
+        remembered: Where it remembers things, if its policy tells.
         side_m: Side of the square that is shown.
         size_px: Side of the picture.
         theme: "dark" or "light".
@@ -96,6 +101,8 @@ def render_close_up(
     canvas = canvases.borrow()
     _draw_ground(canvas, lens, scenario, caches)
     _draw_objects(canvas, lens, objects, obs[layout["los_object"]])
+    if remembered is not None:
+        _draw_memory(canvas, lens, remembered, scenario.cache_side_cells * CELL_M)
     _draw_window(canvas, lens, swarm.position[robot])
     _draw_beams(canvas, lens, scenario, swarm, robot, obs[layout["proximity"]])
     _draw_robots(canvas, lens, scenario, swarm, robot)
@@ -133,6 +140,13 @@ def _draw_objects(canvas: Canvas, lens: _Lens, objects: ObjectState, los_object:
     lying = (objects.status == ObjectStatus.FREE) & lens.shows(place, side)
     paint_squares(canvas, place[lying], side, lens.palette.object, _FAINT)
     paint_squares(canvas, place[seen], side, lens.palette.object)
+
+
+def _draw_memory(canvas: Canvas, lens: _Lens, remembered: RememberedPlaces, cache_side_m: float) -> None:
+    for places_m, side_m in ((remembered.objects_m, CELL_M), (remembered.caches_m, cache_side_m + CELL_M)):
+        half = side_m / 2.0
+        for x, y in places_m[lens.shows(lens.pixels(places_m), half * lens.scale)].tolist():
+            paint_frame(canvas, lens.box((x - half, y - half, x + half, y + half)), _MEMORY_LINE_PX, lens.palette.text)
 
 
 def _draw_window(canvas: Canvas, lens: _Lens, position: FloatArray) -> None:

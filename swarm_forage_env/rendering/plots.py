@@ -108,33 +108,6 @@ def draw_trainings(
     figure.savefig(path, dpi=150)
 
 
-def draw_availability(path: str | Path, curves: Mapping[int, FloatArray], teams: Sequence[float]) -> None:
-    """Draw how likely enough robots are at work over how many are needed: one panel per swarm size, one line per team.
-
-    Args:
-        path: File to write; its suffix chooses the format (.png, .svg, .pdf).
-        curves: Swarm size N -> (K, N) availability of 1, 2, ..., N robots, for each of the K teams.
-        teams: (K,) mean numbers of robots at work.
-
-    Raises:
-        ImportError: matplotlib is not installed.
-    """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(4.0 * len(curves) + 0.8, 4.0), layout="constrained")
-    panels = figure.subplots(1, len(curves), sharey=True, squeeze=False)[0]
-    for axes, (n_robots, lines) in zip(panels, curves.items(), strict=True):
-        needed = np.arange(1, n_robots + 1)
-        for index, (team, line) in enumerate(zip(teams, lines, strict=True)):
-            axes.plot(needed, line, color=COLOURS[index % len(COLOURS)], label=f"mean team {team:g}", clip_on=False)
-        axes.axvline(n_robots / 10.0, color="0.5", linestyle=":", linewidth=1)
-        axes.set(title=f"{n_robots} robots (dotted: a tenth)", xlabel="robots needed at work", xlim=(0, n_robots))
-        axes.grid(alpha=0.3)
-    panels[0].set(ylabel="availability", ylim=(0, 1))
-    panels[-1].legend(frameon=False)
-    figure.savefig(path, dpi=150)
-
-
 def draw_maps(
     path: str | Path,
     rows: Sequence[tuple[str, Mapping[str, FloatArray], bool, tuple[float, float]]],

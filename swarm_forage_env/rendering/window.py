@@ -63,6 +63,8 @@ class Scene:
     """Text of the window's title bar."""
     ring: tuple[float, float, float] | None = None
     """Column, row and radius, in pixels of the frame, of a ring around what is chosen."""
+    marks: tuple[tuple[float, float, float], ...] = ()
+    """Columns, rows and sides, in pixels of the frame, of squares around what the chosen one remembers."""
     close_up: NDArray[np.uint8] | None = None
     """(`CLOSE_UP_PX`, `CLOSE_UP_PX`, 3) picture on top of the panel."""
     lines: tuple[str, ...] = ()
@@ -109,6 +111,9 @@ class Window:
         surface = self._surface
         surface.fill(scene.palette.page)
         _put(pygame, surface, scene.frame, (0, 0))
+        for column, row, side in scene.marks:
+            square = (round(column - side / 2), round(row - side / 2), round(side), round(side))
+            pygame.draw.rect(surface, scene.palette.text, square, width=1)
         if scene.ring is not None:
             column, row, radius = scene.ring
             pygame.draw.circle(surface, scene.palette.text, (column, row), radius, width=2)

@@ -9,6 +9,7 @@ import numpy as np
 
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.study.run import LiveRun, build_stack, warm_up
 from swarm_forage_env.study.spec import RunSpec
 
@@ -19,8 +20,9 @@ SIZES_MEASURED = 3
 FIRST_TICKS = 20
 """Ticks of the first measured stretch; each further one is twice as long."""
 
-Kind: TypeAlias = tuple[str, ...]
-"""Runs of a kind have the same code in every tick: scenario, engine, caches, policy and wrappers."""
+Kind: TypeAlias = tuple[str | bool | Quirks, ...]
+"""Runs of a kind have the same code in every tick: scenario with its quirks, engine, caches, whether objects walk, the
+policy and wrappers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +67,9 @@ def calibrate(specs: Iterable[RunSpec], *, tell: Callable[[str], None] | None = 
 def kind_of(spec: RunSpec) -> Kind:
     """Return the kind of a run."""
     scenario = spec.scenario
-    return (scenario.name, scenario.physics, scenario.caches, spec.policy, *(config.name for config in spec.wrappers))
+    walks = scenario.objects.walk_probability > 0.0
+    world = (scenario.name, scenario.quirks, scenario.physics, scenario.caches, walks)
+    return (*world, spec.policy, *(config.name for config in spec.wrappers))
 
 
 def _some(sizes: Sequence[int]) -> list[int]:

@@ -47,6 +47,7 @@ from swarm_forage_env.study.studies import (
     list_word,
     plain_settings,
     study_policy,
+    value_words,
 )
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
@@ -125,6 +126,29 @@ def is_set_of_paper(spec: StudySpec) -> bool:
     except ConfigError:  # no such budget of it
         return False
     return replace(same, seeds=spec.seeds).study_id == spec.study_id
+
+
+def left_out(spec: StudySpec) -> dict[str, tuple[str, ...]]:
+    """Return which of the paper's values a set leaves out: axis -> values as they are shown.
+
+        left_out(load_study("S2a", "reduced"))["walk_probability"]  # ("0.026",)
+
+    It is empty for a set that has all of them, and for any other study.
+    """
+    if not is_set_of_paper(spec):
+        return {}
+    lacking: dict[str, tuple[str, ...]] = {}
+    for axis, planned in zip(spec.axes, load_study(spec.name, PAPER).axes, strict=True):
+        words = value_words(planned.values)
+        absent = tuple(words[value] for value in planned.values if value not in axis.values)
+        if absent:
+            lacking[axis.name] = absent
+    return lacking
+
+
+def left_out_words(spec: StudySpec) -> str:
+    """Return the same as one text, "walk_probability 0.026; population_size 460, 627, 819"; "" for nothing."""
+    return "; ".join(f"{axis} {', '.join(values)}" for axis, values in left_out(spec).items())
 
 
 def _read(file: Path) -> dict[str, Any]:

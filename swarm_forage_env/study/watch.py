@@ -12,12 +12,13 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import number
 from swarm_forage_env.contract.codes import Counter, Task
-from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.contract.policy import Policy, RememberedPlaces
 from swarm_forage_env.rendering.close_up import render_close_up
 from swarm_forage_env.rendering.frame import render_frame
 from swarm_forage_env.rendering.view import arena_view, refusing
 from swarm_forage_env.rendering.window import CLOSE_UP_PX, Clicked, Closed, Pressed, Scene, Window, WindowEvent
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.study.film import cast_policy
 from swarm_forage_env.study.levels import LEVELS, Levels, with_idle
 from swarm_forage_env.study.run import LiveRun, build_env
@@ -35,6 +36,8 @@ LONGEST_S = 0.1
 """Ticks of one frame take at most this long, so that the window answers even if the run is slower than its speed."""
 _NEAREST_PX = 30.0
 """A click farther from every robot chooses none."""
+_MARK_GAP_PX = 4.0
+"""How much larger than the thing a mark of memory is."""
 _SIDES_M = (0.8, 1.2, 1.6, 2.4, 4.0, 8.0)
 _SHOWN_SLICES = ("proximity", "los_cell", "los_object", "los_cache")
 
@@ -182,15 +185,19 @@ class Watch:
             theme=self._theme,
         )
         ring = close_up = None
+        marks: tuple[tuple[float, float, float], ...] = ()
         if self.robot is not None and world.swarm.present[self.robot]:
             column, row = self._view.pixels(world.swarm.position[self.robot]).tolist()
             ring = (column, row, 2.5 * self._view.robot_px + 4.0)
+            remembered = self._remembered_places(self.robot)
+            marks = self._marks(remembered)
             close_up = render_close_up(
                 self.scenario,
                 *state,
                 robot=self.robot,
                 obs=world.arena.obs[self.robot],
                 layout=world.layout,
+                remembered=remembered,
                 side_m=_SIDES_M[self._side],
                 size_px=CLOSE_UP_PX,
                 theme=self._theme,
@@ -199,10 +206,29 @@ class Watch:
             frame=frame,
             title=self.title(),
             ring=ring,
+            marks=marks,
             close_up=close_up,
             lines=tuple(self._lines()),
             help=HELP,
             palette=self._view.palette,
+        )
+
+    def _remembered_places(self, robot: int) -> RememberedPlaces | None:
+        tell = getattr(self._policy, "remembered_places", None)
+        return None if tell is None else tell(robot)
+
+    def _marks(self, remembered: RememberedPlaces | None) -> tuple[tuple[float, float, float], ...]:
+        """Return squares of the frame, around the places of objects and of caches."""
+        if remembered is None:
+            return ()
+        view, cache_m = self._view, self.scenario.cache_side_cells * CELL_M
+        return tuple(
+            (column, row, side_px + _MARK_GAP_PX)
+            for places_m, side_px in (
+                (remembered.objects_m, view.object_px),
+                (remembered.caches_m, cache_m * view.scale),
+            )
+            for column, row in view.pixels(places_m).tolist()
         )
 
     def title(self) -> str:
@@ -257,7 +283,8 @@ class Watch:
         if hasattr(policy, "describe_robots"):
             known = policy.describe_robots().n_remembered  # type: ignore[attr-defined] - optional, see Policy
             if known is not None:
-                lines.append(f"remembers: {known[robot]}")
+                shown = ", in thin frames" if hasattr(policy, "remembered_places") else ""
+                lines.append(f"remembers: {known[robot]}{shown}")
         return lines or [f"{self._name} does not tell what its robots are doing"]
 
     def summary(self) -> str:

@@ -11,7 +11,7 @@ from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.own import OwnSensor, own_sensor
-from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, layout_for, refused_tasks
+from swarm_forage_env.contract.policy import CompiledPolicy, layout_for, refused_action, refused_tasks
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
 from swarm_forage_env.scenarios.units import CELLS_PER_M
@@ -223,10 +223,7 @@ class ForagingArena:
             ActionError: see `step`.
         """
         if outcome >= 0:
-            raise ActionError(
-                f"Expected finite actions and wheel gains, got {actions[outcome].tolist()} and "
-                f"{gain[outcome].tolist()} for robot_{outcome}; the world was not stepped."
-            )
+            raise refused_action(outcome, actions[outcome], gain[outcome])
         self.tick, self.has_changed = self.tick + 1, False
         if outcome != DONE:
             self._finish(outcome, actions, tasks)

@@ -69,6 +69,9 @@ class SwarmWrapper(BaseParallelWrapper):
                 f"each at most once, is {', '.join(STACK_ORDER)}."
             )
         super().__init__(env)
+        if isinstance(env, SwarmWrapper):
+            env._is_outermost = False
+        self._is_outermost = True
         self.made_from = config
         self._inner = env
         self._unwrapped: ForageEnv = env.unwrapped
@@ -161,7 +164,8 @@ class SwarmWrapper(BaseParallelWrapper):
             tasks: (N,) int8 `contract.codes.Task` codes, None = the policy has no tasks.
 
         Raises:
-            ActionError: as `ForageEnv.step_batch`; for a wrong shape before any wrapper has done anything.
+            ActionError: as `ForageEnv.step_batch`, before any wrapper has done anything. Only a robot that comes back
+                to work in this very tick is looked at later.
         """
         actions, gain = self._before(actions, wheel_gain)
         return self._after(self._inner.step_batch(actions, wheel_gain=gain, tasks=tasks), tasks)
@@ -179,6 +183,8 @@ class SwarmWrapper(BaseParallelWrapper):
     def _before(self, actions: ActionArray, wheel_gain: FloatArray | None) -> tuple[ActionArray, FloatArray | None]:
         actions = self.unwrapped.checked_actions(actions)
         self._require_reset()
+        if self._is_outermost:  # before any wrapper draws a number or lets a robot die
+            self.unwrapped.refuse_bad_step(actions, wheel_gain)
         self.before_step()
         return actions, self.gain(actions, wheel_gain)
 

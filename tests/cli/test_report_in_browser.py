@@ -1,8 +1,11 @@
 """The report on studies in a real browser: it fits, sorts, and asks for nothing."""
 
+import re
+from functools import cache
+
 import pytest
 
-from metrics.claims import INTUITIONS
+from metrics.claims import CLAIMS, INTUITIONS
 from metrics.scoring import judge_claims, study_panels
 from metrics.scoring.verdicts import VARIANTS
 from swarm_forage_env.cli.study_page import Verdicts, page_of
@@ -18,7 +21,14 @@ def by_policy(cell):
     return (10.0 - FOUR.index(cell.policy)) * cell.values[-1]
 
 
+def in_order(name):
+    """A1, A2, ..., A10."""
+    return name[0], int(name[1:])
+
+
+@cache
 def page(*specs):
+    """The page about studies; several tests read the same one."""
     tables = [made_table(spec, by_policy) for spec in specs]
     scored = [study_panels(table, VARIANTS) for table in tables]
     expected = judge_claims(tables, scored, ("corrected",), INTUITIONS)
@@ -43,8 +53,11 @@ def test_it_fits_and_asks_for_nothing(written, tmp_path, width):
         assert browser.ask("document.documentElement.scrollWidth") <= width
         assert [address for address in browser.requests if not address.startswith("data:")] == []
         assert browser.complaints == []
-        assert browser.ask("[...document.images].every((image) => image.naturalWidth > 100)")
-        assert browser.ask("document.images.length") == 12, "twice four figures, four of them with a map"
+        browser.ask("for (const one of document.querySelectorAll('details')) one.open = true")
+        assert browser.ask("document.documentElement.scrollWidth") <= width, "unfolded, too"
+        browser.wait_for("[...document.images].every((image) => image.naturalWidth > 100)")
+        shown = "[...document.images].filter((image) => !image.closest('details')).length"
+        assert browser.ask(shown) == 16, "twice four figures, four of them with a map, and four of theory"
 
 
 def test_tables_are_sorted_by_a_click(written, tmp_path):
@@ -52,10 +65,13 @@ def test_tables_are_sorted_by_a_click(written, tmp_path):
     with Browser(tmp_path, width=1280, height=900) as browser:
         browser.open(written, LOADED)
         before = browser.ask(names)
+        below = (
+            "[...document.querySelectorAll('#verdicts .behind')].map((row) => row.innerText.match(/[A-Z][0-9]+/)[0])"
+        )
         browser.click("#verdicts th button")
-        assert browser.ask(names) == sorted(before)
+        assert browser.ask(names) == browser.ask(below) == sorted(before, key=in_order)
         browser.click("#verdicts th button")
-        assert browser.ask(names) == sorted(before, reverse=True)
+        assert browser.ask(names) == sorted(before, key=in_order, reverse=True)
         assert browser.ask("document.querySelector('#verdicts th').getAttribute('aria-sort')") == "descending"
 
 
@@ -89,7 +105,7 @@ def test_a_figure_has_its_claims_beside_it():
 
 def test_a_claim_that_needs_another_set_says_which():
     article = next(part for part in page(made_study("S1b")).split("<article") if "<h3>S1b: task emergence" in part)
-    assert "corrected: waits for S1d reactivity" in article
+    assert "<b>corrected</b> <small>waits for S1d reactivity" in article
 
 
 def test_what_the_paper_expected_stands_below_its_claims():
@@ -98,4 +114,36 @@ def test_what_the_paper_expected_stands_below_its_claims():
     table = text.split('id="intuitions"')[1].split("</table>")[0]
     assert "CRW: Moving objects do not affect it" in table, "H14 needs no other set"
     assert '<span class="answer supported">' in table
-    assert "DPO" not in table, "the others wait"
+    assert re.findall(r'class="name">(\w+)<', table) == [*INTUITIONS], "those that wait, too"
+
+
+def test_every_claim_is_listed_with_what_stands_behind_its_answers():
+    table = page(made_study()).split('id="verdicts"')[1].split("</table>")[0]
+    claims = dict(zip(re.findall(r'class="name">(\w+)<', table), table.split("<tbody>")[1:], strict=True))
+    assert [*claims] == [*CLAIMS]
+    (told,) = re.findall(r"<b>described, corrected</b>(.*?)</p>", claims["P2"])
+    assert re.search(r"supported.*by bands \w+, statistic [-\d.]+, effect [\d.]+ %, 6 runs: \w", told)
+    assert "waits for S1b task emergence" in claims["E5"]
+    assert "<b>formula</b>" in claims["V1"]
+
+
+def test_a_study_shows_its_arena():
+    (words,) = re.findall(r'<img src="data:image/png;base64,[^"]+" alt="([^"]+)">', page(made_study()))
+    assert words == "S1a: the arena when a run begins"
+
+
+def test_what_follows_from_formulas_stands_beside_its_curves():
+    theory = page(made_study()).split('id="theory"')[1].split("</section>")[0]
+    articles = {part.split("</h3>")[0].split("<h3>")[1]: part for part in theory.split("<article")[1:]}
+    (availability,) = (part for title, part in articles.items() if "availability" in title)
+    assert re.findall(r"<strong>(\w+)</strong>", theory) == re.findall(r"<strong>(\w+)</strong>", availability)
+    assert re.findall(r"<strong>(\w+)</strong>", availability) == ["V1", "V2"]
+    assert re.search(r"<b>formula</b> .*supported.*statistic 0\.402", availability)
+    assert len(articles) == 4, "self-organisation, flexibility, availability, the task graph"
+
+
+def test_other_forms_of_a_measure_are_drawn_where_claims_are_judged_by_them():
+    articles = {part.split("</h3>")[0].split("<h3>")[1]: part for part in page(made_study()).split("<article")[1:]}
+    forms = {title: part.count("The same, measured as") for title, part in articles.items()}
+    assert forms["S1a: raw performance (higher is better), reading described"] == 1, "as in the program"
+    assert forms["S1a: scalability (higher is better), reading described"] == 0, "no claim is about it"

@@ -46,6 +46,17 @@ def test_the_sets_are_listed_with_their_runs(command):
     assert re.search(r"│ all +│ +│ +168 │ 129,024 │", out)
 
 
+def test_what_a_budget_leaves_out_is_listed(command):
+    code, out, _ = command("study", "list", "--budget", "reduced")
+    assert code == 0
+    words = " ".join(re.sub(r"[│┃]", " ", out).split())
+    assert re.search(r"S2a walk_probability 0\.026; population_size .*460, 627, 819", words)
+    assert command("study", "list", "--budget", "quick")[0] == 2
+    assert "of the paper's values: noise 0.00" in " ".join(
+        command("study", "show", "S1e", "--budget", "reduced")[1].split()
+    )
+
+
 def test_a_study_is_shown(written):
     code, out, _ = written("study", "show", "S1g", "--budget", "smoke", "--reading", "program")
     assert code == 0

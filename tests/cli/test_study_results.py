@@ -80,6 +80,8 @@ def test_figures_are_drawn_with_their_numbers(ran):
     assert {f"S1a_raw_performance_described{suffix}" for suffix in (".svg", ".png", ".csv")} <= names
     assert "S1a_raw_performance_described_sierra.svg" in names
     assert Path("figures/S1a_raw_performance_described.csv").read_text().startswith("reading,policy,population_size,")
+    assert {f"theory_self_organisation{suffix}" for suffix in (".svg", ".png", ".csv")} <= names
+    assert Path("figures/S1a_snapshot.png").read_bytes().startswith(b"\x89PNG")
     pairs = Path("figures/S1a_raw_performance_described_pairs.csv").read_text()
     assert pairs.startswith("reading,first,second,p_better,")
     cells = Path("figures/S1a_cells.csv").read_text()

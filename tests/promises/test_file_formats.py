@@ -10,10 +10,13 @@ import numpy as np
 import polars as pl
 import pytest
 
+from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.network import Network, NetworkError
 from swarm_forage_env.study.record import SCHEMA_VERSION, RecordError, RunRecord
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import read_failure
+from swarm_forage_env.training.evaluations import read_evaluations, read_training
+from swarm_forage_env.training.plan import read_plan
 
 FILES = Path(__file__).parent.parent / "files"
 
@@ -70,6 +73,24 @@ def test_a_network_of_a_later_day_is_refused(tmp_path, changed, reason):
     np.savez(tmp_path / "a.npz", **whole)
     with pytest.raises(NetworkError, match=reason):
         Network.load(tmp_path / "a.npz")
+
+
+def test_a_training_of_an_earlier_day_is_read():
+    training = read_training(FILES)
+    plan = training.plan
+    assert (plan.algorithm, plan.n_arenas, plan.total_steps) == ("ppo", 2, 384)
+    assert [(each.steps, each.wall_time_s) for each in training.evaluations] == [(384, 28.0)]
+
+
+def test_a_training_of_a_later_day_is_refused(tmp_path):
+    plan = json.loads((FILES / "plan.json").read_text(encoding="utf-8"))
+    (tmp_path / "plan.json").write_text(json.dumps(plan | {"optimizer": "lion"}), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"plan\.json: Unknown key .*'optimizer'"):
+        read_plan(tmp_path / "plan.json")
+    first, *rows = (FILES / "evaluations.csv").read_text(encoding="utf-8").splitlines()
+    (tmp_path / "evaluations.csv").write_text("\n".join([f"{first},loss", *(f"{row},1" for row in rows)]))
+    with pytest.raises(ConfigError, match=r"evaluations\.csv"):
+        read_evaluations(tmp_path / "evaluations.csv")
 
 
 def test_a_header_that_tells_of_more_than_there_is_takes_no_memory(tmp_path):

@@ -1,6 +1,6 @@
 """Malformed words and files end in one line and a documented exit code, never in a traceback.
 
-A short look in every test run; `scripts/fuzz` gives as many commands as fit into a time.
+A short look in every test run; `scripts/fuzz commands` gives as many as fit into a time.
 """
 
 import pytest

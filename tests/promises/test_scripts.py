@@ -8,11 +8,13 @@ from pathlib import Path
 import pytest
 
 from metrics.claims import CLAIMS, INTUITIONS
+from metrics.laws import ALL_LAWS
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import plan_run
 from swarm_forage_env.study.store import RunStore
 from swarm_forage_env.study.study_file import load_study, set_names
+from tests.support.foraging_table import foraging_table
 from tests.support.made_tables import made_table
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -110,7 +112,26 @@ def test_results_say_which_sets_and_cells_they_are_of(run):
     forms = [line.split(" | ")[:2] for line in of_p2.splitlines() if line.startswith(("| described", "| program"))]
     assert forms == [["| described", "corrected"], ["| described", "sierra"]], "it is of one reading"
     assert "Waits for runs of S1b" in details
+    assert "| `S1a` | population_size 2, 8, 32, 128 | 2 of 192 | E1, E2, E3, P2 |" in page
+    assert "Judged [on fewer values than the paper's](#what-is-left-out): E1, E2, E3, P2, R1" in page
     assert f"| `S1c` | {len(whole.cells)} | 0 | 0 | - |" in page, "four intervals are too short for breakdowns"
+
+
+def test_laws_are_written_beside_the_runs_of_a_study(run):
+    pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
+    foraging_table().write("laws.parquet")
+    code, out, err = run("laws_beside_data", "laws.parquet", "--out", "page")
+    assert (code, out) == (0, "written page/laws.md and page/images/laws.png\n"), err
+    page = Path("page/laws.md").read_text(encoding="utf-8")
+    assert "Swarms of 1 to 8 CRW robots, 512 objects, 4,000 s, 2 runs each. The model knows the runs of one and" in page
+    assert re.findall(r"^\| (\d+) \|", page, re.MULTILINE) == ["1", "2", "4", "8"]
+    assert re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE) == [*ALL_LAWS, *ALL_LAWS], "what they say, and the fits"
+    assert Path("page/images/laws.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_study_of_the_page_on_laws_is_one_that_the_model_holds_for():
+    spec = load_study(ROOT / "scripts/laws.toml")
+    assert [world.caches for world in (spec.specs_of(cell)[0].scenario for cell in spec.cells)] == ["none"] * 8
 
 
 def test_sketches_of_theory_are_those_of_the_docs(run):

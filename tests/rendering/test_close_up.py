@@ -5,6 +5,7 @@ import pytest
 
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import observation_layout
+from swarm_forage_env.contract.policy import RememberedPlaces
 from swarm_forage_env.rendering.close_up import render_close_up
 from swarm_forage_env.rendering.view import PALETTE, THEMES
 from swarm_forage_env.scenarios.presets import scenario
@@ -74,6 +75,21 @@ def test_objects_that_the_robot_sees_are_bright(place):
     assert pale not in (PALETTE.floor, PALETTE.object)
     place.obs[LAYOUT["los_object"]][14] = 2 / 3  # row 1 of three
     assert place.pixel(place.draw(), 0.4, 0.0) == PALETTE.object
+
+
+def test_a_frame_is_around_a_remembered_object(place):
+    memory = RememberedPlaces.of_cells([(82, 40), (150, 40)])  # two cells to the right of the robot's own; far away
+    without, picture = place.draw(), place.draw(remembered=memory)
+    for right, up in ((0.305, 0.0), (0.4, 0.095), (0.4, -0.095)):
+        assert place.pixel(picture, right, up) == PALETTE.text
+        assert place.pixel(without, right, up) != PALETTE.text
+    assert place.pixel(picture, 0.4, 0.03) == place.pixel(without, 0.4, 0.03), "inside it is as it was"
+
+
+def test_a_frame_is_around_a_remembered_cache(place):
+    picture = place.draw(side_m=8.0, remembered=RememberedPlaces.of_cells((), [(80, 40)]))
+    columns = np.flatnonzero((picture == PALETTE.text).all(axis=2).any(axis=0))
+    assert np.ptp(columns) * 8.0 / 300 == pytest.approx((CONFIG.cache_side_cells + 1) * 0.2, abs=0.06)
 
 
 def test_the_window_goes_around_five_cells(place):

@@ -74,6 +74,14 @@ def test_the_ring_is_drawn_over_the_frame(window):
     assert tuple(shown()[60, 100]) == tuple(FRAME[0, 0])
 
 
+def test_squares_are_drawn_around_what_is_marked(window):
+    window.show(Scene(frame=FRAME, title="", marks=((100.0, 60.0, 20.0), (30.0, 30.0, 6.0))))
+    picture = shown()
+    for row, column in ((60, 90), (50, 100), (30, 27)):
+        assert tuple(picture[row, column]) == PALETTE.text
+    assert tuple(picture[60, 100]) == tuple(FRAME[0, 0])
+
+
 def test_the_close_up_is_in_the_panel(window):
     close_up = np.full((300, 300, 3), (9, 8, 7), np.uint8)
     window.show(Scene(frame=FRAME, title="", close_up=close_up, lines=("x",)))

@@ -7,7 +7,7 @@ import pytest
 
 from swarm_forage_env.study import calibration
 from swarm_forage_env.study.calibration import Cost, calibrate, kind_of
-from swarm_forage_env.study.studies import Axis
+from swarm_forage_env.study.studies import READING_NAMES, Axis
 from tests.support.tiny_study import tiny_study
 
 STUDY = tiny_study(
@@ -35,6 +35,20 @@ def test_three_sizes_of_every_kind_are_measured(monkeypatch):
         assert (cost.tick_s > 0.0).all()
         assert (cost.start_s > 0.0).all()
     assert len(told) == 12
+
+
+def test_readings_and_walking_objects_are_kinds_of_their_own():
+    """The authors' program and objects that walk are other code in every tick."""
+    worlds = tiny_study(
+        axes=(Axis(name="walk_probability", values=(0.0, 0.001, 0.051)),), reference=None, readings=tuple(READING_NAMES)
+    )
+    kinds = {cell: kind_of(worlds.specs_of(cell)[0]) for cell in worlds.cells if cell.policy == "random"}
+    assert len(set(kinds.values())) == 4, "two readings, with objects that stay and objects that walk"
+    assert all(
+        (kinds[a] == kinds[b]) == (a.reading == b.reading and bool(a.values[0]) == bool(b.values[0]))
+        for a in kinds
+        for b in kinds
+    )
 
 
 def test_a_run_that_is_short_is_measured_to_its_end():

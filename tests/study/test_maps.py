@@ -42,6 +42,7 @@ def replay() -> Replay:
         remembered_frames=5,
         counters=np.zeros((4, 16), np.int32),
         object_events=np.array(events, np.int32),
+        deliveries=np.zeros((0, 4), np.int32),
         cache_events=np.zeros((0, 5), np.int32),
         signals={},
         versions={},

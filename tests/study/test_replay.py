@@ -43,7 +43,17 @@ DISTURBED = (
     parse_wrapper("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=40"),
     parse_wrapper("sensor_noise:sigma=0.02"),
 )
-ARRAYS = ("position", "heading", "status", "activity", "remembered", "counters", "object_events", "cache_events")
+ARRAYS = (
+    "position",
+    "heading",
+    "status",
+    "activity",
+    "remembered",
+    "counters",
+    "object_events",
+    "deliveries",
+    "cache_events",
+)
 
 
 def spec_of(policy: str = "stochm", wrappers=DISTURBED, **fields):
@@ -140,6 +150,24 @@ def test_pick_ups_and_drops_are_those_that_were_counted():
 
 
 @pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("policy", "wrappers", "physics"),
+    [("dpo", (parse_wrapper("population:death_per_tick=0.001"),), "chipmunk"), ("crw", (), "compiled")],
+)
+def test_every_delivery_is_kept_however_long_frames_are(policy, wrappers, physics):
+    spec = spec_of(policy, wrappers, horizon_s=200.0, physics=physics)
+    kept, record = record_replay(spec, frame_s=40.0)
+    assert record is not None
+    ticks, robots, *steps = kept.deliveries.T
+    assert len(ticks) == record.collected.sum() == kept.counters[-1, Counter.COLLECTED] > 3
+    assert [np.count_nonzero(ticks <= tick) for tick in kept.ticks] == kept.counters[:, Counter.COLLECTED].tolist()
+    assert set(robots.tolist()) <= set(range(12))
+    left, bottom, right, top = kept.scenario.arena.nest_box_m
+    x, y = np.multiply(steps, kept.position_step_m)
+    assert ((left <= x) & (x <= right) & (bottom <= y) & (y <= top)).all()
+
+
+@pytest.mark.compiled
 def test_tasks_activities_and_memories_are_those_of_the_policy():
     spec = spec_of("stochm", ())
     kept, _ = record_replay(spec, frame_s=2.0)
@@ -205,6 +233,7 @@ def test_positions_of_a_huge_arena_fit():
         ({"seconds": 81.0}, ReplayError, "seconds <= 80"),
         ({"seconds": 0.0}, RenderError, "seconds"),
         ({"frame_s": 0.1}, RenderError, "frame_s"),
+        ({"frame_s": 0.3}, ReplayError, r"whole ticks of 0.2 s, got 0.3; take 0.2 or 0.4\."),
         ({"frame_s": float("nan")}, RenderError, "frame_s"),
     ],
 )
@@ -277,7 +306,7 @@ def flip(text: str) -> str:
         (flip, "it does not match its digest"),
         (lambda text: text.replace('class="run">', 'class="run">!'), "damaged"),
         (lambda text: text.replace('class="run"', 'class="gone"'), "damaged"),
-        (lambda text: edited(text, lambda h: h.update(version=99)), "version 99 of the format, .* reads 1; read it"),
+        (lambda text: edited(text, lambda h: h.update(version=99)), "version 99 of the format, .* reads 2; read it"),
         (lambda text: edited(text, lambda h: h.update(format="else")), "no replay page of swarm_forage_env"),
         (lambda text: edited(text, lambda h: h["runs"][0].update(seed=3)), "digest"),
         (lambda text: edited(text, lambda h: h.pop("runs")), "damaged .no 'runs'"),

@@ -1,17 +1,24 @@
 """The replay page in a real browser: it plays, jumps, tells of robots, and asks for nothing."""
 
+import dataclasses
 import os
+import re
+from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from scripts.replay_in_browser import measure
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.replay.capture import record_replay
 from swarm_forage_env.study.replay.files import write_replays
+from swarm_forage_env.study.replay.frames import Status
 from swarm_forage_env.study.spec import plan_run
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.browser import Browser, chromium
+from tests.support.replay_page import choose, place_of, seek
 
 pytestmark = pytest.mark.compiled
 
@@ -53,9 +60,22 @@ def pair(replays, tmp_path_factory) -> Path:
     return write_replays(tmp_path_factory.mktemp("page") / "two.html", replays)
 
 
-@pytest.fixture(params=[DESKTOP, PHONE], ids=["desktop", "phone"])
-def shape(request):
-    return request.param
+@pytest.fixture(scope="module")
+def desktop(tmp_path_factory) -> Iterator[Browser]:
+    """One browser for all tests of this file; each opens its page anew."""
+    with Browser(tmp_path_factory.mktemp("desktop"), **DESKTOP) as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def phone(tmp_path_factory) -> Iterator[Browser]:
+    with Browser(tmp_path_factory.mktemp("phone"), **PHONE) as browser:
+        yield browser
+
+
+@pytest.fixture(params=["desktop", "phone"])
+def browser(request) -> Browser:
+    return request.getfixturevalue(request.param)
 
 
 def keep_picture(browser: Browser, name: str) -> None:
@@ -64,91 +84,72 @@ def keep_picture(browser: Browser, name: str) -> None:
         browser.picture(Path(os.environ["REPLAY_PICTURES"]) / f"{name}.png")
 
 
-def seek(browser: Browser, time_s: float) -> None:
-    browser.ask(f"document.getElementById('scrub').value = {time_s}")
-    browser.ask("document.getElementById('scrub').dispatchEvent(new Event('input'))")
-    browser.ask("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+def test_play_moves_robots_and_pause_stops_them(page, browser):
+    browser.open(page)
+    before = browser.ask(PIXELS)
+    browser.click("#play")
+    browser.wait_for("Number(document.getElementById('scrub').value) > 5")
+    assert browser.ask(PIXELS) != before
+    browser.click("#play")
+    seek(browser, 100.0)
+    still = browser.ask(PIXELS)
+    browser.ask("new Promise((done) => setTimeout(done, 200))")
+    assert browser.ask(PIXELS) == still
+    keep_picture(browser, f"play_{browser.width}")
+    assert (browser.complaints, browser.requests) == ([], [])
 
 
-def test_play_moves_robots_and_pause_stops_them(page, shape, tmp_path):
-    with Browser(tmp_path, **shape) as browser:
-        browser.open(page)
-        before = browser.ask(PIXELS)
-        browser.click("#play")
-        browser.wait_for("Number(document.getElementById('scrub').value) > 5")
-        assert browser.ask(PIXELS) != before
-        browser.click("#play")
-        seek(browser, 100.0)
-        still = browser.ask(PIXELS)
-        browser.ask("new Promise((done) => setTimeout(done, 200))")
-        assert browser.ask(PIXELS) == still
-        keep_picture(browser, f"play_{shape['width']}")
-        assert (browser.complaints, browser.requests) == ([], [])
-
-
-def test_the_end_shows_the_counts_of_the_record(page, replays, shape, tmp_path):
+def test_the_end_shows_the_counts_of_the_record(page, replays, browser):
     delivered = int(replays[0].counters[-1, Counter.COLLECTED])
     assert delivered > 0
-    with Browser(tmp_path, **shape) as browser:
-        browser.open(page)
-        assert browser.ask(NUMBER) == 0
-        seek(browser, 400.0)
-        assert browser.ask(NUMBER) == delivered
-        assert browser.text("#score td") == str(delivered)
-        seek(browser, 200.0)
-        assert browser.ask(NUMBER) == replays[0].counters[200, Counter.COLLECTED]
-        keep_picture(browser, f"end_{shape['width']}")
-        assert (browser.complaints, browser.requests) == ([], [])
+    browser.open(page)
+    assert browser.ask(NUMBER) == 0
+    seek(browser, 400.0)
+    assert browser.ask(NUMBER) == delivered
+    assert browser.text("#score td") == str(delivered)
+    seek(browser, 200.0)
+    assert browser.ask(NUMBER) == replays[0].counters[200, Counter.COLLECTED]
+    keep_picture(browser, f"end_{browser.width}")
+    assert (browser.complaints, browser.requests) == ([], [])
 
 
-def test_nothing_is_wider_than_the_window(pair, shape, tmp_path):
-    with Browser(tmp_path, **shape) as browser:
-        browser.open(pair)
-        assert browser.ask("document.documentElement.scrollWidth") <= shape["width"]
+def test_nothing_is_wider_than_the_window(pair, browser):
+    browser.open(pair)
+    assert browser.ask("document.documentElement.scrollWidth") <= browser.width
 
 
-def test_a_click_chooses_a_robot_and_tells_its_state(pair, replays, tmp_path):
+def test_a_click_chooses_a_robot_and_tells_its_state(pair, replays, desktop):
     replay = replays[0]
-    with Browser(tmp_path, **DESKTOP) as browser:
-        browser.open(pair)
-        seek(browser, 150.0)
-        frame = 150  # one per second
-        robot = next(r for r in range(12) if not replay.status[frame, r] & (8 | 4))
-        left, top, width, height = browser.box(".arena canvas")
-        scale = (min(width, height) - 16) / 8.0
-        x_m, y_m = replay.position_m[frame, robot]
-        browser.click_at(left + width / 2 + scale * (x_m - 4.0), top + height / 2 - scale * (y_m - 4.0))
-        browser.wait_for("document.querySelector('#robot h2') !== null")
-        assert browser.text("#robot h2").startswith("robot ")
-        chosen = int(browser.text("#robot h2").removeprefix("robot ").removesuffix("follow"))
-        assert abs(replay.position_m[frame, chosen] - (x_m, y_m)).max() < 0.3
-        told = browser.text("#robot .told")
-        assert replay.activities[replay.activity[frame, chosen]] in told
-        assert f"{replay.remembered[frame // 5, chosen]} thing" in told
-        browser.press("f")
-        browser.wait_for("document.querySelector('#robot button').ariaPressed === 'true'")
-        keep_picture(browser, "robot")
-        browser.press("Escape")
-        browser.wait_for("document.querySelector('#robot h2') === null")
-        assert (browser.complaints, browser.requests) == ([], [])
+    desktop.open(pair)
+    frame = 150  # one per second
+    robot = next(r for r in range(12) if not replay.status[frame, r] & (8 | 4))
+    choose(desktop, replay, frame, robot)
+    words = desktop.text("#robot .told")
+    assert replay.activities[replay.activity[frame, robot]] in words
+    assert f"{replay.remembered[frame // 5, robot]} thing" in words
+    desktop.press("f")
+    desktop.wait_for("document.querySelector('#robot button').ariaPressed === 'true'")
+    keep_picture(desktop, "robot")
+    desktop.press("Escape")
+    desktop.wait_for("document.querySelector('#robot h2') === null")
+    assert (desktop.complaints, desktop.requests) == ([], [])
 
 
-def test_keys_play_step_and_switch_to_dark(page, tmp_path):
+def test_keys_play_step_and_switch_to_dark(page, desktop):
     value = "Number(document.getElementById('scrub').value)"
-    with Browser(tmp_path, **DESKTOP) as browser:
-        browser.open(page)
-        browser.press("ArrowRight")
-        browser.wait_for(f"{value} === 10")
-        browser.press("End")
-        browser.wait_for(f"{value} === 400")
-        browser.press("Home")
-        browser.press(" ", code="Space")
-        browser.wait_for(f"{value} > 1")
-        browser.press(" ", code="Space")
-        light = browser.ask("getComputedStyle(document.body).backgroundColor")
-        browser.press("t")
-        assert browser.ask("getComputedStyle(document.body).backgroundColor") != light
-        assert browser.complaints == []
+    desktop.open(page)
+    desktop.press("ArrowRight")
+    desktop.wait_for(f"{value} === 10")
+    desktop.press("End")
+    desktop.wait_for(f"{value} === 400")
+    desktop.press("Home")
+    desktop.press(" ", code="Space")
+    desktop.wait_for(f"{value} > 1")
+    desktop.press(" ", code="Space")
+    light = desktop.ask("getComputedStyle(document.body).backgroundColor")
+    desktop.press("t")
+    assert desktop.ask("getComputedStyle(document.body).backgroundColor") != light
+    assert desktop.complaints == []
 
 
 def test_the_system_may_ask_for_dark(page, tmp_path):
@@ -168,32 +169,139 @@ def system_asks_for(browser: Browser, scheme: str) -> None:
     browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
 
-def test_a_click_on_a_curve_jumps_there(page, tmp_path):
-    with Browser(tmp_path, **DESKTOP) as browser:
-        browser.open(page)
-        browser.click(".curve:not([hidden]) canvas")
-        browser.wait_for("Math.abs(Number(document.getElementById('scrub').value) - 200) < 30")
+def test_a_click_on_a_curve_jumps_there(page, desktop):
+    desktop.open(page)
+    desktop.click(".curve:not([hidden]) canvas")
+    desktop.wait_for("Math.abs(Number(document.getElementById('scrub').value) - 200) < 30")
 
 
-def test_two_fingers_zoom(page, tmp_path):
-    with Browser(tmp_path, **PHONE) as browser:
-        browser.open(page)
-        x, y = browser.middle(".arena canvas")
-        before = browser.ask(PIXELS)
-        browser.touch("touchStart", (x - 20, y), (x + 20, y))
-        for reach in (40, 60, 80):
-            browser.touch("touchMove", (x - reach, y), (x + reach, y))
-        browser.touch("touchEnd")
-        browser.wait_for("document.querySelector('.arena canvas').classList.contains('zoomed')")
-        assert browser.ask(PIXELS) != before
-        assert browser.complaints == []
+def test_two_fingers_zoom(page, phone):
+    phone.open(page)
+    x, y = phone.middle(".arena canvas")
+    before = phone.ask(PIXELS)
+    phone.touch("touchStart", (x - 20, y), (x + 20, y))
+    for reach in (40, 60, 80):
+        phone.touch("touchMove", (x - reach, y), (x + reach, y))
+    phone.touch("touchEnd")
+    phone.wait_for("document.querySelector('.arena canvas').classList.contains('zoomed')")
+    assert phone.ask(PIXELS) != before
+    assert phone.complaints == []
 
 
-def test_a_damaged_page_says_so(page, tmp_path):
+def test_a_damaged_page_says_so(page, desktop, tmp_path):
     text = page.read_text()
     start = text.index('class="run">') + 40
     broken = tmp_path / "broken.html"
     broken.write_text(text[:start] + "AAAA" * 20 + text[start + 80 :])
-    with Browser(tmp_path, **DESKTOP) as browser:
-        browser.open(broken, "document.getElementById('loading')?.textContent.includes('cannot be shown')")
-        assert "may be damaged" in browser.text("#loading")
+    desktop.open(broken, "document.getElementById('loading')?.textContent.includes('cannot be shown')")
+    assert "may be damaged" in desktop.text("#loading")
+
+
+def test_robots_that_are_not_yet_born_are_not_called_dead(desktop, tmp_path):
+    births = parse_wrapper("population:initial_robots=2,birth_per_tick=0.02")
+    replay, _ = record_replay(plan_run(WORLD, "random", wrappers=(births,), seed=1), seconds=40.0)
+    absent = replay.has(Status.ABSENT)
+    born = int(np.flatnonzero(absent[0] & ~absent[-1])[0])
+    first = int(np.argmin(absent[:, born]))
+    desktop.open(write_replays(tmp_path / "births.html", replay))
+    assert "in interference" in desktop.text("#legend")
+    assert "dead" not in desktop.text("#legend")
+    choose(desktop, replay, 40, born)
+    assert told(desktop) != "not yet born"
+    seek(desktop, first - 1.0)
+    assert told(desktop) == "not yet born"
+    assert desktop.complaints == []
+
+
+def test_pointing_at_a_robot_tells_its_state(page, replays, desktop):
+    replay = replays[0]
+    desktop.open(page)
+    seek(desktop, 150.0)
+    robot = int(np.flatnonzero(~replay.has(Status.ABSENT)[150])[0])
+    x, y = place_of(desktop, replay, 150, robot)
+    desktop.move_to(x, y)
+    desktop.wait_for("!document.getElementById('tip').hidden")
+    lines = desktop.ask("[...document.getElementById('tip').children].map((line) => line.innerText.trim())")
+    assert lines[0] == f"robot {robot}"
+    assert f"activity: {replay.activities[replay.activity[150, robot]]}" in lines
+    x_m, y_m = replay.position_m[150, robot]
+    assert lines[-1] == f"place: {x_m:.1f}, {y_m:.1f} m"
+    desktop.move_to(2.0, 2.0)
+    desktop.wait_for("document.getElementById('tip').hidden")
+    assert desktop.complaints == []
+
+
+def test_following_keeps_the_robot_in_the_middle(page, replays, desktop):
+    replay = replays[0]
+    inner = np.abs(replay.position_m - 4.0).max(axis=2) < 2.0  # near a wall the arena ends before the window does
+    frames = np.array([50, 60])
+    robot = int(np.flatnonzero(inner[frames].all(axis=0) & ~replay.has(Status.ABSENT)[-1])[0])
+    desktop.open(page)
+    choose(desktop, replay, int(frames[0]), robot)
+    desktop.press("f")
+    desktop.wait_for("document.querySelector('.arena canvas').classList.contains('zoomed')")
+    for frame in frames.tolist():
+        seek(desktop, float(frame))
+        desktop.press("Escape")  # lets go; the view stays
+        desktop.click_at(*desktop.middle(".arena canvas"))
+        desktop.wait_for(f"document.querySelector('#robot h2')?.textContent.startsWith('robot {robot}f')")
+        desktop.press("f")
+    assert np.ptp(replay.position_m[frames, robot], axis=0).max() > 0.1, "it has moved"
+
+
+def test_the_throttle_has_a_curve_that_tells_its_value(page, replays, desktop):
+    (throttle,) = replays[0].signals.values()
+    desktop.open(page)
+    values = "[...document.querySelectorAll('.curve')].find((c) => c.querySelector('h2').innerText === 'throttle')"
+    for frame in (40, 150):
+        seek(desktop, float(frame))
+        assert float(desktop.ask(f"{values}.querySelector('.values').innerText")) == pytest.approx(
+            throttle[frame], abs=0.005
+        )
+
+
+def test_a_ring_shows_where_an_object_has_been_delivered(page, replays, desktop, tmp_path):
+    replay = replays[0]
+    silent = write_replays(tmp_path / "silent.html", dataclasses.replace(replay, deliveries=replay.deliveries[:0]))
+    first_s = float(replay.deliveries[0, 0]) * replay.scenario.dt_s
+    pictures = []
+    for file in (page, silent):
+        desktop.open(file)
+        for time_s in (first_s - 1.0, first_s + 0.4):
+            seek(desktop, time_s)
+            pictures.append(desktop.ask(PIXELS))
+    before, after, silent_before, silent_after = pictures
+    assert before == silent_before
+    assert after != silent_after
+
+
+def test_dead_robots_and_those_in_repair_are_told_and_explained(page, replays, desktop):
+    replay = replays[0]
+    absent, repair = replay.has(Status.ABSENT), replay.has(Status.REPAIR)
+    dead = int(np.flatnonzero(absent[-1])[0])
+    frame, broken = (int(place[0]) for place in np.nonzero(repair))
+    desktop.open(page)
+    for name in ("dead", "in repair"):
+        assert name in desktop.text("#legend")
+    choose(desktop, replay, int(np.argmax(absent[:, dead])) - 1, dead)
+    assert told(desktop) != "dead"
+    seek(desktop, 400.0)
+    assert told(desktop) == "dead"
+    choose(desktop, replay, frame, broken)
+    assert told(desktop) == "in repair"
+    assert desktop.complaints == []
+
+
+def test_size_and_speed_of_a_page_are_measured(tmp_path, capsys):
+    chromium()
+    measure(tmp_path, 3, 4)
+    told = capsys.readouterr().out
+    assert told.startswith("3 robots, 5 frames: 0.1")
+    rate, took = (float(found) for found in re.findall(r"(\d+\.\d+) (?:bytes per robot|ms of processor time)", told))
+    assert rate > 0.0
+    assert 0.0 < took < 1000.0
+
+
+def told(browser: Browser) -> str:
+    """Return the state of the chosen robot, as the page calls it."""
+    return browser.text("#robot td")

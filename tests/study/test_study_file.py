@@ -11,7 +11,14 @@ from swarm_forage_env.policies import pretrained
 from swarm_forage_env.study import study_file
 from swarm_forage_env.study.experiments import BUDGETS
 from swarm_forage_env.study.studies import Cell, StudySpec
-from swarm_forage_env.study.study_file import budget_names, is_set_of_paper, load_study, set_names
+from swarm_forage_env.study.study_file import (
+    budget_names,
+    is_set_of_paper,
+    left_out,
+    left_out_words,
+    load_study,
+    set_names,
+)
 
 EXPERIMENTS = {"S1a": 8, "S1b": 10, "S1c": 7, "S1d": 7, "S1e": 8, "S1f": 8, "S1g": 8, "S1h": 8,
                "S2a": 32, "S2b": 24, "S2c": 24, "S2d": 24}  # fmt: skip
@@ -232,3 +239,11 @@ def test_an_axis_of_lists(tmp_path):
     assert spec.axes[0].values == ("none", "nest_distance")
     assert spec.reference == "none"
     assert [spec.experiment(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance",)]
+
+
+def test_what_a_budget_leaves_out_of_the_paper_is_told():
+    reduced = load_study("S2a", "reduced")
+    assert left_out(reduced) == {"walk_probability": ("0.026",), "population_size": ("460", "627", "819")}
+    assert left_out_words(reduced) == "walk_probability 0.026; population_size 460, 627, 819"
+    assert left_out(load_study("S2a", "paper")) == {}
+    assert left_out(replace(reduced, name="mine")) == {}, "nobody knows what a study of one's own might have"

@@ -66,6 +66,28 @@ def test_looking_changes_nothing(policy, wrappers):
     assert watch.levels.changes == []
 
 
+def test_marks_are_where_the_chosen_robot_remembers_things():
+    watch = Watch(SMALL, "stochm", seed=3, size_px=400)
+    watch.run.advance(to_tick=1500)
+    policy, view = watch._policy, watch._view
+    for robot in range(8):
+        watch.robot = robot
+        objects = [(x, y) for x, y, _ in policy.remembered(robot).values()]
+        caches = [(x, y) for x, y, *_ in policy.remembered_caches(robot).values()]
+        expected = view.pixels((np.array([*objects, *caches]).reshape(-1, 2) + 0.5) * 0.2)
+        marks = np.array(watch.scene().marks).reshape(-1, 3)
+        np.testing.assert_allclose(marks[:, :2], expected)
+        assert (np.diff(marks[:, 2]) >= 0.0).all(), "caches are larger"
+    assert policy.n_known.any()
+    assert policy.n_caches.any()
+
+
+def test_a_policy_that_does_not_tell_has_no_marks():
+    watch = Watch(SMALL, "random", seed=3, size_px=240)
+    watch.robot = 1
+    assert watch.scene().marks == ()
+
+
 def test_pause_one_tick_and_speed(watch, monkeypatch):
     monkeypatch.setattr(watching, "LONGEST_S", 1000.0)  # ticks take long while they are compiled
     watch.advance(0.2)
@@ -129,7 +151,7 @@ def test_the_scene_tells_of_the_chosen_robot(watch):
     assert scene.close_up.shape == (300, 300, 3)
     assert "robot 4 at" in text
     assert watch._policy.describe_robot(4) in text
-    assert "remembers: 0" in text
+    assert "remembers: 0, in thin frames" in text
     assert scene.help == HELP
 
 

@@ -17,9 +17,14 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"
 PATIENCE_S = 60.0
 
 
+def find_chromium() -> str | None:
+    """Return the path of a browser, None where there is none."""
+    return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+
+
 def chromium() -> str:
     """Return the path of a browser; skips the test where there is none."""
-    found = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+    found = find_chromium()
     if found is None:
         pytest.skip(f"needs a browser: none of {', '.join(NAMES)} is installed")
     return found
@@ -31,11 +36,13 @@ class Browser:
     Attributes:
         complaints: Errors and messages on the console.
         requests: Addresses that the page has asked for, itself aside.
+        width: Width of the window in pixels.
     """
 
     def __init__(self, folder: Path, *, width: int, height: int, touch: bool = False, dark: bool = False) -> None:
         self.complaints: list[str] = []
         self.requests: list[str] = []
+        self.width = width
         self._ids = itertools.count(1)
         self._unread = b""
         self._address = ""
@@ -106,7 +113,12 @@ class Browser:
             self.requests.append(about["request"]["url"])
 
     def open(self, file: Path, ready: str = "document.getElementById('loading')?.hidden === true") -> None:
-        """Open a file and wait until it is ready; by default until its replay is unpacked."""
+        """Open a file and wait until it is ready; by default until its replay is unpacked.
+
+        What was kept of an earlier page is gone.
+        """
+        self.complaints.clear()
+        self.requests.clear()
         self._address = file.resolve().as_uri()
         self.call("Page.navigate", url=self._address)
         self.wait_for(ready)
@@ -150,6 +162,10 @@ class Browser:
         """Press and release the mouse."""
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
+
+    def move_to(self, x: float, y: float) -> None:
+        """Move the mouse, with no button down."""
+        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
 
     def press(self, key: str, *, code: str = "") -> None:
         """Press and release a key."""

@@ -145,6 +145,14 @@ def test_a_command_that_is_not_finite_is_refused_and_nothing_moves(column, value
     assert env.tick == 2
 
 
+def test_the_largest_numbers_are_clipped_as_others_are():
+    most = np.finfo(np.float32).max
+    env, other = tidy_world(n_robots=2), tidy_world(n_robots=2)
+    env.step_batch(np.array([[most, most, most], [-most, most, -most]], np.float32))
+    other.step_batch(np.array([[1.0, 1.0, 1.0], [-1.0, 1.0, -1.0]], np.float32))
+    assert_same_world(snapshot(env), snapshot(other))
+
+
 def test_infinite_wheels_of_opposite_sign_are_refused():
     env = tidy_world(n_robots=1)
     with pytest.raises(ActionError, match="finite"):

@@ -86,6 +86,37 @@ def test_actions_of_a_wrong_shape_are_refused_before_any_hook(stack, actions):
     assert stack.unwrapped.calls == []
 
 
+@pytest.mark.parametrize(
+    ("action", "gain", "reason"),
+    [
+        ((0.0, np.nan, 0.0), None, "Expected finite actions"),
+        ((0.0, 0.0, -np.inf), None, "Expected finite actions"),
+        ((0.0, 0.0, 0.0), np.full((4, 2), np.nan), "Expected finite actions"),
+        ((0.0, 0.0, 0.0), np.ones(4), r"wheel_gain with shape \(n_robots, 2\) = \(4, 2\), got \(4,\)"),
+    ],
+)
+def test_what_the_arena_would_refuse_is_refused_before_any_hook(stack, action, gain, reason):
+    """Else who catches the error and goes on has another run: noise was drawn, and robots have died."""
+    stack.reset_batch(7)
+    Logging.log.clear()
+    actions = np.zeros((4, 3), np.float32)
+    actions[2] = action
+    with pytest.raises(ActionError, match=reason):
+        stack.step_batch(actions, wheel_gain=gain)
+    assert Logging.log == []
+    assert stack.unwrapped.calls == []
+
+
+def test_numbers_of_robots_that_are_away_are_ignored(stack):
+    stack.reset_batch(7)
+    away = np.array([True, True, False, True])
+    stack.unwrapped.set_population(active=away, present=away)
+    actions = np.zeros((4, 3), np.float32)
+    actions[2] = np.nan
+    stack.step_batch(actions)
+    assert len(stack.unwrapped.calls) == 1
+
+
 @pytest.mark.parametrize("of_the_inside", [False, True])
 def test_a_step_before_the_first_reset_is_refused(of_the_inside):
     env = wrapper_at(2)(FakeArena(small_scenario()))

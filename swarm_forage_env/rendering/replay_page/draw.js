@@ -178,20 +178,17 @@ class Painter {
   /** A ring grows where an object has just been delivered. */
   flashes(pen, speed) {
     const { run, view } = this;
-    const { frames, robots } = run.deliveries;
+    const { times, x, y } = run.deliveries;
     const lasts = Math.max(2 * run.frameS, FLASH_S * speed);
-    const first = countUpTo(frames, (run.time - lasts) / run.frameS);
-    const end = countUpTo(frames, run.frame);
+    const first = countUpTo(times, run.time - lasts);
+    const end = countUpTo(times, run.time);
     pen.strokeStyle = theme.colours.nest;
     pen.lineWidth = 2;
     for (let i = Math.max(first, end - 200); i < end; i++) {
-      const age = (run.time - frames[i] * run.frameS) / lasts;
-      const at = 2 * robots[i] * run.nFrames + frames[i];
-      const step = run.header.position_step_m;
-      pen.globalAlpha = 0.9 * (1 - Math.min(1, Math.max(0, age)));
+      const age = (run.time - times[i]) / lasts;
+      pen.globalAlpha = 0.9 * (1 - age);
       pen.beginPath();
-      disc(pen, view.px(step * run.arrays.position[at]), view.py(step * run.arrays.position[at + run.nFrames]),
-        this.radius * (1.4 + 3 * age));
+      disc(pen, view.px(x[i]), view.py(y[i]), this.radius * (1.4 + 3 * age));
       pen.stroke();
     }
     pen.globalAlpha = 1;
@@ -210,7 +207,7 @@ class Painter {
     for (let robot = 0; robot < run.nRobots; robot++) {
       const state = run.status[robot];
       if (state & ABSENT) {
-        if (run.firstSeen[robot] < run.frame) gone.push(robot);
+        if (run.isDead(robot)) gone.push(robot);
         continue;
       }
       if (state & CARRYING) carrying.push(robot);

@@ -3,7 +3,7 @@
 /** Rows of what one robot is doing, as [name, text]. */
 function robotFacts(run, robot) {
   const state = run.status[robot];
-  if (state & ABSENT) return [["state", run.firstSeen[robot] < run.frame ? "dead" : "not yet born"]];
+  if (state & ABSENT) return [["state", run.isDead(robot) ? "dead" : "not yet born"]];
   const facts = [["state", stateWords(state)]];
   if (run.header.has_tasks) facts.push(["task", run.header.tasks[run.task(robot)]]);
   const activity = run.activity(robot);

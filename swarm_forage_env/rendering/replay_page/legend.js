@@ -78,14 +78,13 @@ class Legend {
   /** A list of [name, painter] of the signs that occur in these runs. */
   entries() {
     const anyRun = (test) => this.runs.some(test);
-    const ofStatus = (bit) => anyRun((run) => run.arrays.status.some((state) => state & bit));
-    this.hasRepair ??= ofStatus(REPAIR);
-    this.hasAbsent ??= ofStatus(ABSENT);
+    this.hasRepair ??= anyRun((run) => run.arrays.status.some((state) => state & REPAIR));
+    this.hasDead ??= anyRun((run) => run.x.some((_, robot) => run.isDead(robot, run.nFrames - 1)));
     const byTask = shown.colour === "task";
     const names = byTask ? [] : ["empty", "carrying"];
     names.push("in interference");
     if (this.hasRepair) names.push("in repair");
-    if (this.hasAbsent) names.push("dead");
+    if (this.hasDead) names.push("dead");
     names.push("delivered", "object", "nest");
     if (anyRun((run) => run.header.world.sources_m.length > 0)) names.push("source");
     if (anyRun((run) => run.header.world.caches !== "none")) names.push("cache");

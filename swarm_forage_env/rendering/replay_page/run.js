@@ -53,6 +53,11 @@ class Run {
     return frame;
   }
 
+  /** Whether a robot that was in the world before a frame is not there any more. One not yet born is not dead. */
+  isDead(robot, frame = this.frame) {
+    return this.firstSeen[robot] < frame && (this.arrays.status[robot * this.nFrames + frame] & ABSENT) !== 0;
+  }
+
   timeOf(frame) {
     return Math.min(frame * this.frameS, this.endS);
   }
@@ -124,27 +129,13 @@ class Run {
     return this.arrays.counters[this.header.counters.indexOf(name) * this.nFrames + frame];
   }
 
-  /** Drops of objects in the nest: frames, in order, and robots. */
+  /** Deliveries: times in s, in order, and places in m. */
   findDeliveries() {
-    const table = this.objects;
-    const [left, bottom, right, top] = this.header.world.nest_box_m;
+    const { deliveries } = this.arrays;
+    const count = deliveries.length / 4;
+    const [ticks, , x, y] = [0, 1, 2, 3].map((column) => deliveries.subarray(column * count, (column + 1) * count));
     const step = this.header.position_step_m;
-    const carriers = new Int32Array(this.header.n_objects).fill(-1);
-    const frames = [];
-    const robots = [];
-    for (let i = 0; i < table.count; i++) {
-      const object = table.rows[i];
-      const robot = carriers[object];
-      const now = table.a[i] === CARRIED ? table.b[i] : -1;
-      carriers[object] = now;
-      if (robot < 0 || robot === now) continue;
-      const at = 2 * robot * this.nFrames + table.frames[i];
-      const x = step * this.arrays.position[at];
-      const y = step * this.arrays.position[at + this.nFrames];
-      if (x < left - 0.3 || x > right + 0.3 || y < bottom - 0.3 || y > top + 0.3) continue;
-      frames.push(table.frames[i]);
-      robots.push(robot);
-    }
-    return { frames: Int32Array.from(frames), robots: Int32Array.from(robots) };
+    const metres = (steps) => Float32Array.from(steps, (value) => step * value);
+    return { times: Float64Array.from(ticks, (tick) => tick * this.header.dt_s), x: metres(x), y: metres(y) };
   }
 }

@@ -9,9 +9,12 @@ const sort = (table, heading) => {
   const isUp = heading.getAttribute("aria-sort") !== "ascending";
   for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
   heading.setAttribute("aria-sort", isUp ? "ascending" : "descending");
-  const rows = [...table.tBodies[0].rows];
-  rows.sort((a, b) => (isUp ? 1 : -1) * compare(keyOf(a, heading.cellIndex), keyOf(b, heading.cellIndex)));
-  table.tBodies[0].append(...rows);
+  // Of claims, each with its numbers below it, the groups of rows are sorted; else the rows.
+  const isGrouped = table.classList.contains("claimed");
+  const parts = isGrouped ? [...table.tBodies] : [...table.tBodies[0].rows];
+  const key = (part) => keyOf(isGrouped ? part.rows[0] : part, heading.cellIndex);
+  parts.sort((a, b) => (isUp ? 1 : -1) * compare(key(a), key(b)));
+  (isGrouped ? table : table.tBodies[0]).append(...parts);
 };
 for (const table of document.querySelectorAll("table.sortable")) {
   for (const heading of table.tHead.rows[0].cells) {

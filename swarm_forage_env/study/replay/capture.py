@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from swarm_forage_env._internal.fields import number
+from swarm_forage_env.contract.codes import Counter, Event
 from swarm_forage_env.contract.policy import Policy, RobotStates
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy, policy_label
@@ -59,7 +60,7 @@ def record_replay(
         The replay; and the record of the run, the same as without a replay, or None if only a part was run.
 
     Raises:
-        ReplayError: `seconds` is longer than the run.
+        ReplayError: `seconds` is longer than the run, or `frame_s` is no whole number of ticks.
         RenderError: `seconds` or `frame_s` is no positive number.
         ValueError: no installed policy has the name, or it refuses its parameters.
     """
@@ -74,7 +75,10 @@ def record_replay(
     album = _Album(env, policy, 1 + math.ceil(end / step))
     album.look()
     while env.tick < end and not run.over:
-        run.advance(to_tick=min(env.tick + step, end))
+        frame_end = min(env.tick + step, end)
+        while env.tick < frame_end and not run.over:
+            run.advance(to_tick=env.tick + 1)
+            album.note_deliveries()
         album.look()
         if progress is not None:
             progress(env.tick, end)
@@ -108,7 +112,14 @@ def _ticks_between_frames(scenario: ScenarioConfig, end: int, frame_s: float | N
     if frame_s is not None:
         with refusing():
             number("frame_s", frame_s, at_least=scenario.dt_s)
-        return round(frame_s / scenario.dt_s)
+        step = round(frame_s / scenario.dt_s)
+        if not math.isclose(step * scenario.dt_s, frame_s):
+            low = math.floor(frame_s / scenario.dt_s)
+            nearest = " or ".join(f"{ticks * scenario.dt_s:g}" for ticks in (low, low + 1))
+            raise ReplayError(
+                f"Expected frame_s as whole ticks of {scenario.dt_s:g} s, got {frame_s:g}; take {nearest}."
+            )
+        return step
     n_robots = scenario.robots.n_robots
     for seconds in FRAME_STEPS_S:
         step = max(1, round(seconds / scenario.dt_s))
@@ -144,6 +155,8 @@ class _Album:
         self._remembered: list[np.ndarray] = []
         self._counters = np.zeros((most_frames, len(env.events.counters)), np.int32)
         self._first_counters = env.events.counters.copy()
+        self._deliveries: list[np.ndarray] = []
+        self._n_delivered = int(self._first_counters[Counter.COLLECTED])
         self._objects = _Changes(env.scenario.objects.n_objects)
         self._caches = _Changes(len(env.caches.alive))
         self.ticks: list[int] = []
@@ -159,10 +172,25 @@ class _Album:
         caches = env.caches
         self._caches.look(frame, np.column_stack((caches.count, np.where(caches.alive[:, None], caches.cell, -1))))
 
+    def note_deliveries(self) -> None:
+        """Keep the deliveries of the tick that has just passed; what happened is told for one tick only."""
+        env = self._env
+        n_delivered = int(env.events.counters[Counter.COLLECTED])
+        if n_delivered == self._n_delivered:
+            return
+        self._n_delivered = n_delivered
+        robots = np.flatnonzero(env.events.code == Event.DELIVERED)
+        ticks = np.full(len(robots), env.tick)
+        self._deliveries.append(np.column_stack((ticks, robots, self._steps()[robots])).astype(np.int32))
+
+    def _steps(self) -> np.ndarray:
+        """Return where robots are, (N, 2) in steps."""
+        limit = np.iinfo(np.uint16).max
+        return np.clip(np.rint(self._env.swarm.position / self._step_m), 0, limit).astype(np.uint16)
+
     def _keep_poses(self, frame: int) -> None:
         swarm = self._env.swarm
-        limit = np.iinfo(np.uint16).max
-        steps = np.clip(np.rint(swarm.position / self._step_m), 0, limit).astype(np.uint16)
+        steps = self._steps()
         turns = np.rint(swarm.heading * (HEADING_STEPS / (2.0 * np.pi))).astype(np.int64).astype(np.uint8)
         absent = ~swarm.present
         if frame and absent.any():  # parked bodies are nowhere
@@ -205,6 +233,7 @@ class _Album:
             "remembered_frames": REMEMBERED_FRAMES,
             "counters": self._counters[:end],
             "object_events": self._objects.events(),
+            "deliveries": np.concatenate((np.zeros((0, 4), np.int32), *self._deliveries)),
             "cache_events": self._caches.events(),
             "has_tasks": getattr(self._policy, "task", None) is not None,
         }

@@ -27,7 +27,7 @@ from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.wrappers.recorder import TOTALS
 
 FORMAT = "swarm_forage_env replay"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 """Raised whenever an array or a field changes its name, type or meaning."""
 _ARRAYS = {
     "position": "u2",
@@ -37,6 +37,7 @@ _ARRAYS = {
     "remembered": "u2",
     "counters": "i4",
     "object_events": "i4",
+    "deliveries": "i4",
     "cache_events": "i4",
 }
 """Arrays of a `Replay` and their types in a file; those that are None are left out."""

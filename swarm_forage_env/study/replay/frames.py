@@ -76,6 +76,9 @@ class Replay:
     object_events: Whole
     """(E, 5) frame, object row, `ObjectStatus`, and cell x, y; of a carried object robot row and -1. Frame 0 has all
     objects, later ones those that changed. So a change that is undone within a frame is missing; counters miss none."""
+    deliveries: Whole
+    """(E, 4) tick in which an object was delivered to the nest, robot row, and where the robot was, x, y in steps of
+    `position_step_m`; in order of ticks. There are as many as `counters` has."""
     cache_events: Whole
     """(E, 5) frame, slot, number of objects (0 = the cache is gone), and centre cell x, y."""
     signals: Mapping[str, NDArray[np.float32]]

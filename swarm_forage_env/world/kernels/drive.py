@@ -50,8 +50,11 @@ def drive(
     Returns -1, or the first active row with a command or gain that is not finite; then nothing is written.
     """
     for i in range(facing.shape[0]):
-        command = float(actions[i, 0]) + float(actions[i, 1]) + float(actions[i, 2])
-        if active[i] and not math.isfinite(command + wheel_gain[i, 0] + wheel_gain[i, 1]):
+        if not active[i]:
+            continue
+        # One by one: large numbers are clipped, and their sum would be infinite.
+        is_command = math.isfinite(actions[i, 0]) and math.isfinite(actions[i, 1]) and math.isfinite(actions[i, 2])
+        if not (is_command and math.isfinite(wheel_gain[i, 0] + wheel_gain[i, 1])):
             return i
     scale, max_speed, max_difference, wheel_base = limits[0], limits[1], limits[2], limits[3]
     for i in range(facing.shape[0]):

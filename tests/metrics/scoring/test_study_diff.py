@@ -102,6 +102,34 @@ def test_single_runs_with_other_bits_leave_it_open():
     assert found.to_mapping()["cells"][0]["shifts"][0]["p"] is None
 
 
+def test_a_line_is_of_the_cells_that_can_be_tested_and_of_identical_ones():
+    """A cell of one run, or without the column, says nothing; it does not make the line look smaller."""
+    axis = Axis(name="population_size", values=(1, 2, 4, 8))
+    spec = made_study("S1a", axis)
+    single, same = {1, 2}, {4}
+    lost = {(cell, seed) for cell in spec.cells for seed in spec.seeds if cell.values[-1] in single and seed}
+    before = made_table(spec, steady, lost=lost)
+    after = made_table(spec, lambda cell: steady(cell) * (1.0 if cell.values[-1] in same else 1.2), lost=lost)
+    found = diff_studies(before, after, PERFORMANCE)
+    assert [cell.state for cell in found.cells[:4]] == ["open", "open", "identical", "different"]
+    assert found.lines[0].difference == pytest.approx(0.5 * 0.2 / 1.1), "half of the two cells that count"
+
+
+def test_other_bits_without_a_column_to_test_are_open():
+    spec = made_study()
+    tables = []
+    for pickups in (1.0, 2.0):
+        table = noisy(spec)
+        first = pl.col("cell") == 0
+        frame = table.frame.with_columns(
+            cache_pickups=pl.when(~first).then(3.0), n_active=pl.when(first).then(pickups).otherwise(4.0)
+        )
+        tables.append(StudyTable(spec=spec, frame=frame, versions=table.versions))
+    found = diff_studies(*tables, ("cache_pickups",))
+    assert [cell.state for cell in found.cells] == ["open"] + ["identical"] * (len(found.cells) - 1)
+    assert found.differs
+
+
 def test_columns_without_any_scatter_are_told_apart_too():
     table = made_table(made_study(), steady)
     frame = table.frame.with_columns(n_active=pl.col("n_active") + 1.0)

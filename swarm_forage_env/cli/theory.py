@@ -1,0 +1,245 @@
+"""Figures that need no runs: three sketches of what measures mean, the task graph, and the paper's availability curves.
+
+The curves are laws and measures of `metrics`, the graph is that of the controllers. Each figure has its numbers as a
+table. Drawing needs matplotlib (the optional extra "plots").
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from baselines.tasks import DESTINATION, SOURCE, TAB_CHILDREN, TAB_ROOT, Goal
+from metrics import adaptability, availability_curves, environment_scaling, reactivity, task_emergence, waveform
+from metrics.laws import SizeLaw
+from metrics.scoring.plots import COLOURS
+from metrics.scoring.study_plots import save_picture
+from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.scenarios.presets import warehouse_small
+from swarm_forage_env.study.studies import SIZE, StudySpec
+
+if TYPE_CHECKING:
+    import polars as pl
+
+SIZES = 2.0 ** np.arange(8)
+SKETCHED = {
+    "superlinear: robots help each other": SizeLaw(name="power", a=1.0, exponent=1.15),
+    "linear: robots do not affect each other": SizeLaw(name="linear", a=1.0),
+    "sublinear: robots get in each other's way": SizeLaw(name="contention", a=1.0, contention=0.01),
+}
+"""What the curve says -> the law; its parameters are our choice, so that the curves can be told apart."""
+
+STUDIED = warehouse_small()
+ENDS = np.arange(1, STUDIED.horizon_ticks // STUDIED.interval_ticks + 1) * STUDIED.interval_ticks
+"""Ticks at which the study's intervals end."""
+IDEAL_CONDITIONS = 0.1
+CONDITIONS = waveform("square", ENDS, frequency=4e-5, amplitude=0.3, offset=0.3)
+"""Speed lost: two periods in a run, a level of the paper's sweeps."""
+IDEAL_PERFORMANCE = 20.0
+"""Objects per interval under ideal conditions (our choice)."""
+FOLLOWED = {"perfectly reactive": 1.0, "perfectly adaptable": 0.0, "between the two": 0.5}
+"""Swarm -> which share of the change of the conditions its performance follows; the last is our choice."""
+
+AVAILABILITY_SIZES, AVAILABILITY_TEAMS = (50, 200), (5.0, 10.0, 20.0)
+"""Swarm sizes and mean teams of the paper's availability figure."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TheoryFigure:
+    """A figure with the numbers in it."""
+
+    kind: str
+    """self_organisation, flexibility, availability or task_graph."""
+    title: str
+    numbers: "pl.DataFrame"
+    draw: Callable[[Any], None]
+    """Draws it into an empty matplotlib figure."""
+
+    @property
+    def name(self) -> str:
+        """Name of its files."""
+        return f"theory_{self.kind}"
+
+
+def draw_theory(figure: TheoryFigure, paths: Sequence[Path]) -> None:
+    """Draw a figure into picture files; their suffixes choose the formats (.svg, .png, .pdf).
+
+    Raises:
+        ImportError: matplotlib is not installed.
+    """
+    from matplotlib.figure import Figure  # not pyplot: no global state, no window system
+
+    picture: Any = Figure(figsize=(9.0, 4.2), layout="constrained")
+    figure.draw(picture)
+    save_picture(picture, figure.name, paths)
+
+
+def theory_figures() -> tuple[TheoryFigure, ...]:
+    """Return all of them, as in the paper."""
+    return (self_organisation(), flexibility(), availability_figure(AVAILABILITY_SIZES), task_graph())
+
+
+def theory_of(spec: StudySpec) -> tuple[TheoryFigure, ...]:
+    """Return the figures that explain what a study varies: sizes, conditions, or the population."""
+    axes = {axis.name for axis in spec.axes}
+    found: list[TheoryFigure] = []
+    if SIZE in axes:
+        found.append(self_organisation())
+    if "throttle" in axes:
+        found.append(flexibility())
+    if "population_dynamics" in axes:
+        sizes = {spec.specs_of(cell)[0].scenario.robots.n_robots for cell in spec.cells}
+        found.append(availability_figure(sorted(sizes)))
+    if {policy.policy for policy in spec.policies} & {"stochm", "stochx"}:
+        found.append(task_graph())
+    return tuple(found)
+
+
+def self_organisation() -> TheoryFigure:
+    """Performance per robot over the size, and what each size achieves beyond twice the next smaller one (E_T)."""
+    rows: list[dict[str, Any]] = []
+    for words, law in SKETCHED.items():
+        performance = law.performance(SIZES)
+        beyond = [None] + [
+            float(task_emergence([small], int(n), [large], int(2 * n)))
+            for n, small, large in zip(SIZES, performance, performance[1:], strict=False)
+        ]
+        for size, each, gained in zip(SIZES, performance / SIZES, beyond, strict=True):
+            rows.append({"curve": words, "robots": int(size), "per_robot": float(each), "task_emergence": gained})
+    frame = _frame(rows)
+
+    def draw(picture: Any) -> None:
+        picture.set_size_inches(9.0, 3.6)
+        left, right = picture.subplots(1, 2)
+        for colour, words in zip(COLOURS, SKETCHED, strict=False):
+            mine = frame.filter(frame["curve"] == words)
+            left.plot(mine["robots"], mine["per_robot"], color=colour, marker="o", markersize=3, label=words)
+            right.plot(mine["robots"][1:], mine["task_emergence"][1:], color=colour, marker="o", markersize=3)
+        left.set_ylabel("performance per robot")
+        right.set_ylabel("task self-organisation, E_T")
+        for place in (left, right):
+            place.set_xscale("log", base=2)
+            place.set_xticks(SIZES, [f"{size:g}" for size in SIZES])
+            place.set_xlabel("robots")
+            place.grid(alpha=0.3)
+        picture.legend(
+            *left.get_legend_handles_labels(), loc="outside lower center", ncols=1, frameon=False, fontsize=9
+        )
+
+    title = "Theory: what self-organisation means (sketched laws, no runs)"
+    return TheoryFigure(kind="self_organisation", title=title, numbers=frame, draw=draw)
+
+
+def flexibility() -> TheoryFigure:
+    """Conditions that change, and what three swarms achieve under them, with the R and A of each."""
+    seconds = ENDS * STUDIED.dt_s
+    ideal = np.full(len(ENDS), IDEAL_PERFORMANCE)
+    change = environment_scaling(CONDITIONS, IDEAL_CONDITIONS) - 1.0
+    labels: dict[str, str] = {}
+    rows: list[dict[str, Any]] = []
+    for name, share in FOLLOWED.items():
+        performance = (1.0 + share * change) * ideal
+        r = float(reactivity(ideal, performance, CONDITIONS, IDEAL_CONDITIONS))
+        a = float(adaptability(ideal, performance))
+        labels[name] = f"{name}: R {r:.0f}, A {a:.0f}"
+        rows += [
+            {"swarm": name, "time_s": float(t), "conditions": float(v), "performance": float(p), "R": r, "A": a}
+            for t, v, p in zip(seconds, CONDITIONS, performance, strict=True)
+        ]
+    frame = _frame(rows)
+
+    def draw(picture: Any) -> None:
+        picture.set_size_inches(9.0, 4.6)
+        above, below = picture.subplots(2, 1, sharex=True, height_ratios=(1, 2))
+        above.step(seconds, CONDITIONS, where="pre", color="0.2", label="applied, V(t)")
+        above.axhline(IDEAL_CONDITIONS, color="0.2", linestyle="--", label="ideal, $I_{ec}$")
+        above.set_ylabel("share of\nspeed lost")
+        above.legend(frameon=False, fontsize=9, loc="upper right", ncols=2)
+        above.set_ylim(-0.05, 0.95)
+        for colour, (name, label) in zip(COLOURS, labels.items(), strict=False):
+            mine = frame.filter(frame["swarm"] == name)
+            below.step(mine["time_s"], mine["performance"], where="pre", color=colour, label=label)
+        below.set_ylim(0.0, 1.8 * IDEAL_PERFORMANCE)
+        below.set_ylabel("performance,\nobjects per interval")
+        below.set_xlabel("time, s")
+        below.legend(frameon=False, fontsize=9, loc="upper right", ncols=3)
+
+    title = "Theory: an example of reactivity R and adaptability A (sketched swarms, no runs)"
+    return TheoryFigure(kind="flexibility", title=title, numbers=frame, draw=draw)
+
+
+def availability_figure(sizes: Sequence[int], teams: Sequence[float] = AVAILABILITY_TEAMS) -> TheoryFigure:
+    """How likely enough robots are at work, over how many are needed; computed in equilibrium."""
+    rows = [
+        {"robots": size, "mean_team": team, "needed": needed, "availability": value}
+        for size in sizes
+        for team, curve in zip(teams, availability_curves(size, teams).tolist(), strict=True)
+        for needed, value in enumerate(curve, 1)
+    ]
+    frame = _frame(rows)
+
+    def draw(picture: Any) -> None:
+        picture.set_size_inches(4.0 * len(sizes) + 0.8, 4.0)
+        places: Any = picture.subplots(1, len(sizes), sharey=True, squeeze=False)[0]
+        for place, size in zip(places, sizes, strict=True):
+            for index, team in enumerate(teams):
+                mine = frame.filter((frame["robots"] == size) & (frame["mean_team"] == team))
+                colour = COLOURS[index % len(COLOURS)]
+                place.plot(mine["needed"], mine["availability"], color=colour, label=f"mean team {team:g}")
+            place.axvline(size / 10.0, color="0.5", linestyle=":", linewidth=1)
+            place.set(title=f"{size} robots (dotted: a tenth)", xlabel="robots needed at work", xlim=(0, size))
+            place.grid(alpha=0.3)
+        places[0].set(ylabel="availability", ylim=(0, 1))
+        places[-1].legend(frameon=False)
+
+    title = "Theory: availability, how likely enough robots are at work (no runs)"
+    return TheoryFigure(kind="availability", title=title, numbers=frame, draw=draw)
+
+
+def task_graph() -> TheoryFigure:
+    """The tasks: a root above its two subtasks, each with its source and destination."""
+    places = {int(TAB_ROOT[0]): (0.5, 2.0)}
+    parents: dict[int, int] = {}
+    for root, children in zip(TAB_ROOT.tolist(), TAB_CHILDREN.tolist(), strict=True):
+        x, y = places[root]
+        for side, child in zip((-1.0, 1.0), children, strict=True):
+            places[child] = (x + side * 0.5 * 0.5 ** (3.0 - y), y - 1.0)
+            parents[child] = root
+    rows = [
+        {
+            "task": _words(Task(task).name),
+            "part_of": _words(Task(parents[task]).name) if task in parents else None,
+            "source": _words(Goal(int(SOURCE[task])).name),
+            "destination": _words(Goal(int(DESTINATION[task])).name),
+        }
+        for task in places
+    ]
+
+    def draw(picture: Any) -> None:
+        place = picture.subplots()
+        blocks = TAB_ROOT.tolist()
+        for child, root in parents.items():
+            (x, y), (to_x, to_y) = places[root], places[child]
+            place.plot([x, to_x], [y, to_y], color=COLOURS[blocks.index(root)], linewidth=2.0, zorder=1)
+        for row, (x, y) in zip(rows, places.values(), strict=True):
+            label = f"{row['task']}\n{row['source']} to {row['destination']}"
+            box = {"boxstyle": "round,pad=0.5", "facecolor": "white", "edgecolor": "0.4"}
+            place.text(x, y, label, ha="center", va="center", fontsize=9, bbox=box, zorder=2)
+        place.set_xlim(0.0, 1.0)
+        place.set_ylim(-0.4, 2.4)
+        place.set_axis_off()
+
+    title = "The task graph of STOCHM (upper block) and STOCHX (all)"
+    return TheoryFigure(kind="task_graph", title=title, numbers=_frame(rows), draw=draw)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ").lower()
+
+
+def _frame(rows: Iterable[dict[str, Any]]) -> "pl.DataFrame":
+    import polars as pl
+
+    return pl.DataFrame([*rows], infer_schema_length=None)

@@ -1,0 +1,77 @@
+"""Campaigns of random cases: faults with their numbers, figures at the end, also after Ctrl-C, and in the page."""
+
+import os
+import signal
+from collections import Counter
+
+import pytest
+
+from scripts import fuzz
+
+PAGE = "before\n\n<!-- table by scripts/fuzz -->\nNone yet.\n<!-- end of table -->\n\nafter\n"
+
+
+@pytest.fixture
+def page(tmp_path, monkeypatch):
+    monkeypatch.setattr(fuzz, "PAGE", tmp_path / "promises.md")
+    fuzz.PAGE.write_text(PAGE)
+    return fuzz.PAGE
+
+
+def of_worlds(monkeypatch, case):
+    monkeypatch.setitem(fuzz.KINDS, "worlds", case)
+
+
+def test_a_fault_is_shown_with_the_words_that_repeat_it(monkeypatch, capsys):
+    of_worlds(monkeypatch, lambda number, folder: (Counter(ticks=1000), "a wall leaks" if number == 7 else ""))
+    assert fuzz.main(["worlds", "--first", "5", "--count", "4"]) == 1
+    assert capsys.readouterr().out.splitlines() == [
+        "--- scripts/fuzz worlds --first 7 --count 1",
+        "a wall leaks",
+        "4 worlds, 1 faults; 4,000 ticks",
+    ]
+
+
+def test_figures_come_after_ctrl_c_even_if_the_case_takes_it_for_its_own(monkeypatch, capsys):
+    def case(number, folder):
+        if number == 2:
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+            except KeyboardInterrupt:
+                return Counter(codes=1), "ended by Ctrl-C"
+        return Counter(codes=1), ""
+
+    of_worlds(monkeypatch, case)
+    before = signal.getsignal(signal.SIGINT)
+    assert fuzz.main(["worlds"]) == 0
+    assert capsys.readouterr().out.splitlines() == ["Stopped by Ctrl-C.", "2 worlds, 0 faults; 2 codes"]
+    assert signal.getsignal(signal.SIGINT) == before
+
+
+def test_figures_come_into_the_page_and_those_of_other_kinds_stay(page, monkeypatch):
+    monkeypatch.setitem(fuzz.KINDS, "kills", lambda number, folder: (Counter(kills=2), ""))
+    of_worlds(monkeypatch, lambda number, folder: (Counter(ticks=10), "wrong"))
+    fuzz.main(["kills", "--count", "3", "--note"])
+    fuzz.main(["worlds", "--count", "1", "--note"])
+    fuzz.main(["worlds", "--count", "2", "--first", "4", "--note"])
+    lines = page.read_text().splitlines()
+    assert lines[:3] == PAGE.splitlines()[:3]
+    assert lines[-3:] == PAGE.splitlines()[-3:]
+    assert lines[5].startswith("| worlds | 2 | 2 | 20 ticks | 2")
+    assert lines[5].endswith("| `scripts/fuzz worlds --first 4 --count 2` |")
+    assert lines[6].startswith("| kills | 3 | 0 | 6 kills | 2")
+    assert len(lines) == 10
+
+
+def test_a_page_without_the_marks_is_told(page):
+    page.write_text("nothing")
+    with pytest.raises(ValueError, match="marks of a table by scripts/fuzz"):
+        fuzz.note(fuzz.Campaign("worlds", 0))
+
+
+def test_every_kind_of_case_runs(capsys):
+    assert fuzz.main(["commands", "--count", "1"]) == 0
+    assert fuzz.main(["worlds", "--count", "1"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("1 commands, 0 faults; 1 ended with exit code ")
+    assert "ticks" in lines[1]

@@ -1,0 +1,119 @@
+"""Who drives the swarms of worlds made at random: ways that no sensible policy would take, and policies."""
+
+from typing import Protocol
+
+import numpy as np
+
+from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.contract.types import ActionArray, ObsArray
+from swarm_forage_env.env import ForageEnv
+
+WAYS = {
+    "E": (1, 0),
+    "W": (-1, 0),
+    "N": (0, 1),
+    "S": (0, -1),
+    "NE": (1, 1),
+    "NW": (-1, 1),
+    "SE": (1, -1),
+    "SW": (-1, -1),
+}
+"""Directions of walls and corners."""
+
+
+def towards(env: ForageEnv, place: str) -> ActionArray:
+    """Full speed towards a wall or a corner, one of `WAYS`, turning on the spot to face it; (N, 3)."""
+    swarm, arena = env.swarm, env.scenario.arena
+    actions = np.zeros((len(swarm.active), 3), np.float32)
+    way = np.array(WAYS[place])
+    target = np.where(way > 0, (arena.width_m, arena.height_m), 0.0)
+    to = np.where(way == 0, 0.0, target - swarm.position)
+    turn = np.angle(np.exp(1j * (np.arctan2(to[:, 1], to[:, 0]) - swarm.heading)))
+    actions[:, 0] = np.where(np.abs(turn) < 0.3, 1.0, -np.sign(turn))
+    actions[:, 1] = np.where(np.abs(turn) < 0.3, 1.0, np.sign(turn))
+    return actions
+
+
+class Driver(Protocol):
+    """Chooses the actions of a swarm; it looks at nothing but its arguments and what it drew at its reset."""
+
+    def reset(self, env: ForageEnv, rng: np.random.Generator) -> None:
+        """Start a run."""
+
+    def act(self, env: ForageEnv, obs: ObsArray) -> ActionArray:
+        """Return (N, 3) actions for observations (N, D)."""
+        ...
+
+
+class Uniform:
+    """Anything in [-1, 1], another in every tick."""
+
+    def reset(self, env: ForageEnv, rng: np.random.Generator) -> None:
+        """Keep the generator."""
+        self._rng = rng
+
+    def act(self, env: ForageEnv, obs: ObsArray) -> ActionArray:
+        """Draw."""
+        return self._rng.uniform(-1.0, 1.0, (len(obs), 3)).astype(np.float32)
+
+
+class Corners:
+    """Corners of the action space, each for a while: ends of ranges are where faults are."""
+
+    def reset(self, env: ForageEnv, rng: np.random.Generator) -> None:
+        """Keep the generator."""
+        self._rng = rng
+        self._actions = self._draw(env.scenario.robots.n_robots)
+
+    def _draw(self, n_robots: int) -> ActionArray:
+        return self._rng.choice(np.array([-1.0, 0.0, 1.0], np.float32), (n_robots, 3))
+
+    def act(self, env: ForageEnv, obs: ObsArray) -> ActionArray:
+        """Change some."""
+        changed = self._rng.random(len(obs)) < 0.1
+        self._actions[changed] = self._draw(len(obs))[changed]
+        return self._actions.copy()
+
+
+class Beyond:
+    """Numbers far outside of [-1, 1], which are clipped, and numbers next to zero."""
+
+    NUMBERS = np.array([-3e38, 3e38, -2.0, 2.0, 1e-45, -1e-45, -0.0, 1.0000001, -0.25, 0.5], np.float32)
+
+    def reset(self, env: ForageEnv, rng: np.random.Generator) -> None:
+        """Keep the generator."""
+        self._rng = rng
+
+    def act(self, env: ForageEnv, obs: ObsArray) -> ActionArray:
+        """Draw."""
+        return self._rng.choice(self.NUMBERS, (len(obs), 3))
+
+
+class Wall:
+    """All to one wall or corner, grasping and letting go on the way."""
+
+    def reset(self, env: ForageEnv, rng: np.random.Generator) -> None:
+        """Choose where."""
+        self._rng = rng
+        self._place = str(rng.choice(list(WAYS)))
+
+    def act(self, env: ForageEnv, obs: ObsArray) -> ActionArray:
+        """Drive there."""
+        actions = towards(env, self._place)
+        actions[:, 2] = self._rng.uniform(-1.0, 1.0, len(obs))
+        return actions
+
+
+class Driven:
+    """A policy, which sees observations only."""
+
+    def __init__(self, policy: Policy) -> None:
+        self._policy = policy
+
+    def reset(self, env: ForageEnv, rng: np.random.Generator) -> None:
+        """Reset the policy."""
+        self._policy.reset(env.swarm_spec, rng)
+
+    def act(self, env: ForageEnv, obs: ObsArray) -> ActionArray:
+        """Ask the policy."""
+        return self._policy.act(obs, env.active)
