@@ -144,6 +144,8 @@ class _Cache(FunctionCache):
             # Two processes that keep different types at the same moment can choose the same name for a file.
             if found is not None and found.signature.args != tuple(sig):
                 raise ValueError(f"types {found.signature.args} under those of {tuple(sig)}")
+            if found is None:
+                tell_of_first_run()
             return found
         except Exception as error:  # noqa: BLE001 - what a damaged file raises depends on where it is damaged
             _say(f"Compiled functions in {self.cache_path} cannot be read and are made anew ({error}).")
@@ -168,7 +170,7 @@ class _Cache(FunctionCache):
 
 _DURATION = "about half a minute"
 """Of compiling all that a run needs; `docs/speed.md` has the measurement."""
-_FIRST_RUN = f"First run: compiling for {_DURATION}. The result is kept."
+_FIRST_RUN = f"First run: compiling for {_DURATION}."
 _NOT_KEPT = f"Compiled functions cannot be kept, so every process spends {_DURATION} or more on them"
 _WAY_OUT = "Set NUMBA_CACHE_DIR to a folder that can be written to."
 
@@ -191,7 +193,7 @@ def _say(text: str, level: int = logging.WARNING) -> None:
 
 
 def tell_of_first_run() -> None:
-    """Tell, once in a process, that it is being compiled what is then kept.
+    """Tell, once in a process, that functions are being compiled, here or in a worker.
 
     It is no warning: the console command shows it, and scripts do if they set up `logging` for level INFO.
     """
@@ -215,8 +217,6 @@ def direct(function: F, *example: Any) -> F:
         return function
     key = function, tuple(_kind_of(argument) for argument in example)
     if key not in _entry_points:
-        if is_new(function, *example):
-            tell_of_first_run()
         with _collector_off():
             _entry_points[key] = compiled(tuple(_type_of(argument) for argument in example))
     return cast(F, _entry_points[key])

@@ -18,7 +18,7 @@ from typing import TextIO
 
 import numpy as np
 
-from swarm_forage_env._internal.compiling import direct, is_new, tell_of_first_run
+from swarm_forage_env._internal.compiling import direct, is_new
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import load_policy
@@ -37,7 +37,6 @@ _PROGRAM = "import sys; sys.path[:] = {path!r}; from swarm_forage_env.study.firs
 def compile_run(spec: RunSpec) -> None:
     """Compile what a run needs, in two processes; return at once if it is compiled, or could not be kept."""
     if is_first_run(spec):
-        tell_of_first_run()
         with _Helper(spec) as helper:
             compile_half(spec.scenario, 0)
             helper.wait_for_half()
@@ -52,7 +51,6 @@ def compile_world(scenario: ScenarioConfig) -> None:
     The outermost kernel is left to the first step: there may be one arena or several.
     """
     if is_first(scenario):
-        tell_of_first_run()
         whole = replace(scenario, horizon_s=scenario.interval_s)  # a plan is of whole intervals
         with _Helper(plan_run(whole, "random")) as helper:
             compile_half(scenario, 0)

@@ -47,6 +47,14 @@ def test_conflicts_over_one_object_are_counted(run):
 
 
 @pytest.mark.compiled
+def test_what_a_batch_of_runs_could_save_is_estimated(run):
+    code, out, _ = run("batch_gain", "--seeds", "2", "--ticks", "5")
+    assert code == 0
+    header, _, *rows = [line.split("|") for line in out.splitlines()]
+    assert [(len(row), row[2].strip()) for row in rows] == [(len(header), size) for size in ("8", "50", "8", "50")]
+
+
+@pytest.mark.compiled
 def test_two_engines_are_compared(run):
     words = ("--policy", "dpo", "--robots", "30", "--seeds", "2", "--horizon", "20", "--all")
     lines = run("compare_engines", *words)[1].splitlines()
