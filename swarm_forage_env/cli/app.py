@@ -4,6 +4,7 @@ A command has a file of its own and imports what it needs when it runs, so that 
 """
 
 import logging
+import signal
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -106,18 +107,18 @@ def _news_shown() -> Iterator[None]:
 
 def main() -> None:
     """Run the command line and exit; an error is one line on stderr, and `ending` says which exit code it has."""
-    from swarm_forage_env.cli.interrupts import terminated_as_interrupted
+    from swarm_forage_env.cli.interrupts import heard
 
     show_any_text()
-    with terminated_as_interrupted() as came, _news_shown():
-        code = _outcome()
-    if came and code == EXIT_INTERRUPTED:
+    with heard() as came, _news_shown():
+        code = _outcome(came)
+    if signal.SIGTERM in came and code == EXIT_INTERRUPTED:
         code = EXIT_TERMINATED
     sys.exit(code)
 
 
-def _outcome() -> int | str | None:
-    """Carry out the command and return its exit code."""
+def _outcome(came: Sequence[int]) -> int | str | None:
+    """Carry out the command and return its exit code; `came` has the interrupts so far, see `heard`."""
     try:
         _refuse_unreadable(sys.argv[1:])
         with trust_of(sys.argv[1:]), warnings.catch_warnings():
@@ -126,7 +127,7 @@ def _outcome() -> int | str | None:
     except SystemExit as ending:
         return ending.code
     except BaseException as error:  # noqa: BLE001 - the last guard: whatever happens ends in one line
-        return end(error)
+        return end(KeyboardInterrupt() if came else error)
 
 
 def _refuse_unreadable(words: Sequence[str]) -> None:

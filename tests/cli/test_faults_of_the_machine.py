@@ -1,5 +1,6 @@
 """What commands do when the machine fails them: full disks, too little memory, SIGTERM. One line, no traceback."""
 
+import ctypes
 import os
 import resource
 import signal
@@ -87,6 +88,27 @@ def test_sigterm_keeps_finished_runs_as_ctrl_c_does(command, monkeypatch):
     assert "Interrupted: 1 of 3 runs are finished and kept." in err.splitlines()[-1]
     assert len(load("results/warehouse_small")) == 1
     assert signal.getsignal(signal.SIGTERM) == before
+
+
+@pytest.mark.parametrize(("number", "expected"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+@pytest.mark.parametrize("fails", [True, False], ids=["compiler fails", "compiler goes on"])
+def test_an_interrupt_that_llvm_swallows_still_ends_the_command(number, expected, fails, command, monkeypatch):
+    @ctypes.CFUNCTYPE(None)
+    def called_from_c():  # as LLVM calls Python: what it raises goes nowhere
+        os.kill(os.getpid(), number)
+        time.sleep(0.01)
+
+    def compiling(self, task, rng):
+        called_from_c()
+        if fails:
+            raise RuntimeError("no compiled object yet")
+        time.sleep(60)
+
+    monkeypatch.setattr(RandomPolicy, "reset", compiling)
+    code, _, err = command("record", "--policy", "random", "--robots", "2", "--seconds", "20")
+    assert code == expected, err
+    assert "should not happen" not in err
+    assert "Traceback" not in err
 
 
 @pytest.mark.compiled
