@@ -436,7 +436,7 @@ def left_out(results: Results) -> str:
 
 
 def fewer_values(results: Results) -> str:
-    """Return what these studies have less of than the paper's, and and the claims judged without it; "" if nothing."""
+    """Return what these studies have less of than the paper's, and the claims judged without it; "" if nothing."""
     lines: list[tuple[str, ...]] = []
     for table in results.tables:
         spec = table.spec

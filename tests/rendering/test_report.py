@@ -9,6 +9,7 @@ FIGURE = {
     "title": "a < b",
     "pictures": [{"address": picture_address(b"<svg/>"), "words": "curves"}],
     "claims": [],
+    "others": [],
     "numbers": {"header": ["policy", "mean"], "rows": [("crw", 0.12345678), ("dpo", None)]},
     "pairs": {"header": [], "rows": []},
 }
@@ -18,7 +19,8 @@ VALUES = {
     "columns": [],
     "counts": [],
     "claims": [],
-    "waiting": [],
+    "intuitions": [],
+    "theory": [],
     "studies": [
         {
             "name": "mine",
@@ -27,6 +29,7 @@ VALUES = {
             "state": "",
             "figures": [FIGURE],
             "models": [],
+            "snapshot": {"address": picture_address(b"<svg/>"), "words": "the arena"},
             "cells": {"header": [], "rows": []},
             "missing": [],
             "settings": "",

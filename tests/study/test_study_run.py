@@ -181,14 +181,14 @@ sys.path.insert(0, sys.argv[2])
 from swarm_forage_env.study.study_run import StudyFolder, run_study
 from tests.support.tiny_study import tiny_study
 if __name__ == "__main__":
-    run_study(tiny_study(seeds=tuple(range(8))), StudyFolder(sys.argv[1]), jobs=1)
+    run_study(tiny_study(seeds=tuple(range(16))), StudyFolder(sys.argv[1]), jobs=1)
 """
 
 
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGINT])
 def test_a_kill_at_a_random_moment_changes_nothing(tmp_path, sent, request):
     """However often and whenever a study is ended, the rest is done at restart, and the table is the same."""
-    study = tiny_study(seeds=tuple(range(8)))
+    study = tiny_study(seeds=tuple(range(16)))
     straight = StudyFolder(tmp_path / "straight")
     run_study(study, straight, jobs=1)
     broken = StudyFolder(tmp_path / "broken")
@@ -197,7 +197,7 @@ def test_a_kill_at_a_random_moment_changes_nothing(tmp_path, sent, request):
     while not broken.store.run_ids():
         assert started.poll() is None, "it ended before it was killed"
         time.sleep(0.01)
-    time.sleep(random.Random().uniform(0.0, 0.3))
+    time.sleep(random.Random().uniform(0.0, 0.2))
     os.kill(started.pid, sent)
     started.wait()
     n_kept = len(broken.store.run_ids())

@@ -30,6 +30,7 @@ def gain_of(config: ThrottleConfig, commands, *, carrying=(), wheel_gain=None) -
     world.swarm.carried_object[list(carrying)] = 0
     actions = np.zeros((4, 3), np.float32)
     actions[: len(commands), :2] = commands
+    world.swarm.active[:] = np.isfinite(actions).all(axis=1)
     stack.step_batch(actions, wheel_gain=wheel_gain)
     return world.calls[-1]["wheel_gain"]
 
@@ -146,7 +147,7 @@ def test_nothing_happens_without_throttle(amplitude):
     assert gain_of(constant(amplitude), [(0.4, 0.4)], wheel_gain=outer) is outer
 
 
-def test_rows_that_are_not_numbers_disturb_nobody():
+def test_rows_of_the_inactive_may_be_no_numbers_and_disturb_nobody():
     gain = gain_of(constant(0.5), [(np.nan, 0.4), (np.inf, -np.inf), (0.4, 0.4)])
     assert gain[2].tolist() == [0.5, 0.5]
 
