@@ -44,7 +44,7 @@ def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
                 missing += [
                     f"the answer to {name}, reading {reading}"
                     for reading in (READING_NAMES if claim.panels else ())
-                    if not re.search(rf"<b>{reading}{form}</b> <span class=\"answer \w+\">.*statistic", rows[name])
+                    if not re.search(rf"<b>{reading}{form}</b> <span class=\"answer [\w ]+\">.*statistic", rows[name])
                 ]
     return missing
 
