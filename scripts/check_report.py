@@ -16,8 +16,8 @@ from metrics.scoring.figure_panels import FIGURE_MEASURES
 from metrics.scoring.measures import MEASURE_CRITERIA
 from swarm_forage_env.study.studies import READING_NAMES
 
-TABLES = {"verdicts": (CLAIMS, ", corrected"), "intuitions": (INTUITIONS, "")}
-"""Table of the page -> what it lists, and what stands behind a reading in the headings of its columns."""
+TABLES = {"verdicts": CLAIMS, "intuitions": INTUITIONS}
+"""Table of the page -> what it lists."""
 
 
 def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
@@ -35,7 +35,7 @@ def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
             for words in drawn
         )
     ]
-    for table, (claims, form) in TABLES.items():
+    for table, claims in TABLES.items():
         rows = _rows(page, table)
         for name, claim in claims.items():
             if name not in rows:
@@ -44,7 +44,7 @@ def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
                 missing += [
                     f"the answer to {name}, reading {reading}"
                     for reading in (READING_NAMES if claim.panels else ())
-                    if not re.search(rf"<b>{reading}{form}</b> <span class=\"answer [\w ]+\">.*statistic", rows[name])
+                    if not re.search(rf"<b>{reading}, corrected</b> <span class=\"answer [\w ]+\">.*statistic", rows[name])
                 ]
     return missing
 
