@@ -19,6 +19,9 @@ from swarm_forage_env.study.studies import READING_NAMES
 TABLES = {"verdicts": CLAIMS, "intuitions": INTUITIONS}
 """Table of the page -> what it lists."""
 
+ANSWERED = r'<b>{}, corrected</b> <span class="answer [\w ]+">.*statistic'
+"""What a row of such a table has for a reading."""
+
 
 def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
     """Return what is missing in a report on studies whose last axis is the swarm size, in words."""
@@ -44,7 +47,7 @@ def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
                 missing += [
                     f"the answer to {name}, reading {reading}"
                     for reading in (READING_NAMES if claim.panels else ())
-                    if not re.search(rf"<b>{reading}, corrected</b> <span class=\"answer [\w ]+\">.*statistic", rows[name])
+                    if not re.search(ANSWERED.format(reading), rows[name])
                 ]
     return missing
 
