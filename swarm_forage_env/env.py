@@ -9,9 +9,10 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
 from swarm_forage_env._internal.fields import as_whole, instance, switch
+from swarm_forage_env.contract.actions import as_actions, checked_gain, refuse_not_finite
 from swarm_forage_env.contract.calls import is_over, no_options
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, SwarmSpec, refused_action
+from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.arena import ForagingArena
@@ -250,18 +251,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             RuntimeError: before the first reset.
         """
         self._require_reset()
-        expected = self._actions.shape
-        try:
-            # Kernels are compiled for contiguous float32 only; another type would have all compiled anew.
-            checked = np.ascontiguousarray(actions, np.float32)
-        except (TypeError, ValueError) as error:
-            raise ActionError(f"Expected actions with shape (n_robots, 3) = {expected}: {error}.") from error
-        if checked.shape != expected:
-            raise ActionError(
-                f"Expected actions with shape (n_robots, 3) = {expected}, got {checked.shape}; "
-                "pass one row per robot, inactive ones included."
-            )
-        return checked
+        return as_actions(actions, len(self._actions))
 
     def refuse_bad_step(self, actions: ActionArray, wheel_gain: FloatArray | None) -> None:
         """Refuse what the arena would refuse, for wrappers, which have to know it before they do anything.
@@ -273,20 +263,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         Raises:
             ActionError: a gain of the wrong shape, or an action or gain of an active robot that is not finite.
         """
-        gain = self._checked_gain(wheel_gain)
-        if np.isfinite(actions).all() and (gain is None or np.isfinite(gain).all()):
-            return
-        gain = np.ones((len(actions), 2)) if gain is None else gain
-        bad = self.active & ~(np.isfinite(actions).all(axis=1) & np.isfinite(gain).all(axis=1))
-        if bad.any():
-            row = int(np.argmax(bad))
-            raise refused_action(row, actions[row], gain[row])
-
-    def _checked_gain(self, wheel_gain: FloatArray | None) -> FloatArray | None:
-        expected = (len(self._actions), 2)
-        if wheel_gain is not None and np.shape(wheel_gain) != expected:
-            raise ActionError(f"Expected wheel_gain with shape (n_robots, 2) = {expected}, got {np.shape(wheel_gain)}.")
-        return wheel_gain
+        refuse_not_finite(self.active, actions, checked_gain(wheel_gain, len(self._actions)))
 
     def step_batch(
         self,
@@ -323,7 +300,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         (`world.rack`).
         """
         actions = self.checked_actions(actions)
-        wheel_gain = self._checked_gain(wheel_gain)
+        wheel_gain = checked_gain(wheel_gain, len(actions))
         self._rewards.remember()
         return actions, wheel_gain
 

@@ -168,10 +168,8 @@ class _Cache(FunctionCache):
             _say(f"{_NOT_KEPT} ({error.strerror}: {self.cache_path}). {_WAY_OUT}")
 
 
-_DURATION = "about half a minute"
-"""Of compiling all that a run needs; `docs/speed.md` has the measurement."""
-_FIRST_RUN = f"First run: compiling for {_DURATION}."
-_NOT_KEPT = f"Compiled functions cannot be kept, so every process spends {_DURATION} or more on them"
+_FIRST_RUN = "Compiling what is used here for the first time: seconds, or half a minute after an installation."
+_NOT_KEPT = "Compiled functions cannot be kept, so every process spends about half a minute or more on them"
 _WAY_OUT = "Set NUMBA_CACHE_DIR to a folder that can be written to."
 
 

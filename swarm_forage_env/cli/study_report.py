@@ -97,7 +97,7 @@ def plan_report(spec: StudySpec, folder: StudyFolder, part: tuple[int, int], wor
         [
             f"{spec.name}, budget {spec.budget}{shares}: {len(todo):,} of {len(planned):,} runs to do",
             *aligned(rows),
-            f"about {wall} on {counted(busy, 'core')} as fast as this one is now",
+            f"about {wall} on {counted(busy, 'core')} as fast as this one is now, and some seconds to start",
         ]
     )
 

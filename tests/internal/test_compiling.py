@@ -257,7 +257,7 @@ def test_damaged_files_of_the_cache_are_made_anew(inner, tmp_path, name, caplog)
 def test_a_first_run_is_told_once_and_a_second_one_is_none(inner, caplog):
     with caplog.at_level(logging.INFO, "swarm_forage_env"):
         direct(inner(), 1)  # two types, compiled one after the other
-        assert [(record.levelname, record.message[:10]) for record in caplog.records] == [("INFO", "First run:")]
+        assert [(record.levelname, record.message[:9]) for record in caplog.records] == [("INFO", "Compiling")]
         compiling._say.cache_clear()
         inner()
         assert caplog.text == "", "it comes from the cache"

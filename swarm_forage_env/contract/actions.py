@@ -1,0 +1,58 @@
+"""What an action at array level must be: its shape, its type, and finite numbers for robots at work."""
+
+import numpy as np
+
+from swarm_forage_env.contract.policy import ActionError, refused_action
+from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray
+
+
+def as_actions(actions: ActionArray, n_robots: int) -> ActionArray:
+    """Return `actions` as a contiguous (N, 3) float32 array, the same array if it is one; values are not checked.
+
+    Raises:
+        ActionError: values that are not numbers, or another shape.
+    """
+    expected = (n_robots, 3)
+    try:
+        # Kernels are compiled for contiguous float32 only; another type would have all compiled anew.
+        checked = np.ascontiguousarray(actions, np.float32)
+    except (TypeError, ValueError) as error:
+        raise ActionError(f"Expected actions with shape (n_robots, 3) = {expected}: {error}.") from error
+    if checked.shape != expected:
+        raise ActionError(
+            f"Expected actions with shape (n_robots, 3) = {expected}, got {checked.shape}; "
+            "pass one row per robot, inactive ones included."
+        )
+    return checked
+
+
+def checked_gain(wheel_gain: FloatArray | None, n_robots: int) -> FloatArray | None:
+    """Return factors on the wheel speeds, (N, 2) or None.
+
+    Raises:
+        ActionError: another shape.
+    """
+    expected = (n_robots, 2)
+    if wheel_gain is not None and np.shape(wheel_gain) != expected:
+        raise ActionError(f"Expected wheel_gain with shape (n_robots, 2) = {expected}, got {np.shape(wheel_gain)}.")
+    return wheel_gain
+
+
+def refuse_not_finite(active: BoolArray, actions: ActionArray, wheel_gain: FloatArray | None) -> None:
+    """Refuse what the arena would refuse, before it is stepped.
+
+    Args:
+        active: (N,) whose actions count.
+        actions: (N, 3) as `as_actions` returns them.
+        wheel_gain: (N, 2) as `checked_gain` returns them, or None for 1.
+
+    Raises:
+        ActionError: an action or gain of an active robot that is not finite.
+    """
+    if np.isfinite(actions).all() and (wheel_gain is None or np.isfinite(wheel_gain).all()):
+        return
+    gain = np.ones((len(actions), 2)) if wheel_gain is None else wheel_gain
+    bad = active & ~(np.isfinite(actions).all(axis=1) & np.isfinite(gain).all(axis=1))
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise refused_action(row, actions[row], gain[row])
