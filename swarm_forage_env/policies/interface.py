@@ -6,6 +6,7 @@ use the same translation, so a policy runs exactly as it was trained.
 """
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any, TypeAlias
@@ -376,6 +377,10 @@ def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
     """
     known_keys(mapping, InterfaceConfig.__dataclass_fields__, "interface option")
     values = dict(mapping)
+    range_m = values.get("neighbour_range_m")
+    if isinstance(range_m, str):  # a word of the command line; `number` refuses what is none
+        with suppress(ValueError):
+            values["neighbour_range_m"] = float(range_m)
     own = values.get("own_sensors")
     if isinstance(own, str | list):  # a word of the command line, "one+two", or of JSON, which knows no tuples
         values["own_sensors"] = tuple(own.split("+")) if isinstance(own, str) else tuple(own)

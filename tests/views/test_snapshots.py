@@ -1,7 +1,6 @@
 """Snapshots and copies of what learners use: dictionaries, one agent for all, agent by agent."""
 
 import copy
-import re
 
 import numpy as np
 import pytest

@@ -10,8 +10,10 @@ import pytest
 from swarm_forage_env import ConfigError, ForageEnv, load_policy, parallel_env, plan_run, run_one, scenario
 from swarm_forage_env.checks import check_policy
 from swarm_forage_env.contract.policy import ActionError, SwarmSpec
-from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.policies.registry import from_callable
+from swarm_forage_env.training.datasets.layout import chunk_file
+from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.learner_arena import plan_arena
 from tests.reference import neighbourhood
@@ -160,8 +162,9 @@ class OneByOne(ArenaBatch):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("observation", ["full", "compact"])
-@pytest.mark.parametrize("wrappers", [(), ("message_noise:sigma=0.1,loss=0.2",)])
+@pytest.mark.parametrize(
+    ("observation", "wrappers"), [("full", ()), ("compact", ("message_noise:sigma=0.1,loss=0.2",))]
+)
 def test_arenas_together_are_what_they_are_alone(observation, wrappers):
     world = scenario("warehouse_small", **SMALL | BOTH)
     plan = plan_arena(world, {}, interface={"observation": observation}, wrappers=wrappers, max_cycles=12)
@@ -219,7 +222,7 @@ def test_trained_policies_run_where_there_are_messages():
     actions = policy.act(env.reset_batch(seed=1), env.active)
     assert not actions[:, 3:].any()
     env.step_batch(actions)
-    mixed = load_policy("mixed:ppo_warehouse_small=4,crw")
+    mixed = load_policy("mixed:ppo_warehouse_small=4,crw=rest")
     mixed.reset(env.swarm_spec, np.random.default_rng(1))
     assert not mixed.act(env.last_obs, env.active)[:, 3:].any()
 
@@ -236,6 +239,24 @@ def test_a_policy_says_what_it_needs():
             LearnerInterface(shown, SwarmSpec.of(scenario("warehouse_small", **fields)))
     blind = InterfaceConfig(neighbours_seen=0, message_size=0).for_scenario(scenario("warehouse_small", **BOTH))
     assert blind.sensors == ()
+
+
+def test_an_interface_can_be_said_in_words():
+    said = {"neighbours_seen": 3, "neighbour_range_m": "1.3", "message_size": 2}
+    assert interface_from_mapping(said) == InterfaceConfig(neighbours_seen=3, neighbour_range_m=1.3, message_size=2)
+    with pytest.raises(ConfigError, match=r"interface\.neighbour_range_m.*'far'"):
+        interface_from_mapping({"neighbour_range_m": "far"})
+
+
+def test_a_data_set_has_the_columns_of_messages(tmp_path):
+    world = scenario("warehouse_small", **SMALL | BOTH, horizon_s=2.0, interval_s=2.0)
+    for policy, size in (("random", 5), ("ppo_warehouse_small", None)):
+        plan = plan_dataset(plan_run(world, policy), [3])
+        record_dataset(plan, tmp_path / policy)
+        with np.load(chunk_file(tmp_path / policy, 3, 0)) as chunk:
+            assert chunk["actions"].shape[2:] == (() if size is None else (size,))
+            assert chunk["observations"].shape[2] == len(plan.card.columns)
+            assert "messages" in plan.card.columns or size is None
 
 
 def test_numbered_actions_carry_no_message():

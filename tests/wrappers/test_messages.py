@@ -55,7 +55,7 @@ def test_where_everything_is_lost_nothing_is_heard():
 
 
 def test_noise_may_follow_a_waveform():
-    noisy = parse_wrapper("message_noise:waveform=step,amplitude=0.5,start_s=0.6").wrap(made(message_range_m=40.0))
+    noisy = parse_wrapper("message_noise:sigma=step,amplitude=0.5,start_s=0.6").wrap(made(message_range_m=40.0))
     assert isinstance(noisy.made_from, MessageNoiseConfig)
     assert isinstance(noisy.made_from.sigma, Waveform)
     columns = noisy.unwrapped.layout["messages"]
