@@ -8,13 +8,12 @@ scripted policies run without Python between the ticks; there is nothing to save
 seeds: stepping the arenas (`world.rack`), and asking the policy, with the robots of all arenas in one array. Both are
 timed beside what is done now, arena by arena, on copies of the same worlds. The difference, over what whole runs take,
 is the most that could be saved: rewards, wrappers, records and the work of handing rows around would stay. All ways
-take turns. Times are microseconds of processor time per robot-tick, medians of the rounds. The share is worked out
-round by round; the table has its median, smallest and largest.
+take turns. Times are microseconds of processor time per robot-tick, medians of the rounds. Shares are worked out round
+by round; the table has the median, the smallest and the largest.
 """
 
 import argparse
 import copy
-import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -94,9 +93,15 @@ def row(label: str, policy_name: str, wrappers: Sequence[str], n_robots: int, gi
     rounds = rounds_of((advance, step_each, step_together, ask_each, ask_together), given.rounds)
     rounds *= 1e6 / (ticks * n_seeds * n_robots)
     cells = [f"{time:.2f}" for time in np.median(rounds, axis=0)]
-    shares = [100 * (step - step_all + ask - ask_all) / run for run, step, step_all, ask, ask_all in rounds.tolist()]
-    saved = f"{statistics.median(shares):.0f} % ({min(shares):.0f} to {max(shares):.0f})"
-    return f"| {label} | {n_robots} | {' | '.join(cells)} | {saved} |"
+    run, step, step_all, ask, ask_all = rounds.T
+    saved = [share_cell(each / run) for each in (step - step_all, step - step_all + ask - ask_all)]
+    return f"| {label} | {n_robots} | {' | '.join(cells + saved)} |"
+
+
+def share_cell(shares: np.ndarray) -> str:
+    """Return the median, smallest and largest share in percent: "6 % (3 to 9)"."""
+    middle, low, high = (round(100 * float(share)) for share in (np.median(shares), shares.min(), shares.max()))
+    return f"{middle} % ({low} to {high})"
 
 
 def main() -> None:
@@ -107,9 +112,10 @@ def main() -> None:
     parser.add_argument("--rounds", type=whole(at_least=1), default=7)
     given = parser.parse_args()
     print(
-        "| runs | robots | whole run | steps, one by one | together | policy, one by one | together | saved at most |"
+        "| runs | robots | whole run | steps, one by one | together | policy, one by one | together "
+        "| saved at most, steps alone | with the policy |"
     )
-    print("|---|--:|--:|--:|--:|--:|--:|--:|")
+    print("|---|--:|--:|--:|--:|--:|--:|--:|--:|")
     for label, policy_name, wrappers in CASES:
         for n_robots in SIZES:
             print(row(label, policy_name, wrappers, n_robots, given), flush=True)
