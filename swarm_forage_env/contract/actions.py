@@ -1,5 +1,7 @@
 """What an action at array level must be: its shape, its type, and finite numbers for robots at work."""
 
+from math import isfinite
+
 import numpy as np
 
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, refused_action
@@ -59,7 +61,8 @@ def refuse_not_finite(active: BoolArray, actions: ActionArray, wheel_gain: Float
     Raises:
         ActionError: an action or gain of an active robot that is not finite.
     """
-    if np.isfinite(actions).all() and (wheel_gain is None or np.isfinite(wheel_gain).all()):
+    # A sum of squares is finite only if all its numbers are; where it is not, which is rare, one looks at each.
+    if isfinite(np.vdot(actions, actions)) and (wheel_gain is None or isfinite(np.vdot(wheel_gain, wheel_gain))):
         return
     gain = np.ones((len(actions), 2)) if wheel_gain is None else wheel_gain
     bad = active & ~(np.isfinite(actions).all(axis=1) & np.isfinite(gain).all(axis=1))

@@ -269,17 +269,30 @@ class LearnerInterface:
         Raises:
             ActionError: another shape, or a number outside of `action_space`.
         """
-        commands = self._commands
+        return self.carry_out(self.checked(actions), obs)
+
+    def checked(self, actions: np.ndarray) -> np.ndarray:
+        """Return actions as `carry_out` takes them; arguments and errors as those of `command`."""
         if actions.shape != self._actions_shape:
             raise ActionError(
                 f"Expected actions with shape {self._actions_shape}, one row per robot as in {self.action_space}, "
                 f"got {actions.shape}."
             )
+        if not self._is_discrete:
+            return actions
+        self._check_numbers(actions)
+        return np.ascontiguousarray(actions, np.int32)
+
+    def carry_out(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
+        """Do what `command` does with actions that were checked, which may last for several ticks.
+
+        Args:
+            actions: What `checked` returned.
+            obs: As in `command`.
+        """
+        commands = self._commands
         if self._is_discrete:
-            self._check_numbers(actions)
-            numbered_actions(
-                np.ascontiguousarray(actions, np.int32), self._wheels, self._grips, obs, self._carrying, commands
-            )
+            numbered_actions(actions, self._wheels, self._grips, obs, self._carrying, commands)
         else:
             driven = self._n_driven
             np.copyto(commands[:, :driven], actions[:, :driven], casting="same_kind")

@@ -117,21 +117,15 @@ TWINS = {
     "swarm_forage_env.world.kernels.walk.walk": Twin(
         "object_walk.walk_slowly", "world/test_object_motion.py", "swarm_forage_env.world.kernels.walk.walk"
     ),
+    "swarm_forage_env.wrappers.kernels.noise.disturb": NOISE,
     "swarm_forage_env.wrappers.kernels.noise.garble": Twin(
         "adversity.garbled", "wrappers/test_messages.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
     ),
-    "swarm_forage_env.wrappers.kernels.noise.perturb_readings": NOISE,
     "swarm_forage_env.wrappers.kernels.noise.shift_neighbours": Twin(
         "adversity.shifted_neighbours",
         "wrappers/test_messages.py",
         "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch",
     ),
-    "swarm_forage_env.wrappers.kernels.noise.share_that_sees_obstacles": Twin(
-        "sensing.interferes",
-        "wrappers/test_believed_interference.py",
-        "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch",
-    ),
-    "swarm_forage_env.wrappers.kernels.noise.turn_heading": NOISE,
     "swarm_forage_env.world.kernels.task_shares.add_task_shares": Twin(
         "task_shares.task_shares",
         "wrappers/test_recorder.py",
@@ -169,7 +163,6 @@ WITHOUT = {
     "tests/study/test_compiled_runs.py",
     "swarm_forage_env.world.kernels.tick.set_out": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.whole": IN_ORDER,
-    "swarm_forage_env.wrappers.kernels.gaussian.to_normal": "compared with the normal distribution function of scipy",
     "swarm_forage_env.wrappers.kernels.noise.noisy_gain": "one product per wheel; by hand in "
     "tests/wrappers/test_noise.py",
 }
