@@ -61,7 +61,7 @@ def test_a_quick_look_writes_no_entry(command, tiny):
 def test_a_dry_run_tells_what_there_is_to_do(command, tiny):
     code, out, _ = command("benchmark", "--policy", "crw", "--policy", "dpo", "--name", "two", "--dry-run")
     assert code == 0
-    assert "two in the benchmark, version 1: 9 worlds, 2 seeds, 400 s per run" in out
+    assert "two in the benchmark, version 1: 9 worlds, 2 seeds, 200 s per run" in out
     assert "36 runs, 36 to do" in out
     assert not Path("results").exists()
 
@@ -69,7 +69,7 @@ def test_a_dry_run_tells_what_there_is_to_do(command, tiny):
 def test_the_worlds_are_shown(command, tiny):
     code, out, _ = command("benchmark", "worlds")
     assert code == 0
-    assert "seeds 1, 2, 400 s per run, 6 worlds that count" in out
+    assert "seeds 1, 2, 200 s per run, 6 worlds that count" in out
     assert "room, throttle 0   " in out
     assert "reference of measures" in out
 

@@ -70,8 +70,8 @@ def test_one_run_serves_as_a_size_and_as_the_undisturbed_swarm():
 def test_quick_is_shorter_and_another_identity():
     full, quick = load_protocol(TINY), load_protocol(TINY, quick=True)
     assert [world.name for world in quick.worlds] == [world.name for world in full.worlds]
-    assert (quick.horizon_s, quick.seeds) == (200.0, (1,))
-    assert quick.worlds[0].scenario.horizon_s == 200.0
+    assert (quick.horizon_s, quick.seeds) == (100.0, (1,))
+    assert quick.worlds[0].scenario.horizon_s == 100.0
     assert quick.identity != full.identity
 
 

@@ -36,7 +36,7 @@ def test_an_entry_has_the_runs_of_all_policies(entry, protocol):
     spec = next(s for s in benchmark_specs("crw", protocol) if s.seed == 2 and s.scenario.robots.n_robots == 2)
     record = run_one(spec)
     row = entry.performance("room, 2 robots")[0]
-    assert row[1] == pytest.approx(record.performance.sum() / 0.4)  # per 1,000 s, of 400 s
+    assert row[1] == pytest.approx(record.performance.sum() / 0.2)  # per 1,000 s, of 200 s
     assert entry.interference("room, 2 robots")[0, 1] == pytest.approx(record.interference_fraction.mean(), rel=1e-5)
     assert entry.performance("room, noisy wheels").shape == (2, 2)
 
