@@ -57,7 +57,10 @@ def _draw_scores(panel: Panel, ranked: Sequence[Standing]) -> None:
     panel.set_yticks(places, [unread(standing.entry.name) for standing in ranked])
     panel.set_ylim(len(ranked) - 0.5, -0.5)
     panel.set_xlim(left=0.0)
-    panel.set_title("score: share of the best scripted controller, interquartile mean and 95 % interval", fontsize=9)
+    seeds = "; orange: each training seed" if any(standing.by_policy for standing in ranked) else ""
+    panel.set_title(
+        f"score: share of the best scripted controller, interquartile mean and 95 % interval{seeds}", fontsize=9
+    )
     panel.grid(axis="x", alpha=0.3)
 
 
