@@ -172,7 +172,7 @@ class LearnerArena:
         return tick
 
     def command(self, actions: np.ndarray) -> ActionArray:
-        """Return the commands of the next tick, (N, 3) in a reused buffer; see `LearnerInterface.command`."""
+        """Return the actions of the next tick, (N, A) in a reused buffer; see `LearnerInterface.command`."""
         return self.interface.command(actions, self.env.last_obs)
 
     def take(self, tick: BatchStep, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
