@@ -17,6 +17,7 @@ MAY_BE_SKIPPED = {
     r"needs (benchmarl|epymarl|ray|sb3_contrib|supersuit|torchrl): .*": (
         "each library has an environment of its own: scripts/test_bridges"
     ),
+    r"could not import 'optuna': .*": "only one page needs it (docs/bridges/optuna.md)",
 }
 """Reason of a skip -> why it is no failure under --no-skips."""
 _skipped: dict[str, str] = {}

@@ -15,6 +15,7 @@ import typer
 
 from swarm_forage_env.cli.ablate import ablate
 from swarm_forage_env.cli.availability import availability
+from swarm_forage_env.cli.benchmark import benchmark
 from swarm_forage_env.cli.choose import choose
 from swarm_forage_env.cli.compare import compare
 from swarm_forage_env.cli.curves import curves
@@ -75,6 +76,7 @@ def _options(
 for command in (run, score, compare, predict, choose, train, curves, dataset):
     app.command()(command)
 app.add_typer(study, name="study")
+app.add_typer(benchmark, name="benchmark")
 app.command("list")(list_everything)
 for command in (info, schema, rerun, watch, record, replay, maps, saliency, stuck, ablate, availability):
     app.command()(command)

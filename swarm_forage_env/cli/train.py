@@ -77,6 +77,15 @@ def train(  # long: one parameter per option
     settings: Settings = None,
     wrappers: Wrappers = None,
     config: ConfigFile = None,
+    callbacks: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--callback",
+            metavar="MODULE:CLASS",
+            help="Callback of stable-baselines3, code of yours that runs beside the training; or the name of an entry "
+            "point. May be repeated.",
+        ),
+    ] = None,
     processes: Annotated[int, typer.Option(min=0, help="Processes for the arenas; 0 = all in this process.")] = 0,
     resume: Annotated[
         bool,
@@ -135,4 +144,4 @@ def train(  # long: one parameter per option
     folder = out or Path("results/training") / name
     if resume and plan is None:
         chosen = resumed_plan(folder, chosen if says_more else None, steps)
-    run_training(chosen, folder, n_processes=processes, resume=resume)
+    run_training(chosen, folder, n_processes=processes, resume=resume, callbacks=callbacks or ())

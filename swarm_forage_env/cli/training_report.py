@@ -22,20 +22,26 @@ LINE_EVERY_S = 60.0
 """Shortest time between two lines about the progress where stderr is no terminal, s."""
 
 
-def run_training(plan: TrainingPlan, folder: Path, *, n_processes: int, resume: bool) -> None:
-    """Train, show how it goes, and say where the results are.
+def run_training(
+    plan: TrainingPlan, folder: Path, *, n_processes: int, resume: bool, callbacks: Sequence[str] = ()
+) -> None:
+    """Train, show how it goes, and say where the results are; `callbacks` as in `training.sb3.callbacks`.
 
     Raises:
         ImportError: stable-baselines3 is not installed.
-        ConfigError: see `training.sb3.training.train`.
+        ConfigError: see `training.sb3.training.train` and `training.sb3.callbacks.named_callbacks`.
     """
+    from swarm_forage_env.training.sb3.callbacks import named_callbacks
     from swarm_forage_env.training.sb3.training import MODEL_FILE, train
+
+    added = named_callbacks(callbacks)
 
     console = Console(stderr=True, highlight=False, markup=False, emoji=False)
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         try:
-            result = train(plan, folder, n_processes=n_processes, resume=resume, report=_reporter(plan, bar))
+            report = _reporter(plan, bar)
+            result = train(plan, folder, n_processes=n_processes, resume=resume, report=report, callbacks=added)
         except KeyboardInterrupt:
             bar.console.print(_farewell(folder, is_kept=(folder / MODEL_FILE).exists()), soft_wrap=True)
             raise

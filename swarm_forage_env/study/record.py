@@ -95,7 +95,7 @@ class RunRecord:
     spec: str
     """The run's complete specification as JSON (`study.spec.RunSpec.from_json`)."""
     provenance: Mapping[str, str]
-    """Versions, commit, time of creation, wall-clock seconds."""
+    """Versions, commit, time of creation, seconds of the clock and of a core."""
 
     def __post_init__(self) -> None:
         n_intervals = len(self.interval)
@@ -124,6 +124,11 @@ class RunRecord:
     def wall_time_s(self) -> float:
         """Wall-clock seconds that the run took, policy and recording included; NaN where unknown."""
         return float(self.provenance.get("wall_time_s", "nan"))
+
+    @property
+    def cpu_time_s(self) -> float:
+        """Seconds of a core that the run took, other work of the machine left out; NaN where unknown."""
+        return float(self.provenance.get("cpu_time_s", "nan"))
 
     def keys(self) -> dict[str, str | int | float]:
         """Return the identifying fields by name."""

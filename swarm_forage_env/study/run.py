@@ -6,7 +6,7 @@
 import time
 from collections.abc import Iterable
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -137,25 +137,39 @@ def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:
         policy: A fresh instance; it drives only this run.
         spec: The run.
     """
-    started = time.perf_counter()
+    started = Started.now()
     recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
     LiveRun(recorder, policy, spec.seed).advance()
     recorder.close()
     return finished_record(recorder, spec, started)
 
 
-def finished_record(recorder: RunRecorder, spec: RunSpec, started: float) -> RunRecord:
+class Started(NamedTuple):
+    """When a run began, by the clocks of this process, s."""
+
+    wall_s: float
+    cpu_s: float
+    """Of all threads: another run in the same process counts, too."""
+
+    @classmethod
+    def now(cls) -> "Started":
+        """Read both clocks."""
+        return cls(time.perf_counter(), time.process_time())
+
+
+def finished_record(recorder: RunRecorder, spec: RunSpec, started: Started) -> RunRecord:
     """Return the record of a run that has ended.
 
     Args:
         recorder: Outermost wrapper of the run.
         spec: The run.
-        started: When it began, by `time.perf_counter`.
+        started: When it began.
     """
     columns: dict[str, Any] = recorder.columns()
     origin = {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "wall_time_s": f"{time.perf_counter() - started:.3f}",
+        "wall_time_s": f"{time.perf_counter() - started.wall_s:.3f}",
+        "cpu_time_s": f"{time.process_time() - started.cpu_s:.3f}",
     }
     return RunRecord(
         run_id=spec.run_id,

@@ -134,6 +134,10 @@ def test_without_the_training_library_the_message_says_what_to_install(command, 
         (("--scenario", "warehouse_smal"), "Did you mean 'warehouse_small'"),
         (("--wrapper", "throtle:amplitude=0.1"), "Did you mean 'throttle'"),
         (("--plan", "nothing.toml"), "Cannot read the plan nothing.toml"),
+        pytest.param(("--callback", "mine"), "Expected a callback as module:Class", marks=needs_training),
+        pytest.param(("--callback", "nothing:Mine"), "No module named 'nothing'", marks=needs_training),
+        pytest.param(("--callback", "json:Mine"), "has no attribute 'Mine'", marks=needs_training),
+        pytest.param(("--callback", "collections:Counter"), "got Counter; derive its class", marks=needs_training),
         (("--plan", "ppo_warehouse_small", "--steps", "5"), "write them into its file"),
         (("--plan", "ppo_warehouse_small", "--scenario", "warehouse_small"), "write them into its file"),
     ],
@@ -169,6 +173,28 @@ def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
     folder.mkdir(parents=True)
     (folder / "model.zip").touch()
     assert f"To go on: swarm-forage --trust-models train --out {folder} --resume" in command("train", *TINY)[2]
+
+
+CALLBACK = """
+from stable_baselines3.common.callbacks import BaseCallback
+
+class Stop(BaseCallback):
+    def _on_step(self):
+        print("seen", self.num_timesteps)
+        return self.num_timesteps < 64
+"""
+
+
+@needs_training
+def test_a_callback_of_the_user_runs_beside_the_training_and_can_end_it(command):
+    Path("my_callbacks.py").write_text(CALLBACK)
+    code, out, err = command("train", *TINY, "--callback", "my_callbacks:Stop", "--out", "stopped")
+    assert code == 0, err
+    assert [line.split()[0] for line in out.splitlines()] == ["seen"] * 8  # 8 robots decide in each step
+    assert out.splitlines()[-1] == "seen 64"
+    assert re.search(r"^\s+64 ", err, re.MULTILINE), err  # the last evaluation took place
+    assert Path("stopped/policy.npz").is_file()
+    assert "allback" not in Path("stopped/plan.json").read_text()  # a plan from elsewhere can name no code
 
 
 @pytest.mark.parametrize("name", ["warehouse_small", "search_and_rescue"])

@@ -1,7 +1,6 @@
 """From a run to its replay. Looking reads the state and never writes it, so it does not change the run."""
 
 import math
-import time
 from collections.abc import Callable
 from typing import Any, cast
 
@@ -23,7 +22,7 @@ from swarm_forage_env.study.replay.frames import (
     Status,
     position_step_m,
 )
-from swarm_forage_env.study.run import LiveRun, build_stack, finished_record
+from swarm_forage_env.study.run import LiveRun, Started, build_stack, finished_record
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.wrappers.handling import HandlingCostConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
@@ -64,7 +63,7 @@ def record_replay(
         RenderError: `seconds` or `frame_s` is no positive number.
         ValueError: no installed policy has the name, or it refuses its parameters.
     """
-    started = time.perf_counter()
+    started = Started.now()
     scenario = spec.scenario
     end = _last_tick(scenario, seconds)
     step = _ticks_between_frames(scenario, end, frame_s)

@@ -9,7 +9,7 @@ import importlib.util
 import inspect
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from io import BytesIO
 from pathlib import Path
@@ -20,7 +20,7 @@ import stable_baselines3
 import torch
 from stable_baselines3 import A2C, DQN, PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.logger import HParam
 from stable_baselines3.common.utils import safe_mean
 
@@ -88,6 +88,7 @@ def train(
     n_processes: int = 0,
     resume: bool = False,
     report: Report | None = None,
+    callbacks: Sequence[BaseCallback] = (),
 ) -> TrainingResult:
     """Train, or go on training from the last checkpoint.
 
@@ -102,6 +103,7 @@ def train(
         n_processes: Processes that the arenas are spread over; 0 = all in this process.
         resume: Go on where the checkpoint in `folder` stopped.
         report: Told the status about once a second, and every evaluation.
+        callbacks: Further callbacks of the library; one that returns False ends the training, as the library has it.
 
     Raises:
         ConfigError: the algorithm knows no such option, more processes than arenas, the folder holds a training run and
@@ -116,6 +118,7 @@ def train(
     check_folder(folder)
     torch.set_num_threads(1)  # networks this small gain nothing from more, and arenas want the cores
     watch = _Watch(plan, folder, report or _keep_quiet)
+    together = _Together(watch, callbacks)
     if available_cores() > 1:
         compile_world(plan.scenario)
     env = SwarmVecEnv(
@@ -134,11 +137,13 @@ def train(
             done = 0 if model is None else model.num_timesteps
             if done < ends:
                 model = _prepared(plan, stage, folder, env, done)
-                _learn(model, ends - done, watch, f"stage {number}{_changes(stage)}")
+                _learn(model, ends - done, together, f"stage {number}{_changes(stage)}")
+            if together.ended:
+                break
         assert model is not None, "a plan has a stage"
-        if watch.lacks_evaluation(model.num_timesteps):
+        if watch.lacks_evaluation(model.num_timesteps) and not together.ended:
             model = _prepared(plan, plan.stages[-1], folder, env, model.num_timesteps)
-            _learn(model, 0, watch, "its last evaluation")
+            _learn(model, 0, _Together(watch), "its last evaluation")
     finally:
         env.close()
     policy_file = folder / POLICY_FILE if plan.algorithm in EXPORTABLE else None
@@ -252,12 +257,12 @@ def _changes(stage: Stage) -> str:
     return f", with {fields}" if fields else ""
 
 
-def _learn(model: BaseAlgorithm, steps: int, watch: "_Watch", where: str) -> None:
+def _learn(model: BaseAlgorithm, steps: int, callbacks: "_Together", where: str) -> None:
     try:
-        model.learn(steps, callback=watch, reset_num_timesteps=False, tb_log_name=model.__class__.__name__.lower())
+        model.learn(steps, callback=callbacks, reset_num_timesteps=False, tb_log_name=model.__class__.__name__.lower())
     except KeyboardInterrupt:
         if not _has_diverged(model):
-            watch.keep(model)
+            callbacks.watch.keep(model)
         raise
     except (ConfigError, EmptyRolloutError) as error:  # what only a reset or a run finds to be impossible
         raise ConfigError(f"Cannot train in {where}: {error}") from error
@@ -403,6 +408,24 @@ class _Watch(BaseCallback):
         records = [run_policy(make_policy(), spec) for spec in specs]
         performance = np.mean([record.rate_per_1000_s("performance") for record in records])
         return float(performance), float(np.mean([record.interference_fraction.mean() for record in records]))
+
+
+class _Together(CallbackList):
+    """Our callback and those of the user, and whether one of them ended the training.
+
+    Attributes:
+        ended: A callback returned False; the library then leaves `learn` and tells nobody why.
+    """
+
+    def __init__(self, watch: _Watch, others: Sequence[BaseCallback] = ()) -> None:
+        super().__init__([watch, *others])
+        self.watch = watch
+        self.ended = False
+
+    def _on_step(self) -> bool:
+        goes_on = super()._on_step()
+        self.ended = self.ended or not goes_on
+        return goes_on
 
 
 def _keep_quiet(news: TrainingStatus | Evaluation) -> None:

@@ -1,0 +1,25 @@
+"""A benchmark that others can enter: a fixed protocol of worlds and seeds, entry files, and what they are worth."""
+
+from .entry import Entry, Training, read_entry
+from .figure import draw_benchmark
+from .page import page_block
+from .protocol import BenchmarkError, Protocol, load_protocol
+from .running import benchmark_specs, run_benchmark
+from .standing import Standing, reference_of, scripted_entries, standing_of
+
+__all__ = [
+    "run_benchmark",
+    "benchmark_specs",
+    "load_protocol",
+    "read_entry",
+    "scripted_entries",
+    "reference_of",
+    "standing_of",
+    "page_block",
+    "draw_benchmark",
+    "Protocol",
+    "Entry",
+    "Training",
+    "Standing",
+    "BenchmarkError",
+]

@@ -1,0 +1,265 @@
+"""An entry of the benchmark: one JSON file with every number that the page needs.
+
+    entry = read_entry("dpo.json", load_protocol())
+    entry.performance("two sources, 8 robots")  # per 1,000 s, (policies, seeds)
+
+A file is taken only if it is whole: of this version of the protocol, every run of every world, and the digest that was
+written with it. So numbers that were altered by hand, or by a broken copy, are noticed.
+"""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from metrics.curves import FloatArray
+
+from .protocol import BenchmarkError, Protocol
+
+TRAINED_IN = ("given", "other", "nothing", "unknown")
+"""Where a policy was trained: in the training worlds only, also elsewhere, not at all, or nobody said."""
+_KEYS = (
+    "benchmark",
+    "name",
+    "command",
+    "training",
+    "policies",
+    "core_hours",
+    "versions",
+    "runs",
+    "measures",
+    "digest",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Training:
+    """How the policies of an entry were made, as its author says."""
+
+    worlds: str = "unknown"
+    """One of `TRAINED_IN`."""
+    command: str = ""
+    library: str = ""
+    core_hours: float | None = None
+    """Of all its trainings together."""
+
+    def __post_init__(self) -> None:
+        if self.worlds not in TRAINED_IN:
+            raise BenchmarkError(f"Expected training worlds to be one of {', '.join(TRAINED_IN)}, got {self.worlds!r}.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EntryPolicy:
+    """One policy of an entry: one training seed of a learner."""
+
+    name: str
+    """As it was named on the command line, a file without its folder."""
+    digest: str = ""
+    """Hash of the content of its file; empty for a policy in Python."""
+    training_seed: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class EntryMeasure:
+    """One measure of swarm engineering at one level, of all policies and seeds."""
+
+    group: str
+    label: str
+    at: str
+    """The level in words."""
+    n_robots: tuple[int, ...]
+    unit: str
+    higher_is_better: bool
+    values: tuple[tuple[float | None, ...], ...]
+    """(policies, seeds); None where a run has no such value."""
+    relative: tuple[tuple[float | None, ...], ...] = ()
+    """The same over the performance that they are compared with; empty for measures that are relative themselves."""
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """What it is about, the same for all entries."""
+        return self.group, self.label, self.at
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Entry:
+    """What an entry file holds."""
+
+    version: int
+    identity: str
+    """Of the protocol, see `Protocol.identity`."""
+    is_quick: bool
+    name: str
+    command: str
+    policies: tuple[EntryPolicy, ...]
+    runs: Mapping[str, Mapping[str, Sequence[Sequence[float]]]]
+    """World -> "performance" (per 1,000 s) and "interference" (share of robot time), (policies, seeds) each."""
+    measures: tuple[EntryMeasure, ...] = ()
+    training: Training = field(default_factory=Training)
+    core_hours: float = 0.0
+    """That the runs of the entry took."""
+    versions: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    def performance(self, world: str) -> FloatArray:
+        """Return the performance of all runs of a world, per 1,000 s, (policies, seeds)."""
+        return np.asarray(self.runs[world]["performance"], dtype=np.float64)
+
+    def interference(self, world: str) -> FloatArray:
+        """Return the share of robot time lost to interference, (policies, seeds)."""
+        return np.asarray(self.runs[world]["interference"], dtype=np.float64)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the entry as plain values, its digest last."""
+        content: dict[str, Any] = {
+            "benchmark": {"version": self.version, "identity": self.identity, "quick": self.is_quick},
+            "name": self.name,
+            "command": self.command,
+            "training": asdict(self.training),
+            "policies": [asdict(policy) for policy in self.policies],
+            "core_hours": self.core_hours,
+            "versions": dict(self.versions),
+            "runs": {
+                world: {name: _lists(rows) for name, rows in of_world.items()} for world, of_world in self.runs.items()
+            },
+            "measures": [asdict(measure) for measure in self.measures],
+        }
+        return {**content, "digest": _digest(content)}
+
+    def write(self, path: str | Path) -> None:
+        """Write the entry to a file, whole or not at all."""
+        from swarm_forage_env._internal.files import replacing
+
+        with replacing(Path(path)) as draft:
+            draft.write_text(_text(self.to_mapping()), encoding="utf-8")
+
+    def check(self, protocol: Protocol, where: str) -> None:
+        """Refuse an entry of another protocol, or one that lacks runs.
+
+        Args:
+            protocol: What it must be an entry of.
+            where: Name of the entry in messages.
+
+        Raises:
+            BenchmarkError: see above.
+        """
+        if self.version != protocol.version:
+            raise BenchmarkError(
+                f"Expected an entry of version {protocol.version} of the benchmark, got one of version {self.version} "
+                f"in {where}; run swarm-forage benchmark again."
+            )
+        if self.identity != protocol.identity:
+            told = "a quick look, which is no entry" if self.is_quick else "other worlds or seeds"
+            raise BenchmarkError(
+                f"Expected an entry of the benchmark, {protocol.name}, got {told} in {where}; run swarm-forage "
+                "benchmark again, without --quick and with this version of the package."
+            )
+        shape = (len(self.policies), len(protocol.seeds))
+        for world in protocol.worlds:
+            for name in ("performance", "interference"):
+                rows = self.runs.get(world.name, {}).get(name)
+                if rows is None:
+                    raise BenchmarkError(f"Expected {name} in the world {world.name!r} in {where}, found none.")
+                values = _numbers(rows)
+                if values.shape != shape or not np.isfinite(values).all() or (values < 0.0).any():
+                    raise BenchmarkError(
+                        f"Expected {name} in the world {world.name!r} of {where} as numbers from 0 up, one for each "
+                        f"of {shape[0]} policies and {shape[1]} seeds."
+                    )
+
+
+def read_entry(path: str | Path, protocol: Protocol) -> Entry:
+    """Read an entry file.
+
+    Raises:
+        BenchmarkError: the file cannot be read, holds no whole entry of `protocol`, or was altered.
+    """
+    from swarm_forage_env._internal.parsing import parse_json
+
+    try:
+        content = parse_json(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BenchmarkError(f"Cannot read the entry {path}: {error.strerror or error}.") from error
+    except ValueError as error:
+        raise BenchmarkError(f"Expected an entry of the benchmark as JSON in {path}: {error}.") from error
+    if not isinstance(content, dict) or sorted(content) != sorted(_KEYS):  # pyright: ignore[reportUnknownArgumentType] - JSON holds anything
+        raise BenchmarkError(f"Expected an entry of the benchmark in {path}, with the keys {', '.join(_KEYS)}.")
+    try:
+        entry = _entry(content)  # pyright: ignore[reportUnknownArgumentType] - JSON holds anything
+    except (TypeError, KeyError, ValueError) as error:
+        raise BenchmarkError(f"Cannot use the entry {path}: {error}") from error
+    entry.check(protocol, str(path))
+    if entry.to_mapping()["digest"] != content["digest"]:
+        raise BenchmarkError(
+            f"Expected the numbers of {path} as swarm-forage benchmark wrote them, got others: the digest does not "
+            "fit. Make the entry again."
+        )
+    return entry
+
+
+def _entry(content: Mapping[str, Any]) -> Entry:
+    about = content["benchmark"]
+    return Entry(
+        version=about["version"],
+        identity=about["identity"],
+        is_quick=about["quick"],
+        name=content["name"],
+        command=content["command"],
+        training=Training(**content["training"]),
+        policies=tuple(EntryPolicy(**policy) for policy in content["policies"]),
+        core_hours=content["core_hours"],
+        versions=content["versions"],
+        runs=content["runs"],
+        measures=tuple(_measure(measure) for measure in content["measures"]),
+    )
+
+
+def _measure(content: Mapping[str, Any]) -> EntryMeasure:
+    lists: dict[str, Any] = {name: tuple(tuple[Any](row) for row in content[name]) for name in ("values", "relative")}
+    fields: dict[str, Any] = {**content, **lists, "n_robots": tuple[Any](content["n_robots"])}
+    return EntryMeasure(**fields)
+
+
+def _numbers(rows: Any) -> FloatArray:
+    try:
+        return np.asarray(rows, dtype=np.float64)
+    except (TypeError, ValueError):
+        return np.empty(0)
+
+
+def _lists(rows: Sequence[Sequence[float]]) -> list[list[float]]:
+    return [list(row) for row in rows]
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    from swarm_forage_env.study.spec import identity_of
+
+    return identity_of(json.loads(json.dumps(content)))
+
+
+def _text(content: Mapping[str, Any]) -> str:
+    """JSON with one line per world and measure: files that people can compare line by line."""
+    lines: list[str] = []
+    for key, value in content.items():
+        if key == "runs":
+            inner = ",\n".join(f"  {json.dumps(name)}: {json.dumps(rows)}" for name, rows in value.items())
+            lines.append(f' "runs": {{\n{inner}\n }}')
+        elif key == "measures":
+            inner = ",\n".join(f"  {json.dumps(measure)}" for measure in value)
+            lines.append(f' "measures": [\n{inner}\n ]')
+        else:
+            lines.append(f" {json.dumps(key)}: {json.dumps(value)}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def six_digits(value: float) -> float:
+    """Return a number as entry files hold it: more digits would say nothing, and make files longer."""
+    return float(f"{value:.6g}")
+
+
+def rounded(value: float) -> float | None:
+    """Return the same; None where there is no number."""
+    return six_digits(value) if math.isfinite(value) else None

@@ -1,0 +1,200 @@
+"""The page of the benchmark: tables of all entries, written between two marks of a Markdown file."""
+
+import math
+import re
+from collections.abc import Sequence
+
+from metrics.scoring.texts import number, percent
+from metrics.statistics import Estimate
+
+from .entry import Entry
+from .protocol import BenchmarkError, Protocol, scenario_fields
+from .standing import Reference, Standing, improvements, measure_mean
+
+BEGIN = "<!-- generated: swarm-forage benchmark page -->"
+END = "<!-- end of entries -->"
+_BLOCK = re.compile(re.escape(BEGIN) + r".*?" + re.escape(END), re.DOTALL)
+_TRAINED = {"given": "training worlds", "other": "also other worlds", "nothing": "not trained", "unknown": "not said"}
+"""`Training.worlds` -> words of the table."""
+BOARD_HEADER = (
+    "entry",
+    "score",
+    "better than the best scripted",
+    "worlds won",
+    "calm",
+    "disturbed",
+    "training worlds",
+    "interference",
+)
+"""Headings of `board_rows`."""
+
+
+def sorted_standings(standings: Sequence[Standing]) -> list[Standing]:
+    """Return standings, the highest score first."""
+    return sorted(standings, key=lambda standing: (-standing.score.value, standing.entry.name))
+
+
+def board_rows(standings: Sequence[Standing]) -> list[tuple[str, ...]]:
+    """Return one row per entry under `BOARD_HEADER`."""
+    return [
+        (
+            standing.entry.name,
+            bounded(standing.score),
+            percent_of(standing.improvement.value),
+            f"{standing.n_won} of {standing.n_worlds}",
+            share(standing.calm),
+            share(standing.disturbed),
+            share(standing.training),
+            percent_of(standing.interference, 1),
+        )
+        for standing in standings
+    ]
+
+
+def page_block(standings: Sequence[Standing], reference: Reference, protocol: Protocol, picture: str = "") -> str:
+    """Return the generated part of the page.
+
+    Args:
+        standings: All entries.
+        reference: The best scripted controllers.
+        protocol: What they are entries of.
+        picture: Path of the figure as the page links it; empty for none.
+    """
+    ranked = sorted_standings(standings)
+    entries = [standing.entry for standing in ranked]
+    n_runs = len(protocol.scored) * len(protocol.seeds)
+    parts = [
+        f"Version {protocol.version}: {len(protocol.scored)} held-out worlds, {len(protocol.seeds)} seeds, so {n_runs} "
+        f"runs of {protocol.horizon_s:,g} s that count per policy.",
+        markdown(BOARD_HEADER, board_rows(ranked)),
+        *([f"![Scores of all entries, and their shares in each world]({picture})"] if picture else []),
+        "### How each was made\n\n" + markdown(*_origins(entries)),
+        "### Group by group\n\n" + markdown(*_groups(ranked, protocol)),
+        "### One against the other\n\nHow often a run of the row's entry is better than one of the column's in the "
+        "same world.\n\n" + markdown(*_duels(entries, protocol)),
+        "### World by world\n\nPerformance per 1,000 s, mean over runs; the best of all entries is bold.\n\n"
+        + markdown(*_worlds(entries, reference, protocol)),
+        "### All measures\n\nMeans over runs; amounts and distances as shares of performance.\n\n"
+        + markdown(*_measures(entries)),
+    ]
+    return f"{BEGIN}\n\n" + "\n\n".join(parts) + f"\n\n{END}"
+
+
+def with_block(text: str, block: str, where: str) -> str:
+    """Return a page with another generated part.
+
+    Raises:
+        BenchmarkError: the page does not have the two marks once.
+    """
+    if len(_BLOCK.findall(text)) != 1:
+        raise BenchmarkError(f"Expected one part between {BEGIN} and {END} in {where}; write these two lines into it.")
+    return _BLOCK.sub(lambda _: block, text)
+
+
+def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table in Markdown."""
+    lines = ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in (header, *rows)]
+    return "\n".join([lines[0], "|" + " --- |" * len(header), *lines[1:]])
+
+
+def bounded(estimate: Estimate) -> str:
+    """Return a score with its interval, "0.87 (0.80 to 0.93)"."""
+    if math.isnan(estimate.lower):
+        return share(estimate.value)
+    return f"{share(estimate.value)} ({share(estimate.lower)} to {share(estimate.upper)})"
+
+
+def share(value: float) -> str:
+    """Return a share of the best scripted controller, with two decimals; a dash where there is none."""
+    return "-" if math.isnan(value) else f"{value:.2f}"
+
+
+def percent_of(value: float, decimals: int = 0) -> str:
+    """Return a share in percent, with so many decimals."""
+    return "-" if math.isnan(value) else f"{100.0 * value:.{decimals}f} %"
+
+
+def _cell(text: str) -> str:
+    """A cell of a Markdown table: names may hold what would end it, or begin HTML."""
+    return " ".join(text.split()).replace("|", r"\|").replace("<", "&lt;")
+
+
+def _code(text: str) -> str:
+    return f"`{text.replace('`', '')}`" if text else ""
+
+
+def _origins(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    header = ("entry", "trained in", "training seeds", "training", "core-hours", "scored by", "core-hours")
+    rows = [
+        (
+            entry.name,
+            _TRAINED[entry.training.worlds],
+            ", ".join("-" if p.training_seed is None else str(p.training_seed) for p in entry.policies),
+            " ".join(filter(None, (entry.training.library, _code(entry.training.command)))) or "-",
+            "-" if entry.training.core_hours is None else number(entry.training.core_hours),
+            _code(entry.command) or "-",
+            number(entry.core_hours),
+        )
+        for entry in entries
+    ]
+    return header, rows
+
+
+def _groups(ranked: Sequence[Standing], protocol: Protocol) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    names = [group.name for group in protocol.groups]
+    several = any(standing.by_policy for standing in ranked)
+    header = ("entry", *names, *(("score of each training seed",) if several else ()))
+    rows = [
+        (
+            standing.entry.name,
+            *(share(standing.groups[name]) for name in names),
+            *((", ".join(map(share, standing.by_policy)) or "-",) if several else ()),
+        )
+        for standing in ranked
+    ]
+    return header, rows
+
+
+def _duels(entries: Sequence[Entry], protocol: Protocol) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    shares = improvements(entries, protocol)
+    names = [entry.name for entry in entries]
+    rows = [
+        (name, *("" if k == other else percent_of(shares[k, other]) for other in range(len(names))))
+        for k, name in enumerate(names)
+    ]
+    return ("", *names), rows
+
+
+def _worlds(
+    entries: Sequence[Entry], reference: Reference, protocol: Protocol
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    rows: list[tuple[str, ...]] = []
+    for world in protocol.worlds:
+        if not world.is_scored:
+            continue
+        told = scenario_fields(world)
+        means = [float(entry.performance(world.name).mean()) for entry in entries]
+        rows.append(
+            (
+                world.name,
+                f"{told['robots']} robots, {told['objects']} objects, {told['arena']}",
+                reference.best[world.name],
+                *(f"**{number(mean)}**" if mean == max(means) else number(mean) for mean in means),
+            )
+        )
+    return ("world", "what it is", "best scripted", *(entry.name for entry in entries)), rows
+
+
+def _measures(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """All measures but those that only say the performance of a world again."""
+    known = [{measure.key: measure for measure in entry.measures} for entry in entries]
+    places = {key: measure for of_entry in known for key, measure in of_entry.items()}
+    rows: list[tuple[str, ...]] = []
+    for key, measure in places.items():
+        if measure.label in ("raw_performance", "efficiency"):
+            continue
+        show = percent if measure.relative else number
+        values = [measure_mean(found[key]) if key in found else math.nan for found in known]
+        better = "higher" if measure.higher_is_better else "lower"
+        rows.append((f"{measure.label}, {measure.group}", measure.at, better, *map(show, values)))
+    return ("measure", "at", "better", *(entry.name for entry in entries)), rows

@@ -1,0 +1,219 @@
+"""The protocol of the benchmark: which worlds, which seeds, how long, read from a TOML file that never changes.
+
+protocol = load_protocol()          # version 1
+protocol.worlds[0].name             # "small warehouse"
+load_protocol(quick=True)           # the same worlds, shorter and with fewer seeds: for a look
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from metrics.scoring.columns import SIZE, UNDISTURBED
+
+if TYPE_CHECKING:
+    from swarm_forage_env.scenarios.config import ScenarioConfig
+    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.wrappers.base import WrapperConfig
+
+LATEST = 1
+"""Version of the protocol that is run where none is asked for."""
+_KEYS = ("version", "physics", "horizon_s", "interval_s", "seeds", "quick", "training", "group")
+_QUICK_KEYS = ("horizon_s", "seeds")
+_TRAINING_KEYS = ("name", "scenario", "set")
+_GROUP_KEYS = ("name", "scenario", "set", "sizes", "levels", "disturbed")
+_LEVEL_WORDS = {"handling_cost": "handling", "population_dynamics": "failures"}
+"""Criterion -> its word in the name of a world, where that is another."""
+
+
+class BenchmarkError(ValueError):
+    """A protocol or an entry that cannot be used; the message says why, and what to do."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class World:
+    """A place where every policy is run, once per seed."""
+
+    name: str
+    """Unique: "small warehouse, 8 robots", "small warehouse, noise 0.03"."""
+    group: str
+    """The group of worlds it belongs to; empty for a world to train in."""
+    scenario: "ScenarioConfig"
+    wrappers: "tuple[WrapperConfig, ...]" = ()
+    is_scored: bool = True
+    """Whether its performance counts; if not, measures use it as their reference."""
+
+    @property
+    def is_held_out(self) -> bool:
+        """Whether nobody is to train in it."""
+        return bool(self.group)
+
+    @property
+    def is_disturbed(self) -> bool:
+        """Whether something disturbs the swarm."""
+        return bool(self.wrappers)
+
+    @property
+    def counts(self) -> bool:
+        """Whether its performance is part of the score."""
+        return self.is_held_out and self.is_scored
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Group:
+    """Worlds that measures compare with each other: one scenario at several sizes, undisturbed and disturbed."""
+
+    name: str
+    roles: "tuple[tuple[str, Experiment], ...]"
+    """Name of a world, and what it is to the measures. A world can have two roles: a swarm size, and undisturbed."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Protocol:
+    """Everything that decides what an entry has to run."""
+
+    version: int
+    identity: str
+    """Short hash of what the file says: two protocols with the same one ask for the same runs."""
+    is_quick: bool
+    horizon_s: float
+    interval_s: float
+    seeds: tuple[int, ...]
+    worlds: tuple[World, ...]
+    """The worlds to train in first."""
+    groups: tuple[Group, ...]
+
+    @property
+    def scored(self) -> tuple[World, ...]:
+        """The held-out worlds whose performance counts."""
+        return tuple(world for world in self.worlds if world.counts)
+
+    @property
+    def name(self) -> str:
+        """Name for people."""
+        return f"version {self.version}" + (", quick" if self.is_quick else "")
+
+
+def protocol_folder() -> Path:
+    """Return where the files of all versions are."""
+    return Path(__file__).parent
+
+
+def load_protocol(file: str | Path | None = None, *, quick: bool = False) -> Protocol:
+    """Read a protocol.
+
+    Args:
+        file: Default that of the latest version.
+        quick: Shorter runs with fewer seeds, as the file says; no entry can be made of them.
+
+    Raises:
+        BenchmarkError: the file cannot be read, or describes no protocol; the message names it.
+    """
+    from swarm_forage_env._internal.parsing import parse_toml
+
+    path = protocol_folder() / f"benchmark_v{LATEST}.toml" if file is None else Path(file)
+    try:
+        return _protocol(parse_toml(path.read_text(encoding="utf-8")), quick=quick)
+    except OSError as error:
+        raise BenchmarkError(f"Cannot read the protocol {path}: {error.strerror or error}.") from error
+    except (ValueError, KeyError, TypeError) as error:
+        reason = f"missing key {error}" if isinstance(error, KeyError) else str(error)
+        raise BenchmarkError(f"Cannot use the protocol {path}: {reason}") from error
+
+
+def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
+    from swarm_forage_env._internal.fields import known_keys, unique_names
+    from swarm_forage_env.study.spec import identity_of
+
+    known_keys(content, _KEYS, "key of a protocol")
+    chosen = {name: content[name] for name in ("physics", "horizon_s", "interval_s", "seeds")}
+    if quick:
+        known_keys(content["quick"], _QUICK_KEYS, prefix="quick.")
+        chosen |= content["quick"]
+    seeds = tuple(chosen.pop("seeds"))
+    worlds: list[World] = []
+    for entry in content.get("training", []):
+        known_keys(entry, _TRAINING_KEYS, prefix="training.")
+        worlds.append(World(name=f"training: {entry['name']}", group="", scenario=_scenario(entry, chosen)))
+    groups: list[Group] = []
+    for entry in content["group"]:
+        known_keys(entry, _GROUP_KEYS, prefix="group.")
+        group, of_group = _group(entry, _scenario(entry, chosen))
+        groups.append(group)
+        worlds += of_group
+    unique_names("worlds", tuple(world.name for world in worlds))
+    return Protocol(
+        version=content["version"],
+        identity=identity_of({**content, "is_quick": quick}),
+        is_quick=quick,
+        horizon_s=chosen["horizon_s"],
+        interval_s=chosen["interval_s"],
+        seeds=seeds,
+        worlds=tuple(worlds),
+        groups=tuple(groups),
+    )
+
+
+def _scenario(entry: Mapping[str, Any], of_all: Mapping[str, Any]) -> "ScenarioConfig":
+    from swarm_forage_env.scenarios.presets import scenario
+    from swarm_forage_env.study.studies import plain_settings
+
+    return scenario(entry["scenario"], **plain_settings(entry.get("set", {})), **of_all)
+
+
+def _group(entry: Mapping[str, Any], base: "ScenarioConfig") -> tuple[Group, list[World]]:
+    """The worlds of a group, and what they are to the measures."""
+    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.wrappers.registry import wrappers_from_mapping
+
+    name: str = entry["name"]
+    worlds: dict[str, World] = {}
+    roles: list[tuple[str, Experiment]] = []
+
+    def add(what: str, scenario: "ScenarioConfig", wrappers: "tuple[WrapperConfig, ...]" = (), **told: bool) -> str:
+        world = World(name=f"{name}, {what}", group=name, scenario=scenario, wrappers=wrappers, **told)
+        if world.name in worlds:
+            raise BenchmarkError(f"Expected worlds of different names, got {world.name!r} twice.")
+        worlds[world.name] = world
+        return world.name
+
+    for size in entry["sizes"]:
+        sized = replace(base, robots=replace(base.robots, n_robots=size))
+        place = add(f"{size} robot{'s' if size > 1 else ''}", sized, is_scored=size > 1)
+        roles.append((place, Experiment(criterion=SIZE, value=size, scenario=sized)))
+        if size == base.robots.n_robots:
+            roles.append((place, Experiment(criterion=UNDISTURBED, value=0.0, scenario=sized)))
+    for what, experiment, is_reference in _disturbances(entry.get("levels", {}), base):
+        place = add(what, base, experiment.wrappers, is_scored=not is_reference)
+        roles.append((place, experiment))
+    for what, tables in entry.get("disturbed", {}).items():
+        add(what, base, wrappers_from_mapping(tables))
+    return Group(name=name, roles=tuple(roles)), list(worlds.values())
+
+
+def _disturbances(levels: Mapping[str, Any], base: "ScenarioConfig") -> "Iterator[tuple[str, Experiment, bool]]":
+    """Yield the name, the experiment and whether it is only a reference, of each level of each criterion."""
+    from swarm_forage_env.study.experiments import Experiment, wrappers_at
+
+    for criterion, values in levels.items():
+        # Only what varies over time has a reference of its own; others are held against the undisturbed run.
+        own_reference = [0.0] if wrappers_at(base, criterion, 0.0) else []
+        for value in (*own_reference, *values):
+            wrappers = wrappers_at(base, criterion, value)
+            experiment = Experiment(criterion=criterion, value=value, scenario=base, wrappers=wrappers)
+            is_deadly = experiment.population is not None and experiment.population.death_per_tick > 0.0
+            word = "deaths" if is_deadly else _LEVEL_WORDS.get(criterion, criterion)
+            yield f"{word} {value:g}", experiment, value == 0.0
+
+
+def scenario_fields(world: World) -> dict[str, Any]:
+    """Return what people want to know of a world: its scenario, robots, objects and arena."""
+    scenario = world.scenario
+    return {
+        "scenario": scenario.name,
+        "robots": scenario.robots.n_robots,
+        "objects": scenario.objects.n_objects,
+        "arena": f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m",
+        "disturbed by": ", ".join(config.name for config in world.wrappers),
+    }

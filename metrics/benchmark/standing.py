@@ -1,0 +1,167 @@
+"""What an entry is worth: its runs as shares of the best scripted controller's, made one number.
+
+The performance of each run is divided by the mean of that scripted controller which is best in the world. So 1 is as
+good as the best of the four there, and worlds of few and of many deliveries count alike. The score is the
+interquartile mean of all held-out runs: a world in which a policy is lucky, or breaks down, does not decide it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from metrics.curves import FloatArray
+from metrics.distributions import interquartile_mean, probability_of_improvement
+from metrics.statistics import Estimate
+
+from .entry import Entry, EntryMeasure, read_entry
+from .protocol import BenchmarkError, Protocol, World
+
+SCRIPTED = ("crw", "dpo", "stochm", "stochx")
+"""The controllers that all others are held against; their entries come with the package."""
+_SEED = 1
+"""Of the bootstrap; fixed, so that the same entries give the same page."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reference:
+    """The best scripted controller of each world that counts or is trained in."""
+
+    best: dict[str, str]
+    """World -> name of the controller with the highest mean."""
+    runs: dict[str, FloatArray]
+    """World -> performance of its runs, per 1,000 s, (runs,)."""
+
+    def mean(self, world: str) -> float:
+        """Return the mean performance of the best scripted controller in a world, per 1,000 s."""
+        return float(self.runs[world].mean())
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Standing:
+    """What an entry is worth."""
+
+    entry: Entry
+    score: Estimate
+    """Interquartile mean over the runs of all held-out worlds; 1 = as good as the best scripted controller."""
+    improvement: Estimate
+    """How probably one of its runs is better than one of the best scripted controller in the same world."""
+    n_won: int
+    """Held-out worlds in which its mean is above that of every scripted controller."""
+    n_worlds: int
+    calm: float
+    """Interquartile mean over undisturbed held-out worlds."""
+    disturbed: float
+    training: float
+    """Interquartile mean over the training worlds."""
+    groups: dict[str, float]
+    """Group -> interquartile mean over its worlds."""
+    interference: float
+    """Share of robot time lost in held-out worlds, mean over runs."""
+    by_policy: tuple[float, ...]
+    """Score of each policy, where there are several: the spread over training seeds."""
+
+
+def scripted_folder() -> Path:
+    """Return where the entries of the scripted controllers are."""
+    return Path(__file__).parent / "scripted"
+
+
+def scripted_entries(protocol: Protocol, folder: Path | None = None) -> tuple[Entry, ...]:
+    """Return the entries of the scripted controllers, which come with the package.
+
+    Args:
+        protocol: The full protocol, not the quick one.
+        folder: Where they are; default in the package.
+
+    Raises:
+        BenchmarkError: one is missing, or is no entry of this protocol.
+    """
+    return tuple(read_entry((folder or scripted_folder()) / f"{name}.json", protocol) for name in SCRIPTED)
+
+
+def reference_of(scripted: Sequence[Entry], protocol: Protocol) -> Reference:
+    """Return the best scripted controller of each world.
+
+    Raises:
+        BenchmarkError: nobody achieves anything in a world that counts, so nothing can be held against it.
+    """
+    best: dict[str, str] = {}
+    runs: dict[str, FloatArray] = {}
+    for world in _judged(protocol):
+        winner = max(scripted, key=lambda entry: float(entry.performance(world.name).mean()))
+        best[world.name] = winner.name
+        runs[world.name] = winner.performance(world.name).ravel()
+        if runs[world.name].mean() <= 0.0:
+            raise BenchmarkError(
+                f"Expected a scripted controller that achieves something in the world {world.name!r}, got none; the "
+                "protocol needs a world in its place."
+            )
+    return Reference(best=best, runs=runs)
+
+
+def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Standing:
+    """Return what an entry is worth; a quick one is held against full runs, whose rates are those of longer runs."""
+    shares = {world.name: shares_of(entry, world, reference) for world in _judged(protocol)}
+
+    def middle(chosen: Callable[[World], bool]) -> float:
+        picked = [shares[world.name].ravel() for world in _judged(protocol) if chosen(world)]
+        return interquartile_mean(picked, seed=_SEED).value if picked else float("nan")
+
+    counting = protocol.scored
+    n_policies = len(entry.policies)
+    ours = [entry.performance(world.name).ravel() for world in counting]
+    theirs = [reference.runs[world.name] for world in counting]
+    return Standing(
+        entry=entry,
+        score=interquartile_mean([shares[world.name].ravel() for world in counting], seed=_SEED),
+        improvement=probability_of_improvement(ours, theirs, seed=_SEED),
+        n_won=sum(bool(shares[world.name].mean() > 1.0) for world in counting),
+        n_worlds=len(counting),
+        calm=middle(lambda world: world.counts and not world.is_disturbed),
+        disturbed=middle(lambda world: world.counts and world.is_disturbed),
+        training=middle(lambda world: not world.is_held_out),
+        groups={group.name: middle(lambda world, of=group.name: world.group == of) for group in protocol.groups},
+        interference=float(np.mean([entry.interference(world.name).mean() for world in counting])),
+        by_policy=tuple(
+            interquartile_mean([shares[world.name][k] for world in counting], seed=_SEED).value
+            for k in range(n_policies)
+        )
+        if n_policies > 1
+        else (),
+    )
+
+
+def shares_of(entry: Entry, world: World, reference: Reference) -> FloatArray:
+    """Return the performance of an entry's runs over the best scripted mean in a world, (policies, seeds)."""
+    return entry.performance(world.name) / reference.mean(world.name)
+
+
+def improvements(entries: Sequence[Entry], protocol: Protocol) -> FloatArray:
+    """Return how probably a run of one entry is better than one of another in the same world, mean over worlds.
+
+    Returns:
+        (E, E): row over column; 0.5 on the diagonal.
+    """
+    runs = [[entry.performance(world.name).ravel() for world in protocol.scored] for entry in entries]
+    return np.array(
+        [
+            [0.5 if a is b else probability_of_improvement(a, b, seed=_SEED, n_resamples=1).value for b in runs]
+            for a in runs
+        ]
+    )
+
+
+def measure_mean(measure: EntryMeasure) -> float:
+    """Return the mean of a measure over policies and seeds, relative to performance where it is an amount.
+
+    NaN where no run has a value.
+    """
+    rows = measure.relative or measure.values
+    known = [value for row in rows for value in row if value is not None]
+    return float(np.mean(known)) if known else float("nan")
+
+
+def _judged(protocol: Protocol) -> tuple[World, ...]:
+    return tuple(world for world in protocol.worlds if world.is_scored)

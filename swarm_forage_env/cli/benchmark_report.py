@@ -1,0 +1,210 @@
+"""How `benchmark` carries out its work, and what it prints: plan, worlds, standings, the page."""
+
+import json
+import os
+import shlex
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from metrics.benchmark.entry import Entry, Training, read_entry
+from metrics.benchmark.page import BOARD_HEADER, board_rows, page_block, sorted_standings, with_block
+from metrics.benchmark.protocol import BenchmarkError, Protocol, load_protocol, scenario_fields
+from metrics.benchmark.running import benchmark_specs, run_benchmark
+from metrics.benchmark.standing import Reference, Standing, reference_of, scripted_entries, standing_of
+from metrics.scoring.texts import aligned, counted, plain
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.printable import printable
+from swarm_forage_env.cli.interrupts import resumable
+from swarm_forage_env.cli.options import NO_PICTURE
+from swarm_forage_env.cli.report import estimate, estimated_seconds
+from swarm_forage_env.study.runner import available_cores
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.study.store import RunStore
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Wanted:
+    """What the options of `benchmark` ask for."""
+
+    policies: tuple[str, ...]
+    name: str
+    quick: bool = False
+    trained_in: str = "unknown"
+    training: str = ""
+    library: str = ""
+    training_hours: float | None = None
+    training_seeds: tuple[int, ...] = ()
+
+    @property
+    def command(self) -> str:
+        """What makes the same entry again; files without their folders, which are nobody's business."""
+        policies = [word for policy in self.policies for word in ("--policy", Path(policy).name)]
+        return shlex.join(["swarm-forage", "benchmark", *policies, "--name", self.name])
+
+
+def run_and_show(wanted: Wanted, file: Path | None, records: Path, jobs: int | None, *, as_json: bool) -> None:
+    """Run what is missing, write the entry unless `file` is None, and show what it is worth.
+
+    Raises:
+        typer.Exit: Ctrl-C.
+        ConfigError: an unknown policy, or a file that cannot be opened.
+        BenchmarkError: runs failed.
+    """
+    protocol = load_protocol(quick=wanted.quick)
+    _planned(wanted, protocol)  # refuses what cannot be run, before anything is
+    training = Training(
+        worlds=wanted.trained_in,
+        command=wanted.training,
+        library=wanted.library,
+        core_hours=wanted.training_hours,
+    )
+    with resumable(records):
+        entry = run_benchmark(
+            wanted.policies,
+            name=wanted.name,
+            protocol=protocol,
+            command=wanted.command,
+            training=training,
+            training_seeds=wanted.training_seeds,
+            out=records,
+            jobs=jobs,
+        )
+    if file is not None:
+        entry.write(file)
+        typer.echo(f"entry {file}", err=True)
+    _show([entry], protocol, as_json=as_json)
+    if wanted.quick:
+        typer.echo("A quick look, no entry: shorter runs than those of the scripted controllers.", err=True)
+
+
+def show_entries(paths: Sequence[Path], *, as_json: bool) -> None:
+    """Show what entries are worth; raises BenchmarkError for a file that is no entry."""
+    protocol = load_protocol()
+    _show([read_entry(path, protocol) for path in entry_files(paths)], protocol, as_json=as_json)
+
+
+def write_page(paths: Sequence[Path], page: Path, picture: Path) -> tuple[Path, ...]:
+    """Write the generated part of a page and its figure; returns what was written.
+
+    Raises:
+        BenchmarkError: a file that is no entry, or a page without the marks.
+    """
+    from metrics.benchmark.figure import draw_benchmark
+
+    protocol = load_protocol()
+    standings, reference = _standings([read_entry(path, protocol) for path in entry_files(paths)], protocol)
+    text = page.read_text(encoding="utf-8")
+    link = Path(os.path.relpath(picture, page.parent)).as_posix()
+    text = with_block(text, page_block(standings, reference, protocol, link), str(page))
+    try:
+        with replacing(picture, ending=picture.suffix) as draft:
+            draw_benchmark(standings, reference, protocol, draft)
+    except ImportError as error:
+        raise ImportError(NO_PICTURE) from error
+    with replacing(page) as draft:
+        draft.write_text(text, encoding="utf-8")
+    return page, picture
+
+
+def entry_files(given: Sequence[Path]) -> list[Path]:
+    """Return entry files; a folder stands for those in it, in the order of their names."""
+    return [file for path in given for file in (sorted(path.glob("*.json")) if path.is_dir() else [path])]
+
+
+def plan_text(wanted: Wanted, records: Path, jobs: int | None) -> str:
+    """Return what would be run, with an estimate.
+
+    Raises:
+        ConfigError: an unknown policy, or a file that cannot be opened.
+    """
+    protocol = load_protocol(quick=wanted.quick)
+    store = RunStore(records)
+    specs = _planned(wanted, protocol)
+    todo = [spec for spec in specs if spec.run_id not in store]
+    processes = jobs or available_cores()
+    seconds = estimated_seconds(todo, processes)
+    return "\n".join(
+        [
+            f"{wanted.name} in the benchmark, {protocol.name}: {counted(len(protocol.worlds), 'world')}, "
+            f"{counted(len(protocol.seeds), 'seed')}, {protocol.horizon_s:,g} s per run, records go to {store.folder}",
+            f"{counted(len(specs), 'run')}, {len(todo):,} to do" + estimate(seconds, processes, any_left=bool(todo)),
+        ]
+    )
+
+
+def _planned(wanted: Wanted, protocol: Protocol) -> list[RunSpec]:
+    """Return all runs; raises ConfigError for an unknown policy, or a file that cannot be opened."""
+    try:
+        return [spec for policy in wanted.policies for spec in benchmark_specs(policy, protocol)]
+    except ValueError as error:  # of a policy or its file
+        raise ConfigError(str(error)) from error
+
+
+def worlds_text() -> str:
+    """Return all worlds as a table."""
+    protocol = load_protocol()
+    rows: list[Sequence[str]] = [("world", "scenario", "robots", "objects", "arena", "disturbed by", "counts")]
+    for world in protocol.worlds:
+        why = "yes" if world.counts else "reference of measures" if world.is_held_out else "no, to train in"
+        rows.append((world.name, *map(str, scenario_fields(world).values()), why))
+    kinds = Counter(world.counts for world in protocol.worlds)
+    return "\n".join(
+        [
+            f"Benchmark, {protocol.name}: seeds {', '.join(map(str, protocol.seeds))}, {protocol.horizon_s:,g} s per "
+            f"run, {kinds[True]} worlds that count",
+            *aligned(rows),
+        ]
+    )
+
+
+def _standings(entries: Sequence[Entry], protocol: Protocol) -> tuple[list[Standing], Reference]:
+    """What entries are worth, and what the scripted controllers are beside them.
+
+    Raises:
+        BenchmarkError: two entries of one name.
+    """
+    full = load_protocol()
+    scripted = scripted_entries(full)
+    reference = reference_of(scripted, full)
+    own_names = {entry.name for entry in scripted}
+    added = [entry for entry in entries if entry.name not in own_names]
+    counts = Counter(entry.name for entry in added)
+    twice = [name for name, count in counts.items() if count > 1]
+    if twice:
+        raise BenchmarkError(f"Expected entries of different names, got {twice[0]!r} twice.")
+    standings = [standing_of(entry, reference, full) for entry in scripted]
+    standings += [standing_of(entry, reference, protocol) for entry in added]
+    return sorted_standings(standings), reference
+
+
+def _show(entries: Sequence[Entry], protocol: Protocol, *, as_json: bool) -> None:
+    standings, _ = _standings(entries, protocol)
+    if as_json:
+        typer.echo(json.dumps([_mapping(standing) for standing in standings], indent=1))
+        return
+    for line in aligned([BOARD_HEADER, *board_rows(standings)]):
+        typer.echo(printable(line))
+
+
+def _mapping(standing: Standing) -> dict[str, Any]:
+    """A standing as plain values for JSON."""
+    score, improvement = standing.score, standing.improvement
+    return {
+        "name": standing.entry.name,
+        "score": [plain(score.value), plain(score.lower), plain(score.upper)],
+        "improvement": [plain(improvement.value), plain(improvement.lower), plain(improvement.upper)],
+        "worlds_won": standing.n_won,
+        "worlds": standing.n_worlds,
+        "calm": plain(standing.calm),
+        "disturbed": plain(standing.disturbed),
+        "training_worlds": plain(standing.training),
+        "groups": {name: plain(value) for name, value in standing.groups.items()},
+        "interference": plain(standing.interference),
+        "by_policy": [plain(value) for value in standing.by_policy],
+    }

@@ -1,0 +1,74 @@
+"""Callbacks of stable-baselines3 by name: code of the user that runs beside a training.
+
+    swarm-forage train --callback my_callbacks:Mine     # class Mine in my_callbacks.py, in this folder or installed
+    swarm-forage train --callback wandb                 # an entry point that an installed package offers
+
+Only the command line and Python name callbacks. A plan, which may come from anywhere, cannot: it holds no code.
+"""
+
+import sys
+from collections.abc import Iterable
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from stable_baselines3.common.callbacks import BaseCallback
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.spelling import suggestion
+
+CALLBACK_ENTRY_POINTS = "swarm_forage_env.callbacks"
+"""Entry-point group under which installed packages offer classes of callbacks by name."""
+
+
+def named_callbacks(names: Iterable[str]) -> tuple[BaseCallback, ...]:
+    """Return callbacks by their names, each made without arguments.
+
+    Args:
+        names: "module:Class", or the name of an entry point. A module may lie in the current folder.
+
+    Raises:
+        ConfigError: there is none of that name, it cannot be imported or made, or it is no callback.
+    """
+    return tuple(map(_made, names))
+
+
+def _made(name: str) -> BaseCallback:
+    try:
+        made = _found(name)()
+    except ConfigError:
+        raise
+    except Exception as error:  # code of the user, which may raise anything
+        reason = " ".join(str(error).split()) or "no message"
+        raise ConfigError(f"Cannot make the callback {name!r}: {type(error).__name__}: {reason}") from error
+    if not isinstance(made, BaseCallback):
+        raise ConfigError(
+            f"Expected {name!r} to make a callback of stable-baselines3, got {type(made).__name__}; derive its class "
+            "from stable_baselines3.common.callbacks.BaseCallback."
+        )
+    return made
+
+
+def _found(name: str) -> Any:
+    """The class (or function) of that name; whatever its import raises comes through."""
+    module, colon, attribute = name.partition(":")
+    if colon:
+        return getattr(_imported(module), attribute)
+    offered = {point.name: point for point in entry_points(group=CALLBACK_ENTRY_POINTS)}
+    if name not in offered:
+        raise ConfigError(
+            f"Expected a callback as module:Class or as the name of an entry point, got {name!r}."
+            f"{suggestion(name, offered)} Entry points: {', '.join(sorted(offered)) or 'none'}."
+        )
+    return offered[name].load()
+
+
+def _imported(module: str) -> Any:
+    """Import a module, also from the current folder, which Python does not search for an installed command."""
+    here = str(Path.cwd())
+    sys.path.insert(0, here)
+    try:
+        return import_module(module)
+    finally:
+        sys.path.remove(here)

@@ -1,0 +1,122 @@
+"""The command `benchmark`, with a tiny protocol in place of the real one."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from metrics.benchmark import load_protocol
+from metrics.benchmark.page import BEGIN, END
+from metrics.benchmark.standing import SCRIPTED
+from tests.support.entries import TINY, made_up_entry
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A place with the entries of the scripted controllers, and the tiny protocol."""
+    place = tmp_path_factory.mktemp("benchmark")
+    (place / "benchmark_v1.toml").write_text(TINY.read_text())
+    for k, name in enumerate(SCRIPTED):
+        made_up_entry(load_protocol(TINY), name, lambda _, k=k: 10.0 + k).write(place / f"{name}.json")
+    return place
+
+
+@pytest.fixture
+def tiny(folder, monkeypatch):
+    monkeypatch.setattr("metrics.benchmark.protocol.protocol_folder", lambda: folder)
+    monkeypatch.setattr("metrics.benchmark.standing.scripted_folder", lambda: folder)
+
+
+@pytest.fixture
+def mine(tiny, tmp_path):
+    """An entry in the folder of the command."""
+    made_up_entry(load_protocol(), "mine", lambda k: 30.0).write(tmp_path / "mine.json")
+
+
+def test_a_policy_becomes_an_entry_that_can_be_shown(command, tiny):
+    words = ("--policy", "crw", "--name", "again", "--trained-in", "nothing", "--jobs", "1")
+    code, out, err = command("benchmark", *words)
+    assert code == 0, err
+    header, *rows = out.splitlines()
+    assert header.split()[:2] == ["entry", "score"]
+    assert {row.split()[0] for row in rows} == {*SCRIPTED, "again"}
+    file = Path("results/benchmark/again.json")
+    content = json.loads(file.read_text())
+    assert content["command"] == "swarm-forage benchmark --policy crw --name again"
+    assert content["training"]["worlds"] == "nothing"
+    code, shown, _ = command("benchmark", "show", str(file))
+    assert (code, shown) == (0, out)
+    code, told, _ = command("benchmark", "show", "results/benchmark", "--json")
+    assert {standing["name"] for standing in json.loads(told)} == {*SCRIPTED, "again"}
+
+
+def test_a_quick_look_writes_no_entry(command, tiny):
+    code, out, err = command("benchmark", "--policy", "random", "--quick", "--jobs", "1")
+    assert code == 0, err
+    assert "random" in out
+    assert "no entry" in err
+    assert not list(Path("results/benchmark").glob("*.json"))
+
+
+def test_a_dry_run_tells_what_there_is_to_do(command, tiny):
+    code, out, _ = command("benchmark", "--policy", "crw", "--policy", "dpo", "--name", "two", "--dry-run")
+    assert code == 0
+    assert "two in the benchmark, version 1: 9 worlds, 2 seeds, 200 s per run" in out
+    assert "36 runs, 36 to do" in out
+    assert not Path("results").exists()
+
+
+def test_the_worlds_are_shown(command, tiny):
+    code, out, _ = command("benchmark", "worlds")
+    assert code == 0
+    assert "seeds 1, 2, 200 s per run, 6 worlds that count" in out
+    assert "room, throttle 0   " in out
+    assert "reference of measures" in out
+
+
+def test_a_page_is_written_with_its_figure(command, mine):
+    Path("docs").mkdir()
+    Path("docs/benchmark.md").write_text(f"# Benchmark\n\n{BEGIN}\n{END}\n\nend\n")
+    code, out, err = command("benchmark", "page", "mine.json")
+    assert code == 0, err
+    assert out.split() == ["docs/benchmark.md", "docs/images/benchmark.png"]
+    text = Path("docs/benchmark.md").read_text()
+    assert "| mine | " in text
+    assert "](images/benchmark.png)" in text
+    assert text.endswith(f"{END}\n\nend\n")
+
+
+def spoil(name, change):
+    file = Path(name)
+    file.write_text(change(file.read_text()))
+
+
+def test_an_altered_entry_is_refused_in_one_line(command, mine):
+    spoil("mine.json", lambda text: text.replace('"interference": [[0.1, 0.1]]', '"interference": [[0.0, 0.1]]', 1))
+    code, out, err = command("benchmark", "show", "mine.json")
+    assert (code, out) == (2, "")
+    assert err.startswith("swarm-forage: Expected the numbers of mine.json as swarm-forage benchmark wrote them")
+    assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "Expected --policy"),
+        (("--policy", "crw", "--policy", "dpo"), "Expected --name"),
+        (("--policy", "crw", "--quick", "--out", "x.json"), "a quick look is no entry"),
+        (("--policy", "cwr"), "Unknown policy 'cwr'"),
+        (("--policy", "none.npz"), "none.npz"),
+        (("--policy", "crw", "--trained-in", "mars"), "got 'mars'"),
+        (("--policy", "crw", "--training-seed", "1", "--training-seed", "2"), "got 2 for 1 policies"),
+        (("show", "none.json"), "Cannot read the entry none.json"),
+        (("show", "mine.json", "mine.json"), "'mine' twice"),
+        (("page", "mine.json", "--into", "none.md"), "none.md"),
+        (("page", "mine.json", "--into", "mine.json"), "write these two lines"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_one_line(words, message, command, mine):
+    code, _, err = command("benchmark", *words)
+    assert code in (1, 2)
+    assert message in err
+    assert len(err.splitlines()) == 1

@@ -1,0 +1,85 @@
+"""From policies to an entry, in a tiny protocol: the runs, and the measures that they allow."""
+
+import math
+
+import pytest
+
+from metrics.benchmark import BenchmarkError, Training, benchmark_specs, load_protocol, read_entry, run_benchmark
+from metrics.scoring.measures import MEASURE_CRITERIA
+from swarm_forage_env import run_one
+from tests.support.entries import TINY
+
+FROM_RATES_ALONE = {"availability"}
+"""Measures that say the same of every policy, and are in no entry."""
+
+
+@pytest.fixture(scope="module")
+def protocol():
+    return load_protocol(TINY)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("records")
+
+
+@pytest.fixture(scope="module")
+def entry(protocol, folder):
+    policies = ("crw", "ppo_warehouse_small")
+    training = Training(worlds="given", library="a library", core_hours=1.5)
+    return run_benchmark(
+        policies, name="both", protocol=protocol, training=training, out=folder, jobs=1, progress=False
+    )
+
+
+def test_an_entry_has_the_runs_of_all_policies(entry, protocol):
+    spec = next(s for s in benchmark_specs("crw", protocol) if s.seed == 2 and s.scenario.robots.n_robots == 2)
+    record = run_one(spec)
+    row = entry.performance("room, 2 robots")[0]
+    assert row[1] == pytest.approx(record.performance.sum() / 0.2)  # per 1,000 s, of 200 s
+    assert entry.interference("room, 2 robots")[0, 1] == pytest.approx(record.interference_fraction.mean(), rel=1e-5)
+    assert entry.performance("room, noisy wheels").shape == (2, 2)
+
+
+def test_an_entry_has_every_measure(entry):
+    assert {measure.label for measure in entry.measures} == MEASURE_CRITERIA.keys() - FROM_RATES_ALONE
+    emergence = next(measure for measure in entry.measures if measure.label == "spatial_emergence")
+    assert (emergence.group, emergence.at) == ("room", "N = 1 to 2")
+    assert [len(row) for row in (*emergence.values, *emergence.relative)] == [2, 2, 2, 2]
+
+
+def test_an_entry_tells_how_it_was_made(entry):
+    crw, ppo = entry.policies
+    assert (crw.name, crw.digest, crw.training_seed) == ("crw", "", None)
+    assert (ppo.name, len(ppo.digest), ppo.training_seed) == ("ppo_warehouse_small", 16, 0)
+    assert entry.training.core_hours == 1.5
+    assert entry.core_hours >= 0.0
+    assert not math.isnan(entry.core_hours)
+    assert entry.versions["swarm-forage-env"]
+
+
+def test_stored_runs_give_the_same_entry(entry, protocol, folder, tmp_path):
+    again = run_benchmark(
+        ["crw", "ppo_warehouse_small"],
+        name="both",
+        protocol=protocol,
+        training=entry.training,
+        training_seeds=(3, 4),
+        out=folder,
+        jobs=1,
+        progress=False,
+    )
+    assert again.runs == entry.runs
+    assert [policy.training_seed for policy in again.policies] == [3, 4]
+    again.write(tmp_path / "entry.json")
+    assert read_entry(tmp_path / "entry.json", protocol).runs == entry.runs
+
+
+def test_training_seeds_are_one_per_policy(protocol):
+    with pytest.raises(BenchmarkError, match="got 1 for 2 policies"):
+        run_benchmark(["crw", "dpo"], name="two", protocol=protocol, training_seeds=(1,))
+
+
+def test_an_unknown_policy_is_refused(protocol):
+    with pytest.raises(ValueError, match="Unknown policy 'cwr'"):
+        benchmark_specs("cwr", protocol)

@@ -1,0 +1,120 @@
+"""What entries are worth, checked on numbers made up: shares of the best scripted controller, and the page."""
+
+import numpy as np
+import pytest
+
+from metrics.benchmark import BenchmarkError, draw_benchmark, load_protocol, page_block, reference_of, standing_of
+from metrics.benchmark.page import BEGIN, END, markdown, with_block
+from metrics.benchmark.standing import SCRIPTED, improvements, scripted_entries
+from tests.support.entries import TINY, made_up_entry
+
+
+@pytest.fixture(scope="module")
+def protocol():
+    return load_protocol(TINY)
+
+
+@pytest.fixture(scope="module")
+def scripted(protocol):
+    """The first two are best in every other world: 19 and 21 there, so 20 on average."""
+    best = (lambda k: 19.0 if k % 2 else 9.0), (lambda k: 9.0 if k % 2 else 19.0)
+    performances = (*best, lambda k: 1.0, lambda k: 2.0)
+    return [made_up_entry(protocol, name, p) for name, p in zip(SCRIPTED, performances, strict=True)]
+
+
+@pytest.fixture(scope="module")
+def reference(protocol, scripted):
+    return reference_of(scripted, protocol)
+
+
+def test_the_reference_is_the_best_scripted_controller_of_each_world(protocol, reference):
+    for k, world in enumerate(protocol.worlds):
+        if world.is_scored:
+            assert reference.best[world.name] == SCRIPTED[0 if k % 2 else 1]
+            assert reference.mean(world.name) == 20.0
+    assert "room, 1 robot" not in reference.best
+
+
+def test_a_world_in_which_no_scripted_controller_achieves_anything_is_refused(protocol):
+    nobody = [made_up_entry(protocol, name, lambda k: -1.0) for name in SCRIPTED]  # -1 and 1 objects: 0 on average
+    with pytest.raises(BenchmarkError, match="training: here"):
+        reference_of(nobody, protocol)
+
+
+def test_the_score_is_the_interquartile_mean_of_shares(protocol, reference):
+    standing = standing_of(made_up_entry(protocol, "twice", lambda k: 39.0), reference, protocol)
+    assert standing.score.value == pytest.approx(2.0)
+    assert standing.score.lower <= 2.0 <= standing.score.upper
+    assert (standing.n_won, standing.n_worlds) == (6, 6)
+    assert standing.improvement.value == 1.0
+    assert (standing.calm, standing.disturbed, standing.training) == pytest.approx((2.0, 2.0, 2.0))
+    assert standing.groups == {"room": pytest.approx(2.0)}
+    assert standing.interference == pytest.approx(0.1)
+    assert standing.by_policy == ()
+
+
+def test_one_world_in_which_a_policy_is_lucky_does_not_decide(protocol, reference):
+    lucky = made_up_entry(protocol, "lucky", lambda k: 1e6 if protocol.worlds[k].name == "room, noisy wheels" else 9.0)
+    standing = standing_of(lucky, reference, protocol)
+    assert standing.score.value == pytest.approx(0.5, abs=0.1)
+    assert standing.n_won == 1
+    assert standing.disturbed > standing.calm
+
+
+def test_each_training_seed_has_a_score_of_its_own(protocol, reference):
+    standing = standing_of(made_up_entry(protocol, "two", lambda k: 18.5, n_policies=2), reference, protocol)
+    assert standing.by_policy == (pytest.approx(19.5 / 20), pytest.approx(20.5 / 20))
+
+
+def test_references_of_measures_do_not_count(protocol, reference):
+    references = ("room, 1 robot", "room, throttle 0")
+    usual, other = (
+        made_up_entry(protocol, "it", lambda k, high=high: high if protocol.worlds[k].name in references else 10.0)
+        for high in (10.0, 1000.0)
+    )
+    assert standing_of(usual, reference, protocol).score == standing_of(other, reference, protocol).score
+
+
+def test_improvements_of_a_pair_add_up_to_one(protocol, scripted):
+    shares = improvements(scripted, protocol)
+    np.testing.assert_allclose(shares + shares.T, 1.0)
+    assert shares[0, 2] == 1.0  # always better than 1 object
+
+
+def test_the_page_has_every_entry_with_its_command_cost_and_seeds(protocol, scripted, reference):
+    entries = [*scripted, made_up_entry(protocol, "mine|<b>", lambda k: 39.0, n_policies=2)]
+    block = page_block([standing_of(e, reference, protocol) for e in entries], reference, protocol, "it.png")
+    rows = [line for line in block.splitlines() if line.startswith("|")]
+    first = rows[2]  # after the heading and the line below it
+    assert first.startswith(r"| mine\|&lt;b> | 2.0")  # the best comes first, and its name ends no cell
+    assert "![Scores of all entries, and their shares in each world](it.png)" in block
+    assert r"`swarm-forage benchmark --policy crw` | 0.25 |" in block
+    assert "| 0, 1 |" in block
+    assert "| room, noisy wheels | 4 robots, 60 objects, 9 x 9 m | dpo |" in block
+    assert "| scalability, room | N = 2 to 4 | higher |" in block
+
+
+def test_a_page_gets_another_block_between_its_marks():
+    page = f"before\n{BEGIN}\nold\n{END}\nafter\n"
+    assert with_block(page, f"{BEGIN}\nnew \\1\n{END}", "page") == f"before\n{BEGIN}\nnew \\1\n{END}\nafter\n"
+    with pytest.raises(BenchmarkError, match=r"in page\.md"):
+        with_block("no marks", "new", "page.md")
+
+
+def test_a_table_in_markdown():
+    assert markdown(("a", "b"), [("1", "2|3")]) == "| a | b |\n| --- | --- |\n| 1 | 2\\|3 |"
+
+
+def test_the_figure_shows_every_entry_and_world(protocol, scripted, reference, tmp_path):
+    pytest.importorskip("matplotlib")
+    standings = [standing_of(e, reference, protocol) for e in scripted]
+    draw_benchmark(standings, reference, protocol, tmp_path / "it.svg")
+    drawn = (tmp_path / "it.svg").read_text()
+    assert all(f"<!-- {name} -->" in drawn for name in (*SCRIPTED, "room, noisy wheels"))
+
+
+def test_the_entries_of_the_scripted_controllers_are_whole_and_achieve_something():
+    protocol = load_protocol()
+    entries = scripted_entries(protocol)
+    assert tuple(entry.name for entry in entries) == SCRIPTED
+    reference_of(entries, protocol)
