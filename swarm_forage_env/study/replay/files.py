@@ -183,7 +183,7 @@ def _about(replay: Replay) -> dict[str, Any]:
             for name, (title, unit) in _SIGNALS.items()
             if name in replay.signals
         ],
-        "disturbances": [config.name.replace("_", " ") for config in spec.wrappers],
+        "disturbances": [config.in_words(scenario.dt_s) for config in spec.wrappers],
         "world": _world(scenario),
         "versions": dict(replay.versions),
         "spec": spec.to_mapping(),
