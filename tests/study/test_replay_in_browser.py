@@ -268,6 +268,23 @@ def test_pointing_at_a_robot_tells_its_state(page, replays, desktop):
     assert desktop.complaints == []
 
 
+def test_thin_frames_show_what_the_chosen_robot_remembers(page, replays, desktop, tmp_path):
+    replay = replays[0]
+    unknown = write_replays(tmp_path / "unknown.html", dataclasses.replace(replay, memory_events=None))
+    here = ~replay.has(Status.ABSENT)[300]
+    robot = int(np.flatnonzero(here & (replay.remembered[60] > 0))[0])
+    pictures = []
+    for file in (page, unknown):
+        desktop.open(file)
+        choose(desktop, replay, 300, robot)
+        desktop.move_to(2.0, 2.0)
+        seek(desktop, 300.0)
+        pictures.append(desktop.ask(PIXELS))
+        keep_picture(desktop, f"memory_{file.stem}")
+    assert pictures[0] != pictures[1]
+    assert desktop.complaints == []
+
+
 def test_following_keeps_the_robot_in_the_middle(page, replays, desktop):
     replay = replays[0]
     inner = np.abs(replay.position_m - 4.0).max(axis=2) < 2.0  # near a wall the arena ends before the window does
