@@ -210,7 +210,8 @@ def density(age_ticks: int, log_keep: float) -> float:
 def object_memories(memory: ObjectMemory, robots: np.ndarray) -> Memories:
     """Return where all robots remember objects."""
     robot, entry = np.nonzero(np.arange(memory.row.shape[1]) < robots["n_known"][:, None])
-    return Memories.of_cells(robot, np.column_stack((memory.cell_x[robot, entry], memory.cell_y[robot, entry])))
+    cells = np.column_stack((memory.cell_x[robot, entry], memory.cell_y[robot, entry]))
+    return Memories.of_cells(robot.astype(np.int32), cells)
 
 
 def remembered_objects(

@@ -151,7 +151,7 @@ class TaskPolicy(ScriptedPolicy):
         known = caches[robot, entry]
         cells = np.column_stack((known["cell_x"], known["cell_y"]))
         objects = object_memories(self._memory.objects, self._robots)
-        return Memories.together((objects, Memories.of_cells(robot, cells, is_cache=True)))
+        return Memories.together((objects, Memories.of_cells(robot.astype(np.int32), cells, is_cache=True)))
 
     def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
         """Return the objects that one robot remembers: object row -> (cell x, cell y, pheromone density)."""

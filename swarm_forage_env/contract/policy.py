@@ -169,7 +169,7 @@ class Memories(NamedTuple):
     @classmethod
     def of_cells(cls, robot: IntArray, cell: IntArray, *, is_cache: bool = False) -> "Memories":
         """Return objects, or caches, that robots (K,) remember in cells (K, 2)."""
-        return cls(robot, (cell + 0.5) / CELLS_PER_M, np.full(len(robot), is_cache))
+        return cls(robot, np.divide(cell + 0.5, CELLS_PER_M, dtype=np.float64), np.full(len(robot), is_cache))
 
     @classmethod
     def together(cls, parts: "Iterable[Memories]") -> "Memories":

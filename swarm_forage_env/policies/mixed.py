@@ -114,10 +114,13 @@ class MixedPolicy:
 
     def describe_memories(self) -> Memories:
         """Return where all robots remember things; those of a part that does not tell have no places."""
-        told: list[tuple[slice, Memories]] = [
-            (rows, policy.describe_memories()) for policy, rows in self._driving if hasattr(policy, "describe_memories")
-        ]
-        return Memories.together(part._replace(robot=part.robot + rows.start) for rows, part in told)
+        told: list[Memories] = []
+        for policy, rows in self._driving:
+            tell = getattr(policy, "describe_memories", None)
+            if tell is not None:
+                part: Memories = tell()
+                told.append(part._replace(robot=part.robot + rows.start))
+        return Memories.together(told)
 
     def _place_of(self, row: int) -> tuple[int, int]:
         """Return the part to which a robot belongs, and its row within that part."""

@@ -123,10 +123,10 @@ class Run {
 
   /** Number of things that a robot remembers, or null. */
   remembered(robot) {
-    const places = this.places(robot);
-    if (places) return places.length;
     const { remembered } = this.arrays;
     if (!remembered) return null;
+    const places = this.places(robot);
+    if (places) return places.length; // of this frame; numbers are kept of fewer frames
     const samples = remembered.length / this.nRobots;
     const sample = Math.min(samples - 1, Math.floor(this.frame / this.header.remembered_frames));
     return remembered[robot * samples + sample];
