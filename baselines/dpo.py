@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.policy import RememberedPlaces, SwarmSpec
+from swarm_forage_env.contract.policy import Memories, RememberedPlaces, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 
 from .machines import (
@@ -22,7 +22,16 @@ from .machines import (
     explore_freely,
     follow_cargo,
 )
-from .memory import ObjectMemory, forget, look_around, memory_of, new_memory, object_row_of, remembered_objects
+from .memory import (
+    ObjectMemory,
+    forget,
+    look_around,
+    memory_of,
+    new_memory,
+    object_memories,
+    object_row_of,
+    remembered_objects,
+)
 from .object_choice import MemoryParameters, object_is_known, object_is_reached, select_object
 from .parameters import chosen_parameters, kernel_constants
 from .robots import ACQUIRE, DRAWS, HOMING, VECTOR_IDLE, WAIT_PICKUP, new_robots, sense
@@ -127,6 +136,10 @@ class DPOPolicy(ScriptedPolicy):
     def remembered_places(self, row: int) -> RememberedPlaces:
         """Return where one robot remembers objects, in m."""
         return RememberedPlaces.of_cells((x, y) for x, y, _ in self.remembered(row).values())
+
+    def describe_memories(self) -> Memories:
+        """Return where all robots remember objects."""
+        return object_memories(self._memory, self._robots)
 
     def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
         """Return what one robot remembers: object row -> (cell x, cell y, pheromone density)."""

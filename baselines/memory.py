@@ -21,6 +21,7 @@ import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.layout import WINDOW_CELLS
+from swarm_forage_env.contract.policy import Memories
 from swarm_forage_env.contract.types import CodeArray, IntArray, ObsArray, Row
 
 _WINDOW = WINDOW_CELLS * WINDOW_CELLS
@@ -204,6 +205,13 @@ def _forget_what_is_gone(robot: np.record, c: np.record, memory: OneMemory) -> N
 def density(age_ticks: int, log_keep: float) -> float:
     """Pheromone density of what was last seen `age_ticks` ago: (1 - rho)^(age + 1), log_keep = log(1 - rho)."""
     return math.exp(log_keep * (age_ticks + 1))
+
+
+def object_memories(memory: ObjectMemory, robots: np.ndarray) -> Memories:
+    """Return where all robots remember objects."""
+    robot, entry = np.nonzero(np.arange(memory.row.shape[1]) < robots["n_known"][:, None])
+    cells = np.column_stack((memory.cell_x[robot, entry], memory.cell_y[robot, entry]))
+    return Memories.of_cells(robot.astype(np.int32), cells)
 
 
 def remembered_objects(

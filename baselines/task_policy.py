@@ -5,11 +5,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env.contract.policy import RememberedPlaces, SwarmSpec
+from swarm_forage_env.contract.policy import Memories, RememberedPlaces, SwarmSpec
 from swarm_forage_env.contract.types import CodeArray, FloatArray, IntArray
 
 from .cache_memory import new_task_memory
-from .memory import density, remembered_objects
+from .memory import density, object_memories, remembered_objects
 from .parameters import chosen_parameters, kernel_constants
 from .robots import describe_robot
 from .scripted import ScriptedPolicy
@@ -143,6 +143,15 @@ class TaskPolicy(ScriptedPolicy):
             objects=((x, y) for x, y, _ in self.remembered(row).values()),
             caches=((x, y) for x, y, *_ in self.remembered_caches(row).values()),
         )
+
+    def describe_memories(self) -> Memories:
+        """Return where all robots remember objects and caches."""
+        caches = self._memory.caches
+        robot, entry = np.nonzero(np.arange(caches.shape[1]) < self._robots["n_caches"][:, None])
+        known = caches[robot, entry]
+        cells = np.column_stack((known["cell_x"], known["cell_y"]))
+        objects = object_memories(self._memory.objects, self._robots)
+        return Memories.together((objects, Memories.of_cells(robot.astype(np.int32), cells, is_cache=True)))
 
     def remembered(self, robot_index: int) -> dict[int, tuple[int, int, float]]:
         """Return the objects that one robot remembers: object row -> (cell x, cell y, pheromone density)."""

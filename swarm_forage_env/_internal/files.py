@@ -39,6 +39,33 @@ def replacing(path: Path, *, ending: str = ".tmp") -> Generator[Path]:
         draft.unlink(missing_ok=True)
 
 
+@contextmanager
+def alone_in(folder: Path) -> Generator[None]:
+    """Keep a folder, which must be there, to this process, as long as others ask in the same way.
+
+    The system forgets it when the process ends, however it ends, and nothing is left in the folder. Where the system
+    has no such locks (Windows), nobody is refused.
+
+    Raises:
+        BlockingIOError: somebody else has the folder; the error names it.
+        OSError: it cannot be opened.
+    """
+    try:
+        from fcntl import LOCK_EX, LOCK_NB, flock
+    except ImportError:
+        yield
+        return
+    opened = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            flock(opened, LOCK_EX | LOCK_NB)
+        except BlockingIOError as error:
+            raise BlockingIOError(error.errno, error.strerror, str(folder)) from error
+        yield
+    finally:
+        os.close(opened)
+
+
 def check_folder(folder: Path) -> None:
     """Try whether a folder, there or still to be made, can be written to, before hours of work; nothing of it stays.
 

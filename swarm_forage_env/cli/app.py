@@ -125,11 +125,24 @@ def _outcome(came: Sequence[int]) -> int | str | None:
         _refuse_unreadable(sys.argv[1:])
         with trust_of(sys.argv[1:]), warnings.catch_warnings():
             warnings.showwarning = _show_warning
-            return app(standalone_mode=False)
+            return _carry_out(sys.argv[1:])
     except SystemExit as ending:
         return ending.code
     except BaseException as error:  # noqa: BLE001 - the last guard: whatever happens ends in one line
         return end(KeyboardInterrupt() if came else error)
+
+
+def _carry_out(words: list[str]) -> int | None:
+    """Carry out the command that words name; returns its exit code.
+
+    Not by `app(...)`: typer turns Ctrl-C into an exit code there, and nobody would say what is kept.
+    """
+    command = typer.main.get_command(app)
+    try:
+        with command.make_context("swarm-forage", words) as context:
+            return command.invoke(context)
+    except typer.Exit as ending:
+        return ending.exit_code
 
 
 def _refuse_unreadable(words: Sequence[str]) -> None:

@@ -43,7 +43,10 @@ def end(error: BaseException) -> int:
     if isinstance(error, ValueError) and type(error).__module__.partition(".")[0] in _OURS:
         return complain(str(error), EXIT_USAGE)
     if isinstance(error, KeyboardInterrupt | typer.Abort):
-        return complain("interrupted", EXIT_INTERRUPTED)
+        # Commands that keep a part of their work say so themselves.
+        return complain(
+            "Interrupted. What was under way is not kept; the same command starts it again.", EXIT_INTERRUPTED
+        )
     if isinstance(error, BrokenPipeError):  # whoever read our output has enough, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the last flush fails again
         return EXIT_FAILURE

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
@@ -13,12 +13,18 @@ if TYPE_CHECKING:
     from swarm_forage_env.study.maps import FloorMaps
 
 
+OwnScales: TypeAlias = Annotated[
+    bool, typer.Option("--own-scales", help="A scale of its own for each map; default one per column, to compare rows.")
+]
+
+
 def maps(
     page: Annotated[Path, typer.Argument(help="A file that 'swarm-forage replay' has written.")],
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Picture to write; default the page's name and .maps.png.")
     ] = None,
     side: Annotated[float, typer.Option(help="Side of the squares in m.")] = 0.4,
+    own_scales: OwnScales = False,
 ) -> None:
     """Draw where robots were, took and left objects, and got in each other's way, from a replay.
 
@@ -42,7 +48,7 @@ def maps(
         raise typer.BadParameter(str(error)) from error
     picture = out or page.with_suffix(".maps.png")
     check_file(picture)
-    write_maps(with_differences(found), picture)
+    write_maps(with_differences(found), picture, own_scales=own_scales)
     typer.echo(f"wrote maps of {counted(len(found), 'run')} to {picture} and .npz files beside it")
 
 
@@ -51,10 +57,14 @@ def with_differences(found: "Sequence[FloorMaps]") -> "list[FloorMaps]":
     return [*found, *(one.minus(found[0]) for one in found[1:])]
 
 
-def write_maps(every: "Sequence[FloorMaps]", picture: Path, *, per: str = "") -> None:
+def write_maps(every: "Sequence[FloorMaps]", picture: Path, *, per: str = "", own_scales: bool = False) -> None:
     """Write a picture of maps, and their arrays to files beside it; without matplotlib, say so.
 
-    `per` is what everything is divided by, for the titles.
+    Args:
+        every: Maps and differences.
+        picture: File to write.
+        per: What everything is divided by, for the units.
+        own_scales: See `rendering.plots.draw_maps`.
     """
     from swarm_forage_env._internal.files import as_file_name
     from swarm_forage_env.rendering.plots import draw_maps
@@ -63,8 +73,9 @@ def write_maps(every: "Sequence[FloorMaps]", picture: Path, *, per: str = "") ->
     picture.parent.mkdir(parents=True, exist_ok=True)
     for one in every:
         one.write(picture.with_suffix(f".{as_file_name(one.label)}.npz"))
-    titles = {name: f"{meaning}, per {per}" if per else meaning for name, meaning in MEANINGS.items()}
+    columns = {name: (what, f"{unit}, per {per}" if per else unit) for name, (what, unit) in MEANINGS.items()}
+    rows = [(one.label, one.arrays, one.is_difference, one.size_m) for one in every]
     try:
-        draw_maps(picture, [(one.label, one.arrays, one.is_difference, one.size_m) for one in every], titles)
+        draw_maps(picture, rows, columns, own_scales=own_scales)
     except ImportError:
         notes().print(NO_PICTURE)

@@ -1,7 +1,7 @@
 """The command `record`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -13,9 +13,15 @@ from swarm_forage_env.cli.world_options import World, takes_world
 def record(
     described: World,
     out: Annotated[
-        Path | None, typer.Option(help="File to write, .gif or .mp4; default results/SCENARIO_POLICY.gif.")
+        Path | None,
+        typer.Option(
+            "--out", "-o", help="File to write, .gif or .mp4, or .png with --at; default results/SCENARIO_POLICY.gif."
+        ),
     ] = None,
     policy: Annotated[str, typer.Option("--policy", "--controller", help="Name, or file of a trained policy.")] = "crw",
+    at: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="One picture at this simulated time, in place of a film.")
+    ] = None,
     seconds: Annotated[float, typer.Option(help="Simulated seconds to film.")] = 300.0,
     speedup: Annotated[float, typer.Option(help="Simulated seconds per second of film.")] = 20.0,
     fps: Annotated[float, typer.Option(help="Pictures per second.")] = 20.0,
@@ -23,34 +29,39 @@ def record(
     theme: Annotated[str, typer.Option(help="dark or light.")] = "dark",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
 ) -> None:
-    """Film a run."""
+    """Film a run, or draw it at one time.
+
+    'swarm-forage record --policy dpo --at 300 --out dpo.png' draws how it is after 300 s.
+    """
     from swarm_forage_env._internal.files import as_file_name
     from swarm_forage_env.cli.scenario_options import described_world
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.policies.registry import policy_label
     from swarm_forage_env.rendering.view import RenderError
-    from swarm_forage_env.study.film import record_run
+    from swarm_forage_env.study.film import picture_run, record_run
 
     world, asked_caches, disturbances = described_world(described)
     _refuse_unknown(policy)
-    film = out or Path("results", f"{described.scenario}_{as_file_name(policy_label(policy))}.gif")
+    ending = "gif" if at is None else "png"
+    file = out or Path("results", f"{described.scenario}_{as_file_name(policy_label(policy))}.{ending}")
+    look: dict[str, Any] = {"seed": seed, "size_px": size, "theme": theme, "caches": asked_caches}
     try:
-        with progress_bar("pictures") as progress:
-            written = record_run(
-                world,
-                policy,
-                film,
-                seconds=seconds,
-                seed=seed,
-                speedup=speedup,
-                fps=fps,
-                size_px=size,
-                theme=theme,
-                caches=asked_caches,
-                wrappers=disturbances,
-                progress=progress,
-            )
+        if at is not None:
+            written = picture_run(world, policy, file, at_s=at, wrappers=disturbances, **look)
+        else:
+            with progress_bar("pictures") as progress:
+                written = record_run(
+                    world,
+                    policy,
+                    file,
+                    seconds=seconds,
+                    speedup=speedup,
+                    fps=fps,
+                    wrappers=disturbances,
+                    progress=progress,
+                    **look,
+                )
     except (RenderError, ModelError, NetworkError) as error:
         raise typer.BadParameter(str(error)) from error
     typer.echo(f"wrote {written}")

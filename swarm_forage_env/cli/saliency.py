@@ -46,7 +46,7 @@ def saliency(
     bars = {group: found.changed[group] for group in GROUPS[1:] if found.n_rows[group]}
     try:
         picture.parent.mkdir(parents=True, exist_ok=True)
-        draw_saliency(picture, found.slices, bars, title=title, xlabel=_words(found))
+        draw_saliency(picture, found.slices, bars, title=title, xlabel=_axis_words(found))
     except ImportError:
         notes().print(NO_PICTURE)
         return
@@ -58,6 +58,14 @@ def saliency(
 
 def _words(found: "Saliency") -> str:
     return "share of decisions that change" if found.moved is not None else "mean change of the commands"
+
+
+def _axis_words(found: "Saliency") -> str:
+    """Return what the bars are, in which unit, and what their ends mean."""
+    exchanged = "when the slice comes from another observation"
+    if found.moved is not None:
+        return f"share of decisions that change {exchanged}\n(0: it is not looked at, 1: every decision changes)"
+    return f"mean change of the commands {exchanged}\n(0: it is not looked at; commands lie in [-1, 1], so at most 2)"
 
 
 def _table(found: "Saliency", title: str) -> "Table":

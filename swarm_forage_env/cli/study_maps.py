@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.maps import with_differences, write_maps
+from swarm_forage_env.cli.maps import OwnScales, with_differences, write_maps
 
 PICTURE_FILE = "maps.png"
 
@@ -25,6 +25,7 @@ def maps(
     per_robot: Annotated[
         bool, typer.Option("--per-robot", help="Divide by the swarm size, to compare swarms of several sizes.")
     ] = False,
+    own_scales: OwnScales = False,
     out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/maps/NAME.")] = None,
 ) -> None:
     """Draw where robots of some cells were, took and left objects, and got in each other's way.
@@ -51,5 +52,5 @@ def maps(
             f"Runs that come out different from their records, which other versions made: {', '.join(changed)}; "
             "the maps show them as they are now."
         )
-    write_maps(with_differences(found), picture, per="robot" if per_robot else "")
+    write_maps(with_differences(found), picture, per="robot" if per_robot else "", own_scales=own_scales)
     typer.echo(f"wrote maps of {counted(len(found), 'cell')} to {picture} and .npz files beside it")

@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from metrics.scoring.texts import counted
-from swarm_forage_env.cli.options import NO_PICTURE, no_picture
+from swarm_forage_env.cli.options import EXIT_INTERRUPTED, NO_PICTURE, complain, no_picture
 from swarm_forage_env.rendering.plots import draw_trainings
 from swarm_forage_env.scenarios.performance import quantity
 from swarm_forage_env.study.progress import duration
@@ -43,8 +44,8 @@ def run_training(
             report = _reporter(plan, bar)
             result = train(plan, folder, n_processes=n_processes, resume=resume, report=report, callbacks=added)
         except KeyboardInterrupt:
-            bar.console.print(_farewell(folder, is_kept=(folder / MODEL_FILE).exists()), soft_wrap=True)
-            raise
+            words = _farewell(folder, is_kept=(folder / MODEL_FILE).exists())
+            raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None
     if not result.steps:
         console.print(
             f"This training was finished: {result.model.num_timesteps:,} of {plan.total_steps:,} decisions. "

@@ -184,6 +184,28 @@ class RememberedPlaces(NamedTuple):
         return cls(objects_m, caches_m)
 
 
+class Memories(NamedTuple):
+    """Where all robots remember things, for people; see `Policy`. One row per place, in any order."""
+
+    robot: IntArray
+    """(K,) robot row."""
+    place_m: FloatArray
+    """(K, 2) m, middle of the cell of an object, or of a cache."""
+    is_cache: BoolArray
+    """(K,) whether a cache is remembered there, else an object."""
+
+    @classmethod
+    def of_cells(cls, robot: IntArray, cell: IntArray, *, is_cache: bool = False) -> "Memories":
+        """Return objects, or caches, that robots (K,) remember in cells (K, 2)."""
+        return cls(robot, np.divide(cell + 0.5, CELLS_PER_M, dtype=np.float64), np.full(len(robot), is_cache))
+
+    @classmethod
+    def together(cls, parts: "Iterable[Memories]") -> "Memories":
+        """Return all places of several memories."""
+        nothing = cls(np.zeros(0, np.int32), np.zeros((0, 2)), np.zeros(0, np.bool_))
+        return cls(*(np.concatenate(columns) for columns in zip(nothing, *parts, strict=True)))
+
+
 class CompiledPolicy(Protocol):
     """A policy whose ticks can be run without Python in between. Policies offer it by a method `compiled`."""
 
@@ -221,10 +243,10 @@ class Policy(Protocol):
     Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
     doing, for people (`study.stuck` shows it); `describe_robots() -> RobotStates`, the same of all robots as arrays
     (`study.replay` keeps it); `remembered_places(row) -> RememberedPlaces`, where one robot remembers things (the
-    window shows it); `part_rows`, slices of rows that the record tells apart, set by `reset` (of mixed
-    swarms, whose runs are counted tick by tick); `compiled() -> CompiledPolicy | None`, for runs without Python
-    between ticks; the class attributes `caches` ("none", "static", "dynamic": those that
-    the policy is made for) and `reads` (names of the slices it looks at; default all;
+    window shows it); `describe_memories() -> Memories`, the same of all robots (`study.replay` keeps it); `part_rows`,
+    slices of rows that the record tells apart, set by `reset` (of mixed swarms, whose runs are counted tick by tick);
+    `compiled() -> CompiledPolicy | None`, for runs without Python between ticks; the class attributes `caches` ("none",
+    "static", "dynamic": those that the policy is made for) and `reads` (names of the slices it looks at; default all;
     "light if carrying" = light only of robots that carry).
     """
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, table
 from swarm_forage_env.contract.codes import Task
-from swarm_forage_env.contract.policy import Policy, RememberedPlaces, RobotStates, SwarmSpec
+from swarm_forage_env.contract.policy import Memories, Policy, RememberedPlaces, RobotStates, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, IntArray, ObsArray
 from swarm_forage_env.policies.mixture import mixture_parts, part_sizes
 from swarm_forage_env.policies.registry import load_policy, part_labels
@@ -112,6 +112,16 @@ class MixedPolicy:
         if not hasattr(policy, "remembered_places"):
             return RememberedPlaces.of_cells(())
         return policy.remembered_places(own_row)
+
+    def describe_memories(self) -> Memories:
+        """Return where all robots remember things; those of a part that does not tell have no places."""
+        told: list[Memories] = []
+        for policy, rows in self._driving:
+            tell = getattr(policy, "describe_memories", None)
+            if tell is not None:
+                part: Memories = tell()
+                told.append(part._replace(robot=part.robot + rows.start))
+        return Memories.together(told)
 
     def _place_of(self, row: int) -> tuple[int, int]:
         """Return the part to which a robot belongs, and its row within that part."""

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -108,18 +109,22 @@ def draw_trainings(
     figure.savefig(path, dpi=150)
 
 
+MapRow: TypeAlias = tuple[str, Mapping[str, FloatArray], bool, tuple[float, float]]
+"""Label; arrays (ny, nx) by name, row = y from below; whether they are differences; extent of the floor in m."""
+
+
 def draw_maps(
-    path: str | Path,
-    rows: Sequence[tuple[str, Mapping[str, FloatArray], bool, tuple[float, float]]],
-    titles: Mapping[str, str],
+    path: str | Path, rows: Sequence[MapRow], columns: Mapping[str, tuple[str, str]], *, own_scales: bool = False
 ) -> None:
     """Draw maps of floors of the same proportions: a row of panels per map or difference, a column per quantity.
 
+    Colours of a column mean the same in all rows of maps, and the same in all rows of differences, where white is 0.
+
     Args:
         path: File to write; its suffix chooses the format (.png, .svg, .pdf).
-        rows: Label; arrays (ny, nx) by name, row = y from below; whether they are differences; and the extent of the
-            floor along x and y in m.
-        titles: Headline of each column, by name of the array; their order is that of the columns.
+        rows: One per map or difference.
+        columns: What is counted, and its unit, by name of the array; their order is that of the columns.
+        own_scales: Whether every panel has a scale of its own instead, which shows more of what is rare.
 
     Raises:
         ImportError: matplotlib is not installed.
@@ -127,23 +132,32 @@ def draw_maps(
     from matplotlib.figure import Figure
 
     shape = rows[0][3][1] / rows[0][3][0]
-    width, height = 4.2, 3.5 * shape + 0.7
-    figure = Figure(figsize=(width * len(titles), height * len(rows)), layout="constrained")
-    panels = figure.subplots(len(rows), len(titles), squeeze=False)
+    width, height = 4.4, 3.5 * shape + 0.9
+    figure = Figure(figsize=(width * len(columns), height * len(rows)), layout="constrained")
+    panels = figure.subplots(len(rows), len(columns), squeeze=False)
     bar = min(1.0, 1.2 * shape)  # as long as a panel is high
     for (label, arrays, is_difference, size_m), line in zip(rows, panels, strict=True):
-        for (name, title), axes in zip(titles.items(), line, strict=True):
-            values = arrays[name]
-            # Few squares hold most; the last percent would leave all others in one colour.
-            top = float(np.quantile(np.abs(values[values != 0]), 0.99)) if values.any() else 1.0
-            low, colours = (-top, "RdBu_r") if is_difference else (0.0, "cividis")
+        alike = [row for row in rows if row[2] == is_difference]
+        for (name, (what, unit)), axes in zip(columns.items(), line, strict=True):
+            top = _map_top([arrays[name]] if own_scales else [row[1][name] for row in alike])
+            low, colours, ends = (-top, "RdBu_r", "both") if is_difference else (0.0, "cividis", "max")
             image = axes.imshow(
-                values, origin="lower", extent=(0, size_m[0], 0, size_m[1]), vmin=low, vmax=top, cmap=colours
+                arrays[name], origin="lower", extent=(0, size_m[0], 0, size_m[1]), vmin=low, vmax=top, cmap=colours
             )
-            axes.set_title(f"{_unread(label)}\n{title}", fontsize=9)
+            axes.set_title(f"{_unread(label)}\n{what}", fontsize=9)
+            axes.set_xlabel("x [m]", fontsize=7)
+            axes.set_ylabel("y [m]", fontsize=7)
             axes.tick_params(labelsize=7)
-            figure.colorbar(image, ax=axes, shrink=bar).ax.tick_params(labelsize=7)
+            scale = figure.colorbar(image, ax=axes, shrink=bar, extend=ends)
+            scale.set_label(f"more {unit}" if is_difference else unit, fontsize=7)
+            scale.ax.tick_params(labelsize=7)
     figure.savefig(path, dpi=110)
+
+
+def _map_top(arrays: Sequence[FloatArray]) -> float:
+    """Return the end of the scale of maps: few squares hold most; the last percent would hide all others."""
+    values = np.abs(np.concatenate([array.ravel() for array in arrays]))
+    return float(np.quantile(values[values > 0], 0.99)) if values.any() else 1.0
 
 
 def draw_saliency(

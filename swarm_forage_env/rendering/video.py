@@ -1,4 +1,4 @@
-"""Writing pictures as a film: GIF with Pillow, MP4 with imageio and ffmpeg."""
+"""Writing pictures: one as PNG, many as a film. GIF and PNG with Pillow, MP4 with imageio and ffmpeg."""
 
 from collections.abc import Iterable, Iterator
 from itertools import product
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 Frame = NDArray[np.uint8]
 SUFFIXES = (".gif", ".mp4")
+PICTURE_SUFFIX = ".png"
 MAX_FPS = {".gif": 50, ".mp4": 60}
 """Highest rates. GIF counts in hundredths of a second, and viewers slow down films with less than two per frame."""
 MAX_GIF_FRAMES = 1500
@@ -42,10 +43,9 @@ def check_film(path: str | Path, fps: float, n_frames: int) -> Path:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise RenderError(f"Expected a path ending in {' or '.join(SUFFIXES)}, got {str(path)!r}.")
-    existing = next(folder for folder in path.absolute().parents if folder.exists())
-    if not existing.is_dir():
-        raise RenderError(f"Expected {str(path.parent)!r} to be a folder, but {str(existing)!r} is a file.")
+        hint = "; one picture is made by --at SECONDS, at_s in Python" if suffix == PICTURE_SUFFIX else ""
+        raise RenderError(f"Expected a film's path to end in {' or '.join(SUFFIXES)}, got {str(path)!r}{hint}.")
+    _check_place(path)
     with refusing():
         number(f"fps of a {suffix}", fps, at_least=1, at_most=MAX_FPS[suffix])
     if suffix == ".gif" and n_frames > MAX_GIF_FRAMES:
@@ -55,6 +55,36 @@ def check_film(path: str | Path, fps: float, n_frames: int) -> Path:
         )
     if suffix == ".mp4":
         _import_imageio()
+    return path
+
+
+def check_picture(path: str | Path) -> Path:
+    """Return `path` if a picture can be written there.
+
+    Raises:
+        RenderError: another suffix than .png, or a file in place of the folder.
+    """
+    path = Path(path)
+    if path.suffix.lower() != PICTURE_SUFFIX:
+        raise RenderError(
+            f"Expected a picture's path to end in {PICTURE_SUFFIX}, got {str(path)!r}; for a film, leave --at out."
+        )
+    _check_place(path)
+    return path
+
+
+def _check_place(path: Path) -> None:
+    existing = next(folder for folder in path.absolute().parents if folder.exists())
+    if not existing.is_dir():
+        raise RenderError(f"Expected {str(path.parent)!r} to be a folder, but {str(existing)!r} is a file.")
+
+
+def write_picture(frame: Frame, path: Path) -> Path:
+    """Write one picture, (H, W, 3) uint8, as PNG, whole or not at all; returns the path."""
+    from PIL import Image
+
+    with replacing(path, ending=PICTURE_SUFFIX) as draft:
+        Image.fromarray(frame).save(draft)
     return path
 
 

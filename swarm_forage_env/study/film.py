@@ -15,7 +15,7 @@ from swarm_forage_env._internal.files import check_file
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import load_policy, policy_label
 from swarm_forage_env.rendering.frame import Trails, render_frame
-from swarm_forage_env.rendering.video import Frame, check_film, write_film
+from swarm_forage_env.rendering.video import Frame, check_film, check_picture, write_film, write_picture
 from swarm_forage_env.rendering.view import RenderError, arena_view, refusing
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.study.run import LiveRun, build_env
@@ -77,7 +77,7 @@ def record_run(
     path = check_film(path, fps, len(ticks))
     arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
     policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
-    title = f"{scenario.name.replace('_', ' ')}, {name}, {scenario.arena.width_m:g} x {scenario.arena.height_m:g} m"
+    title = _title(scenario, name)
     stack = build_env(scenario, wrappers, reads=getattr(policy, "reads", None))
     n_samples = round(trail_s * fps / speedup) + 1
     check_file(path)
@@ -98,6 +98,72 @@ def record_run(
                 progress(done, len(ticks))
 
     return write_film(frames(), path, fps=fps, n_frames=len(ticks), theme=theme)
+
+
+def picture_run(
+    scenario: ScenarioConfig,
+    policy: str | Policy,
+    path: str | Path,
+    *,
+    at_s: float,
+    seed: int = 0,
+    size_px: int = 900,
+    trail_s: float = 20.0,
+    theme: str = "dark",
+    caches: str | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    wrappers: "Iterable[WrapperConfig]" = (),
+) -> Path:
+    """Run a policy up to a time and draw one picture.
+
+    Args:
+        scenario: The scenario; its horizon need not be whole recording intervals.
+        policy: Name of an installed policy, path of a policy file, or a fresh policy object.
+        path: File to write, .png.
+        at_s: Simulated time of the picture.
+        seed: Seed of the run.
+        size_px: Longer side of the drawn arena.
+        trail_s: Simulated time over which the robots' trails fade; 0 for none.
+        theme: "dark" or "light".
+        caches: As in `record_run`, and so are the next two.
+        parameters: Keyword arguments of a policy that is given by name or path.
+        wrappers: Configurations of noise, throttling and population dynamics.
+
+    Returns:
+        The path written.
+
+    Raises:
+        RenderError: a value out of range; then nothing has been run or written.
+        OSError: the file cannot be written; then nothing has been run.
+        ImportError: Pillow is not installed.
+        ValueError: unknown policy name, or a policy file that cannot be opened or does not fit the scenario.
+    """
+    path = check_picture(path)
+    with refusing():
+        number("at_s", at_s, at_least=0.0, at_most=scenario.horizon_s)
+        number("trail_s", trail_s, at_least=0.0)
+    arena_view(scenario, size_px, theme)  # refuses a bad size or theme before the run starts
+    policy, name, scenario = cast_policy(policy, scenario, caches, parameters)
+    run = LiveRun(build_env(scenario, wrappers, reads=getattr(policy, "reads", None)), policy, seed)
+    check_file(path)
+    end = round(at_s / scenario.dt_s)
+    samples = [tick for tick in range(end, -1, -round(1.0 / scenario.dt_s)) if (end - tick) * scenario.dt_s <= trail_s]
+    trails = Trails(scenario.robots.n_robots, len(samples)) if len(samples) > 1 else None
+    for tick in reversed(samples):
+        run.advance(to_tick=tick)  # a run that has ended stays as it is
+        if trails is not None:
+            trails.add(run.forage_env.swarm)
+    world = run.forage_env
+    state = (world.swarm, world.objects, world.caches, world.events)
+    title = _title(scenario, name)
+    return write_picture(
+        render_frame(scenario, *state, tick=world.tick, size_px=size_px, trails=trails, title=title, theme=theme), path
+    )
+
+
+def _title(scenario: ScenarioConfig, policy: str) -> str:
+    arena = scenario.arena
+    return f"{scenario.name.replace('_', ' ')}, {policy}, {arena.width_m:g} x {arena.height_m:g} m"
 
 
 def cast_policy(

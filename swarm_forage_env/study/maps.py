@@ -14,13 +14,13 @@ from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.study.replay.frames import Replay, Status
 
-MEANINGS: Mapping[str, str] = {
-    "density": "active robots per m², mean over time",
-    "interference": "robots in interference per m², mean over time",
-    "pickups": "objects picked up per m² and 1,000 s",
-    "drops": "objects dropped per m² and 1,000 s",
+MEANINGS: Mapping[str, tuple[str, str]] = {
+    "density": ("active robots, mean over time", "per m²"),
+    "interference": ("robots in interference, mean over time", "per m²"),
+    "pickups": ("objects picked up", "per m² and 1,000 s"),
+    "drops": ("objects dropped", "per m² and 1,000 s"),
 }
-"""Map -> what its numbers are."""
+"""Map -> what is counted, and in which unit."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

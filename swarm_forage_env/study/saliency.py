@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarm_forage_env._internal.fields import ConfigError, number
+from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.network import Network
-from swarm_forage_env.policies.pretrained import network_file
+from swarm_forage_env.policies.pretrained import network_file, network_names
 from swarm_forage_env.study.run import LiveRun, build_env
 from swarm_forage_env.study.spec import RunSpec
 
@@ -73,9 +74,11 @@ def open_network_of(policy: str) -> Network:
     """
     file = network_file(policy) or Path(policy)
     if file.suffix.lower() != ".npz":
+        known = network_names()
         raise ConfigError(
-            f"Expected a network, that is the name of a shipped one or an .npz file, got {policy!r}; training leaves "
-            "policy.npz beside a model, and other policies have no network to look into."
+            f"Expected a network, that is the name of a shipped one ({', '.join(known)}) or an .npz file, got "
+            f"{policy!r}.{suggestion(policy, known)} Training leaves policy.npz beside a model; other policies have no "
+            "network to look into."
         )
     return Network.load(file)
 

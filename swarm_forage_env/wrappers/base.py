@@ -240,10 +240,24 @@ class WrapperConfig(ABC):
     """Name in stored specifications and in `wrappers.registry.WRAPPERS`."""
     stack_position: ClassVar[int]
     """Place of the wrapper in `STACK_ORDER`."""
+    example: ClassVar[str] = ""
+    """Settings as words of a command line that work with every scenario; errors show them."""
 
     @abstractmethod
     def wrap(self, env: ForageEnv | SwarmWrapper) -> SwarmWrapper:
         """Build the wrapper around `env`."""
+
+    def in_words(self, dt_s: float) -> str:
+        """Return the wrapper and its settings for people, in one line; pages show it.
+
+        Args:
+            dt_s: Length of a tick, for what is set per tick.
+        """
+        settings = ", ".join(
+            f"{key} {'+'.join(map(str, value)) if isinstance(value, list | tuple) else value}"
+            for key, value in self.to_mapping().items()
+        )
+        return f"{self.name.replace('_', ' ')}: {settings}"
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the fields as plain values, ready for JSON."""

@@ -76,6 +76,7 @@ class HandlingCostConfig(WrapperConfig):
 
     waveform: Waveform
     """Ticks that a pick-up or a drop takes; values below those of the scenario change nothing."""
+    example: ClassVar[str] = "waveform=constant,amplitude=50"
 
     def __post_init__(self) -> None:
         hint = "; for example Waveform(kind='constant', amplitude=10)"
@@ -89,6 +90,11 @@ class HandlingCostConfig(WrapperConfig):
     def wrap(self, env: ForageEnv | SwarmWrapper) -> HandlingCost:
         """Build the wrapper around `env`."""
         return HandlingCost(env, self)
+
+    def in_words(self, dt_s: float) -> str:
+        """Return how long handling takes; see `WrapperConfig.in_words`."""
+        # One tick is what handling takes without the wrapper.
+        return f"handling cost: a pick-up or a drop takes {self.waveform.in_words(' s', factor=dt_s, floor=1.0)}"
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "HandlingCostConfig":

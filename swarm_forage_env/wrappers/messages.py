@@ -84,6 +84,7 @@ class MessageNoiseConfig(WrapperConfig):
     is below 0)."""
     loss: float = 0.0
     """Probability, per robot and tick, that it hears nothing at all."""
+    example: ClassVar[str] = "sigma=0.1"
 
     def __post_init__(self) -> None:
         if not isinstance(self.sigma, Waveform):
@@ -93,6 +94,11 @@ class MessageNoiseConfig(WrapperConfig):
     def wrap(self, env: ForageEnv | SwarmWrapper) -> MessageNoise:
         """Build the wrapper around `env`."""
         return MessageNoise(env, self)
+
+    def in_words(self, dt_s: float) -> str:
+        """Return how noisy messages are, and how many are lost; see `WrapperConfig.in_words`."""
+        sigma = self.sigma.in_words("", floor=0.0) if isinstance(self.sigma, Waveform) else f"{self.sigma:g}"
+        return f"message noise: sigma {sigma}, {100 * self.loss:g} % lost"
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "MessageNoiseConfig":

@@ -232,6 +232,7 @@ class SensorNoiseConfig(WrapperConfig):
     """Group -> its own standard deviation, instead of `sigma`; the group need not be among `groups`."""
     distribution: str = "gaussian"
     """One of `DISTRIBUTIONS`; a uniform one has the same standard deviation (our choice)."""
+    example: ClassVar[str] = "sigma=0.03"
 
     def __post_init__(self) -> None:
         several("sensor_noise.groups", self.groups, "names of sensors")
@@ -251,6 +252,17 @@ class SensorNoiseConfig(WrapperConfig):
     def wrap(self, env: ForageEnv | SwarmWrapper) -> SensorNoise:
         """Build the wrapper around `env`."""
         return SensorNoise(env, self)
+
+    def in_words(self, dt_s: float) -> str:
+        """Return which sensors are how noisy; see `WrapperConfig.in_words`."""
+        by_sigma: dict[str, list[str]] = {}
+        for group, sigma in self.group_sigmas().items():
+            by_sigma.setdefault(_sigma_in_words(sigma), []).append(group.replace("_", " "))
+        parts = [
+            f"sigma {sigma} ({'all sensors' if len(groups) == len(NOISE_GROUPS) else ', '.join(groups)})"
+            for sigma, groups in by_sigma.items()
+        ]
+        return f"{_distribution_in_words(self.distribution)}sensor noise: {'; '.join(parts)}"
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "SensorNoiseConfig":
@@ -285,6 +297,7 @@ class ActuatorNoiseConfig(WrapperConfig):
     """Standard deviation of the factor on a wheel's speed."""
     distribution: str = "gaussian"
     """One of `DISTRIBUTIONS`; a uniform one has the same standard deviation (our choice)."""
+    example: ClassVar[str] = "sigma=0.1"
 
     def __post_init__(self) -> None:
         _check_sigma("actuator_noise.sigma", self.sigma)
@@ -293,6 +306,10 @@ class ActuatorNoiseConfig(WrapperConfig):
     def wrap(self, env: ForageEnv | SwarmWrapper) -> ActuatorNoise:
         """Build the wrapper around `env`."""
         return ActuatorNoise(env, self)
+
+    def in_words(self, dt_s: float) -> str:
+        """Return how noisy wheels are; see `WrapperConfig.in_words`."""
+        return f"{_distribution_in_words(self.distribution)}wheel noise: sigma {_sigma_in_words(self.sigma)}"
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "ActuatorNoiseConfig":
@@ -315,6 +332,14 @@ def noise_levels(
         (SensorNoiseConfig(sigma=sigma, groups=groups), ActuatorNoiseConfig(sigma=sigma))
         for sigma in np.linspace(0.0, sigma_max, n_levels).tolist()
     )
+
+
+def _sigma_in_words(sigma: Sigma) -> str:
+    return sigma.in_words("", floor=0.0) if isinstance(sigma, Waveform) else f"{sigma:g}"
+
+
+def _distribution_in_words(distribution: str) -> str:
+    return "" if distribution == "gaussian" else f"{distribution} "
 
 
 def _check_sigma(where: str, sigma: Any) -> None:

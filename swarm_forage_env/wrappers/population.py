@@ -155,6 +155,7 @@ class PopulationConfig(WrapperConfig):
     """No births while this many robots are present. Default: all of the scenario."""
     deaths: str = "terminate"
     """Whether the agent of a dead robot terminates, or stays until the end ("absorbing")."""
+    example: ClassVar[str] = "death_per_tick=0.0005"
 
     def __post_init__(self) -> None:
         for process in ("death", "birth", "malfunction", "repair"):
@@ -177,6 +178,25 @@ class PopulationConfig(WrapperConfig):
     def wrap(self, env: ForageEnv | SwarmWrapper) -> PopulationDynamics:
         """Build the wrapper around `env`."""
         return PopulationDynamics(env, self)
+
+    def in_words(self, dt_s: float) -> str:
+        """Return how often what happens to the swarm; see `WrapperConfig.in_words`."""
+        rates = self.rates
+        words = [
+            f"a {what} every {dt_s / rate:,.4g} s on average"
+            for what, rate in (
+                ("death", rates.death),
+                ("birth", rates.birth),
+                ("malfunction", rates.malfunction),
+                ("repair", rates.repair),
+            )
+            if rate > 0.0
+        ]
+        if self.initial_robots is not None:
+            words.append(f"{self.initial_robots} robots at the start")
+        if self.max_robots is not None:
+            words.append(f"at most {self.max_robots}")
+        return f"population: {', '.join(words) or 'no changes'}"
 
 
 def malfunction_levels(n_robots: int) -> tuple[PopulationConfig, ...]:

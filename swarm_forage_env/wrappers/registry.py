@@ -42,10 +42,21 @@ def parse_wrapper(text: str) -> "WrapperConfig":
         sensor_noise:sigma=0.03,groups=proximity+light,sigmas.position=0.1
 
     Raises:
-        ConfigError: an unknown name or key, a word that is no key=value, or values that the wrapper refuses.
+        ConfigError: an unknown name or key, a word that is no key=value, no word after the colon, or values that the
+            wrapper refuses; the message has an example.
     """
-    name, _, settings = text.strip().partition(":")
+    name, colon, settings = text.strip().partition(":")
     config_class = wrapper_config_class(name)
+    try:
+        if colon and not settings:
+            raise ConfigError(f"Expected the settings of wrapper {name} after the colon, got none.")
+        return config_class.from_mapping(_settings(text, name, settings))
+    except ConfigError as error:
+        raise ConfigError(f"{error} For example: {name}:{config_class.example}") from error
+
+
+def _settings(text: str, name: str, settings: str) -> dict[str, Any]:
+    """Return the words key=value of one wrapper as a mapping; `text` is all of it, for messages."""
     mapping: dict[str, Any] = {}
     for setting in filter(None, settings.split(",")):
         key, equals, value = (part.strip() for part in setting.partition("="))
@@ -60,7 +71,7 @@ def parse_wrapper(text: str) -> "WrapperConfig":
         if last in target:
             raise ConfigError(f"Expected {key} of wrapper {name} once, got it twice in {text!r}.")
         target[last] = _plain_value(value)
-    return config_class.from_mapping(mapping)
+    return mapping
 
 
 def wrapper_configs(given: "Iterable[WrapperConfig | str]") -> "tuple[WrapperConfig, ...]":

@@ -85,6 +85,7 @@ class ThrottleConfig(WrapperConfig):
     """Share of speed lost; negative values throttle nothing."""
     carriers: bool = False
     """Whether only robots that carry an object at the start of the step are throttled."""
+    example: ClassVar[str] = "waveform=constant,amplitude=0.2"
 
     def __post_init__(self) -> None:
         hint = "; for example Waveform(kind='constant', amplitude=0.1)"
@@ -99,6 +100,11 @@ class ThrottleConfig(WrapperConfig):
     def wrap(self, env: ForageEnv | SwarmWrapper) -> Throttle:
         """Build the wrapper around `env`."""
         return Throttle(env, self)
+
+    def in_words(self, dt_s: float) -> str:
+        """Return who loses which share of its speed; see `WrapperConfig.in_words`."""
+        who = "carrying robots" if self.carriers else "robots"
+        return f"throttle: {who} lose {self.waveform.in_words(' % of their speed', factor=100.0, floor=0.0)}"
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "ThrottleConfig":

@@ -125,6 +125,37 @@ class Waveform:
         shift = 2.0 * self.amplitude * self.phase if self.kind == "sawtooth" else 0.0
         return self.offset + shift + abs(self.amplitude)
 
+    @property
+    def trough(self) -> float:
+        """Smallest value that the signal can take."""
+        if self.kind == "constant":
+            return self.amplitude
+        if self.kind == "table":
+            return min(self.values)
+        if self.kind == "step":
+            return self.offset + min(0.0, self.amplitude)
+        return self.peak - 2.0 * abs(self.amplitude)
+
+    def in_words(self, unit: str, *, factor: float = 1.0, floor: float = -math.inf) -> str:
+        """Return how the value goes, for people: "0 to 40 % (sine, period 200 s)".
+
+        Args:
+            unit: Follows the last number, such as " %".
+            factor: Values are shown times this.
+            floor: Values below count as this one.
+        """
+
+        def shown(value: float) -> str:
+            return f"{factor * max(floor, value):,.4g}"
+
+        if self.kind == "constant":
+            return f"{shown(self.amplitude)}{unit}"
+        if self.kind == "step":
+            return f"{shown(self.offset)}, from {self.start_s:,g} s on {shown(self.offset + self.amplitude)}{unit}"
+        manner = f"table of {len(self.values)} values" if self.kind == "table" else f"period {self.period_s:,g} s"
+        kind = "" if self.kind == "table" else f"{self.kind}, "
+        return f"{shown(self.trough)} to {shown(self.peak)}{unit} ({kind}{manner})"
+
     def signal(self, dt_s: float) -> Signal:
         """Return V as a function of the tick, for ticks of `dt_s` seconds; it can be pickled."""
         amplitude, offset, phase = self.amplitude, self.offset, self.phase

@@ -65,3 +65,40 @@ def test_record_says_when_a_network_does_not_fit(command):
     code, _, err = command("record", "--policy", "mine.npz", *SHORT_FILM)
     assert (code, err.count("\n")) == (2, 1)
     assert "Expected a network from 111 columns to 3 actions" in err
+
+
+def test_record_draws_one_picture_of_the_run_it_films(command, monkeypatch):
+    image = pytest.importorskip("PIL.Image")
+    render, filmed = film.render_frame, {}
+
+    def note(*args, tick, **options):
+        filmed[tick] = render(*args, tick=tick, **options)
+        return filmed[tick]
+
+    words = ("--policy", "random", "--robots", "3", "--size", "240")
+    assert command("record", *words, "--seconds", "8", "--fps", "20")[0] == 0
+    monkeypatch.setattr(film, "render_frame", note)
+    code, out, err = command("record", *words, "--at", "8", "--out", "new/at.png")
+    assert (code, out, err) == (0, "wrote new/at.png\n", "")
+    assert list(filmed) == [40]
+    with image.open("new/at.png") as picture:
+        assert np.array_equal(np.asarray(picture), filmed[40])
+    with image.open("results/warehouse_small_random.gif") as gif:
+        gif.seek(gif.n_frames - 1)
+        off = np.abs(np.asarray(gif.convert("RGB"), float) - filmed[40]).mean()
+    assert off < 4.0, "the last picture of the film, but for the colours of a GIF and the length of trails"
+    assert command("record", *words, "--at", "0")[1] == "wrote results/warehouse_small_random.png\n"
+
+
+def test_record_says_how_pictures_and_films_are_asked_for(command):
+    pytest.importorskip("PIL")
+    for words, said in (
+        (("--out", "x.png"), "one picture is made by --at SECONDS"),
+        (("--out", "x.gif", "--at", "3"), "for a film, leave --at out"),
+        (("--at", "-1"), "at_s"),
+        (("--at", "20000"), "at_s"),
+    ):
+        code, out, err = command("record", *words)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert said in err
+    assert not list(Path().iterdir())

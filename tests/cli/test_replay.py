@@ -120,5 +120,6 @@ def test_an_interrupt_leaves_no_file(command, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("swarm_forage_env.study.run.LiveRun.advance", interrupted)
-    assert command("replay", "random", *SHORT, "-o", "run.html")[0] == 130
+    told = "swarm-forage: Interrupted. What was under way is not kept; the same command starts it again.\n"
+    assert command("replay", "random", *SHORT, "-o", "run.html") == (130, "", told)
     assert not list(Path().iterdir())

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.pictures import keep_figures
+
 WORDS = ("--robots", "3", "--seconds", "20")
 
 
@@ -28,7 +30,9 @@ def test_saliency_is_told_and_drawn(command, monkeypatch):
 def test_saliency_refuses_what_is_no_network(command):
     Path("broken.npz").write_text("nothing")
     for name, message in (
-        ("crw", "Expected a network"),
+        ("crw", "Expected a network, that is the name of a shipped one (ppo_warehouse_small) or an .npz file"),
+        ("nosuch", "the name of a shipped one (ppo_warehouse_small)"),
+        ("ppo_warehous_small", "Did you mean 'ppo_warehouse_small'?"),
         ("broken.npz", "Expected broken.npz to hold a network"),
         ("model.zip", "Expected a network"),
     ):
@@ -39,6 +43,16 @@ def test_saliency_refuses_what_is_no_network(command):
     code, _, err = command("saliency", "missing.npz")
     assert code == 1
     assert "missing.npz" in err
+
+
+@pytest.mark.compiled
+def test_the_axis_says_what_is_measured_and_what_its_ends_mean(command, monkeypatch):
+    pytest.importorskip("matplotlib")
+    figures = keep_figures(monkeypatch)
+    assert command("saliency", "ppo_warehouse_small", *WORDS)[0] == 0
+    label = figures[0].axes[0].get_xlabel()
+    assert label.startswith("share of decisions that change when the slice comes from another observation")
+    assert "0: it is not looked at, 1: every decision changes" in label
 
 
 @pytest.mark.compiled

@@ -167,7 +167,7 @@ def test_ctrl_c_says_how_to_go_on(command, monkeypatch):
     monkeypatch.setattr(training, "train", stop)
     code, _, err = command("train", *TINY)
     assert code == 130
-    assert "Stopped before there was anything to keep; the same command starts again." in err
+    assert err.endswith("swarm-forage: Stopped before there was anything to keep; the same command starts again.\n")
 
     folder = Path("results/training/warehouse_small_ppo")
     folder.mkdir(parents=True)

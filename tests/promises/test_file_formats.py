@@ -13,6 +13,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.network import Network, NetworkError
 from swarm_forage_env.study.record import SCHEMA_VERSION, RecordError, RunRecord
+from swarm_forage_env.study.replay.files import read_replays
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import read_failure
 from swarm_forage_env.training.evaluations import read_evaluations, read_training
@@ -46,6 +47,13 @@ def test_a_failure_of_an_earlier_day_is_read(tmp_path):
     (tmp_path / "a.json").write_text(json.dumps(content), encoding="utf-8")
     with pytest.raises(RecordError, match=r"Unknown key .*gravity"):
         read_failure(tmp_path / "a.json")
+
+
+def test_a_replay_of_an_earlier_day_is_read():
+    (replay,) = read_replays(FILES / "replay.html")
+    assert (replay.label, replay.n_frames, replay.scenario.robots.n_robots) == ("dpo", 31, 2)
+    assert replay.memory_events is None, "it is of version 2"
+    assert "death_per_tick" in replay.spec.to_json()
 
 
 def test_a_network_of_an_earlier_day_is_read():

@@ -29,6 +29,7 @@ from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 from tests.support.busy import BusyPolicy
 from tests.support.stage import assert_conserved
+from tests.support.wrapper_configs import OuterConfig
 
 ROBOTS = 8
 
@@ -321,12 +322,69 @@ def test_wrappers_are_named_on_a_command_line(text, expected):
         ("sensor_noise:sigma=0.1,sigma.kind=sine", "sigma of wrapper sensor_noise either as a value or as a table"),
         ("sensor_noise:sigma=0.1,groups=proximty", "Unknown group of sensors 'proximty'"),
         ("population:death_per_tick=-1", "population.death_per_tick to be a finite number >= 0"),
+        ("population:", "Expected the settings of wrapper population after the colon, got none"),
+        ("population:death=0.1", r"Unknown key 'death'.* For example: population:death_per_tick=0\.0005$"),
         ("", "Unknown wrapper ''"),
     ],
 )
 def test_command_line_errors_say_what_is_wrong(text, message):
     with pytest.raises(ConfigError, match=message):
         parse_wrapper(text)
+
+
+@pytest.mark.parametrize("name", WRAPPERS)
+def test_the_example_of_a_wrapper_works_and_does_something(name):
+    config = parse_wrapper(f"{name}:{wrapper_config_class(name).example}")
+    assert config.in_words(0.2) != QUIET[name].in_words(0.2)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("throttle:waveform=constant,amplitude=0.2", "throttle: robots lose 20 % of their speed"),
+        (
+            "throttle:waveform=sine,amplitude=0.2,offset=0.1,period_s=5000,carriers=true",
+            "throttle: carrying robots lose 0 to 30 % of their speed (sine, period 5,000 s)",
+        ),
+        (
+            "throttle:waveform=step,amplitude=0.3,start_s=500",
+            "throttle: robots lose 0, from 500 s on 30 % of their speed",
+        ),
+        (
+            "throttle:waveform=sawtooth,amplitude=0.1,offset=0.1,phase=1,period_s=50",
+            "throttle: robots lose 20 to 40 % of their speed (sawtooth, period 50 s)",
+        ),
+        (
+            "handling_cost:waveform=table,times_s=0+100,values=1+50",
+            "handling cost: a pick-up or a drop takes 0.2 to 10 s (table of 2 values)",
+        ),
+        ("sensor_noise:sigma=0.03", "sensor noise: sigma 0.03 (all sensors)"),
+        (
+            "sensor_noise:sigma=0.03,groups=light+wheel_speed,sigmas.position=0.1,distribution=uniform",
+            "uniform sensor noise: sigma 0.03 (light, wheel speed); sigma 0.1 (position)",
+        ),
+        (
+            "actuator_noise:sigma=square,amplitude=0.2,offset=0.1,period_s=100",
+            "wheel noise: sigma 0 to 0.3 (square, period 100 s)",
+        ),
+        (
+            "population:death_per_tick=0.0005,birth_per_tick=0.001,initial_robots=20,max_robots=30",
+            "population: a death every 400 s on average, a birth every 200 s on average, 20 robots at the start, "
+            "at most 30",
+        ),
+        (
+            "population:malfunction_per_tick=0.01,repair_per_tick=0.02",
+            "population: a malfunction every 20 s on average, a repair every 10 s on average",
+        ),
+        ("population", "population: no changes"),
+    ],
+)
+def test_wrappers_tell_their_settings_in_plain_words(text, expected):
+    assert parse_wrapper(text).in_words(0.2) == expected
+
+
+def test_a_wrapper_of_someone_else_tells_its_settings_too():
+    assert OuterConfig().in_words(0.2) == "test outer: groups proximity"
 
 
 def test_wrappers_are_read_from_toml():

@@ -1,12 +1,13 @@
 """Plots: what their labels say, and that legends hide nothing."""
 
+import numpy as np
 import pytest
 
 pytest.importorskip("matplotlib")
 
 from matplotlib.figure import Figure
 
-from swarm_forage_env.rendering.plots import draw_trainings
+from swarm_forage_env.rendering.plots import draw_maps, draw_trainings
 
 
 @pytest.fixture
@@ -42,3 +43,35 @@ def test_the_legend_of_trainings_stands_beside_the_axes(drawn):
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == ["mine", "crw"]
     assert not any(legend.get_window_extent().overlaps(axes.get_window_extent()) for axes in figure.axes)
+
+
+def maps_drawn(drawn, **options):
+    few, many = np.array([[0.0, 1.0]]), np.array([[0.0, 10.0]])
+    rows = [
+        ("few", {"density": few}, False, (2.0, 1.0)),
+        ("many", {"density": many}, False, (2.0, 1.0)),
+        ("many minus few", {"density": many - few}, True, (2.0, 1.0)),
+        ("few minus many", {"density": 0.5 * (few - many)}, True, (2.0, 1.0)),
+    ]
+    draw_maps("unused.png", rows, {"density": ("robots", "per m²")}, **options)
+    axes = [axes for axes in drawn[-1].axes if axes.get_images()]
+    return axes, [axes.get_images()[0].get_clim() for axes in axes]
+
+
+def test_maps_of_one_quantity_have_one_scale_and_differences_a_symmetric_one(drawn):
+    _, scales = maps_drawn(drawn)
+    assert scales[0] == scales[1] == pytest.approx((0.0, 10.0), rel=0.02)
+    assert scales[2] == scales[3] == pytest.approx((-9.0, 9.0), rel=0.02)
+
+
+def test_maps_may_have_scales_of_their_own(drawn):
+    _, scales = maps_drawn(drawn, own_scales=True)
+    assert [top for _, top in scales] == pytest.approx([1.0, 10.0, 9.0, 4.5])
+
+
+def test_maps_tell_their_units(drawn):
+    axes, _ = maps_drawn(drawn)
+    assert {(one.get_xlabel(), one.get_ylabel()) for one in axes} == {("x [m]", "y [m]")}
+    bars = [one.get_images()[0].colorbar.ax.get_ylabel() for one in axes]
+    assert bars == ["per m²", "per m²", "more per m²", "more per m²"]
+    assert axes[0].get_images()[0].get_extent() == [0, 2.0, 0, 1.0]

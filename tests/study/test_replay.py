@@ -53,6 +53,7 @@ ARRAYS = (
     "object_events",
     "deliveries",
     "cache_events",
+    "memory_events",
 )
 
 
@@ -165,6 +166,41 @@ def test_every_delivery_is_kept_however_long_frames_are(policy, wrappers, physic
     left, bottom, right, top = kept.scenario.arena.nest_box_m
     x, y = np.multiply(steps, kept.position_step_m)
     assert ((left <= x) & (x <= right) & (bottom <= y) & (y <= top)).all()
+
+
+def places_at(replay: Replay, frame: int, robot: int) -> set[tuple[int, float, float]]:
+    """Put together what a robot remembers at a frame: kind, x, y in m."""
+    places = set()
+    for when, row, kind, *steps in replay.memory_events.tolist():
+        if row == robot and when <= frame:
+            place = (abs(kind), *(round(step * replay.position_step_m, 3) for step in steps))
+            (places.add if kind > 0 else places.remove)(place)
+    return places
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", ["dpo", "stochm", "mixed:crw=2,dpo=rest"])
+def test_places_are_those_that_robots_remember(name, tmp_path):
+    spec = spec_of(name, ())
+    kept, _ = record_replay(spec, frame_s=10.0)
+    (kept,) = read_replays(write_replays(tmp_path / "a.html", kept))
+    policy = load_policy(spec.policy, spec.parameters)
+    run = LiveRun(build_env(spec.scenario, reads=policy.reads), policy, spec.seed)
+    n_places = 0
+    for frame, tick in enumerate(kept.ticks.tolist()):
+        run.advance(to_tick=tick)
+        for robot in range(spec.scenario.robots.n_robots):
+            told = policy.remembered_places(robot)
+            expected = {(1, *place) for place in np.round(told.objects_m, 3).tolist()}
+            expected |= {(2, *place) for place in np.round(told.caches_m, 3).tolist()}
+            assert places_at(kept, frame, robot) == expected
+            n_places += len(expected)
+    assert n_places > 0
+    assert (kept.memory_events[:, 2] < 0).any(), "something has been forgotten"
+
+
+def test_robots_without_memory_have_no_places():
+    assert record_replay(spec_of("random", ()), seconds=2.0)[0].memory_events is None
 
 
 @pytest.mark.compiled
@@ -306,7 +342,10 @@ def flip(text: str) -> str:
         (flip, "it does not match its digest"),
         (lambda text: text.replace('class="run">', 'class="run">!'), "damaged"),
         (lambda text: text.replace('class="run"', 'class="gone"'), "damaged"),
-        (lambda text: edited(text, lambda h: h.update(version=99)), "version 99 of the format, .* reads 2; read it"),
+        (
+            lambda text: edited(text, lambda h: h.update(version=99)),
+            "version 99 of the format, .* reads 2 and 3; read it",
+        ),
         (lambda text: edited(text, lambda h: h.update(format="else")), "no replay page of swarm_forage_env"),
         (lambda text: edited(text, lambda h: h["runs"][0].update(seed=3)), "digest"),
         (lambda text: edited(text, lambda h: h.pop("runs")), "damaged .no 'runs'"),

@@ -197,6 +197,42 @@ def test_a_damaged_page_says_so(page, desktop, tmp_path):
     assert "may be damaged" in desktop.text("#loading")
 
 
+def test_a_page_is_ready_when_it_is_loaded(page, desktop):
+    asked = "addEventListener('load', () => { window.atLoad = document.getElementById('loading').hidden; })"
+    number = desktop.call("Page.addScriptToEvaluateOnNewDocument", source=asked)["identifier"]
+    desktop.open(page)
+    desktop.call("Page.removeScriptToEvaluateOnNewDocument", identifier=number)
+    desktop.wait_for("window.atLoad !== undefined")
+    assert desktop.ask("window.atLoad"), "a picture taken at once would show no run"
+
+
+def test_names_are_whole_above_the_counts_of_many_runs(replays, browser, tmp_path):
+    names = ["ppo_warehouse_small", "mixed:crw=10,dpo=40", "stochm with sensor noise", "crw"]
+    many = [dataclasses.replace(replays[1], label=name) for name in names]
+    browser.open(write_replays(tmp_path / "many.html", many))
+    seek(browser, 400.0)
+    heads = "[...document.querySelectorAll('#score thead span')]"
+    assert browser.ask(f"{heads}.map((head) => head.textContent)") == names
+    assert browser.ask(f"{heads}.every((h) => h.scrollWidth <= h.clientWidth + 1 && h.offsetHeight <= 170)")
+    score = "document.getElementById('score')"
+    assert browser.ask(f"{score}.scrollWidth - {score}.clientWidth") == 0
+    captions = "[...document.querySelectorAll('.caption .name')]"
+    assert browser.ask(f"{captions}.map((name) => name.textContent)") == names
+    assert browser.ask(f"{captions}.every((name) => name.scrollWidth <= name.clientWidth)")
+    keep_picture(browser, f"names_{browser.width}")
+
+
+def test_the_subtitle_names_what_disturbs_the_runs(replays, pair, desktop, tmp_path):
+    desktop.open(pair)
+    told = "population: a death every 1,000 s on average, a malfunction every 400 s on average, a repair every 20 s"
+    assert desktop.text("#subtitle").count(told) == 1
+    assert "throttle: robots lose 0 to 40 % of their speed (sine, period 200 s)" in desktop.text("#subtitle")
+    quiet = dataclasses.replace(replays[1], spec=dataclasses.replace(replays[1].spec, wrappers=()), label="quiet")
+    desktop.open(write_replays(tmp_path / "one_of_two.html", [quiet, replays[0]]))
+    assert "stochm: population: a death" in desktop.text("#subtitle"), "not of both"
+    assert "quiet:" not in desktop.text("#subtitle")
+
+
 def test_robots_that_are_not_yet_born_are_not_called_dead(desktop, tmp_path):
     births = parse_wrapper("population:initial_robots=2,birth_per_tick=0.02")
     replay, _ = record_replay(plan_run(WORLD, "random", wrappers=(births,), seed=1), seconds=40.0)
@@ -204,6 +240,7 @@ def test_robots_that_are_not_yet_born_are_not_called_dead(desktop, tmp_path):
     born = int(np.flatnonzero(absent[0] & ~absent[-1])[0])
     first = int(np.argmin(absent[:, born]))
     desktop.open(write_replays(tmp_path / "births.html", replay))
+    assert "a birth every 10 s on average, 2 robots at the start" in desktop.text("#subtitle")
     assert "in interference" in desktop.text("#legend")
     assert "dead" not in desktop.text("#legend")
     choose(desktop, replay, 40, born)
@@ -228,6 +265,23 @@ def test_pointing_at_a_robot_tells_its_state(page, replays, desktop):
     assert lines[-1] == f"place: {x_m:.1f}, {y_m:.1f} m"
     desktop.move_to(2.0, 2.0)
     desktop.wait_for("document.getElementById('tip').hidden")
+    assert desktop.complaints == []
+
+
+def test_thin_frames_show_what_the_chosen_robot_remembers(page, replays, desktop, tmp_path):
+    replay = replays[0]
+    unknown = write_replays(tmp_path / "unknown.html", dataclasses.replace(replay, memory_events=None))
+    here = ~replay.has(Status.ABSENT)[300]
+    robot = int(np.flatnonzero(here & (replay.remembered[60] > 0))[0])
+    pictures = []
+    for file in (page, unknown):
+        desktop.open(file)
+        choose(desktop, replay, 300, robot)
+        desktop.move_to(2.0, 2.0)
+        seek(desktop, 300.0)
+        pictures.append(desktop.ask(PIXELS))
+        keep_picture(desktop, f"memory_{file.stem}")
+    assert pictures[0] != pictures[1]
     assert desktop.complaints == []
 
 

@@ -134,6 +134,22 @@ def test_transitions_are_the_decisions_of_robots_at_work(tmp_path):
 # Whole or not at all
 
 
+def test_a_second_recording_into_one_folder_is_refused_while_the_first_is_under_way(tmp_path):
+    pytest.importorskip("fcntl")
+    told = []
+
+    def second(*_):
+        with pytest.raises(DatasetError, match="another command is recording there; wait until it has ended"):
+            record_dataset(plan(seeds=(4,)), tmp_path)
+        told.append(True)
+
+    record_dataset(plan(seeds=(3,)), tmp_path, progress=second)
+    assert told
+    assert [run.seed for run in TrajectoryDataset(tmp_path).runs] == [3]
+    record_dataset(plan(seeds=(4,)), tmp_path)
+    assert [run.seed for run in TrajectoryDataset(tmp_path).runs] == [3, 4]
+
+
 @pytest.mark.parametrize("is_killed", [False, True])
 def test_an_interrupted_recording_goes_on(is_killed, tmp_path, monkeypatch):
     whole, cut = tmp_path / "whole", tmp_path / "cut"

@@ -27,6 +27,11 @@ def network_file(name: str) -> Path | None:
     return _shipped(f"{name}.npz")
 
 
+def network_names() -> tuple[str, ...]:
+    """Return the names of the shipped policies that are networks."""
+    return tuple(sorted(path.stem for path in _FOLDER.glob("*.npz")))
+
+
 def _shipped(file: str) -> Path | None:
     path = _FOLDER / file
     return path if path.is_file() else None

@@ -175,7 +175,7 @@ class LineChart extends Chart {
 
   use(series) {
     this.lines = this.runs.map(series);
-    this.top = roundUp(Math.max(1e-9, ...this.lines.flat().map((point) => point.value)));
+    this.top = roundUp(Math.max(0, ...this.lines.flat().map((point) => point.value)));
   }
 
   paintStill(pen) {

@@ -9,11 +9,6 @@ function bytesOfBase64(text) {
   return bytes;
 }
 
-async function inflate(bytes) {
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
 /** Undo byte planes, zigzag and differences. The first axis of the array, of this length, is the last one here: the
  *  values of one robot lie together. */
 function undoChanges(planes, type, length) {
@@ -33,12 +28,13 @@ function undoChanges(planes, type, length) {
 }
 
 /** Unpack all arrays of a run, by name. */
-async function unpackRun(header, text) {
+function unpackRun(header, text) {
   const packed = bytesOfBase64(text);
   const arrays = {};
   for (const { name, dtype, shape, offset, size } of header.arrays) {
-    const raw = await inflate(packed.subarray(offset, offset + size));
     const type = ARRAY_TYPES[dtype];
+    const length = shape.reduce((product, extent) => product * extent, type.BYTES_PER_ELEMENT);
+    const raw = inflate(packed.subarray(offset, offset + size), length);
     arrays[name] = dtype === "f4" ? new type(raw.buffer, 0, shape[0]) : undoChanges(raw, type, shape[0]);
   }
   return arrays;

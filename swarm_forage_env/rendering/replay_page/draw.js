@@ -299,6 +299,7 @@ class Painter {
     pen.beginPath();
     disc(pen, x, y, Math.max(9, 2.6 * this.radius));
     pen.stroke();
+    this.memory(pen, robot);
     if (!chosen) return;
     pen.font = "600 12px system-ui, sans-serif";
     pen.textAlign = "left";
@@ -309,6 +310,18 @@ class Painter {
     const [left, bottom] = [x + Math.max(9, 2.6 * this.radius) + 2, y - 5];
     pen.strokeText(String(robot), left, bottom);
     pen.fillText(String(robot), left, bottom);
+  }
+
+  /** Thin frames around the places that a robot remembers. */
+  memory(pen, robot) {
+    const { run, view } = this;
+    const sides = [0, view.objectPx(run.header.n_objects), Math.max(run.header.world.cache_side_m * view.scale, 10)];
+    pen.strokeStyle = theme.colours.text;
+    pen.lineWidth = 1;
+    for (const [kind, x, y] of run.places(robot) ?? []) {
+      const side = sides[kind] + 4;
+      pen.strokeRect(view.px(x) - side / 2, view.py(y) - side / 2, side, side);
+    }
   }
 
   scaleBar(pen) {

@@ -25,6 +25,8 @@ function stateWords(state) {
   return words.join(", ");
 }
 
+const UPRIGHT_RUNS = 3; // from so many on, whole names have no room above their columns and stand upright
+
 /** A table with a column per run; each row is [name, text of run 0, text of run 1, ...]. */
 function tableOf(runs, rows) {
   const table = document.createElement("table");
@@ -32,11 +34,14 @@ function tableOf(runs, rows) {
     const names = table.createTHead().insertRow();
     names.append(document.createElement("th"));
     for (const run of runs) {
-      const name = document.createElement("th");
+      const name = document.createElement("span");
       name.style.color = theme.ofRun(run.index);
-      name.textContent = name.title = run.header.label;
-      names.append(name);
+      name.append(...breakable(run.header.label));
+      const head = document.createElement("th");
+      head.append(name);
+      names.append(head);
     }
+    table.classList.toggle("narrow", runs.length >= UPRIGHT_RUNS);
   }
   const body = table.createTBody();
   for (const [name, ...texts] of rows) {

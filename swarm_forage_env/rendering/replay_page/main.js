@@ -18,7 +18,7 @@ class Page {
     this.restyle();
     document.addEventListener("themed", () => this.restyle());
     addEventListener("resize", () => this.resize());
-    requestAnimationFrame((now) => this.turn(now));
+    this.turn(performance.now()); // at once, for pictures that are taken as soon as the page is loaded
   }
 
   describe() {
@@ -26,8 +26,15 @@ class Page {
     const { world } = header;
     const facts = [header.scenario.replaceAll("_", " "), `${header.n_robots} robots`, `${header.n_objects} objects`,
       `${world.width_m} × ${world.height_m} m`, `seed ${header.seed}`];
-    for (const text of header.disturbances) facts.push(text);
-    document.getElementById("subtitle").textContent = facts.join("  ·  ");
+    document.getElementById("subtitle").textContent = [...facts, ...this.disturbances()].join("  ·  ");
+  }
+
+  /** What disturbs the runs, in words; those of one run alone begin with its name. */
+  disturbances() {
+    const [first, ...others] = this.runs.map((run) => run.header.disturbances);
+    if (others.every((words) => words.join() === first.join())) return first;
+    return this.runs.filter((run) => run.header.disturbances.length > 0)
+      .map((run) => `${run.header.label}: ${run.header.disturbances.join(", ")}`);
   }
 
   repaint() {
@@ -45,7 +52,8 @@ class Page {
     const { width_m, height_m } = this.runs[0].header.world;
     const isNarrow = innerWidth <= 860;
     const height = isNarrow ? innerHeight * 0.62 * Math.max(1, this.runs.length / 2) : Math.max(300, innerHeight * 0.64);
-    const caption = this.panels[0].box.querySelector("figcaption").offsetHeight + 2;
+    const captions = this.panels.map((panel) => panel.box.querySelector("figcaption").offsetHeight);
+    const caption = Math.max(...captions) + 2;
     const grid = bestGrid(this.runs.length, width_m / height_m, arenas.clientWidth, height, 12, caption);
     arenas.style.gridTemplateColumns = `repeat(${grid.columns}, ${grid.width + 2}px)`;
     for (const panel of this.panels) panel.resize(grid.width, grid.height);
@@ -118,7 +126,7 @@ class Page {
   }
 }
 
-async function start() {
+function start() {
   const loading = document.getElementById("loading");
   try {
     theme.start();
@@ -126,7 +134,7 @@ async function start() {
     const texts = [...document.querySelectorAll("script.run")];
     const runs = [];
     for (const [index, about] of header.runs.entries()) {
-      runs.push(new Run(about, await unpackRun(about, texts[index].textContent), index));
+      runs.push(new Run(about, unpackRun(about, texts[index].textContent), index));
       texts[index].remove(); // the text is not needed any more, and it is large
     }
     new Page(runs);

@@ -6,6 +6,11 @@ const REACH_PX = 16; // how near a click must come to a robot
 /** What is looked at: the same robot in all runs. */
 const focus = { chosen: -1, hovered: -1, follows: false, panel: null };
 
+/** A name that may go on in another line behind each _ , or =. */
+function breakable(name) {
+  return name.split(/(?<=[_,=])/).flatMap((part) => [part, document.createElement("wbr")]);
+}
+
 class Panel {
   constructor(parent, run, camera, page) {
     this.run = run;
@@ -17,7 +22,7 @@ class Panel {
     this.box.style.margin = "0";
     this.box.innerHTML = `<figcaption class="caption"><i class="swatch"></i><span class="name"></span>
       <span class="amount"></span><span class="unit"></span></figcaption><canvas></canvas>`;
-    this.box.querySelector(".name").textContent = run.header.label;
+    this.box.querySelector(".name").append(...breakable(run.header.label));
     this.box.querySelector(".unit").textContent = run.header.performance.words;
     this.amount = this.box.querySelector(".amount");
     this.canvas = this.box.querySelector("canvas");

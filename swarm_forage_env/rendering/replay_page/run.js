@@ -106,10 +106,27 @@ class Run {
     return codes ? this.header.activities[codes[robot * this.nFrames + this.frame]] : null;
   }
 
+  /** Places that a robot remembers, as [1 for an object or 2 for a cache, x, y in m], or null where nobody tells. */
+  places(robot) {
+    const events = this.arrays.memory_events;
+    if (!events) return null;
+    const count = events.length / 5;
+    const [frames, robots, kinds, x, y] = [0, 1, 2, 3, 4].map((k) => events.subarray(k * count, (k + 1) * count));
+    const places = new Map();
+    for (let i = countUpTo(robots, robot - 1); i < count && robots[i] === robot && frames[i] <= this.frame; i++) {
+      const key = [Math.abs(kinds[i]), x[i], y[i]].join();
+      if (kinds[i] < 0) places.delete(key);
+      else places.set(key, [kinds[i], this.header.position_step_m * x[i], this.header.position_step_m * y[i]]);
+    }
+    return [...places.values()];
+  }
+
   /** Number of things that a robot remembers, or null. */
   remembered(robot) {
     const { remembered } = this.arrays;
     if (!remembered) return null;
+    const places = this.places(robot);
+    if (places) return places.length; // of this frame; numbers are kept of fewer frames
     const samples = remembered.length / this.nRobots;
     const sample = Math.min(samples - 1, Math.floor(this.frame / this.header.remembered_frames));
     return remembered[robot * samples + sample];

@@ -8,7 +8,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import number
 from swarm_forage_env.contract.codes import Counter, Event
-from swarm_forage_env.contract.policy import Policy, RobotStates
+from swarm_forage_env.contract.policy import Memories, Policy, RobotStates
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy, policy_label
 from swarm_forage_env.rendering.view import refusing
@@ -158,6 +158,8 @@ class _Album:
         self._n_delivered = int(self._first_counters[Counter.COLLECTED])
         self._objects = _Changes(env.scenario.objects.n_objects)
         self._caches = _Changes(len(env.caches.alive))
+        self._remember = cast("Callable[[], Memories] | None", getattr(policy, "describe_memories", None))
+        self._memories = _MemoryChanges()
         self.ticks: list[int] = []
 
     def look(self) -> None:
@@ -170,6 +172,9 @@ class _Album:
         self._objects.look(frame, _objects_now(env))
         caches = env.caches
         self._caches.look(frame, np.column_stack((caches.count, np.where(caches.alive[:, None], caches.cell, -1))))
+
+        if self._remember is not None:
+            self._memories.look(frame, self._remember(), self._step_m)
 
     def note_deliveries(self) -> None:
         """Keep the deliveries of the tick that has just passed; what happened is told for one tick only."""
@@ -232,6 +237,7 @@ class _Album:
             "remembered_frames": REMEMBERED_FRAMES,
             "counters": self._counters[:end],
             "object_events": self._objects.events(),
+            "memory_events": None if self._remember is None else self._memories.events(),
             "deliveries": np.concatenate((np.zeros((0, 4), np.int32), *self._deliveries)),
             "cache_events": self._caches.events(),
             "has_tasks": getattr(self._policy, "task", None) is not None,
@@ -263,3 +269,32 @@ class _Changes:
 
     def events(self) -> np.ndarray:
         return np.concatenate(self._found) if self._found else np.zeros((0, 5), np.int32)
+
+
+class _MemoryChanges:
+    """Keeps which places robots begin and cease to remember."""
+
+    def __init__(self) -> None:
+        self._last = np.zeros((0, 4), np.int32)
+        self._found: list[np.ndarray] = []
+
+    def look(self, frame: int, memories: Memories, step_m: float) -> None:
+        steps = np.clip(np.rint(memories.place_m / step_m), 0, np.iinfo(np.uint16).max)
+        now = np.column_stack((memories.robot, 1 + memories.is_cache, steps)).astype(np.int32)
+        now = now[np.unique(_as_numbers(now), return_index=True)[1]]
+        new, old = _as_numbers(now), _as_numbers(self._last)
+        for rows, sign in ((self._last[~np.isin(old, new)], -1), (now[~np.isin(new, old)], 1)):
+            if len(rows):
+                self._found.append(np.column_stack((np.full(len(rows), frame), rows)).astype(np.int32))
+                self._found[-1][:, 2] *= sign
+        self._last = now
+
+    def events(self) -> np.ndarray:
+        every = np.concatenate((np.zeros((0, 5), np.int32), *self._found))
+        return every[np.lexsort((every[:, 0], every[:, 1]))]
+
+
+def _as_numbers(places: np.ndarray) -> np.ndarray:
+    """Return one whole number for each row: robot, 1 or 2, x, y, of which the last two are below 2^16."""
+    robot, kind, x, y = places.T.astype(np.int64)
+    return (((2 * robot + kind - 1) << 16 | x) << 16) | y

@@ -27,8 +27,10 @@ from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.wrappers.recorder import TOTALS
 
 FORMAT = "swarm_forage_env replay"
-FORMAT_VERSION = 2
-"""Raised whenever an array or a field changes its name, type or meaning."""
+FORMAT_VERSION = 3
+"""Raised whenever an array or a field is new, or changes its name, type or meaning."""
+READ_VERSIONS = (2, 3)
+"""Versions that `read_replays` reads; 2 is without `memory_events`."""
 _ARRAYS = {
     "position": "u2",
     "heading": "u1",
@@ -39,6 +41,7 @@ _ARRAYS = {
     "object_events": "i4",
     "deliveries": "i4",
     "cache_events": "i4",
+    "memory_events": "i4",
 }
 """Arrays of a `Replay` and their types in a file; those that are None are left out."""
 _SIGNALS = {"throttle": ("throttle", ""), "handling_cost": ("handling cost", " ticks")}
@@ -125,10 +128,10 @@ def _headline(replays: Sequence[Replay]) -> str:
 def _runs_of(header: dict[str, Any]) -> list[dict[str, Any]]:
     if header.get("format") != FORMAT:
         raise PageError("it is no replay page of swarm_forage_env")
-    if header.get("version") != FORMAT_VERSION:
+    if header.get("version") not in READ_VERSIONS:
         raise PageError(
             f"it has version {header.get('version')} of the format, this version of swarm_forage_env reads "
-            f"{FORMAT_VERSION}; read it with the version that wrote it"
+            f"{' and '.join(map(str, READ_VERSIONS))}; read it with the version that wrote it"
         )
     return header["runs"]
 
@@ -183,7 +186,7 @@ def _about(replay: Replay) -> dict[str, Any]:
             for name, (title, unit) in _SIGNALS.items()
             if name in replay.signals
         ],
-        "disturbances": [config.name.replace("_", " ") for config in spec.wrappers],
+        "disturbances": [config.in_words(scenario.dt_s) for config in spec.wrappers],
         "world": _world(scenario),
         "versions": dict(replay.versions),
         "spec": spec.to_mapping(),

@@ -81,6 +81,10 @@ class Replay:
     `position_step_m`; in order of ticks. There are as many as `counters` has."""
     cache_events: Whole
     """(E, 5) frame, slot, number of objects (0 = the cache is gone), and centre cell x, y."""
+    memory_events: Whole | None = None
+    """(E, 5) frame, robot row, what is new, and where, x, y in steps of `position_step_m`: 1 = an object is remembered
+    there, 2 = a cache, -1 and -2 = no more. In order of robots, then of frames; frame 0 has what all remember then.
+    None where the policy does not tell, and in pages of version 2."""
     signals: Mapping[str, NDArray[np.float32]]
     """(F,) each: throttle or handling cost at the frames, by name of the wrapper."""
     versions: Mapping[str, str]

@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, several, whole
-from swarm_forage_env._internal.files import check_folder, replacing
+from swarm_forage_env._internal.files import alone_in, check_folder, replacing
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.policy import COMMANDS, Policy, SwarmSpec
@@ -153,7 +153,7 @@ def record_dataset(
     """Make the runs that a folder lacks; each chunk is there whole or not at all.
 
     After an interruption the same call goes on: runs that are whole are kept, the one under way is made again. A folder
-    may get more seeds later.
+    may get more seeds later. Two calls at the same time would remove each other's drafts, so the second is refused.
 
     Args:
         plan: What to record.
@@ -164,14 +164,27 @@ def record_dataset(
         One summary per seed of the plan.
 
     Raises:
-        DatasetError: the folder holds another data set, or one of other versions.
+        DatasetError: the folder holds another data set, or one of other versions, or another call is writing to it.
         OSError: the folder cannot be written to, or has no room; then nothing has been run.
     """
     folder = Path(folder)
-    card = _card_of_folder(plan.card, folder)
+    _card_of_folder(plan.card, folder)  # refuses another data set
+    _check_room(folder, len(plan.missing(folder)) * plan.run_bytes)
+    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with alone_in(folder):
+            _record_runs(plan, folder, progress)
+    except BlockingIOError as error:
+        raise DatasetError(
+            f"Expected to be the only one that writes to {folder}, but another command is recording there; wait until "
+            "it has ended, or give another --out."
+        ) from error
+    return tuple(RunSummary.read(folder, seed) for seed in plan.card.seeds)
+
+
+def _record_runs(plan: DatasetPlan, folder: Path, progress: Callable[[int, int], None] | None) -> None:
+    _card_of_folder(plan.card, folder).write(folder)
     todo = plan.missing(folder)
-    _check_room(folder, len(todo) * plan.run_bytes)
-    card.write(folder)
     for draft in folder.glob(".*.tmp"):  # of a process that was killed
         draft.unlink(missing_ok=True)
     in_all = len(todo) * plan.n_decisions
@@ -182,7 +195,6 @@ def record_dataset(
                 progress(before + done, in_all)
 
         _record_run(plan, seed, folder, tell).write(folder)
-    return tuple(RunSummary.read(folder, seed) for seed in plan.card.seeds)
 
 
 def _card_of_folder(card: Card, folder: Path) -> Card:
