@@ -47,7 +47,7 @@ def open_class(place: str, *, digest: str | None = None, **parameters: Any) -> P
     found = checked_digest(file, digest)
     if name is None:
         raise PythonFileError(f"Expected the class with its file, as {file}:MyPolicy, got {place!r}. {_known(file)}")
-    factory = getattr(_module(file, found), name, None)
+    factory = getattr(_module(Path(file).resolve(), found), name, None)
     if not callable(factory):
         meant = suggestion(name, classes_of(file))
         raise PythonFileError(f"Expected {file} to have a class {name}.{meant} {_known(file)}")
@@ -89,9 +89,8 @@ def _known(file: str) -> str:
 
 
 @lru_cache(maxsize=8)  # every run makes its policy anew; the module is run once
-def _module(file: str, digest: str) -> ModuleType:
-    """Run a file as a module, once for each content that it has."""
-    path = Path(file).resolve()
+def _module(path: Path, digest: str) -> ModuleType:
+    """Run a file, given by its whole path, as a module, once for each content that it has."""
     where = hashlib.blake2b(str(path).encode(), digest_size=4).hexdigest()
     spec = spec_from_file_location(f"{path.stem}_{where}_{digest}", path)  # no name that something else has
     assert spec is not None, "its name ends in .py"
@@ -104,11 +103,11 @@ def _module(file: str, digest: str) -> ModuleType:
         spec.loader.exec_module(module)
     except Exception as error:
         del sys.modules[spec.name]
-        raise PythonFileError(f"Cannot run {file}: {_told(error, file)}.") from error
+        raise PythonFileError(f"Cannot run {path}: {_told(error, path)}.") from error
     return module
 
 
-def _told(error: Exception, file: str) -> str:
+def _told(error: Exception, file: str | Path) -> str:
     """Return an error in a user's file with the last line of that file that it passed."""
     whole = str(Path(file).resolve())
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == whole]
