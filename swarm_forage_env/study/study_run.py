@@ -20,7 +20,7 @@ from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.study.progress import RunProgress
 from swarm_forage_env.study.record import RecordError, software_versions
-from swarm_forage_env.study.runner import run_each
+from swarm_forage_env.study.runner import processes_of, run_each, seconds_of
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import RunFailure, RunStore
 from swarm_forage_env.study.studies import READING_NAMES, Cell, StudySpec
@@ -222,6 +222,7 @@ def run_study(
             foreign=before.n_foreign,
             damaged=tuple(before.damaged.values()),
             work=sum(run.robot_ticks for run in todo),
+            n_processes=None if executor is not None else processes_of(len(todo), jobs),
         )
         if progress
         else nullcontext()
@@ -232,7 +233,8 @@ def run_study(
             is_failure = isinstance(outcome, RunFailure)
             states[outcome.run_id] = FAILED if is_failure else DONE
             if shown is not None:
-                shown.advance(failed=is_failure, work=planned[outcome.run_id].robot_ticks)
+                work = planned[outcome.run_id].robot_ticks
+                shown.advance(failed=is_failure, work=work, took_s=seconds_of(outcome))
     return StudyState(states=states, damaged={}, n_foreign=before.n_foreign)
 
 
