@@ -110,7 +110,7 @@ class StudyFolder:
                 readings=tuple(name for name in READING_NAMES if name in {*there.readings, *spec.readings}),
             )
             mine, other = kept.to_mapping(), there.to_mapping()
-            told = ("seeds", "readings", "title", "budget")
+            told = ("seeds", "readings", "title", "budget", "file")
             differing = [key for key in mine if key not in told and mine[key] != other[key]]
             if differing:
                 raise RecordError(
