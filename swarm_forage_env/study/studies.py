@@ -80,9 +80,9 @@ class Axis:
         if dot:
             wrapper_config_class(wrapper)  # refuses unknown names; the field is checked with its values
         else:
-            known_name(
-                "axis", self.name, (*CRITERIA, SHARE, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY))
-            )
+            allowed = (*CRITERIA, SHARE, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY))
+            shown_by = f"{', '.join(CRITERIA)}, {SHARE}, and the fields that swarm-forage info warehouse_small lists"
+            known_name("axis", self.name, allowed, all_by=shown_by)
         several(f"the values of axis {self.name}", self.values, "values")
         kinds = {_kind(value) for value in self.values}
         if len(kinds) > 1 or "" in kinds or len(set(self.values)) < len(self.values):

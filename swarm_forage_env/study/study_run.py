@@ -7,6 +7,7 @@
 A folder can be filled by several machines, each with a shard, and copied together.
 """
 
+import errno
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -69,11 +70,11 @@ class StudyFolder:
         """Use `folder`.
 
         Raises:
-            RecordError: there is a file of that name.
+            NotADirectoryError: there is a file of that name.
         """
         self.folder = Path(folder)
         if self.folder.exists() and not self.folder.is_dir():
-            raise RecordError(f"Expected a folder for a study, got the file {self.folder}.")
+            raise NotADirectoryError(errno.ENOTDIR, "Expected a folder for a study, got a file", str(self.folder))
         self.store = RunStore(self.folder / "runs")
         self.study_file = self.folder / "study.json"
 
