@@ -58,7 +58,6 @@ def test_a_folder_in_the_place_of_the_file_is_told_before_anything_is_run(comman
         (*RUN, "--out", "taken"),
         ("score", "--policy", "random", "--budget", "quick", "--jobs", "1", "--out", "taken"),
         ("study", "run", "S1a", "--budget", "smoke", "--workers", "1", "--out", "taken"),
-        ("dataset", "--policy", "crw", "--robots", "2", "--out", "taken"),
     ],
     ids=lambda words: words[0],
 )
