@@ -76,7 +76,7 @@ class LearnedPolicy:
         return self._chosen
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
-        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
+        """Choose actions; see `Policy.act`. The returned (N, A) array is reused by the next call."""
         if self._ticks_left == 0:
             view = self.interface.observe(obs, self._view)
             self._chosen, self._memory = self._remember(view, self._memory, self._rng)

@@ -87,7 +87,7 @@ class RunSpec:
 
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
         `physics` is left out where it is the default, so that runs in Chipmunk have the same ids with and without it;
-        so are own sensors and an own reward where there are none.
+        so are own sensors, an own reward, neighbours and messages where there are none.
         """
         return identity_of({**self._others(), "scenario": _identifying_fields(self.scenario)})
 
@@ -163,6 +163,10 @@ def _identifying_fields(scenario: ScenarioConfig) -> dict[str, Any]:
     for section, name in (("robots", "own_sensors"), ("reward", "own_reward")):
         if not mapping[section][name]:  # runs without them are those of before there were any
             del mapping[section][name]
+    robots = mapping["robots"]
+    for size, range_m in (("neighbours_seen", "neighbour_range_m"), ("message_size", "message_range_m")):
+        if not robots[size]:  # likewise; a range then changes nothing
+            del robots[size], robots[range_m]
     return mapping
 
 

@@ -25,6 +25,7 @@ STACK_ORDER = (
     "Throttle",
     "ActuatorNoise",
     "HandlingCost",
+    "MessageNoise",
     "ForageEnv",
 )
 """The documented stack, outermost first; `SwarmWrapper.stack_position` counts along it."""
@@ -112,7 +113,7 @@ class SwarmWrapper(BaseParallelWrapper):
         """Return the wheel gain handed to the next wrapper inwards.
 
         Args:
-            actions: (N, 3) float32, the commands of this step; read only.
+            actions: (N, A) float32, the actions of this step, commands in the first three columns; read only.
             wheel_gain: (N, 2) factors on the left and right wheel speed from the wrappers outside, None = all 1.
                 Write the product into your own array; never change this one.
         """
@@ -159,7 +160,7 @@ class SwarmWrapper(BaseParallelWrapper):
         """Advance the stack by one tick; see `ForageEnv.step_batch`.
 
         Args:
-            actions: (N, 3) float32 in [-1, 1].
+            actions: (N, A) float32 in [-1, 1].
             wheel_gain: (N, 2) factors on the wheel speeds, None = all 1.
             tasks: (N,) int8 `contract.codes.Task` codes, None = the policy has no tasks.
 

@@ -7,8 +7,9 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import known_name, number, one_of, several, table
+from swarm_forage_env._internal.fields import ConfigError, known_name, number, one_of, several, table
 from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.layout import NEIGHBOUR_FIELDS, NEIGHBOURS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
@@ -18,12 +19,16 @@ from swarm_forage_env.wrappers.kernels.noise import (
     noisy_gain,
     perturb_readings,
     share_that_sees_obstacles,
+    shift_neighbours,
     turn_heading,
 )
 from swarm_forage_env.wrappers.waveform import Signal, Waveform, gather_waveform
 
 NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
 """Groups of sensors that can be noisy, in the order of their columns."""
+NAMED_GROUPS = (NEIGHBOURS,)
+"""Groups that are noisy only where they are named, because few scenarios have them."""
+ALL_GROUPS = (*NOISE_GROUPS, *NAMED_GROUPS)
 POSE_GROUPS = NOISE_GROUPS[4:]
 """Groups that the authors' program leaves exact (quirk `pose_sensors_exact`); the paper speaks of all sensors."""
 DISTRIBUTIONS = ("gaussian", "uniform")
@@ -47,8 +52,9 @@ class SensorNoise(SwarmWrapper):
     """Perturbs what policies see. The rules of the arena and the measure of interference use exact readings.
 
     Unit of sigma: 1 for readings (proximity, light, ground; clamped to [0, 1]), 1 cm/s for wheel speeds and 1 m per
-    axis for positions (both clamped to the ends of their range), 1 rad for the heading, whose angle is perturbed. All
-    other columns stay exact, rows of robots that are not present stay zero.
+    axis for positions (both clamped to the ends of their range), 1 rad for the heading, whose angle is perturbed. Where
+    the group `neighbours` is named, 1 is 1 m forward and left to each neighbour that is seen; nobody is seen wrongly or
+    overlooked. All other columns stay exact, rows of robots that are not present stay zero.
 
     In every tick a number is drawn for each robot and noisy column, whether it is used or not. So a death, the policy's
     choice of slices and the size of sigma do not change the draws of other robots and columns.
@@ -60,12 +66,21 @@ class SensorNoise(SwarmWrapper):
     stack_position: ClassVar[int] = 1
 
     def __init__(self, env: ForageEnv | SwarmWrapper, config: "SensorNoiseConfig") -> None:
-        """Wrap `env`."""
+        """Wrap `env`; raises ConfigError as `reconfigure`."""
         super().__init__(env, config)
         self.reconfigure(config)
 
     def reconfigure(self, config: "SensorNoiseConfig") -> None:
-        """Go on under another configuration from the next tick on; with other noisy groups, all draws are others."""
+        """Go on under another configuration from the next tick on; with other noisy groups, all draws are others.
+
+        Raises:
+            ConfigError: noise on neighbours where robots see none.
+        """
+        if NEIGHBOURS in config.group_sigmas() and not self.unwrapped.scenario.robots.neighbours_seen:
+            raise ConfigError(
+                "Expected a scenario in which robots see neighbours, for noise on them; give it neighbours_seen, or "
+                "leave the group out."
+            )
         self.made_from = config
         self._is_uniform = config.distribution == "uniform"
         exact = POSE_GROUPS if self.unwrapped.scenario.quirks.pose_sensors_exact else ()
@@ -82,13 +97,18 @@ class SensorNoise(SwarmWrapper):
         constant: list[float] = []
         self._varying: list[tuple[slice, Signal]] = []
         self._heading: tuple[int, int] | None = None
-        for name in (name for name in NOISE_GROUPS if name in sigmas):
+        self._neighbours: tuple[int, int, int] | None = None
+        for name in (name for name in ALL_GROUPS if name in sigmas):
             part, sigma, first = parts[name], sigmas[name], len(units)
             # Other slices are not read, and the environment does not rewrite them: noise would add up there.
             is_read = part.name in self.unwrapped.arena.reads
             if name == "heading":
                 units.append(1.0)
                 self._heading = (part.start, first) if is_read else None
+            elif name == NEIGHBOURS:
+                n_seen = part.size // NEIGHBOUR_FIELDS
+                units += [1.0 / part.scale[0]] * (2 * n_seen)
+                self._neighbours = (part.start, first, n_seen) if is_read else None
             else:
                 units += [_NATURAL_UNITS.get(name, 1.0) / scale for scale in part.scale]
                 if is_read:
@@ -120,6 +140,8 @@ class SensorNoise(SwarmWrapper):
         perturb_readings(obs, present, self._draws, centre, self._factors, self._spans, self._lows)
         if self._heading is not None:
             turn_heading(obs, present, self._draws, centre, self._factors, *self._heading)
+        if self._neighbours is not None:
+            shift_neighbours(obs, self._draws, centre, self._factors, *self._neighbours)
         return obs
 
     def after_step(self, tasks: CodeArray | None, terminated: BoolArray, truncated: bool) -> None:
@@ -198,7 +220,7 @@ class SensorNoiseConfig(WrapperConfig):
     sigma: Sigma = 0.0
     """Standard deviation for all of `groups`, in the unit of each."""
     groups: tuple[str, ...] = NOISE_GROUPS
-    """Which of `NOISE_GROUPS` are noisy; kept in that order."""
+    """Which of `ALL_GROUPS` are noisy; kept in that order."""
     sigmas: Mapping[str, Sigma] = field(default_factory=dict, hash=False)
     """Group -> its own standard deviation, instead of `sigma`; the group need not be among `groups`."""
     distribution: str = "gaussian"
@@ -207,12 +229,12 @@ class SensorNoiseConfig(WrapperConfig):
     def __post_init__(self) -> None:
         several("sensor_noise.groups", self.groups, "names of sensors")
         for name in (*self.groups, *table("sensor_noise.sigmas", self.sigmas)):
-            known_name("group of sensors", name, NOISE_GROUPS)
+            known_name("group of sensors", name, ALL_GROUPS)
         _check_sigma("sensor_noise.sigma", self.sigma)
         for name, sigma in self.sigmas.items():
             _check_sigma(f"sensor_noise.sigmas.{name}", sigma)
         one_of("sensor_noise.distribution", self.distribution, DISTRIBUTIONS)
-        object.__setattr__(self, "groups", tuple(name for name in NOISE_GROUPS if name in self.groups))
+        object.__setattr__(self, "groups", tuple(name for name in ALL_GROUPS if name in self.groups))
         object.__setattr__(self, "sigmas", dict(self.sigmas))
 
     def group_sigmas(self) -> dict[str, Sigma]:

@@ -4,7 +4,7 @@ import math
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import sees_obstacle
-from swarm_forage_env.contract.layout import RING_SENSORS
+from swarm_forage_env.contract.layout import NEIGHBOUR_FIELDS, RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 
 
@@ -64,6 +64,58 @@ def turn_heading(
         # Rounding to float32 can leave the unit circle by one unit in the last place.
         obs[i, start] = min(1.0, max(-1.0, x * cos - y * sin))
         obs[i, start + 1] = min(1.0, max(-1.0, x * sin + y * cos))
+
+
+@kernel
+def shift_neighbours(
+    obs: ObsArray, draws: ObsArray, centre: float, factors: ObsArray, start: int, first: int, n_seen: int
+) -> None:
+    """Add (draw - centre) * factor to forward and left of neighbours that are there, and clamp them to [-1, 1].
+
+    Args:
+        obs: (N, D), edited.
+        draws: (N, C) float32, two per robot and neighbour.
+        centre: Mean of the draws.
+        factors: (C,) float32.
+        start: First column of the neighbours in `obs`.
+        first: Their first column in `draws` and `factors`.
+        n_seen: Neighbours that an observation has room for.
+    """
+    one = draws.dtype.type(1.0)
+    shift = draws.dtype.type(centre)
+    for i in range(obs.shape[0]):
+        for k in range(n_seen):
+            at = start + NEIGHBOUR_FIELDS * k
+            if obs[i, at + NEIGHBOUR_FIELDS - 1] > 0.0:
+                for axis in range(2):
+                    column = first + 2 * k + axis
+                    noise = (draws[i, column] - shift) * factors[column]
+                    obs[i, at + axis] = min(one, max(-one, obs[i, at + axis] + noise))
+
+
+@kernel
+def garble(obs: ObsArray, draws: ObsArray, lost: FloatArray, start: int, factor: float, loss: float, size: int) -> None:
+    """Disturb what was heard: some robots hear nothing, the others get draw * factor added, clamped to [-1, 1].
+
+    Args:
+        obs: (N, D), edited.
+        draws: (N, m) float32, standard normal.
+        lost: (N,) uniform in [0, 1).
+        start: First column of the messages in `obs`.
+        factor: Standard deviation of the noise.
+        loss: Probability that a robot hears nothing.
+        size: m, numbers of a message; the column after them is 1 where anything was heard.
+    """
+    one = draws.dtype.type(1.0)
+    scale = draws.dtype.type(factor)
+    for i in range(obs.shape[0]):
+        if obs[i, start + size] == 0.0:
+            continue
+        if lost[i] < loss:
+            obs[i, start : start + size + 1] = 0.0
+            continue
+        for k in range(size):
+            obs[i, start + k] = min(one, max(-one, obs[i, start + k] + draws[i, k] * scale))
 
 
 @kernel
