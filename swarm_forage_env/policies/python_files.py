@@ -56,7 +56,7 @@ def open_class(place: str, *, digest: str | None = None, **parameters: Any) -> P
     except TypeError as error:
         raise PythonFileError(f"Expected parameters that {place} takes, got {parameters!r}: {error}.") from error
     try:
-        policy = factory(**parameters)
+        policy: Any = factory(**parameters)
     except Exception as error:
         raise PythonFileError(f"Cannot make {place}: {_told(error, file)}.") from error
     lacking = [method for method in ("reset", "act") if not callable(getattr(policy, method, None))]
