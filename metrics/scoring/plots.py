@@ -1,12 +1,13 @@
 """Pictures of score tables. Needs matplotlib (the optional extra "plots"), imported when something is drawn."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from metrics.catalog import METRICS
+from metrics.claims.panel import MIN_PAIRS
 from metrics.statistics import Summary
 
 from .columns import NOISE, POPULATION, SIZE, THROTTLE
@@ -20,6 +21,9 @@ Panel: TypeAlias = Any
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
 """Okabe-Ito palette: told apart by readers with any colour vision."""
 PANELS_PER_ROW = 4
+FEWEST_RUNS = MIN_PAIRS
+"""Fewer runs are drawn without an interval: they decide nothing, and that of two runs reaches nine standard deviations
+to either side, which would leave nothing else to be seen."""
 LONG_TITLE = 48
 """Letters that fit above a panel; longer titles are smaller, so that they do not run into their neighbours."""
 X_LABELS = {
@@ -62,9 +66,20 @@ def draw_scores(tables: Sequence[ScoreTable], path: str | Path, *, band: bool = 
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(tables), frameon=False)
     where = next((table.scenario for table in tables if table.scenario), "")
-    words = "mean and 95 % interval over seeds" + ("; shaded: mean ± 2 sd of runs" if band else "")
+    words = _about_bars(
+        score.summary.n_used for content in drawn for table in tables for score in content.scores(table)
+    )
+    words += "; shaded: mean ± 2 sd of runs" if band else ""
     figure.suptitle(f"{unread(where) + ': ' if where else ''}{words}; dotted: noise floor; hollow: misleads")
     figure.savefig(path, dpi=150)
+
+
+def _about_bars(n_runs: Iterable[int]) -> str:
+    """Return what is drawn of scores of so many runs."""
+    with_bar = {n >= FEWEST_RUNS for n in n_runs}
+    if True not in with_bar:
+        return f"mean over seeds; no intervals, of fewer than {FEWEST_RUNS} runs"
+    return "mean and 95 % interval over seeds" + (f"; none of fewer than {FEWEST_RUNS}" if False in with_bar else "")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +145,7 @@ def _draw_policy(
 ) -> None:
     summaries = [content.summary(score) for score in scores]
     y = [summary.mean for summary in summaries]
-    half = [0.0 if math.isnan(s.upper) else s.upper - s.mean for s in summaries]
+    half = [0.0 if math.isnan(s.upper) or s.n_used < FEWEST_RUNS else s.upper - s.mean for s in summaries]
     panel.errorbar(x, y, yerr=half, color=colour, marker="o", markersize=4, capsize=2, label=name)
     hollow = [(place, value) for place, value, score in zip(x, y, scores, strict=True) if score.is_doubtful]
     if hollow:
@@ -138,7 +153,7 @@ def _draw_policy(
             *zip(*hollow, strict=True), color=colour, marker="o", markersize=4, markerfacecolor="w", linestyle=""
         )
     if band:
-        spread = [0.0 if math.isnan(s.std) else 2.0 * s.std for s in summaries]
+        spread = [0.0 if math.isnan(s.std) or s.n_used < FEWEST_RUNS else 2.0 * s.std for s in summaries]
         lower = [value - width for value, width in zip(y, spread, strict=True)]
         upper = [value + width for value, width in zip(y, spread, strict=True)]
         panel.fill_between(x, lower, upper, color=colour, alpha=0.15, linewidth=0.0)

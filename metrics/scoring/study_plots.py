@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from metrics.catalog import METRICS
 from metrics.claims import PanelName
@@ -16,7 +17,7 @@ from metrics.statistics import Summary, aggregate
 from .columns import SIZE
 from .figure_panels import StudyPanel, StudyPanels
 from .measures import label_of
-from .plots import COLOURS, PANELS_PER_ROW, X_LABELS, Panel
+from .plots import COLOURS, FEWEST_RUNS, PANELS_PER_ROW, X_LABELS, Panel
 from .texts import number, unread
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def study_figures(scored: StudyPanels) -> tuple[StudyFigure, ...]:
 
 
 def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci") -> None:
-    """Draw a figure into picture files: lines are means, the band is around them, dots are runs.
+    """Draw a figure into picture files: lines are means, dots are runs, and bands are where there are `FEWEST_RUNS`.
 
     Args:
         figure: From `study_figures`.
@@ -117,8 +118,17 @@ def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci"
         place.set_axis_off()
     handles, labels = axes[0].get_legend_handles_labels()
     picture.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 8), frameon=False, fontsize=9)
-    picture.suptitle(f"{unread(figure.title)}\nshaded: {_BANDS[band]}; dots: runs", fontsize=10)
+    picture.suptitle(f"{unread(figure.title)}\n{caption(figure, band)}", fontsize=10)
     save_picture(picture, figure.name, paths)
+
+
+def caption(figure: StudyFigure, band: Band) -> str:
+    """Return what dots and bands are, and why some or all bands are missing."""
+    n_runs = [s.n_used for panel in figure.panels for scores in panel.scores.values() for s in _summaries(scores)]
+    if max(n_runs) < FEWEST_RUNS:
+        return f"lines: means; dots: runs\nno bands: fewer than {FEWEST_RUNS} runs of a cell tell too little"
+    lacking = f"\nno band: cells with fewer than {FEWEST_RUNS} runs, which tell too little"
+    return f"shaded: {_BANDS[band]}; dots: runs" + (lacking if any(0 < n < FEWEST_RUNS for n in n_runs) else "")
 
 
 def draw_map(figure: StudyFigure, paths: Sequence[Path]) -> None:
@@ -171,7 +181,7 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
         colour = COLOURS[index % len(COLOURS)]
         summaries = _summaries(scores)
         mean = np.array([summary.mean for summary in summaries])
-        lower, upper = np.array([_edges(summary, band) for summary in summaries]).T
+        lower, upper = _band(panel, summaries, band)
         beside = levels + step * (index - 0.5 * (len(panel.scores) - 1))
         dots = np.repeat(2.0**beside if is_log else beside, scores.shape[1])
         (marks,) = place.plot(dots, scores.ravel(), ".", markersize=4, color=colour, alpha=0.35, zorder=2.5)
@@ -179,8 +189,10 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
         marker, name = MARKERS[index % len(MARKERS)], unread(policy)
         place.plot(panel.levels, mean, color=colour, marker=marker, markersize=4, linewidth=1.6, label=name, zorder=3)
         place.fill_between(panel.levels, lower, upper, color=colour, alpha=0.2, linewidth=0.0, zorder=2)
-        if len(panel.levels) == 1:  # a band has no width there
-            place.vlines(panel.levels, lower, upper, color=colour, linewidth=3.0, alpha=0.4, zorder=2)
+        equal = np.where(lower == upper, mean, np.nan)  # all runs are equal: a band without height would not be seen
+        place.plot(panel.levels, equal, color=colour, linewidth=5.0, alpha=0.2, zorder=2)
+        alone = _alone(np.isfinite(lower))  # a band without neighbours has no width
+        place.vlines(panel.levels[alone], lower[alone], upper[alone], color=colour, linewidth=3.0, alpha=0.4, zorder=2)
     neutral = METRICS[panel.measure].neutral
     if neutral is not None and panel.variant == "corrected":
         place.axhline(neutral, color="0.5", linewidth=0.8, zorder=0)
@@ -214,10 +226,27 @@ def _x_label(panel: StudyPanel) -> str:
     return X_LABELS.get(panel.criterion, panel.criterion.replace("_", " "))
 
 
+def _band(panel: StudyPanel, summaries: Sequence[Summary], band: Band) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper edges at each level, within the range of the measure; NaN without a band."""
+    edges = np.array([_edges(summary, band) for summary in summaries]).T
+    if panel.variant == "corrected":  # other forms have other ranges
+        about = METRICS[panel.measure]
+        edges = np.clip(edges, about.lowest, about.highest)
+    return edges[0], edges[1]
+
+
 def _edges(summary: Summary, band: Band) -> tuple[float, float]:
+    if summary.n_used < FEWEST_RUNS:
+        return math.nan, math.nan
     if band == "ci":
         return summary.lower, summary.upper
     return summary.mean - 2.0 * summary.std, summary.mean + 2.0 * summary.std
+
+
+def _alone(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which levels have a band while their neighbours have none."""
+    beside = np.concatenate([[False], known, [False]])
+    return known & ~beside[:-2] & ~beside[2:]
 
 
 def _summaries(scores: FloatArray) -> list[Summary]:

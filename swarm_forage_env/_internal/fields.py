@@ -17,7 +17,7 @@ from numbers import Integral, Real
 from typing import Any, cast
 
 from swarm_forage_env._internal.printable import is_printable, shown
-from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.spelling import nearest, suggestion
 
 MAX_NAME = 60
 """Longest name that files are named by (our choice: with four bytes a character, endings still fit into 255 bytes)."""
@@ -206,11 +206,23 @@ def known_keys(mapping: Mapping[str, Any], known: Iterable[str], what: str = "ke
             raise UnknownNameError(f"Unknown {what} {f'{prefix}{key}'!r}.{suggestion(str(key), names)}")
 
 
-def known_name(what: str, name: Any, known: Iterable[str]) -> None:
-    """Refuse a name of a thing of which there are few; the message has the nearest one and lists all."""
+def known_name(what: str, name: Any, known: Iterable[str], *, all_by: str = "") -> None:
+    """Refuse a name that is not known; the message has the nearest one and lists all.
+
+    Args:
+        what: What it is a name of, for the message.
+        name: The name.
+        known: Names that there are.
+        all_by: What shows all of them, where they are too many for a message: it then lists the nearest few.
+    """
     names = tuple(known)
-    if not isinstance(name, str) or name not in names:
-        raise ConfigError(f"Unknown {what} {name!r}.{suggestion(str(name), names)} Known: {', '.join(names)}.")
+    if isinstance(name, str) and name in names:
+        return
+    others = f"Known: {', '.join(names)}."
+    if all_by:
+        near = nearest(str(name), names)
+        others = (f"Near it: {', '.join(near)}. " if near[1:] else "") + f"All {len(names)}: {all_by}."
+    raise ConfigError(f"Unknown {what} {name!r}.{suggestion(str(name), names)} {others}")
 
 
 def _is_number(value: Any) -> bool:

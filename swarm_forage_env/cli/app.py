@@ -55,7 +55,7 @@ def _options(
         bool,
         typer.Option(
             "--trust-models",
-            help="Also open models (.zip) that files name: opening one runs code that it holds (SECURITY.md).",
+            help="Also open models (.zip) and Python (.py) that files name: this runs code in them (SECURITY.md).",
         ),
     ] = False,
 ) -> None:

@@ -16,7 +16,8 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
-from swarm_forage_env.policies.registry import is_policy_file, policy_class, policy_names, split_interface
+from swarm_forage_env.policies.python_files import classes_of
+from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_names
 from swarm_forage_env.scenarios import presets
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.study.spec import stated_caches
@@ -52,7 +53,7 @@ def information(name: str) -> str:
         network = network_file(name)
         return "\n".join([*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])])
     if is_policy_file(name):
-        return "\n".join(_file_lines(Path(split_interface(name)[0])))
+        return "\n".join(_file_lines(Path(file_of(name))))
     if is_mixture(name):
         return "\n\n".join(information(part.policy) for part in mixture_parts(name))
     known = (*presets.SCENARIO_NAMES, *policy_names())
@@ -103,6 +104,10 @@ def _caches(policy: object, if_stated: str = "") -> str:
 def _file_lines(file: Path) -> Iterator[str]:
     if not file.is_file():
         raise ConfigError(f"Cannot read the policy file {file}: there is no such file.")
+    if file.suffix.lower() == ".py":
+        yield f"{file}: Python. It is only read here, and not run."
+        yield f"  classes  {', '.join(classes_of(file)) or 'none'}; as a policy: {file}:NAME"
+        return
     if file.suffix.lower() != ".npz":
         yield f"{file}: a model of stable-baselines3. Opening it runs code that it contains, so it is not opened here."
         return

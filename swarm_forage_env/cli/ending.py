@@ -10,6 +10,7 @@ import sys
 import tempfile
 import traceback
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -26,6 +27,16 @@ DEBUG_VARIABLE = "SWARM_FORAGE_DEBUG"
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
 """Base of typer's complaints about arguments; typer gives it no public name."""
 
+_TWINS = {"--jobs": "--workers", "--workers": "--jobs"}
+"""Options that people mistake for each other: commands have the one, `study run`, which may have its workers elsewhere,
+the other."""
+_BOUNDS = {
+    "greater_than_equal": ("ge", ">="),
+    "greater_than": ("gt", ">"),
+    "less_than_equal": ("le", "<="),
+    "less_than": ("lt", "<"),
+}
+"""How pydantic names a bound -> its word for it, and its sign."""
 _OURS = ("swarm_forage_env", "baselines", "metrics")
 """Where the errors are defined that speak to users: subclasses of ValueError, such as ConfigError and ModelError."""
 
@@ -39,7 +50,7 @@ def end(error: BaseException) -> int:
     from swarm_forage_env.study.runner import WorkerError  # late: only a command that fails needs it
 
     if isinstance(error, _USAGE_ERROR):
-        return complain(error.format_message(), EXIT_USAGE)  # type: ignore[attr-defined] - see _USAGE_ERROR
+        return complain(_about_words(error), EXIT_USAGE)
     if isinstance(error, ValueError) and type(error).__module__.partition(".")[0] in _OURS:
         return complain(str(error), EXIT_USAGE)
     if isinstance(error, KeyboardInterrupt | typer.Abort):
@@ -63,6 +74,32 @@ def end(error: BaseException) -> int:
     if os.environ.get(DEBUG_VARIABLE):
         raise error
     return _end_unforeseen(error)
+
+
+def _about_words(error: Any) -> str:
+    """Return what is wrong with the words of a command, a `_USAGE_ERROR`, in the style of our other errors."""
+    other = _TWINS.get(getattr(error, "option_name", ""))
+    if other and any(other in option.opts for option in error.ctx.command.params):
+        return f"No such option: {error.option_name}; for this command it is {other}."
+    found = getattr(error.__cause__, "errors", None)  # of pydantic, by which typer checks values
+    param = getattr(error, "param", None)
+    if found is None or param is None:
+        return error.format_message()
+    (first, *_) = found()
+    kind = first["type"]
+    if kind.startswith("int_"):
+        wanted = "a whole number"
+    elif kind.startswith("float_"):
+        wanted = "a number"
+    elif kind in _BOUNDS:
+        word, sign = _BOUNDS[kind]
+        wanted = f"a number {sign} {first['ctx'][word]}"
+    else:
+        return error.format_message()
+    about = getattr(param, "help", None)
+    return f"Expected {param.opts[0]} to be {wanted}, got {str(first['input'])!r}." + (
+        f" It is: {about}" if about else ""
+    )
 
 
 def _end_unforeseen(error: BaseException) -> int:

@@ -83,7 +83,10 @@ Budget = Annotated[str, typer.Option("--budget", help="quick, standard or paper:
 ScoreSeeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per experiment; default the budget's.")]
 ScoreHorizon = Annotated[float | None, typer.Option("--horizon", help="Seconds per run; default the budget's.")]
 Out = Annotated[Path | None, typer.Option("--out", help="Folder for records; default results/SCENARIO.")]
-Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Processes; default one per core.")]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", min=1, help="Processes; default one per core that it may use; 1 = in this process."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the results as JSON.")]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and an estimate, run nothing.")]
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from metrics.scoring.plots import FEWEST_RUNS
 from metrics.scoring.texts import counted
 from metrics.statistics import aggregate
 from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts, part_sizes
@@ -237,6 +238,8 @@ def draw_performance(specs: Sequence[RunSpec], records: Sequence[RunRecord], pat
         runs = np.array([record.performance for record in records if record.controller == controller])
         per_interval = [aggregate(column, level=LEVEL) for column in runs.T]
         mean, low, high = np.array([(point.mean, point.lower, point.upper) for point in per_interval]).T
+        if len(runs) < FEWEST_RUNS:
+            low = high = np.full_like(mean, np.nan)
         curves.append(Curve(shown(controller), mean, low, high))
     read_as = quantity(scenario.performance)
     draw_curves(
@@ -245,8 +248,17 @@ def draw_performance(specs: Sequence[RunSpec], records: Sequence[RunRecord], pat
         curves,
         title=f"{scenario.name}, {scenario.robots.n_robots} robots",
         ylabel=f"{read_as.title} per {scenario.interval_s:g} s" if read_as.is_total else read_as.title,
-        band=f"{LEVEL:.0%} t interval over seeds",
+        band=_about_bands(curves),
     )
+
+
+def _about_bands(curves: Sequence[Curve]) -> str:
+    """Return what the bands are; of curves without them, why."""
+    few = f"fewer than {FEWEST_RUNS} runs, too few for a band"
+    with_band = [bool(np.isfinite(curve.low).any()) for curve in curves]
+    if not any(with_band):
+        return few
+    return f"bands: {LEVEL:.0%} t interval over seeds" + ("" if all(with_band) else f"; elsewhere {few}")
 
 
 def plan_note(specs: Sequence[RunSpec], seconds: float, jobs: int) -> str:

@@ -23,8 +23,9 @@ def run(
         typer.Option(
             "--policy",
             "--controller",
-            help="One or more, separated by commas: names, or files of trained policies. A file that does not tell its "
-            "interface can be told it: model.zip:decision_ticks=5. mixed:dpo=10,crw=rest lets several drive one swarm.",
+            help="One or more, separated by commas: names, files of trained policies, or a class in a Python file "
+            "(my_module.py:MyPolicy). A model that does not tell its interface can be told it: "
+            "model.zip:decision_ticks=5. mixed:dpo=10,crw=rest lets several drive one swarm.",
         ),
     ] = "crw",
     seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,

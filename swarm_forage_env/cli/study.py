@@ -62,7 +62,12 @@ def run(  # long: one parameter per option
     reading: Reading = "file",
     shard: Annotated[str, typer.Option("--shard", metavar="I/N", help="Only the I-th of N equal parts.")] = "1/1",
     workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Processes, or jobs of slurm-jobs; default one per core.")
+        int | None,
+        typer.Option(
+            "--workers",
+            min=1,
+            help="Processes, or jobs of slurm-jobs; default one per core that it may use; 1 = in this process.",
+        ),
     ] = None,
     cluster: Annotated[
         str | None,

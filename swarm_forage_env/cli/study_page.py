@@ -1,6 +1,7 @@
 """The command `study report`: studies, their figures and the claims about them as one page."""
 
 import math
+import shlex
 import tempfile
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from metrics.scoring.study_models import ModelFigure
     from metrics.scoring.study_plots import StudyFigure
     from metrics.scoring.verdicts import Judged, Waiting
+    from swarm_forage_env.study.studies import StudySpec
     from swarm_forage_env.study.study_table import StudyTable
 
 WAITS = "waits"
@@ -94,7 +96,7 @@ def page_of(tables: "Sequence[StudyTable]", scored: "Sequence[StudyPanels]", ver
 
     judged, waiting, expected, expected_later = verdicts
     columns = list(dict.fromkeys((one.reading, one.variant) for one in (*judged, *waiting) if one.reading))
-    names = sorted({name for table in tables for made in table.versions for name in made})
+    names = version_names(tables)
     answers = get_args(Answer)
     counts = Counter((one.reading, one.variant, one.verdict.answer) for one in judged)
     waits = Counter((one.reading, one.variant, WAITS) for one in waiting)
@@ -352,12 +354,36 @@ def _cost(table: "StudyTable") -> list[str | int | float]:
 
 def command_of(table: "StudyTable") -> str:
     """Return the command that makes the runs of a study."""
+    from swarm_forage_env.policies import trust
+    from swarm_forage_env.policies.registry import file_of
     from swarm_forage_env.study.study_file import is_set_of_paper
 
     spec = table.spec
     reading, *others = spec.readings
-    budget = f" --budget {spec.budget}" if spec.budget else ""
-    command = f"swarm-forage study run {{}}{budget} --seeds {len(spec.seeds)} --reading {'both' if others else reading}"
-    if is_set_of_paper(spec):
-        return command.format(spec.name)
-    return f"{command.format('FILE')}  # the file of study {spec.name}, identity {spec.study_id}"
+    trusted = any(trust.runs_code(file_of(name)) for name in _policy_files(spec))
+    words = ["swarm-forage", *([trust.TRUST_OPTION] if trusted else []), "study", "run"]
+    words += [spec.name if is_set_of_paper(spec) else spec.file or "FILE"]
+    words += ["--budget", spec.budget] if spec.budget else []
+    # Other seeds than the first ones are chosen by the budget.
+    words += ["--seeds", str(len(spec.seeds))] if spec.seeds == tuple(range(len(spec.seeds))) else []
+    words += ["--reading", "both" if others else reading]
+    command = shlex.join(words)
+    return command if is_set_of_paper(spec) else f"{command}  # study {spec.name}, identity {spec.study_id}"
+
+
+def _policy_files(spec: "StudySpec") -> list[str]:
+    """Return the policies of a study that are files, those in mixed swarms, too."""
+    from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
+    from swarm_forage_env.policies.registry import is_policy_file
+
+    found = [policy.policy for policy in spec.policies]
+    parts = [part.policy for name in found if is_mixture(name) for part in mixture_parts(name)]
+    return [name for name in (*found, *parts) if is_policy_file(name)]
+
+
+def version_names(tables: "Sequence[StudyTable]") -> list[str]:
+    """Return of what the versions are shown: our own first, then the commit, which only runs from a checkout have."""
+    from swarm_forage_env.study.record import PACKAGES
+
+    names = {name for table in tables for made in table.versions for name, version in made.items() if version}
+    return sorted(names, key=lambda name: ((PACKAGES[0], "commit", name).index(name), name))

@@ -4,6 +4,7 @@
     mixed:ppo_warehouse_small=10,crw=rest          ten, and all others
     mixed:ppo_warehouse_small=20%,crw=rest         a fifth, the same as 0.2; fits every size of the swarm
     mixed:ppo_warehouse_small=share,crw=rest       as many as the parameter `share` says, for studies
+    mixed:my_module.py:MyPolicy=10,crw=rest        a class in a Python file, see `registry.split_class`
     mixed:model.zip:decision_ticks=5=10,crw=rest   a file that is told its interface, see `registry.split_interface`
 
 Parts take the rows of the swarm in their order: above, robots 0 to 9 are driven by the trained policy.
@@ -26,9 +27,10 @@ PREFIX = "mixed:"
 REST, SHARE = "rest", "share"
 """Words for an amount: all robots that are left; as the parameter of that name says."""
 
+_CLASS = r"(?:(?<=\.py):[^\W\d]\w*)?"
 _INTERFACE = r"(?::[a-z_]+=[^,=]+(?:,[a-z_]+=[^,=]+)*)?"
 _AMOUNT = rf"\d+%?|\d*\.\d+%?|{REST}|{SHARE}"
-_PART = rf"(?P<policy>[^,:]+?{_INTERFACE})=(?P<amount>{_AMOUNT})(?=,|$)"
+_PART = rf"(?P<policy>[^,:]+?{_CLASS}{_INTERFACE})=(?P<amount>{_AMOUNT})(?=,|$)"
 _PART_WORDS = re.compile(_PART)
 _UNNAMED = re.sub(r"\?P<\w+>", "?:", _PART)
 _LEADING = re.compile(rf"{PREFIX}{_UNNAMED}(?:,{_UNNAMED})*")

@@ -97,7 +97,7 @@ class ModelPolicy(LearnedPolicy):
             ConfigError: an unknown field or value in `interface`.
         """
         self._path = Path(path)
-        self._network, note = _open_model(str(path), _checked_digest(path, digest))
+        self._network, note = _open_model(str(path), checked_digest(path, digest))
         noted, caches = (None, None) if note is None else _read_note(note, self._path)
         self._is_told = noted is not None or interface is not None
         self._source = f"the note in {self._path.name}" if interface is None else "the parameter interface"
@@ -191,7 +191,7 @@ def open_network(path: str | Path, *, digest: str | None = None, interface: Give
     """
     if interface is not None:
         raise ModelError(f"Expected {path} without an interface, got {interface!r}; a network file holds its own.")
-    _checked_digest(path, digest)
+    checked_digest(path, digest)
     return NetworkPolicy(Network.load(path))
 
 
@@ -217,7 +217,7 @@ def look_at_file(path: str | Path, *, digest: str | None = None, **parameters: A
         ModelError: the file is missing or has changed; see also `look_at_model`.
         ConfigError: see `look_at_model`.
     """
-    _checked_digest(path, digest)
+    checked_digest(path, digest)
     return look_at_model(path, **parameters) if Path(path).suffix.lower() == ".zip" else ModelOutside(caches=None)
 
 
@@ -262,7 +262,12 @@ def file_digest(path: str | Path) -> str:
     return hashlib.blake2b(content, digest_size=_DIGEST_DIGITS // 2).hexdigest()
 
 
-def _checked_digest(path: str | Path, planned: str | None) -> str:
+def checked_digest(path: str | Path, planned: str | None) -> str:
+    """Return the `file_digest` of a policy file, which must be the planned one unless that is None.
+
+    Raises:
+        ModelError: the file cannot be read, or has changed.
+    """
     found = file_digest(path)
     if planned not in (None, found):
         raise ModelError(

@@ -5,7 +5,7 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,12 +21,13 @@ POLICY_ENTRY_POINTS = "swarm_forage_env.policies"
 """Entry-point group under which installed packages offer policies by name."""
 POLICY_FILE_ENTRY_POINTS = "swarm_forage_env.policy_files"
 """Entry-point group of functions that open policy files. The name is the suffix of the file without its dot; the value
-is called with the path and the parameters of a run."""
+is called with the path and the parameters of a run. Of a Python file the class is said with the path."""
 _LOCAL_POLICIES: dict[str, Callable[..., Policy]] = {}
 """Names that `local_policy` has given to policies of this process."""
 
 
 _FILE_WITH_WORDS = re.compile(r"(?P<file>.+?):(?P<words>[a-z_]+=[^/\\:]*)")
+_FILE_WITH_CLASS = re.compile(r"(?P<file>.+\.py):(?P<name>[^\W\d]\w*)", re.IGNORECASE)
 _WORDS: dict[str, Any] = {"true": True, "false": False}
 
 
@@ -85,7 +86,7 @@ def policy_names() -> tuple[str, ...]:
 def is_policy_file(name: str) -> bool:
     """Return whether `name` has the suffix of files that an installed package opens as policies.
 
-    The interface may be said with it, see `split_interface`.
+    The interface may be said with it, see `split_interface`, and the class of a Python file, see `split_class`.
     """
     return bool(_openers(split_interface(name)[0]))
 
@@ -111,6 +112,12 @@ def split_interface(policy: str) -> tuple[str, dict[str, Any]]:
     return found["file"], fields
 
 
+def split_class(policy: str) -> tuple[str, str | None]:
+    """Return the Python file and the class of a policy such as `my_module.py:MyPolicy`; else the policy, and None."""
+    found = _FILE_WITH_CLASS.fullmatch(policy)
+    return (policy, None) if found is None else (found["file"], found["name"])
+
+
 def named_interface(policy: str, parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     """Return a policy without the interface that is said with its file, and its parameters with that interface.
 
@@ -126,11 +133,13 @@ def named_interface(policy: str, parameters: Mapping[str, Any]) -> tuple[str, di
 
 
 def policy_label(policy: str) -> str:
-    """Return the name of a policy for people: of a file its name without folder and ending."""
+    """Return the name of a policy for people: of a file its name without folder and ending, or its class."""
     if is_mixture(policy):
         parts = mixture_parts(policy)
         return mixture_of([Part(policy_label(part.policy), part.amount) for part in parts])
-    return PurePath(policy).stem if is_policy_file(policy) else policy
+    if not is_policy_file(policy):
+        return policy
+    return split_class(policy)[1] or PurePath(policy).stem
 
 
 def part_labels(policy: str) -> tuple[str, ...]:
@@ -139,9 +148,16 @@ def part_labels(policy: str) -> tuple[str, ...]:
 
 
 def file_of(policy: str) -> str:
-    """Return a policy without the words that may stand behind its file; see `split_interface`. They are not read."""
+    """Return a policy without what may stand behind its file: a class, or words of an interface, which are not read."""
     found = _FILE_WITH_WORDS.fullmatch(policy)
-    return policy if found is None else found["file"]
+    return split_class(policy if found is None else found["file"])[0]
+
+
+def whole_path(policy: str) -> str:
+    """Return a policy file with its whole path, and with the class if it has one."""
+    file, name = split_class(policy)
+    path = str(Path(file).resolve())
+    return path if name is None else f"{path}:{name}"
 
 
 @cache  # every run asks, and the answer is in the files of all packages that are installed
@@ -151,7 +167,7 @@ def _installed(group: str) -> tuple[EntryPoint, ...]:
 
 def _openers(name: str) -> list[EntryPoint]:
     """Return what opens the policy file of that name: one entry point or none."""
-    suffix = PurePath(name).suffix.removeprefix(".").lower()
+    suffix = PurePath(split_class(name)[0]).suffix.removeprefix(".").lower()
     return [point for point in _installed(POLICY_FILE_ENTRY_POINTS) if point.name == suffix]
 
 
@@ -170,16 +186,16 @@ def policy_class(name: str) -> Callable[..., Policy]:
         return _mixed(name)
     file, _ = split_interface(name)
     for opener in _openers(file):
-        trust.check(file)
+        trust.check(file_of(file))
         return partial(_opened, opener.load(), name)
     for point in _installed(POLICY_ENTRY_POINTS):
         if point.name == name:
             return point.load()
     known = policy_names()
-    needs_name = re.search(r"\.py\b|\w:\w", name) is not None  # a file of Python, or module:Class
     raise ValueError(
-        f"Unknown policy {name!r}.{suggestion(name, known)} Installed policies: {', '.join(known) or 'none'}."
-        + (" A policy in Python is found by the name of an entry point, see docs/studies.md." if needs_name else "")
+        f"Unknown policy {name!r}.{suggestion(name, known)} Installed: {', '.join(known) or 'none'}. To make one "
+        "known, give its file (policy.npz, model.zip, my_module.py:MyPolicy), or pip install a package that offers it "
+        f"by the entry point {POLICY_ENTRY_POINTS!r} (docs/policies.md)."
     )
 
 

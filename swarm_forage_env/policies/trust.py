@@ -1,10 +1,11 @@
 """Which policy files may run code that they hold.
 
 A model of stable-baselines3 (`.zip`) is a pickle: who opens it runs what is in it. A network (`.npz`) is arrays and
-text.
+text. A Python file (`.py`) is code.
 
-A Python program opens what it names, and nothing is asked here. The console command opens models that its user typed,
-and says so. A model that is named inside a file, which may come from anywhere, it opens only if it is told to.
+A program in Python opens what it names, and nothing is asked here. The console command opens files that its
+user typed, and says so of models. A file that is named inside a file, which may come from anywhere, it opens only if it
+is told to.
 """
 
 from collections.abc import Callable, Generator, Iterable
@@ -17,7 +18,7 @@ from swarm_forage_env._internal.fields import ConfigError
 SAFE_SUFFIXES = ("npz",)
 """Policy files that run no code. Any other is asked for, those that other packages open included."""
 TRUST_OPTION = "--trust-models"
-"""Option of the console command that allows all models."""
+"""Option of the console command that allows all files."""
 
 
 class UntrustedModelError(ConfigError):
@@ -79,9 +80,13 @@ def runs_code(file: str | Path) -> bool:
     return PurePath(file).suffix.removeprefix(".").lower() not in SAFE_SUFFIXES
 
 
-def only_looks() -> bool:
-    """Return whether models are not to be opened to plan, because nothing will be run; see `of_a_command`."""
-    return _now[-1].looks_only
+def only_looks_at(file: str | Path) -> bool:
+    """Return whether a file is not to be opened to plan, because nothing will be run; see `of_a_command`.
+
+    Python files are opened all the same: only so do they show what they are made for.
+    """
+    is_python = PurePath(file).suffix.lower() == ".py"
+    return _now[-1].looks_only and runs_code(file) and not is_python
 
 
 def check(file: str | Path) -> None:
@@ -93,7 +98,7 @@ def check(file: str | Path) -> None:
     typed = _now[-1].typed
     if typed is not None and runs_code(file) and _whole(file) not in typed:
         raise UntrustedModelError(
-            f"Expected leave to open {file}, a model that you did not name yourself: opening it runs code in it. "
+            f"Expected leave to open {file}, which you did not name yourself: opening it runs code in it. "
             f"If you trust it: swarm-forage {TRUST_OPTION} and the same words again. A network (.npz) needs no trust."
         )
 

@@ -37,7 +37,7 @@ def draw_curves(
         curves: One per controller.
         title: Headline.
         ylabel: What is drawn, with its unit.
-        band: What the bands are.
+        band: What the bands are, or why there are none.
 
     Raises:
         ImportError: matplotlib is not installed.
@@ -51,9 +51,7 @@ def draw_curves(
         colour = COLOURS[index % len(COLOURS)]
         axes.plot(t_end_s, curve.mean, color=colour, label=_unread(curve.label), marker=marker, clip_on=False)
         axes.fill_between(t_end_s, curve.low, curve.high, color=colour, alpha=0.2, linewidth=0)
-    has_band = any(np.isfinite(curve.low).any() for curve in curves)
-    xlabel = f"time [s] (bands: {band})" if has_band else "time [s]"
-    axes.set(title=_unread(title), xlabel=xlabel, ylabel=ylabel, xlim=(0, None), ylim=(0, None))
+    axes.set(title=_unread(title), xlabel=f"time [s] ({band})", ylabel=ylabel, xlim=(0, None), ylim=(0, None))
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)
     figure.savefig(path, dpi=150)

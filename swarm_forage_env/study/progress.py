@@ -1,4 +1,8 @@
-"""How many runs are done and how long the rest will take, on stderr."""
+"""How many runs are done and how long the rest will take, on stderr.
+
+The estimate is made from how long finished runs took themselves. What comes before the first run, such as starting
+processes and compiling, is not in it: a few short runs would seem to take minutes.
+"""
 
 import time
 from collections.abc import Sequence
@@ -17,7 +21,14 @@ class RunProgress:
     """Context manager: a bar on a terminal, an occasional plain line elsewhere."""
 
     def __init__(
-        self, *, total: int, done: int = 0, foreign: int = 0, damaged: Sequence[str] = (), work: float = 0.0
+        self,
+        *,
+        total: int,
+        done: int = 0,
+        foreign: int = 0,
+        damaged: Sequence[str] = (),
+        work: float = 0.0,
+        n_processes: int | None = None,
     ) -> None:
         """Count runs.
 
@@ -27,11 +38,16 @@ class RunProgress:
             foreign: How many of these other versions made.
             damaged: Why files of others cannot be used; they are run again.
             work: What the rest of the runs takes in any unit, for the estimate; 0 = all runs take as long.
+            n_processes: How many make runs at a time, 1 = this one; None = it is not known.
         """
         self._total = total
         self._damaged = damaged
         self._work = work
         self._work_done = 0.0
+        self._n_processes = n_processes
+        self._measured_s = 0.0
+        self._measured_work = 0.0
+        self._first_start: float | None = None
         self._stored = done
         self._foreign = foreign
         self._done = done
@@ -41,8 +57,7 @@ class RunProgress:
 
     def __enter__(self) -> "RunProgress":
         """Start the clock."""
-        self._started = time.monotonic()
-        self._last_line = self._started
+        self._last_line = time.monotonic()
         if self._stored:
             be = "is" if self._stored == 1 else "are"
             self._console.print(f"{self._stored} of {self._total} runs {be} stored already.")
@@ -74,12 +89,22 @@ class RunProgress:
         if self._bar is not None:
             self._bar.stop()
 
-    def advance(self, *, failed: bool, work: float = 0.0) -> None:
-        """Count one more run, and the work it was."""
+    def advance(self, *, failed: bool, work: float = 0.0, took_s: float | None = None) -> None:
+        """Count one more run.
+
+        Args:
+            failed: Whether it failed.
+            work: The work it was.
+            took_s: How many seconds it took itself; None = nobody knows, then the estimate does without it.
+        """
         self._done += 1
         self._work_done += work
         self._failed += failed
         now = time.monotonic()
+        if took_s is not None:
+            self._measured_s += took_s
+            self._measured_work += work if self._work else 1.0
+            self._first_start = min(now - took_s, now if self._first_start is None else self._first_start)
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=self._done, description=self._remaining())
         elif now - self._last_line >= PLAIN_LINE_EVERY_S or self._done == self._total:
@@ -88,14 +113,23 @@ class RunProgress:
 
     def _remaining(self) -> str:
         failures = f", {self._failed} failed" if self._failed else ""
-        ran, left = self._done - self._stored, self._total - self._done
+        left = self._total - self._done
         if not left:
             return "all done" + failures
-        if not ran:
-            return "no estimate yet" + failures
-        share_left = left / ran if not self._work_done else (self._work - self._work_done) / self._work_done
-        seconds = (time.monotonic() - self._started) * share_left
+        if self._first_start is None:
+            return self._beginning() + failures
+        at_a_time = self._n_processes or self._measured_s / max(time.monotonic() - self._first_start, 1e-9)
+        work_left = self._work - self._work_done if self._work else left
+        seconds = self._measured_s / self._measured_work * work_left / min(at_a_time, left)
         return f"about {duration(seconds)} left{failures}"
+
+    def _beginning(self) -> str:
+        """Return what happens before the first run has ended."""
+        then = "an estimate follows when the first run ends"
+        if self._done > self._stored or self._n_processes == 1:
+            return then
+        who = "workers" if self._n_processes is None else f"{self._n_processes} processes"
+        return f"{who} are starting; {then}"
 
 
 def duration(seconds: float) -> str:

@@ -123,7 +123,17 @@ def run_all(
     n_foreign = sum(
         1 for outcome in outcomes.values() if isinstance(outcome, RunRecord) and not outcome.made_by(versions)
     )
-    display = RunProgress(total=len(planned), done=n_stored, foreign=n_foreign) if progress else nullcontext()
+    display = (
+        RunProgress(
+            total=len(planned),
+            done=n_stored,
+            foreign=n_foreign,
+            work=sum(spec.robot_ticks for spec in todo),
+            n_processes=None if executor is not None else processes_of(len(todo), jobs),
+        )
+        if progress
+        else nullcontext()
+    )
     try:
         # Closing ends the workers at once, wherever the interrupt came.
         fresh = run_each(todo, store=store, executor=executor, jobs=jobs)
@@ -131,7 +141,11 @@ def run_all(
             for outcome in fresh:
                 outcomes[outcome.run_id] = outcome
                 if shown is not None:
-                    shown.advance(failed=isinstance(outcome, RunFailure))
+                    shown.advance(
+                        failed=isinstance(outcome, RunFailure),
+                        work=planned[outcome.run_id].robot_ticks,
+                        took_s=seconds_of(outcome),
+                    )
     except KeyboardInterrupt:
         raise StudyInterrupted(_result(planned, outcomes, n_stored), len(planned)) from None
     return _result(planned, outcomes, n_stored)
@@ -172,7 +186,7 @@ def run_each(
     elif jobs == 1 or len(todo) == 1:
         outcomes = _run_here(todo)
     else:
-        outcomes = _run_in_pool(todo, min(jobs or available_cores(), max(1, len(todo))))
+        outcomes = _run_in_pool(todo, processes_of(len(todo), jobs))
     return _stored(outcomes, store)
 
 
@@ -191,6 +205,16 @@ def _stored(outcomes: Generator[Outcome], store: RunStore | None) -> Generator[O
 def available_cores() -> int:
     """Return the number of cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def processes_of(n_runs: int, jobs: int | None) -> int:
+    """Return how many local processes make so many runs, if `jobs` are asked for; None = one per available core."""
+    return min(jobs or available_cores(), max(1, n_runs))
+
+
+def seconds_of(outcome: Outcome) -> float | None:
+    """Return how long a run took itself; None of one that failed."""
+    return outcome.wall_time_s if isinstance(outcome, RunRecord) else None
 
 
 def _result(planned: dict[str, RunSpec], outcomes: dict[str, Outcome], n_stored: int) -> StudyResult:

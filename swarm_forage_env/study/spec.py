@@ -14,11 +14,13 @@ from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.mixed import agreed_caches
 from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts, part_sizes
 from swarm_forage_env.policies.registry import (
+    file_of,
     is_policy_file,
     load_policy,
     named_interface,
     policy_class,
     policy_label,
+    whole_path,
 )
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping, whole_intervals
 from swarm_forage_env.wrappers.registry import wrapper_config_class
@@ -231,8 +233,8 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
 
     Returns:
         The registered name, or the whole path of the file; the parameters, with the file's digest; and the class of the
-        name or the opened policy, which may state `caches`; where nothing is to be run (`policies.trust.only_looks`),
-        what a model shows from outside.
+        name or the opened policy, which may state `caches`; of a model where nothing is to be run
+        (`policies.trust.only_looks_at`), what it shows from outside.
 
     Raises:
         ValueError: no installed policy has that name, the file cannot be opened, or an interface is given twice.
@@ -244,9 +246,9 @@ def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, 
         return name, pinned, policy_class(name)
     from swarm_forage_env.policies.model_files import file_digest, look_at_file  # late: most runs open no model
 
-    file = str(Path(name).resolve())
-    planned = pinned if "digest" in pinned else {"digest": file_digest(file), **pinned}
-    if trust.only_looks() and trust.runs_code(file):
+    file = whole_path(name)
+    planned = pinned if "digest" in pinned else {"digest": file_digest(file_of(file)), **pinned}
+    if trust.only_looks_at(file_of(file)):
         trust.check(file)
         return file, planned, look_at_file(file, **pinned)
     return (

@@ -6,6 +6,7 @@
 Every file appears whole or not at all, and only the driver of a study writes, so a folder can be read at any time.
 """
 
+import errno
 import json
 import os
 from collections.abc import Iterator
@@ -45,11 +46,11 @@ class RunStore:
         """Use `folder`.
 
         Raises:
-            RecordError: there is a file of that name.
+            NotADirectoryError: there is a file of that name.
         """
         self.folder = Path(folder)
         if self.folder.exists() and not self.folder.is_dir():
-            raise RecordError(f"Expected a folder for run records, got the file {self.folder}.")
+            raise NotADirectoryError(errno.ENOTDIR, "Expected a folder for run records, got a file", str(self.folder))
 
     def path(self, run_id: str) -> Path:
         """Return where the record of a run is, or would be."""

@@ -80,9 +80,9 @@ class Axis:
         if dot:
             wrapper_config_class(wrapper)  # refuses unknown names; the field is checked with its values
         else:
-            known_name(
-                "axis", self.name, (*CRITERIA, SHARE, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY))
-            )
+            allowed = (*CRITERIA, SHARE, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY))
+            shown_by = f"{', '.join(CRITERIA)}, {SHARE}, and the fields that swarm-forage info warehouse_small lists"
+            known_name("axis", self.name, allowed, all_by=shown_by)
         several(f"the values of axis {self.name}", self.values, "values")
         kinds = {_kind(value) for value in self.values}
         if len(kinds) > 1 or "" in kinds or len(set(self.values)) < len(self.values):
@@ -206,6 +206,8 @@ class StudySpec:
     seeds: tuple[int, ...]
     horizon_s: float
     interval_s: float
+    file: str = field(default="", compare=False)
+    """Path of the study file as it was given; empty for the paper's sets, and for studies made in Python."""
 
     def __post_init__(self) -> None:
         check_file_name("name of a study", self.name)
@@ -298,7 +300,8 @@ class StudySpec:
     def study_id(self) -> str:
         """Short hexadecimal hash of all that decides which runs there are and how they are addressed."""
         mapping = self.to_mapping()
-        del mapping["title"], mapping["budget"]
+        for told in ("title", "budget", "file"):
+            mapping.pop(told, None)
         return identity_of(mapping)
 
     def to_mapping(self) -> dict[str, Any]:
@@ -317,6 +320,7 @@ class StudySpec:
             "seeds": list(self.seeds),
             "horizon_s": self.horizon_s,
             "interval_s": self.interval_s,
+            **({"file": self.file} if self.file else {}),
         }
 
     @classmethod
@@ -342,7 +346,7 @@ class StudySpec:
         """
         own = [item.name for item in fields(cls)]
         known_keys(table("a study", mapping), own, "key of a study")
-        missing = [key for key in own if key not in mapping]
+        missing = [key for key in own if key not in mapping and key != "file"]
         if missing:
             raise ConfigError(f"Missing key {missing[0]!r} of a study.")
         values: dict[str, Any] = dict(mapping)

@@ -112,9 +112,10 @@ def load_study(
     """
     file = find_study(name)
     try:
-        return _study(_read(file), file.parent, budget, seeds, readings)
+        spec = _study(_read(file), file.parent, budget, seeds, readings)
     except ConfigError as error:
         raise error if str(file) in str(error) else ConfigError(f"Cannot use {file}: {error}") from error
+    return spec if file.parent == SETS else replace(spec, file=str(file))
 
 
 def is_set_of_paper(spec: StudySpec) -> bool:

@@ -7,6 +7,7 @@
 A folder can be filled by several machines, each with a shard, and copied together.
 """
 
+import errno
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,7 +21,7 @@ from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.study.progress import RunProgress
 from swarm_forage_env.study.record import RecordError, software_versions
-from swarm_forage_env.study.runner import run_each
+from swarm_forage_env.study.runner import processes_of, run_each, seconds_of
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import RunFailure, RunStore
 from swarm_forage_env.study.studies import READING_NAMES, Cell, StudySpec
@@ -69,11 +70,11 @@ class StudyFolder:
         """Use `folder`.
 
         Raises:
-            RecordError: there is a file of that name.
+            NotADirectoryError: there is a file of that name.
         """
         self.folder = Path(folder)
         if self.folder.exists() and not self.folder.is_dir():
-            raise RecordError(f"Expected a folder for a study, got the file {self.folder}.")
+            raise NotADirectoryError(errno.ENOTDIR, "Expected a folder for a study, got a file", str(self.folder))
         self.store = RunStore(self.folder / "runs")
         self.study_file = self.folder / "study.json"
 
@@ -110,7 +111,7 @@ class StudyFolder:
                 readings=tuple(name for name in READING_NAMES if name in {*there.readings, *spec.readings}),
             )
             mine, other = kept.to_mapping(), there.to_mapping()
-            told = ("seeds", "readings", "title", "budget")
+            told = ("seeds", "readings", "title", "budget", "file")
             differing = [key for key in mine if key not in told and mine[key] != other[key]]
             if differing:
                 raise RecordError(
@@ -222,6 +223,7 @@ def run_study(
             foreign=before.n_foreign,
             damaged=tuple(before.damaged.values()),
             work=sum(run.robot_ticks for run in todo),
+            n_processes=None if executor is not None else processes_of(len(todo), jobs),
         )
         if progress
         else nullcontext()
@@ -232,7 +234,8 @@ def run_study(
             is_failure = isinstance(outcome, RunFailure)
             states[outcome.run_id] = FAILED if is_failure else DONE
             if shown is not None:
-                shown.advance(failed=is_failure, work=planned[outcome.run_id].robot_ticks)
+                work = planned[outcome.run_id].robot_ticks
+                shown.advance(failed=is_failure, work=work, took_s=seconds_of(outcome))
     return StudyState(states=states, damaged={}, n_foreign=before.n_foreign)
 
 

@@ -23,6 +23,7 @@ from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.study.record import RunRecord
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import load
+from tests.support.pictures import keep_figures
 
 SHORT = ("--robots", "3", "--objects", "20", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
 RUN = ("run", "--policy", "random", *SHORT)
@@ -38,6 +39,15 @@ def test_run_shows_a_table_and_keeps_records_and_a_picture(command, painted):
     assert [record.seed for record in sorted(load(folder), key=lambda record: record.seed)] == [0, 1]
     assert (folder / "performance.png").read_bytes().startswith(b"\x89PNG")
     assert "2 records in results/warehouse_small" in err
+
+
+def test_a_few_runs_are_drawn_without_bands(command, monkeypatch):
+    figures = keep_figures(monkeypatch)
+    command(*RUN, "--seeds", "2")
+    (axes,) = figures[0].axes
+    assert axes.get_xlabel() == "time [s] (fewer than 4 runs, too few for a band)"
+    command(*RUN, "--seeds", "4")
+    assert figures[1].axes[0].get_xlabel() == "time [s] (bands: 95% t interval over seeds)"
 
 
 def test_a_single_seed_has_no_interval(command):
@@ -441,7 +451,6 @@ def test_help_loads_neither_physics_nor_tables():
         (("run", "--set", "n_robots=3", "--robots", "4"), "Expected n_robots once"),
         (("run", "--wrapper", "throtle:amplitude=1"), "Unknown wrapper 'throtle'. Did you mean 'throttle'?"),
         (("run", "--wrapper", "actuator_noise:sigma"), "Expected the settings of wrapper actuator_noise as key=value"),
-        (("run", "--out", "file"), "Expected a folder for run records, got the file file"),
         (("record", "--out", "x.avi"), "ending in .gif or .mp4"),
         (("info", "crv"), "Did you mean 'crw'?"),
         (("record", "--policy", "crv"), "Did you mean 'crw'?"),

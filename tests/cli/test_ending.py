@@ -53,6 +53,26 @@ def test_the_debug_variable_shows_the_traceback(command, monkeypatch):
         command("schema")
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("run", "--seeds", "x"), "Expected --seeds to be a whole number, got 'x'. It is: Runs per policy."),
+        (("run", "--seeds", "0"), "Expected --seeds to be a number >= 1, got '0'. It is: Runs per policy."),
+        (
+            ("run", "--horizon", "long"),
+            "Expected --horizon to be a number, got 'long'. It is: Simulated seconds",
+        ),
+        (("study", "run", "S1a", "--jobs", "2"), "No such option: --jobs; for this command it is --workers."),
+        (("compare", "--workers", "2"), "No such option: --workers; for this command it is --jobs."),
+        (("list", "--jobs", "2"), "No such option: --jobs"),
+    ],
+)
+def test_wrong_words_are_told_as_other_errors_are(command, words, told):
+    code, _, err = command(*words)
+    assert (code, err.count("\n")) == (EXIT_USAGE, 1)
+    assert err.startswith(f"swarm-forage: {told}")
+
+
 def test_too_little_memory_is_told(capsys):
     assert end(MemoryError("Unable to allocate 9 GiB")) == EXIT_FAILURE
     assert "Not enough memory: Unable to allocate 9 GiB; ask for fewer" in capsys.readouterr().err

@@ -52,6 +52,24 @@ def test_a_folder_in_the_place_of_the_file_is_told_before_anything_is_run(comman
     assert command(*words) == (1, "", "swarm-forage: Expected a file to write, got a folder: taken.gif\n")
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        (*RUN, "--out", "taken"),
+        ("score", "--policy", "random", "--budget", "quick", "--jobs", "1", "--out", "taken"),
+        ("study", "run", "S1a", "--budget", "smoke", "--workers", "1", "--out", "taken"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_file_in_the_place_of_the_folder_cannot_be_written_to(command, monkeypatch, words):
+    """It is no mistake in the words: the same command can succeed elsewhere, as with a full disk."""
+    Path("taken").touch()
+    monkeypatch.setattr(ForageEnv, "reset_batch", lambda *_, **__: pytest.fail("a run was started"))
+    code, out, err = command(*words)
+    assert (code, out) == (1, "")
+    assert err.splitlines()[-1].endswith(": taken")
+
+
 def test_a_disk_that_fills_up_later_ends_the_command_with_one_line(command, monkeypatch):
     def full(self, path):
         raise OSError(*NO_SPACE.args, str(path))

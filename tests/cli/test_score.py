@@ -160,7 +160,6 @@ def test_seeds_length_and_world_can_be_chosen(command):
         (("score",), "Expected either --policy or --curves"),
         (("score", "--policy", "crw", "--curves", "x.csv"), "Expected either --policy or --curves"),
         (("score", "--curves", "x.csv", "--seeds", "3", "--dry-run"), "got --seeds, --dry-run, which are about runs"),
-        (("score", "--policy", "crw", "--out", "curves.csv"), "Expected a folder for run records, got the file"),
         (("score", "--policy", "crww"), "Unknown policy 'crww'. Did you mean 'crw'?"),
         (("score", "--policy", "gone.zip"), "Cannot read the policy file"),
         (("score", "--policy", "bad.npz"), "Expected"),

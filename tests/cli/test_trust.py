@@ -97,7 +97,7 @@ def test_a_failure_that_names_a_model_is_refused(command, model, tmp_path):
     store.write_failure(RunFailure(spec=spec, error="e", traceback="t"))
     code, _, err = command("rerun", str(store.failure_path(spec.run_id)))
     assert code == 2
-    assert "a model that you did not name yourself" in err
+    assert "which you did not name yourself" in err
     assert "swarm-forage --trust-models and the same words again" in err
     assert not Path("owned").exists()
 
@@ -110,7 +110,7 @@ def test_a_plan_that_names_a_model_is_refused_before_anything_starts(command, tm
     )
     code, _, err = command("train", "--plan", "plan.toml", "--out", "training")
     assert (code, Path("owned").exists()) == (2, False)
-    assert "a model that you did not name yourself" in err
+    assert "which you did not name yourself" in err
 
 
 def test_a_study_that_names_a_model_is_refused(command, model, tmp_path):
@@ -133,7 +133,7 @@ def test_the_same_holds_for_each_part_of_a_mixed_swarm(command, model, tmp_path)
     store.write_failure(RunFailure(spec=spec, error="e", traceback="t"))
     code, _, err = command("rerun", str(store.failure_path(spec.run_id)))
     assert (code, Path("owned").exists()) == (2, False)
-    assert "a model that you did not name yourself" in err
+    assert "which you did not name yourself" in err
     code, _, err = command("run", "--policy", mixture, *TINY)
     assert (code, Path("owned").exists()) == (2, True)
     assert f"opening {model}, a model" in err
@@ -173,3 +173,32 @@ def test_looking_at_a_model_whose_description_is_nested_too_deep(tmp_path):
         archive.writestr("data", "[" * 5000)
     with pytest.raises(ModelError, match="nested"):
         look_at_model(tmp_path / "a.zip")
+
+
+OWNING = """
+from pathlib import Path
+
+class Mine:
+    def reset(self, spec, rng): ...
+    def act(self, obs, active): ...
+
+Path("owned").touch()
+"""
+
+
+def test_a_typed_python_file_is_run_and_one_in_a_study_only_on_trust(command):
+    Path("mine.py").write_text(OWNING)
+    Path("study.toml").write_text('name = "s"\nscenario = "warehouse_small"\npolicies = ["mine.py:Mine"]\n')
+    code, _, err = command("study", "show", "study.toml")
+    assert (code, Path("owned").exists()) == (2, False)
+    assert "which you did not name yourself" in err
+    code, out, err = command("info", "mine.py")
+    assert (code, Path("owned").exists()) == (0, False), "info only reads it"
+    assert "classes  Mine" in out
+    code, out, err = command("--trust-models", "study", "show", "study.toml")
+    assert (code, Path("owned").exists()) == (0, True), err
+    assert "Mine" in out
+    Path("owned").unlink()
+    Path("mine.py").write_text(OWNING + "\n")
+    code, _, err = command("run", "--policy", "mixed:mine.py:Mine=1,crw=rest", *TINY, "--dry-run")
+    assert (code, err, Path("owned").exists()) == (0, "", True)

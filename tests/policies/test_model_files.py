@@ -409,7 +409,7 @@ def test_names_are_no_files():
     assert is_policy_file("a/b.ZIP")
     assert is_policy_file("b.npz")
     assert not is_policy_file("crw")
-    assert not is_policy_file("crw.py")
+    assert not is_policy_file("crw.pyc")
 
 
 def test_a_local_name_holds_for_a_while():
@@ -427,7 +427,9 @@ def test_a_local_name_does_not_hide_another_policy(name):
         pass
 
 
-@pytest.mark.parametrize("name", ["my_module.py", "my_module:StraightHome"])
-def test_a_policy_in_python_is_told_to_need_a_name(name):
-    with pytest.raises(ValueError, match="found by the name of an entry point"):
-        load_policy(name)
+def test_an_unknown_policy_is_told_how_one_becomes_known():
+    with pytest.raises(
+        ValueError, match=r"give its file \(policy\.npz, .*my_module\.py:MyPolicy\), or pip install"
+    ) as told:
+        load_policy("my_module:StraightHome")
+    assert "entry point 'swarm_forage_env.policies'" in str(told.value)

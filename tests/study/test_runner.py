@@ -324,7 +324,7 @@ def test_progress_where_stderr_is_no_terminal_is_plain(tmp_path, capsys):
     assert shown.out == ""
     assert shown.err.splitlines() == [
         "1 of 3 runs is stored already.",
-        "1/3 runs, no estimate yet",
+        "1/3 runs, an estimate follows when the first run ends",
         "3/3 runs, all done, 1 failed",
     ]
 

@@ -46,7 +46,7 @@ def test_an_empty_or_missing_folder_has_nothing_to_load(tmp_path):
 
 def test_a_file_is_no_folder(tmp_path):
     (tmp_path / "file").write_text("x")
-    with pytest.raises(RecordError, match="got the file"):
+    with pytest.raises(NotADirectoryError, match="got a file"):
         RunStore(tmp_path / "file")
 
 

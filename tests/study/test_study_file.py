@@ -10,7 +10,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.study import study_file
 from swarm_forage_env.study.experiments import BUDGETS
-from swarm_forage_env.study.studies import Cell, StudySpec
+from swarm_forage_env.study.studies import Axis, Cell, StudySpec
 from swarm_forage_env.study.study_file import (
     budget_names,
     is_set_of_paper,
@@ -187,6 +187,15 @@ def test_unknown_studies_and_budgets_are_refused(written):
         load_study("S1i")
     with pytest.raises(ConfigError, match=r"Did you mean 'tiny'\? Known: tiny, paper"):
         load_study(written(), "tini")
+
+
+def test_an_unknown_axis_is_told_the_nearest_few_and_where_all_are():
+    with pytest.raises(ConfigError, match=r"Did you mean 'max_speed_mps'\?.* All \d+: population_size") as told:
+        Axis(name="max_sped_mps", values=(1.0,))
+    assert len(str(told.value)) < 330
+    assert "swarm-forage info warehouse_small" in str(told.value)
+    with pytest.raises(ConfigError, match="Near it: cache_forget_unit_mismatch, cache"):
+        Axis(name="cache_forget", values=(1.0,))
 
 
 def test_the_studies_of_the_page_are_some(written, tmp_path):

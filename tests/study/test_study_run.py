@@ -171,7 +171,7 @@ def test_a_folder_without_a_study_is_refused(tmp_path):
     (tmp_path / "study.json").write_text("{}")
     with pytest.raises(RecordError, match=r"study\.json: Missing key 'name'"):
         StudyFolder(tmp_path).study()
-    with pytest.raises(RecordError, match="got the file"):
+    with pytest.raises(NotADirectoryError, match="got a file"):
         StudyFolder(tmp_path / "study.json")
 
 

@@ -21,7 +21,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.mixture import is_mixture, part_sizes
 from swarm_forage_env.policies.model_files import look_at_file
-from swarm_forage_env.policies.registry import is_policy_file, load_policy, part_labels
+from swarm_forage_env.policies.registry import file_of, is_policy_file, load_policy, part_labels
 from swarm_forage_env.study.record import software_versions
 from swarm_forage_env.study.run import build_env
 from swarm_forage_env.study.spec import RunSpec
@@ -136,7 +136,7 @@ def _interface_of(spec: RunSpec, world: SwarmSpec) -> InterfaceConfig:
     """Return how a policy decides: the interface of a learned one; full observations and commands of all others."""
     if is_mixture(spec.policy):
         return InterfaceConfig()
-    if trust.only_looks() and is_policy_file(spec.policy) and trust.runs_code(spec.policy):
+    if is_policy_file(spec.policy) and trust.only_looks_at(file_of(spec.policy)):
         return look_at_file(spec.policy, **spec.parameters).interface or InterfaceConfig()
     policy = load_policy(spec.policy, spec.parameters)
     if not isinstance(policy, LearnedPolicy):

@@ -1,12 +1,14 @@
 """Figures of studies: what they show, and the numbers behind them."""
 
+import re
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 
 from metrics.scoring import study_panels
-from metrics.scoring.study_plots import draw_figure, draw_map, limit_height, study_figures
+from metrics.scoring.study_plots import caption, draw_figure, draw_map, limit_height, study_figures
 from metrics.statistics import aggregate
 from swarm_forage_env.study.studies import Axis
 from tests.support.made_tables import FOUR, made_study, made_table
@@ -82,6 +84,69 @@ def test_one_level_is_drawn(tmp_path):
     assert not figure.has_map
     draw_figure(figure, [tmp_path / "one.svg"])
     assert "<!-- 2 -->" in texts(tmp_path / "one.svg")
+
+
+def few_figures(n_seeds, *, performance=by_policy, lost=(), levels=SIZES):
+    """The figure of performance of so many runs per cell."""
+    spec = made_study("S1a", levels, seeds=tuple(range(n_seeds)))
+    drawn = study_figures(study_panels(made_table(spec, performance, lost=lost)))
+    return next(one for one in drawn if one.panels[0].measure == "raw_performance")
+
+
+def bands_of(monkeypatch, figure, tmp_path):
+    """The corners of each band that is drawn, the lines of each isolated one, and the widths of lines."""
+    from matplotlib.axes import Axes
+
+    drawn = {"fill_between": [], "vlines": []}
+    for name, kept in drawn.items():
+        monkeypatch.setattr(Axes, name, lambda _, x, low, high, kept=kept, **__: kept.append((low, high)))
+    draw_figure(figure, [tmp_path / "figure.svg"])
+    monkeypatch.undo()
+    return drawn["fill_between"], drawn["vlines"]
+
+
+def test_fewer_than_four_runs_are_dots_and_a_mean_and_the_caption_says_why(tmp_path, monkeypatch):
+    figure = few_figures(3)
+    bands, alone = bands_of(monkeypatch, figure, tmp_path)
+    assert all(np.isnan(edge).all() for band in bands for edge in band)
+    assert all(low.size == 0 for low, _ in alone)
+    assert caption(figure, "ci") == "lines: means; dots: runs\nno bands: fewer than 4 runs of a cell tell too little"
+    bands, _ = bands_of(monkeypatch, few_figures(4), tmp_path)
+    assert all(np.isfinite(edge).all() for band in bands for edge in band)
+    assert caption(few_figures(4), "ci") == "shaded: 95 % interval of the mean; dots: runs"
+
+
+def test_a_band_with_no_neighbours_is_a_line(tmp_path, monkeypatch):
+    cells = made_study("S1a", SIZES, seeds=(0, 1, 2, 3)).cells
+    figure = few_figures(4, lost={(cell, 3) for cell in cells if cell.values[-1] != 4})
+    bands, alone = bands_of(monkeypatch, figure, tmp_path)
+    assert [np.isfinite(low).tolist() for low, _ in bands] == [[False, True, False]] * len(FOUR)
+    assert [low.size for low, _ in alone] == [1] * len(FOUR)
+    assert caption(figure, "ci").endswith("no band: cells with fewer than 4 runs, which tell too little")
+
+
+def test_bands_stay_within_the_range_of_the_measure(tmp_path, monkeypatch):
+    """Objects are counted: fewer than none cannot be, however far runs lie apart."""
+    figure = few_figures(4)
+    panel = figure.panels[0]
+    scores = {name: np.tile([0.0, 0.0, 0.0, 100.0], (3, 1)) for name in panel.scores}
+    bands, _ = bands_of(monkeypatch, replace(figure, panels=(replace(panel, scores=scores),)), tmp_path)
+    assert [low.tolist() for low, _ in bands] == [[0.0, 0.0, 0.0]] * len(FOUR)
+
+
+@pytest.mark.filterwarnings("error")
+def test_equal_runs_have_a_band_that_is_seen(tmp_path):
+    figure = few_figures(4)
+    panel = figure.panels[0]
+    widths = []
+    for spread in (0.0, 1.0):
+        scores = {name: np.tile(7.0 + spread * np.arange(4), (3, 1)) for name in panel.scores}
+        file = tmp_path / f"{spread}.svg"
+        draw_figure(replace(figure, panels=(replace(panel, scores=scores),)), [file])
+        widths.append(
+            len(re.findall(r"<path d=\"M [^z]*?\" [^>]*stroke-opacity: 0.2[^>]*stroke-width: 5", texts(file)))
+        )
+    assert widths == [len(FOUR), 0]
 
 
 def test_two_axes_give_a_panel_per_value_and_a_map(tmp_path):

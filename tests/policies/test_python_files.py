@@ -1,0 +1,129 @@
+"""Policies in plain Python files, `my_module.py:MyPolicy`: found, pinned, refused, and run in other processes, too."""
+
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env.policies.model_files import ModelError
+from swarm_forage_env.policies.python_files import PythonFileError, classes_of
+from swarm_forage_env.policies.registry import file_of, is_policy_file, load_policy, policy_label, split_class
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.study.runner import run_all
+from swarm_forage_env.study.spec import pin_policy, plan_run
+
+CODE = """
+    from dataclasses import dataclass
+
+    import numpy as np
+
+    from speeds_beside import FULL
+
+
+    @dataclass
+    class Ahead:
+        speed: float = FULL
+        reads = ()
+        caches = "static"
+
+        def reset(self, spec, rng):
+            if self.speed < 0.0:
+                raise RuntimeError("this way round only")
+            self.shape = (spec.n_robots, 3)
+
+        def act(self, obs, active):
+            return np.full(self.shape, self.speed, np.float32)
+
+
+    def slow():
+        return Ahead(speed=0.1)
+
+
+    class Lame:
+        def __init__(self):
+            raise RuntimeError("no\\nlegs")
+
+
+    class Deaf:
+        def reset(self, spec, rng): ...
+"""
+
+
+@pytest.fixture
+def file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.delitem(sys.modules, "speeds_beside", raising=False)
+    (tmp_path / "speeds_beside.py").write_text("FULL = 0.5\n")
+    path = tmp_path / "mine.py"
+    path.write_text(textwrap.dedent(CODE))
+    return path
+
+
+def test_a_class_in_a_file_is_a_policy(file):
+    assert load_policy("mine.py:Ahead").speed == 0.5
+    assert load_policy(f"{file}:Ahead", {"speed": 0.25}).speed == 0.25
+    assert load_policy("mine.py:slow").speed == 0.1, "a function that returns a policy"
+    assert classes_of(file) == ("Ahead", "Lame", "Deaf")
+
+
+def test_its_names():
+    assert split_class("a/mine.py:Ahead") == ("a/mine.py", "Ahead")
+    assert split_class("model.zip:decision_ticks=5") == ("model.zip:decision_ticks=5", None)
+    assert policy_label("a/mine.py:Ahead") == "Ahead"
+    assert policy_label("mixed:a/mine.py:Ahead=20%,crw=rest") == "mixed:Ahead=0.2,crw=rest"
+    assert file_of("a/mine.py:Ahead") == "a/mine.py"
+    assert is_policy_file("a/mine.py:Ahead")
+    assert is_policy_file("a/mine.py")
+    assert not is_policy_file("mine:Ahead")
+
+
+def test_path_and_content_are_the_identity_of_its_runs(file):
+    world = scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=200.0)
+    spec = plan_run(world, "mine.py:Ahead")
+    assert (spec.policy, spec.scenario.caches) == (f"{file}:Ahead", "static")
+    file.write_text(file.read_text().replace("= FULL", "= 0.4"))
+    changed = plan_run(world, "mine.py:Ahead")
+    assert changed.run_id != spec.run_id
+    assert load_policy(changed.policy, changed.parameters) is not None
+    with pytest.raises(ModelError, match="a file that has changed since"):
+        load_policy(spec.policy, spec.parameters)
+    pinned = {"parts": {f"{file}:Ahead": changed.parameters}}
+    assert pin_policy("mixed:mine.py:Ahead=1,crw=rest", {})[:2] == (f"mixed:{file}:Ahead=1,crw=rest", pinned)
+
+
+@pytest.mark.compiled
+def test_worker_processes_find_it(file):
+    world = scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=2.0, interval_s=1.0)
+    specs = [plan_run(world, "mine.py:Ahead", seed=seed) for seed in (1, 2)]
+    result = run_all(specs, jobs=2)
+    assert [failure.error for failure in result.failures] == []
+    assert [record.controller for record in result.records] == [f"{file}:Ahead"] * 2
+
+
+@pytest.mark.parametrize(
+    ("word", "parameters", "reason"),
+    [
+        ("mine.py", {}, r"Expected the class with its file, as mine\.py:MyPolicy.* Classes in it: Ahead, Lame, Deaf\."),
+        ("mine.py:Ahaed", {}, r"to have a class Ahaed\. Did you mean 'Ahead'\?"),
+        ("mine.py:Deaf", {}, r"the methods reset and act, got Deaf without act\."),
+        ("mine.py:Lame", {}, r"Cannot make mine\.py:Lame: RuntimeError: no legs \(line 30\)\."),
+        ("mine.py:Ahead", {"spead": 1.0}, r"Expected parameters that mine\.py:Ahead takes, got \{'spead'"),
+        ("mine.py:Ahead:observation=compact", {}, "without an interface"),
+        ("other.py:Ahead", {}, r"Cannot read the policy file other\.py: No such file"),
+    ],
+)
+def test_what_cannot_be_made_is_told(file, word, parameters, reason):
+    assert file.exists()
+    with pytest.raises((PythonFileError, ModelError), match=reason):
+        load_policy(word, parameters)
+
+
+def test_code_that_cannot_be_run_is_told_with_its_line(file):
+    file.write_text("import math\n\nhalf = 1 / 0\n")
+    with pytest.raises(PythonFileError, match=r"Cannot run .*mine\.py: ZeroDivisionError: .* \(line 3\)\."):
+        load_policy("mine.py:Ahead")
+    Path("broken.py").write_text("def (:\n")
+    with pytest.raises(PythonFileError, match=r"Expected Python in broken\.py, got: invalid syntax"):
+        load_policy("broken.py")
