@@ -36,7 +36,6 @@ from swarm_forage_env.rendering.view import (
     text_height,
 )
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.regions import source_boxes
 from swarm_forage_env.scenarios.units import CELL_M, WALL_M
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
@@ -158,7 +157,7 @@ def _canvases(scenario: ScenarioConfig, size_px: int, theme: str) -> Canvases:
     )
     nest = view.box(arena.nest_box_m)
     if scenario.objects.placement != "power_law":  # its clusters are drawn anew in each run
-        for cells in source_boxes(scenario.objects.placement, *arena.n_cells):
+        for cells in scenario.source_cells:
             x_low, y_low, x_high, y_high = (CELL_M * cell for cell in cells)
             paint_box(canvas, view.box((x_low, y_low, x_high, y_high)), view.palette.source, SOURCE_OPACITY)
         paint_box(canvas, nest, view.palette.floor)

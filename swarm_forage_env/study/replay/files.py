@@ -19,7 +19,6 @@ from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.rendering.page import PageError, build_page, take_page_apart
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.performance import quantity
-from swarm_forage_env.scenarios.regions import source_boxes
 from swarm_forage_env.scenarios.units import CELL_M, WALL_M
 from swarm_forage_env.study.replay.coding import pack, unpack
 from swarm_forage_env.study.replay.frames import Replay, ReplayError
@@ -201,7 +200,7 @@ def _world(scenario: ScenarioConfig) -> dict[str, Any]:
     arena = scenario.arena
     sources: Iterable[tuple[int, ...]] = ()
     if scenario.objects.placement != "power_law":  # its clusters differ from run to run
-        sources = source_boxes(scenario.objects.placement, *arena.n_cells)
+        sources = scenario.source_cells
     return {
         "width_m": arena.width_m,
         "height_m": arena.height_m,
