@@ -17,6 +17,7 @@ from swarm_forage_env.scenarios.performance import quantity
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.regions import (
     PLACEMENTS,
+    POSITIONS,
     Box,
     cache_centre_box,
     capacity,
@@ -172,7 +173,7 @@ class ObjectConfig:
 
     n_objects: int
     placement: str
-    """One of `regions.PLACEMENTS`."""
+    """One of `regions.PLACEMENTS`, or `regions.POSITIONS`."""
     object_positions_m: tuple[tuple[float, float], ...] = ()
     """With placement "positions": places (x, y) in m; an object lies on the cell around one of them."""
     walk_probability: float = 0.0
@@ -184,11 +185,11 @@ class ObjectConfig:
 
     def __post_init__(self) -> None:
         fields.whole("objects.n_objects", self.n_objects, at_least=1)
-        fields.one_of("objects.placement", self.placement, PLACEMENTS)
+        fields.one_of("objects.placement", self.placement, (*PLACEMENTS, POSITIONS))
         fields.pairs("objects.object_positions_m", self.object_positions_m)
         _require(
-            bool(self.object_positions_m) == (self.placement == "positions"),
-            "Expected objects.object_positions_m with placement 'positions', and only with it, got "
+            bool(self.object_positions_m) == (self.placement == POSITIONS),
+            f"Expected objects.object_positions_m with placement {POSITIONS!r}, and only with it, got "
             f"{len(self.object_positions_m)} positions with {self.placement!r}.",
         )
         fields.number("objects.walk_probability", self.walk_probability, at_least=0.0, at_most=1.0)

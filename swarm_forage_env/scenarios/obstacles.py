@@ -7,7 +7,7 @@ Obstacles may touch and overlap each other, and reach into the walls.
 
 import math
 from collections.abc import Iterable
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,26 +46,28 @@ def check_obstacles(obstacles: Any, width_m: float, height_m: float, nest: Recta
             "Expected arena.obstacles to be a tuple of boxes (x low, y low, x high, y high) in m, such as "
             f"((14.0, 4.0, 14.4, 12.0),), got {shown(obstacles)}."
         )
-    if len(obstacles) > MAX_OBSTACLES:
-        raise ConfigError(f"Expected at most {MAX_OBSTACLES} arena.obstacles, got {len(obstacles)}.")
-    for index, box in enumerate(obstacles):
+    boxes = cast("tuple[Any, ...]", obstacles)
+    if len(boxes) > MAX_OBSTACLES:
+        raise ConfigError(f"Expected at most {MAX_OBSTACLES} arena.obstacles, got {len(boxes)}.")
+    for index, box in enumerate(boxes):
         _check_obstacle(f"arena.obstacles[{index}]", box, width_m, height_m, nest)
 
 
 def _check_obstacle(where: str, box: Any, width_m: float, height_m: float, nest: Rectangle) -> None:
-    if not isinstance(box, tuple) or len(box) != 4:
+    edges = cast("tuple[Any, ...]", box) if isinstance(box, tuple) else ()
+    if len(edges) != 4:
         raise ConfigError(f"Expected {where} to be (x low, y low, x high, y high) in m, got {shown(box)}.")
-    for index, edge in enumerate(box):
+    for index, edge in enumerate(edges):
         fields.number(f"{where}[{index}]", edge)
-    x_low, y_low, x_high, y_high = box
+    x_low, y_low, x_high, y_high = edges
     if min(x_high - x_low, y_high - y_low) < MIN_SIDE_M - 1e-9:
         raise ConfigError(
-            f"Expected {where} with x low < x high and y low < y high, at least {MIN_SIDE_M} m apart, got {box}."
+            f"Expected {where} with x low < x high and y low < y high, at least {MIN_SIDE_M} m apart, got {edges}."
         )
     if min(x_low, y_low) < 0.0 or x_high > width_m or y_high > height_m:
-        raise ConfigError(f"Expected {where} inside the {width_m} x {height_m} m arena, got {box}.")
+        raise ConfigError(f"Expected {where} inside the {width_m} x {height_m} m arena, got {edges}.")
     if x_low < nest[2] and nest[0] < x_high and y_low < nest[3] and nest[1] < y_high:
-        raise ConfigError(f"Expected {where} clear of the nest {nest}, got {box}; move the box or the nest.")
+        raise ConfigError(f"Expected {where} clear of the nest {nest}, got {edges}; move the box or the nest.")
 
 
 def blocked_cells(box: Rectangle, nx: int, ny: int, radius_m: float) -> Box:
@@ -74,7 +76,8 @@ def blocked_cells(box: Rectangle, nx: int, ny: int, radius_m: float) -> Box:
     These are the cells that it covers, also in part, and those whose centre is nearer to it than a robot's radius: no
     robot could stand on an object there. (Near corners that is a little more than needed.)
     """
-    low, high = [], []
+    low: list[int] = []
+    high: list[int] = []
     for start, end, n_cells in ((box[0], box[2], nx), (box[1], box[3], ny)):
         covered = math.floor(start * CELLS_PER_M + _ROUNDING_CELLS), math.ceil(end * CELLS_PER_M - _ROUNDING_CELLS)
         first_near = math.floor((start - radius_m) * CELLS_PER_M - 0.5) + 1

@@ -11,7 +11,9 @@ import numpy as np
 
 Box: TypeAlias = tuple[int, int, int, int]
 
-PLACEMENTS = ("single_source", "dual_source", "quad_source", "random", "power_law", "positions")
+PLACEMENTS = ("single_source", "dual_source", "quad_source", "random", "power_law")
+POSITIONS = "positions"
+"""The placement with places of one's own instead of regions by rule."""
 
 
 def distributable_box(nx: int, ny: int) -> Box:
@@ -20,7 +22,7 @@ def distributable_box(nx: int, ny: int) -> Box:
 
 
 def source_boxes(placement: str, nx: int, ny: int) -> tuple[Box, ...]:
-    """Return the source regions of a placement on an nx x ny grid; "positions" has those of its scenario instead.
+    """Return the source regions of a placement on an nx x ny grid; `POSITIONS` has those of its scenario instead.
 
     Power-law clusters are drawn at reset; for them the answer is the whole distributable range.
     The bands are 0.75/0.85 and 0.25/0.85 of the upper distributable index, as in the paper's study; like there, the

@@ -115,7 +115,7 @@ def draw_clusters(config: ScenarioConfig, floor: IntArray, rng: np.random.Genera
     raise ConfigError(
         f"Expected room for {len(sizes)} clusters of {sizes.min()} to {sizes.max()} objects in a power-law arena of "
         f"{arena.width_m} x {arena.height_m} m, found none in {LAYOUTS} random layouts; use a larger arena, a smaller "
-        "nest or smaller caches."
+        "nest, smaller caches or fewer obstacles."
     )
 
 
