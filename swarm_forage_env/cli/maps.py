@@ -65,6 +65,7 @@ def write_maps(every: "Sequence[FloorMaps]", picture: Path, *, per: str = "") ->
         one.write(picture.with_suffix(f".{as_file_name(one.label)}.npz"))
     titles = {name: f"{meaning}, per {per}" if per else meaning for name, meaning in MEANINGS.items()}
     try:
-        draw_maps(picture, [(one.label, one.arrays, one.is_difference, one.size_m) for one in every], titles)
+        rows = [(one.label, one.arrays, one.is_difference, one.size_m, one.obstacles_m) for one in every]
+        draw_maps(picture, rows, titles)
     except ImportError:
         notes().print(NO_PICTURE)

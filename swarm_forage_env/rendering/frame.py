@@ -163,6 +163,8 @@ def _canvases(scenario: ScenarioConfig, size_px: int, theme: str) -> Canvases:
         paint_box(canvas, nest, view.palette.floor)
     paint_box(canvas, nest, view.palette.nest, NEST_OPACITY)
     paint_frame(canvas, nest, max(1.0, 1.5 * view.unit), view.palette.nest)
+    for box in arena.obstacles:
+        paint_box(canvas, view.box(box), view.palette.wall)
     lights = view.pixels(np.asarray(arena.lights_m)[:, :2])
     paint_glows(canvas, lights, 26.0 * view.unit, view.palette.light, 0.5)
     paint_discs(canvas, lights, max(1.5, 3.0 * view.unit), view.palette.light)
@@ -273,6 +275,8 @@ def _draw_symbol(canvas: Canvas, palette: Palette, name: str, x: float, y: float
     elif name == "nest":
         paint_box(canvas, box, palette.nest, NEST_OPACITY)
         paint_frame(canvas, box, 1.0, palette.nest)
+    elif name == "obstacle":
+        paint_box(canvas, box, palette.wall)
     else:
         paint_box(canvas, box, palette.cache, CACHE_OPACITY)
         paint_frame(canvas, box, 1.0, palette.cache)

@@ -10,6 +10,8 @@ from swarm_forage_env.contract.types import FloatArray
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
 """Okabe-Ito palette: told apart by readers with any colour vision."""
+_OBSTACLE = {"facecolor": "white", "edgecolor": "black", "hatch": "////", "linewidth": 0.5}
+"""Hatched: neither a map nor a difference has that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,28 +112,37 @@ def draw_trainings(
 
 def draw_maps(
     path: str | Path,
-    rows: Sequence[tuple[str, Mapping[str, FloatArray], bool, tuple[float, float]]],
+    rows: Sequence[
+        tuple[
+            str,
+            Mapping[str, FloatArray],
+            bool,
+            tuple[float, float],
+            Sequence[tuple[float, float, float, float]],
+        ]
+    ],
     titles: Mapping[str, str],
 ) -> None:
     """Draw maps of floors of the same proportions: a row of panels per map or difference, a column per quantity.
 
     Args:
         path: File to write; its suffix chooses the format (.png, .svg, .pdf).
-        rows: Label; arrays (ny, nx) by name, row = y from below; whether they are differences; and the extent of the
-            floor along x and y in m.
+        rows: Label; arrays (ny, nx) by name, row = y from below; whether they are differences; the extent of the
+            floor along x and y in m; and the boxes on it, which are hatched.
         titles: Headline of each column, by name of the array; their order is that of the columns.
 
     Raises:
         ImportError: matplotlib is not installed.
     """
     from matplotlib.figure import Figure
+    from matplotlib.patches import Rectangle
 
     shape = rows[0][3][1] / rows[0][3][0]
     width, height = 4.2, 3.5 * shape + 0.7
     figure = Figure(figsize=(width * len(titles), height * len(rows)), layout="constrained")
     panels = figure.subplots(len(rows), len(titles), squeeze=False)
     bar = min(1.0, 1.2 * shape)  # as long as a panel is high
-    for (label, arrays, is_difference, size_m), line in zip(rows, panels, strict=True):
+    for (label, arrays, is_difference, size_m, obstacles), line in zip(rows, panels, strict=True):
         for (name, title), axes in zip(titles.items(), line, strict=True):
             values = arrays[name]
             # Few squares hold most; the last percent would leave all others in one colour.
@@ -140,6 +151,8 @@ def draw_maps(
             image = axes.imshow(
                 values, origin="lower", extent=(0, size_m[0], 0, size_m[1]), vmin=low, vmax=top, cmap=colours
             )
+            for x_low, y_low, x_high, y_high in obstacles:
+                axes.add_patch(Rectangle((x_low, y_low), x_high - x_low, y_high - y_low, **_OBSTACLE))
             axes.set_title(f"{_unread(label)}\n{title}", fontsize=9)
             axes.tick_params(labelsize=7)
             figure.colorbar(image, ax=axes, shrink=bar).ax.tick_params(labelsize=7)

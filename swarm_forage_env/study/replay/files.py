@@ -208,6 +208,7 @@ def _world(scenario: ScenarioConfig) -> dict[str, Any]:
         "cell_m": CELL_M,
         "interior_m": list(arena.interior_m),
         "nest_box_m": list(arena.nest_box_m),
+        "obstacles_m": [list(box) for box in arena.obstacles],
         "lights_m": [[x, y] for x, y, _ in arena.lights_m],
         "sources_m": [[CELL_M * edge for edge in box] for box in sources],
         "robot_radius_m": scenario.robots.radius_m,
