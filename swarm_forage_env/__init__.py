@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.views.pettingzoo import parallel_env
     from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
     from swarm_forage_env.wrappers.handling import HandlingCost, HandlingCostConfig
+    from swarm_forage_env.wrappers.messages import MessageNoise, MessageNoiseConfig
     from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig, SensorNoise, SensorNoiseConfig
     from swarm_forage_env.wrappers.population import PopulationConfig, PopulationDynamics
     from swarm_forage_env.wrappers.recorder import RunRecorder
@@ -59,6 +60,8 @@ __all__ = [
     "Grip",
     "HandlingCost",
     "HandlingCostConfig",
+    "MessageNoise",
+    "MessageNoiseConfig",
     "ObservationLayout",
     "OwnSensor",
     "Policy",
@@ -119,6 +122,8 @@ _HOMES = {
     "Grip": "contract.codes",
     "HandlingCost": "wrappers.handling",
     "HandlingCostConfig": "wrappers.handling",
+    "MessageNoise": "wrappers.messages",
+    "MessageNoiseConfig": "wrappers.messages",
     "ObservationLayout": "contract.layout",
     "OwnSensor": "contract.own",
     "Policy": "contract.policy",

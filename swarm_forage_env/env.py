@@ -12,7 +12,7 @@ from swarm_forage_env._internal.fields import as_whole, instance, switch
 from swarm_forage_env.contract.actions import as_actions, checked_gain, refuse_not_finite
 from swarm_forage_env.contract.calls import is_over, no_options
 from swarm_forage_env.contract.layout import ObservationLayout
-from swarm_forage_env.contract.policy import ActionError, CompiledPolicy, SwarmSpec
+from swarm_forage_env.contract.policy import COMMANDS, ActionError, CompiledPolicy, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.arena import ForagingArena
@@ -35,7 +35,8 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
     """A swarm that forages: one agent per robot, named robot_0, robot_1, ...
 
     Observations are flat float32 rows in named slices (`env.layout`, printed by `env.layout.describe()`); actions are
-    (left wheel, right wheel, gripper) in [-1, 1]; values outside are clipped. Robots in repair stay in `agents`; their
+    (left wheel, right wheel, gripper) in [-1, 1], and the numbers of a message where robots can send messages; values
+    outside are clipped. Robots in repair stay in `agents`; their
     observation column `active` is 0. Only permanent death terminates, only the horizon truncates.
     """
 
@@ -89,7 +90,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         self.possible_agents = [f"robot_{row}" for row in range(n_robots)]
         self._row_of = {agent: row for row, agent in enumerate(self.possible_agents)}
         self.agents: list[str] = []
-        self._actions = np.zeros((n_robots, 3), np.float32)
+        self._actions = np.zeros((n_robots, COMMANDS + scenario.robots.message_size), np.float32)
         self._seeds = np.random.default_rng()
         self.seed_value: int | None = None
 
@@ -110,7 +111,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         return self._observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Box:
-        """(3,) float32 in [-1, 1]: left wheel, right wheel, gripper; one space object per agent."""
+        """(A,) float32 in [-1, 1]: left wheel, right wheel, gripper, message; one space object per agent."""
         return self._action_spaces[agent]
 
     @cached_property  # made when asked for: runs of a policy never look at them, and there may be thousands
@@ -120,7 +121,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
 
     @cached_property
     def _action_spaces(self) -> dict[str, spaces.Box]:
-        return {agent: spaces.Box(-1.0, 1.0, (3,), np.float32) for agent in self.possible_agents}
+        return {agent: spaces.Box(-1.0, 1.0, self._actions.shape[1:], np.float32) for agent in self.possible_agents}
 
     @cached_property
     def state_space(self) -> spaces.Box:
@@ -244,20 +245,20 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         return obs
 
     def checked_actions(self, actions: ActionArray) -> ActionArray:
-        """Return `actions` as a contiguous (N, 3) float32 array, the same array if it is one; values are not checked.
+        """Return `actions` as a contiguous (N, A) float32 array, the same array if it is one; values are not checked.
 
         Raises:
             ActionError: values that are not numbers, or another shape.
             RuntimeError: before the first reset.
         """
         self._require_reset()
-        return as_actions(actions, len(self._actions))
+        return as_actions(actions, len(self._actions), self.scenario.robots.message_size)
 
     def refuse_bad_step(self, actions: ActionArray, wheel_gain: FloatArray | None) -> None:
         """Refuse what the arena would refuse, for wrappers, which have to know it before they do anything.
 
         Args:
-            actions: (N, 3) as `checked_actions` returns them.
+            actions: (N, A) as `checked_actions` returns them.
             wheel_gain: As in `step_batch`.
 
         Raises:
@@ -275,7 +276,8 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """Advance one tick at array level.
 
         Args:
-            actions: (N, 3) float32, also for robots that are away (ignored); other number types are converted.
+            actions: (N, 3) float32, also for robots that are away (ignored); other number types are converted. Where
+                robots can send messages, (N, 3 + message_size); (N, 3) says zeros.
             wheel_gain: (N, 2) factor per wheel on the limited speed: the product of the wrappers' gains.
             tasks: (N,) int8 `Task` codes, if the policy has tasks.
 
@@ -440,13 +442,14 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
             )
         packed = self._actions
         complete = len(agents) == len(self.possible_agents)
-        rows = packed if complete else np.empty((len(agents), 3), np.float32)
+        size = packed.shape[1]
+        rows = packed if complete else np.empty((len(agents), size), np.float32)
         try:
             np.stack([actions[agent] for agent in agents], out=rows, casting="same_kind")
         except (TypeError, ValueError) as error:
             shapes = {np.shape(actions[agent]) for agent in agents}
             raise ActionError(
-                f"Expected each action as three numbers, shape (3,), got shapes {sorted(shapes)}: {error}."
+                f"Expected each action as {size} numbers, shape ({size},), got shapes {sorted(shapes)}: {error}."
             ) from error
         if not complete:
             packed[:] = 0.0

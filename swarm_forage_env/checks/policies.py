@@ -94,14 +94,14 @@ def _act_in(policy: Policy, world: ForageEnv, seed: int, ticks: int, *, away: bo
     for tick in range(ticks):
         if tick in populations:
             world.set_population(active=populations[tick], present=everybody)
-        scene = _asked(policy, obs.copy(), world.active.copy(), tick)
+        scene = _asked(policy, obs.copy(), world.active.copy(), tick, world.swarm_spec)
         yield scene
         obs, _, _, truncated = world.step_batch(scene.actions, tasks=_checked_tasks(policy, len(rows), tick))
         if truncated:
             return
 
 
-def _asked(policy: Policy, obs: ObsArray, active: BoolArray, tick: int) -> _Scene:
+def _asked(policy: Policy, obs: ObsArray, active: BoolArray, tick: int, spec: SwarmSpec) -> _Scene:
     """Call `act` and check the actions; the scene holds copies."""
     shown, at_work = obs.copy(), active.copy()
     try:
@@ -116,10 +116,11 @@ def _asked(policy: Policy, obs: ObsArray, active: BoolArray, tick: int) -> _Scen
             f"Expected act to leave obs and active as they are, got them changed at tick {tick}; they belong to the "
             "environment: work on copies."
         )
-    expected = f"Expected actions as float32 of shape (n_robots, 3) = {(len(obs), 3)} in [-1, 1]"
+    shapes = spec.action_shapes
+    expected = f"Expected actions as float32 of shape (n_robots, 3) = {' or '.join(map(str, shapes))} in [-1, 1]"
     if not isinstance(actions, np.ndarray):
         raise CheckError(f"{expected}, got {type(actions).__name__} at tick {tick}; return a numpy array.")
-    if actions.shape != (len(obs), 3):
+    if actions.shape not in shapes:
         raise CheckError(
             f"{expected}, got shape {actions.shape} at tick {tick}; return one row per robot, inactive ones included."
         )
@@ -167,7 +168,7 @@ def _check_same_actions(
     """Give a policy the observations of `scenes` again, in the form that `shown` makes, and compare its actions."""
     _reset(policy, spec, seed)
     for tick, (scene, obs) in enumerate(zip(scenes, shown(scenes), strict=True)):
-        again = _asked(policy, obs, scene.active.copy(), tick).actions
+        again = _asked(policy, obs, scene.active.copy(), tick, spec).actions
         different = np.flatnonzero((again != scene.actions).any(axis=1))
         if len(different):
             row = different[0]

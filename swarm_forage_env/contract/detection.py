@@ -61,10 +61,13 @@ def is_obstacle_vector(x: float, y: float, behind_counts: bool) -> bool:
     Under the quirk `obstacle_behind_counts` anything behind is an obstacle, too, however weak.
     """
     length_squared = x * x + y * y
+    is_long = length_squared > OBSTACLE_LENGTH * OBSTACLE_LENGTH
+    if is_long == behind_counts:  # wherever it is; to know where takes time
+        return is_long
     # Equal obstacles on opposite sides cancel up to rounding; what is left points anywhere.
     if x < 0.0 and length_squared > _CANCELLED and abs(math.atan2(y, x)) > OBSTACLE_ANGLE_RAD:
         return behind_counts
-    return length_squared > OBSTACLE_LENGTH * OBSTACLE_LENGTH
+    return is_long
 
 
 @kernel

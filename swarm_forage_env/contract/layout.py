@@ -21,6 +21,12 @@ CACHE_FIELDS = 4
 SERIAL_SCALE = 2.0**24
 """Cache serial numbers below this are exact in float32."""
 EVENT_SCALE = 16.0
+NEIGHBOURS = "neighbours"
+"""Name of the slice of the nearest robots, which a scenario may switch on."""
+NEIGHBOUR_FIELDS = 4
+"""forward, left, carrying, there; of each neighbour that an observation has room for."""
+MESSAGES = "messages"
+"""Name of the slice of what was heard, which a scenario may switch on."""
 
 LayoutRow: TypeAlias = tuple[str, tuple[float, ...], str, str]
 """Name, scale, noise group and meaning of a slice, as in `ObservationSlice`; the columns follow from the order."""
@@ -111,11 +117,11 @@ def layout_of(rows: Iterable[LayoutRow]) -> ObservationLayout:
 
 @cache
 def observation_layout(
-    width_m: float, height_m: float, n_objects: int, own: tuple[LayoutRow, ...] = ()
+    width_m: float, height_m: float, n_objects: int, further: tuple[LayoutRow, ...] = ()
 ) -> ObservationLayout:
     """Build the layout of an arena of `width_m` x `height_m` metres with `n_objects` objects.
 
-    All columns lie in [-1, 1]; readings keep their natural [0, 1]. The slices `own` come last.
+    All columns lie in [-1, 1]; readings keep their natural [0, 1]. The slices `further` come last.
     """
     half_x, half_y, rows = width_m / 2.0, height_m / 2.0, float(n_objects)
     cache_scale = (SERIAL_SCALE, half_x, half_y, rows)
@@ -138,8 +144,21 @@ def observation_layout(
         ("los_object", (rows,) * window, "", "(row + 1) / M per cell of the 5 x 5 window, row-major from lower left"),
         ("los_cache", cache_scale * VISIBLE_CACHES, "", "up to 4 caches meeting the window, nearest first"),
     ]
-    return layout_of((*table, *own))
+    return layout_of((*table, *further))
+
+
+def neighbours_row(n_seen: int, range_m: float) -> LayoutRow:
+    """Return the slice of the `n_seen` nearest robots within `range_m` metres."""
+    meaning = f"{n_seen} nearest robots: forward, left / {range_m:g} m, 1 if carrying, 1 if there is one"
+    return NEIGHBOURS, (range_m, range_m, 1.0, 1.0) * n_seen, NEIGHBOURS, meaning
+
+
+def messages_row(message_size: int) -> LayoutRow:
+    """Return the slice of what was heard: the mean of the messages, and whether there was any."""
+    return MESSAGES, (1.0,) * (message_size + 1), "", "mean of the messages heard; 1 if there was one"
 
 
 BUILT_IN_SLICES = observation_layout(1.0, 1.0, 1).names
 """Names of the slices that every observation has."""
+OPTIONAL_SLICES = (NEIGHBOURS, MESSAGES)
+"""Names of the slices of the package that come after those, where a scenario asks for them."""

@@ -21,7 +21,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, instance, text, whole
 from swarm_forage_env._internal.spelling import suggestion
-from swarm_forage_env.contract.layout import BUILT_IN_SLICES, LayoutRow
+from swarm_forage_env.contract.layout import BUILT_IN_SLICES, OPTIONAL_SLICES, LayoutRow
 
 SENSOR_ENTRY_POINTS = "swarm_forage_env.sensors"
 """Entry-point group under which installed packages offer objects of the class `OwnSensor`."""
@@ -57,7 +57,7 @@ class OwnSensor:
 
     def __post_init__(self) -> None:
         text("the name of a sensor", self.name)
-        if not self.name.isidentifier() or self.name in BUILT_IN_SLICES:
+        if not self.name.isidentifier() or self.name in (*BUILT_IN_SLICES, *OPTIONAL_SLICES):
             raise ConfigError(
                 f"Expected a name of its own for a sensor, made of letters, digits and _, got {self.name!r}."
             )

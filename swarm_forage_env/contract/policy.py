@@ -11,12 +11,21 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 
 from swarm_forage_env.contract.codes import Task
-from swarm_forage_env.contract.layout import ObservationLayout, observation_layout
+from swarm_forage_env.contract.layout import (
+    LayoutRow,
+    ObservationLayout,
+    messages_row,
+    neighbours_row,
+    observation_layout,
+)
 from swarm_forage_env.contract.own import own_sensor
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, WHEEL_SCALE_MPS
+
+COMMANDS = 3
+"""First columns of an action: left wheel, right wheel, gripper. What a robot says comes after them."""
 
 
 class ActionError(ValueError):
@@ -24,7 +33,7 @@ class ActionError(ValueError):
 
 
 def refused_action(row: int, action: ActionArray, gain: FloatArray) -> ActionError:
-    """Return the error about a robot whose action (3,) or wheel gain (2,) is not finite."""
+    """Return the error about a robot whose action (A,) or wheel gain (2,) is not finite."""
     return ActionError(
         f"Expected finite actions and wheel gains, got {action.tolist()} and {gain.tolist()} for robot_{row}; the "
         "world was not stepped."
@@ -74,7 +83,19 @@ class SwarmSpec:
     """0.2 min(X, Y)."""
     cache_proximity_m: float
     """SITE and CREATE_CACHE drops are refused within this distance of a cache centre."""
+    message_size: int
+    """Numbers that a robot may say, columns of its action after `COMMANDS`."""
     quirks: Quirks
+
+    @property
+    def action_size(self) -> int:
+        """Columns A of an action: the commands and what the robot says."""
+        return COMMANDS + self.message_size
+
+    @property
+    def action_shapes(self) -> tuple[tuple[int, int], ...]:
+        """Shapes of actions that fit: (N, A), and (N, 3), which says zeros."""
+        return tuple(dict.fromkeys((self.n_robots, columns) for columns in (COMMANDS, self.action_size)))
 
     @property
     def state_size(self) -> int:
@@ -114,18 +135,25 @@ class SwarmSpec:
             cache_side_nominal_m=scenario.cache_side_nominal_m,
             min_dist_m=scenario.min_dist_m,
             cache_proximity_m=scenario.cache_proximity_m,
+            message_size=robots.message_size,
             quirks=scenario.quirks,
         )
 
 
 def layout_for(scenario: ScenarioConfig) -> ObservationLayout:
-    """Return the layout of a scenario's observations, with its own sensors.
+    """Return the layout of a scenario's observations, with neighbours, messages and its own sensors where it has them.
 
     Raises:
         ConfigError: a sensor that is not known here.
     """
-    own = tuple(own_sensor(name).row for name in scenario.robots.own_sensors)
-    return observation_layout(scenario.arena.width_m, scenario.arena.height_m, scenario.objects.n_objects, own)
+    robots, further = scenario.robots, list[LayoutRow]()
+    if robots.neighbours_seen:
+        further.append(neighbours_row(robots.neighbours_seen, robots.neighbour_range_m))
+    if robots.message_size:
+        further.append(messages_row(robots.message_size))
+    further += [own_sensor(name).row for name in robots.own_sensors]
+    arena = scenario.arena
+    return observation_layout(arena.width_m, arena.height_m, scenario.objects.n_objects, tuple(further))
 
 
 class RobotStates(NamedTuple):
@@ -212,6 +240,7 @@ class Policy(Protocol):
             active: (N,) bool, robots of the tasked swarm; rows of others are ignored.
 
         Returns:
-            (N, 3) float32 in [-1, 1]: left wheel, right wheel, gripper.
+            (N, 3) float32 in [-1, 1]: left wheel, right wheel, gripper. Where robots can send messages,
+            (N, 3 + message_size); a policy that returns (N, 3) sends zeros.
         """
         ...

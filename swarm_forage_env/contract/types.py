@@ -17,6 +17,6 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 ObsArray: TypeAlias = NDArray[np.float32]
 """Observations, (N, D) float32 in [-1, 1]."""
 ActionArray: TypeAlias = NDArray[np.float32]
-"""Actions, (N, 3) float32 in [-1, 1]: left wheel, right wheel, gripper."""
+"""Actions, (N, A) float32 in [-1, 1]: left wheel, right wheel, gripper, and the numbers of a message; A = 3 without."""
 Row: TypeAlias = Any
 """One row of an array inside a compiled function, such as the observation of one robot, (D,) float32."""

@@ -1,11 +1,13 @@
 """What a learner sees and does: a choice of observations and actions.
 
-The environment itself has observations (N, D) and commands (N, 3). A learner may prefer fewer columns, numbered actions
-or a gripper that works by itself. Training environments and trained policies use the same translation, so a policy
-runs exactly as it was trained.
+The environment itself has observations (N, D) and actions (N, A): commands, and messages if there are any. A learner
+may prefer fewer columns, numbered actions or a gripper that works by itself. Training environments and trained policies
+use the same translation, so a policy runs exactly as it was trained.
 """
 
+import copy
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from typing import Any, TypeAlias
@@ -13,9 +15,18 @@ from typing import Any, TypeAlias
 import numpy as np
 from gymnasium import spaces
 
-from swarm_forage_env._internal.fields import ConfigError, known_keys, one_of, switch, unique_names, whole
-from swarm_forage_env.contract.layout import BUILT_IN_SLICES, LayoutRow, ObservationLayout, layout_of
-from swarm_forage_env.contract.policy import ActionError, SwarmSpec
+from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, switch, unique_names, whole
+from swarm_forage_env.contract.layout import (
+    BUILT_IN_SLICES,
+    MESSAGES,
+    NEIGHBOURS,
+    LayoutRow,
+    ObservationLayout,
+    layout_of,
+    messages_row,
+    neighbours_row,
+)
+from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.kernels.commands import (
     GRIP_COMMANDS,
@@ -27,6 +38,14 @@ from swarm_forage_env.policies.kernels.commands import (
     numbered_actions,
 )
 from swarm_forage_env.policies.kernels.compact import COMPACT_COLUMNS, compact_view
+from swarm_forage_env.policies.kernels.sites import (
+    N_SITES,
+    SITE_COLUMNS,
+    SiteMemory,
+    new_site_memory,
+    remember_sites,
+    show_sites,
+)
 from swarm_forage_env.scenarios.config import ScenarioConfig
 
 OBSERVATIONS = ("full", "compact")
@@ -38,6 +57,13 @@ GRIPS = tuple(GRIP_COMMANDS)
 """Discrete actions of the gripper, in order after the motions; the wheels stand."""
 _SHARED = ("wheel_speed", "position", "heading", "carrying", "interacting", "active")
 """Slices that the compact view takes as they are, in order."""
+_SITE_ROWS: tuple[LayoutRow, ...] = tuple(
+    (name, (1.0,) * SITE_COLUMNS, "", f"{what}: m forward, m left, at most 1 m long; 1 if it is known; distance / 20 m")
+    for name, what in (
+        ("pickup_site", "where the robot picked an object up last"),
+        ("sighting_site", "where it last saw an object while carrying"),
+    )
+)
 _COMPACT_READS = ("proximity", "light", "ground", *_SHARED, "los_cell", "los_object", "los_cache")
 
 
@@ -52,12 +78,22 @@ class InterfaceConfig:
     observation: str = "full"
     """"full": the (D,) row of the environment; "compact": the columns of `compact_layout`."""
     actions: str = "continuous"
-    """"continuous": left wheel, right wheel and, unless automatic, gripper in [-1, 1]; "discrete": a number, see
-    `MOTIONS` and `GRIPS`."""
+    """"continuous": left wheel, right wheel, unless automatic gripper, and the message, in [-1, 1]; "discrete": a
+    number, see `MOTIONS` and `GRIPS`."""
     automatic_gripper: bool = False
     """Grasp when empty and over an object or a cache, deliver when carrying in the nest; the learner only drives."""
     decision_ticks: int = 1
     """Ticks for which an action is kept; rewards add up. An automatic gripper decides in every tick."""
+    neighbours_seen: int | None = None
+    """How many neighbours the learner sees, as many as its scenario shows, or 0. Where nothing is said (None),
+    environments and trainings fill in those of their scenario, and a policy sees none."""
+    neighbour_range_m: float | None = None
+    """How far it sees them: what a column of 1.0 means. None: as for `neighbours_seen`."""
+    message_size: int | None = None
+    """Numbers of the messages that the learner sends and hears, as many as in its scenario, or 0: it says zeros and
+    hears nothing. None: as for `neighbours_seen`. Messages need continuous actions."""
+    site_memory: bool = False
+    """Two places that a robot remembers, see `policies.kernels.sites`: eight more columns."""
     own_sensors: tuple[str, ...] | None = None
     """Names of own sensors that the learner sees beside the columns of the package, in this order. Where nothing is
     said (None), environments and trainings fill in those of their scenario, and a policy sees none."""
@@ -67,17 +103,43 @@ class InterfaceConfig:
         one_of("interface.actions", self.actions, ACTIONS)
         switch("interface.automatic_gripper", self.automatic_gripper)
         whole("interface.decision_ticks", self.decision_ticks, at_least=1)
+        for name in ("neighbours_seen", "message_size"):
+            whole(f"interface.{name}", getattr(self, name), at_least=0, or_none=True)
+        if self.neighbour_range_m is not None:
+            number("interface.neighbour_range_m", self.neighbour_range_m, above=0.0)
+        if self.message_size and self.actions != "continuous":
+            raise ConfigError(
+                f"Expected interface.actions 'continuous' for messages of {self.message_size} numbers, got "
+                f"{self.actions!r}; choose continuous actions, or message_size=0 for a learner without messages."
+            )
+        switch("interface.site_memory", self.site_memory)
         if self.own_sensors is not None:
             unique_names("interface.own_sensors", self.own_sensors)
 
     def for_scenario(self, scenario: ScenarioConfig) -> "InterfaceConfig":
-        """Return these choices with the scenario's own sensors, where nothing was said about them."""
-        return replace(self, own_sensors=scenario.robots.own_sensors) if self.own_sensors is None else self
+        """Return these choices with neighbours, messages and own sensors of the scenario, where nothing was said.
+
+        Neighbours and messages that a scenario does not have stay None.
+
+        Raises:
+            ConfigError: discrete actions in a scenario with messages, of which nothing was said.
+        """
+        robots, found = scenario.robots, dict[str, Any]()
+        if self.own_sensors is None:
+            found["own_sensors"] = robots.own_sensors
+        if self.neighbours_seen is None and robots.neighbours_seen:
+            found["neighbours_seen"] = robots.neighbours_seen
+        if self.neighbour_range_m is None and found.get("neighbours_seen", self.neighbours_seen):
+            found["neighbour_range_m"] = robots.neighbour_range_m
+        if self.message_size is None and robots.message_size:
+            found["message_size"] = robots.message_size
+        return replace(self, **found) if found else self
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """The own sensors that are seen."""
-        return self.own_sensors or ()
+        """The slices that are seen beside those of every observation: neighbours, messages, own sensors."""
+        company = {NEIGHBOURS: self.neighbours_seen, MESSAGES: self.message_size}
+        return (*(name for name, size in company.items() if size), *(self.own_sensors or ()))
 
     @property
     def reads(self) -> tuple[str, ...] | None:
@@ -126,13 +188,19 @@ class LearnerInterface:
         )
         self._wheels = np.array(list(MOTION_WHEELS.values()), np.float32)
         self._grips = np.array(list(GRIP_COMMANDS.values()), np.float32)
-        self._commands = np.zeros((spec.n_robots, 3), np.float32)
+        self._commands = np.zeros((spec.n_robots, spec.action_size), np.float32)
+        self._n_driven = 2 if config.automatic_gripper else COMMANDS
         self.layout = learner_layout(source, config)
         self.shows_all = self.layout == source
         self.passes_on = not (self._is_discrete or config.automatic_gripper)
         own = [source[name] for name in config.sensors]
         self._own_columns = np.array([column for part in own for column in range(part.start, part.stop)], np.intp)
-        self._n_built_in = self.layout.size - len(self._own_columns)
+        self._n_shown = (
+            self.layout.size - len(self._own_columns) - (N_SITES * SITE_COLUMNS if config.site_memory else 0)
+        )
+        self._sites = new_site_memory(spec.n_robots) if config.site_memory else None
+        self._pose_starts = (start["position"], start["heading"])
+        self._cargo_starts = (start["carrying"], start["los_cell"], start["los_object"])
         self.observation_space = self.new_observation_space()
         self.action_space = self.new_action_space()
         self._actions_shape = (spec.n_robots, *(self.action_space.shape or ()))
@@ -145,18 +213,34 @@ class LearnerInterface:
         """Return a new space, with its own random state, for one robot's action."""
         if self._is_discrete:
             return spaces.Discrete(self._n_choices)
-        return spaces.Box(-1.0, 1.0, (2 if self.config.automatic_gripper else 3,), np.float32)
+        return spaces.Box(-1.0, 1.0, (self._n_driven + (self.config.message_size or 0),), np.float32)
 
     @property
     def active_column(self) -> int:
         """Column of what the learner sees that is 1 for robots at work, 0 for all others."""
         return self.layout.part("active").start
 
+    def forget(self) -> None:
+        """Forget what robots remember: a run begins."""
+        if self._sites is not None:
+            for part in self._sites:
+                part[...] = 0
+
+    def memory(self) -> SiteMemory | None:
+        """Return a copy of what robots remember; None without memory."""
+        return copy.deepcopy(self._sites)
+
+    def recall(self, memory: SiteMemory | None) -> None:
+        """Let robots remember what `memory()` of an interface of the same choices and swarm returned."""
+        if self._sites is not None and memory is not None:
+            for part, kept in zip(self._sites, memory, strict=True):
+                np.copyto(part, kept)
+
     def observe(self, obs: ObsArray, out: ObsArray | None = None) -> ObsArray:
-        """Return what the learner sees, a new array or `out`.
+        """Return what the learner sees, a new array or `out`; with `site_memory`, robots remember it.
 
         Args:
-            obs: (N, D) observations of the environment.
+            obs: (N, D) observations of the environment, in each decision of a run.
             out: (N, d) float32 to write into.
         """
         if out is None:
@@ -164,36 +248,56 @@ class LearnerInterface:
         if self._is_compact:
             compact_view(obs, self._view_starts, self._half_x, self._half_y, self._behind_counts, out)
         else:
-            np.copyto(out[:, : self._n_built_in], obs[:, : self._n_built_in])
+            np.copyto(out[:, : self._n_shown], obs[:, : self._n_shown])
+        at = self._n_shown
+        if self._sites is not None:
+            half = self._half_x, self._half_y
+            remember_sites(obs, self._pose_starts, self._cargo_starts, half, self._sites)
+            show_sites(obs, self._pose_starts, half, self._sites, out[:, at:])
+            at += N_SITES * SITE_COLUMNS
         if len(self._own_columns):
-            out[:, self._n_built_in :] = obs[:, self._own_columns]
+            out[:, at:] = obs[:, self._own_columns]
         return out
 
     def command(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
-        """Return commands (N, 3) float32 in a reused buffer.
+        """Return actions of the environment, (N, A) float32, in a reused buffer.
 
         Args:
-            actions: (N,) whole numbers or (N, 2 or 3) float, as `action_space` says, one row per robot.
+            actions: (N,) whole numbers or (N, k) float, as `action_space` says, one row per robot.
             obs: (N, D) observations of the environment in the tick in which the commands are carried out.
 
         Raises:
             ActionError: another shape, or a number outside of `action_space`.
         """
-        commands = self._commands
+        return self.carry_out(self.checked(actions), obs)
+
+    def checked(self, actions: np.ndarray) -> np.ndarray:
+        """Return actions as `carry_out` takes them; arguments and errors as those of `command`."""
         if actions.shape != self._actions_shape:
             raise ActionError(
                 f"Expected actions with shape {self._actions_shape}, one row per robot as in {self.action_space}, "
                 f"got {actions.shape}."
             )
+        if not self._is_discrete:
+            return actions
+        self._check_numbers(actions)
+        return np.ascontiguousarray(actions, np.int32)
+
+    def carry_out(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
+        """Do what `command` does with actions that were checked, which may last for several ticks.
+
+        Args:
+            actions: What `checked` returned.
+            obs: As in `command`.
+        """
+        commands = self._commands
         if self._is_discrete:
-            self._check_numbers(actions)
-            numbered_actions(
-                np.ascontiguousarray(actions, np.int32), self._wheels, self._grips, obs, self._carrying, commands
-            )
-        elif self.config.automatic_gripper:
-            commands[:, :2] = actions
+            numbered_actions(actions, self._wheels, self._grips, obs, self._carrying, commands)
         else:
-            np.copyto(commands, actions, casting="same_kind")
+            driven = self._n_driven
+            np.copyto(commands[:, :driven], actions[:, :driven], casting="same_kind")
+            if self.config.message_size:
+                np.copyto(commands[:, COMMANDS:], actions[:, driven:], casting="same_kind")
         if self.config.automatic_gripper:
             automatic_grip(obs, self._grip_starts, commands)
         return commands
@@ -236,22 +340,44 @@ def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> Observ
     Raises:
         ConfigError: the environment lacks a sensor that the learner wants, or one has the name of another slice.
     """
+    _check_company(source, config)
     missing = [name for name in config.sensors if name not in source.names]
     if missing:
         raise ConfigError(
-            f"Expected a scenario with the own sensors {', '.join(config.sensors)}, which the policy sees; "
-            f"{missing[0]!r} is missing. Give the scenario own_sensors={config.sensors!r}."
+            f"Expected a scenario with the own sensors {', '.join(config.own_sensors or ())}, which the policy sees; "
+            f"{missing[0]!r} is missing. Give the scenario own_sensors={config.own_sensors!r}."
         )
     if config.observation == "compact":
         built_in = [part.row for part in compact_layout(source)]
-    elif source.names == (*BUILT_IN_SLICES, *config.sensors):
+    elif source.names == (*BUILT_IN_SLICES, *config.sensors) and not config.site_memory:
         return source
     else:
         built_in = [part.row for part in source if part.name in BUILT_IN_SLICES]
+    if config.site_memory:
+        built_in += _SITE_ROWS
     taken = sorted({row[0] for row in built_in}.intersection(config.sensors))
     if taken:
         raise ConfigError(f"Expected slices of different names, got {taken[0]!r} twice; rename the own sensor.")
     return layout_of([*built_in, *(source.part(name).row for name in config.sensors)])
+
+
+def _check_company(source: ObservationLayout, config: InterfaceConfig) -> None:
+    """Refuse a scenario that shows other neighbours, or has other messages, than the learner knows."""
+    rows = {part.name: part.row for part in source}
+    n_seen, size = config.neighbours_seen or 0, config.message_size or 0
+    _, scale, _, shown = rows.get(NEIGHBOURS, (NEIGHBOURS, (1.0,), "", "none"))
+    range_m = scale[0] if config.neighbour_range_m is None else config.neighbour_range_m
+    if n_seen and rows.get(NEIGHBOURS) != neighbours_row(n_seen, range_m):
+        raise ConfigError(
+            f"Expected a scenario that shows the neighbours which the policy sees, got {shown}; give the scenario "
+            f"neighbours_seen={n_seen} and neighbour_range_m={range_m:g}."
+        )
+    if size and rows.get(MESSAGES) != messages_row(size):
+        there = source.part(MESSAGES).size - 1 if MESSAGES in rows else 0
+        raise ConfigError(
+            f"Expected a scenario with messages of {size} numbers, which the policy sends, got {there}; give the "
+            f"scenario message_size={size}."
+        )
 
 
 def compact_layout(source: ObservationLayout) -> ObservationLayout:
@@ -312,6 +438,10 @@ def interface_from_mapping(mapping: Mapping[str, Any]) -> InterfaceConfig:
     """
     known_keys(mapping, InterfaceConfig.__dataclass_fields__, "interface option")
     values = dict(mapping)
+    range_m = values.get("neighbour_range_m")
+    if isinstance(range_m, str):  # a word of the command line; `number` refuses what is none
+        with suppress(ValueError):
+            values["neighbour_range_m"] = float(range_m)
     own = values.get("own_sensors")
     if isinstance(own, str | list):  # a word of the command line, "one+two", or of JSON, which knows no tuples
         values["own_sensors"] = tuple(own.split("+")) if isinstance(own, str) else tuple(own)

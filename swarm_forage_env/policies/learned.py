@@ -76,13 +76,14 @@ class LearnedPolicy:
         return self._chosen
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
-        """Choose actions; see `Policy.act`. The returned (N, 3) array is reused by the next call."""
+        """Choose actions; see `Policy.act`. The returned (N, A) array is reused by the next call."""
         if self._ticks_left == 0:
             view = self.interface.observe(obs, self._view)
             self._chosen, self._memory = self._remember(view, self._memory, self._rng)
+            self._checked = self.interface.checked(self._chosen)
             self._ticks_left = self._config.decision_ticks
         self._ticks_left -= 1
-        return self.interface.command(self._chosen, obs)
+        return self.interface.carry_out(self._checked, obs)
 
 
 def _forgetful(choose: Choose, rows: ObsArray, memory: Any, rng: np.random.Generator) -> tuple[np.ndarray, Any]:

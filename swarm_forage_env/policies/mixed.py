@@ -71,7 +71,7 @@ class MixedPolicy:
         sizes = part_sizes(self._mixture, spec.n_robots, self._share)
         ends = np.cumsum(sizes).tolist()
         self.part_rows = tuple(slice(end - size, end) for size, end in zip(sizes, ends, strict=True))
-        self._actions: ActionArray = np.zeros((spec.n_robots, 3), np.float32)
+        self._actions: ActionArray = np.zeros((spec.n_robots, spec.action_size), np.float32)
         chances = rng.spawn(len(sizes))
         everyone = zip(self._policies, self.part_rows, chances, sizes, strict=True)
         self._driving: list[tuple[Policy, slice]] = []
@@ -88,7 +88,8 @@ class MixedPolicy:
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Let each part choose the actions of its robots; see `Policy.act`. The array is reused by the next call."""
         for policy, rows in self._driving:
-            self._actions[rows] = policy.act(obs[rows], active[rows])
+            actions = policy.act(obs[rows], active[rows])
+            self._actions[rows, : actions.shape[1]] = actions  # a part without messages says zeros
         self._take_tasks()
         return self._actions
 

@@ -20,7 +20,7 @@ from gymnasium import spaces
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.parsing import parse_json
-from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.contract.policy import COMMANDS, SwarmSpec
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.interface import (
@@ -121,8 +121,9 @@ class ModelPolicy(LearnedPolicy):
         super().reset(spec, rng)
         found, fitting = describe_spaces(self._network), describe_spaces(self.interface)
         columns, n_robots = spec.layout.size, spec.n_robots
-        whole_swarm = (f"Box({n_robots}, {columns})", f"Box({n_robots}, 3)")
-        sees_what_the_environment_shows = fitting == (f"Box({columns})", "Box(3)")
+        acts = COMMANDS + (self.interface.config.message_size or 0)
+        whole_swarm = (f"Box({n_robots}, {columns})", f"Box({n_robots}, {acts})")
+        sees_what_the_environment_shows = fitting == (f"Box({columns})", f"Box({acts})")
         if found == fitting or (found == whole_swarm and sees_what_the_environment_shows):
             return
         name, goes = self._path.name, " to ".join(found)

@@ -53,16 +53,16 @@ class CallablePolicy:
         self.name = name
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
-        """Remember the expected shape of actions."""
-        self._shape = (spec.n_robots, 3)
+        """Remember which shapes of actions fit."""
+        self._shapes = spec.action_shapes
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
         """Return the function's actions, checked for shape; raises ValueError otherwise."""
         actions = np.asarray(self.function(obs), dtype=np.float32)
-        if actions.shape != self._shape:
+        if actions.shape not in self._shapes:
             raise ValueError(
-                f"Expected policy {self.name!r} to return actions with shape (n_robots, 3) = {self._shape}, "
-                f"got {actions.shape}; return one row per robot."
+                f"Expected policy {self.name!r} to return actions with shape (n_robots, 3) = "
+                f"{' or '.join(map(str, self._shapes))}, got {actions.shape}; return one row per robot."
             )
         return actions
 
@@ -71,7 +71,7 @@ def from_callable(function: Callable[[ObsArray], ActionArray], *, name: str | No
     """Wrap `function(obs) -> actions` as a Policy.
 
     Args:
-        function: Takes (N, D) observations, returns (N, 3) actions.
+        function: Takes (N, D) observations, returns (N, 3) actions; with messages, (N, 3 + message_size).
         name: Name under which results are stored; default the function's own name.
     """
     return CallablePolicy(function, name or getattr(function, "__name__", type(function).__name__))

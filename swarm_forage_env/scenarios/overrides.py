@@ -90,6 +90,12 @@ def scenario_of_same_size(scenario: ScenarioConfig, overrides: Mapping[str, Any]
             f"Expected own_sensors to stay {own!r}, the columns that spaces promise, got "
             f"{changed.robots.own_sensors!r}; make another environment."
         )
+    for name in ("neighbours_seen", "message_size"):
+        before, now = getattr(scenario.robots, name), getattr(changed.robots, name)
+        if now != before:
+            raise ConfigError(
+                f"Expected {name} to stay {before}, as spaces promise, got {now}; make another environment."
+            )
     if changed.robots.n_robots != n_robots:
         raise ConfigError(
             f"Expected n_robots to stay {n_robots}, the number of rows that spaces promise, got "

@@ -82,8 +82,8 @@ class LiveRun:
 def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> CompiledPolicy | None:
     """Return a policy, which was reset, for a run without Python between ticks; None where anybody might have a say.
 
-    That is a wrapper other than the recorder, a subclass, a method that was replaced, an own sensor that the policy
-    reads, a mixed swarm, or Chipmunk.
+    That is a wrapper other than the recorder, a subclass, a method that was replaced, neighbours, messages
+    or an own sensor that the policy reads, a mixed swarm, or Chipmunk.
     """
     env = stack.unwrapped
     if hasattr(policy, "part_rows"):  # parts are counted tick by tick
@@ -93,7 +93,7 @@ def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> Compi
         return None
     if "after_step" in vars(stack) or "step_batch" in {*vars(stack), *vars(env)}:
         return None
-    if env.arena.reads_own_sensors:
+    if env.arena.needs_python:
         return None
     return policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
 

@@ -92,7 +92,8 @@ class RunSpec:
 
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
         `physics` is left out where it is the default, so that runs in Chipmunk have the same ids with and without it;
-        so are own sensors, an own reward, obstacles and positions of objects where there are none.
+        so are own sensors, an own reward, neighbours, messages, obstacles and positions of objects where there are
+        none.
         """
         return identity_of({**self._others(), "scenario": _identifying_fields(self.scenario)})
 
@@ -168,6 +169,10 @@ def _identifying_fields(scenario: ScenarioConfig) -> dict[str, Any]:
     for section, name in _LATER_FIELDS:
         if not mapping[section][name]:
             del mapping[section][name]
+    robots = mapping["robots"]
+    for size, range_m in (("neighbours_seen", "neighbour_range_m"), ("message_size", "message_range_m")):
+        if not robots[size]:  # likewise; a range then changes nothing
+            del robots[size], robots[range_m]
     return mapping
 
 

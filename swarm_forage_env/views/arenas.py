@@ -19,6 +19,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env.contract.codes import Counter
+from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
@@ -158,7 +159,8 @@ class ArenaBatch:
         self._returns = np.zeros((n_arenas, self.n_robots), np.float64)
         self._lengths = np.zeros((n_arenas, self.n_robots), np.int32)
         self._n_columns = self.interface.layout.size
-        self._commands = np.zeros((n_arenas, self.n_robots, 3), np.float32)
+        action_size = COMMANDS + plan.scenario.robots.message_size
+        self._commands = np.zeros((n_arenas, self.n_robots, action_size), np.float32)
         self._rows = self._absent, self._present, self._returns, self._lengths
         self._ways: tuple[list[ForagingArena], Rack | None, Settlement | None] | None = None
         self._no_endings = _Endings().joined(self._n_columns)

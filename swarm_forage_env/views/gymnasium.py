@@ -24,8 +24,9 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
     """One agent that sees and steers every robot: the view of single-agent algorithms and of central control.
 
     Observations are (N, d) float32 in [-1, 1], row i = robot i; the columns are those of the parallel environment
-    (`forage_env.layout`), or of the interface (`interface.layout`). Actions are (N, 3) or (N, 2) float32 in [-1, 1], or
-    (N,) whole numbers where the interface has discrete ones. The reward is the sum over robots and over the ticks of
+    (`forage_env.layout`), or of the interface (`interface.layout`). Actions are (N, 3) or (N, 2) float32 in
+    [-1, 1], with further columns where robots send messages, or (N,) whole numbers where the interface has discrete
+    ones. The reward is the sum over robots and over the ticks of
     a decision. An episode terminates when every robot is dead and is truncated at the horizon.
 
     `info["active"]` is (N,) bool, the tasked swarm. With discrete actions, `info["action_mask"]` is (N, number of

@@ -13,6 +13,7 @@ from swarm_forage_env.contract.calls import OPTION_OF_TESTS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, LearnerInterface, chosen_interface
+from swarm_forage_env.policies.kernels.sites import SiteMemory
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
 from swarm_forage_env.scenarios.overrides import field_sections, scenario_of_same_size
 from swarm_forage_env.scenarios.presets import chosen_scenario
@@ -104,6 +105,8 @@ class LearnerSnapshot:
     """State of the generator of the next seeds."""
     agents: tuple[str, ...] = ()
     """Agents of a parallel environment that are left."""
+    memory: SiteMemory | None = None
+    """What robots remember, where the interface lets them."""
 
 
 class LearnerArena:
@@ -149,6 +152,7 @@ class LearnerArena:
         else:
             self._seeds = np.random.default_rng(seed)
         self.env.reset_batch(seed)
+        self.interface.forget()
 
     def step(self, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
         """Carry out a decision: step until its ticks are done or the run ends.
@@ -172,7 +176,7 @@ class LearnerArena:
         return tick
 
     def command(self, actions: np.ndarray) -> ActionArray:
-        """Return the commands of the next tick, (N, 3) in a reused buffer; see `LearnerInterface.command`."""
+        """Return the actions of the next tick, (N, A) in a reused buffer; see `LearnerInterface.command`."""
         return self.interface.command(actions, self.env.last_obs)
 
     def take(self, tick: BatchStep, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
@@ -196,6 +200,7 @@ class LearnerArena:
             overrides=dict(self._overrides),
             seeds=self._seeds.bit_generator.state,
             agents=tuple(agents),
+            memory=self.interface.memory(),
         )
 
     def restore(self, snapshot: LearnerSnapshot) -> None:
@@ -221,6 +226,7 @@ class LearnerArena:
             self._adopt(env)
             self._overrides = dict(snapshot.overrides)
         self._seeds.bit_generator.state = snapshot.seeds
+        self.interface.recall(snapshot.memory)
 
     def observe(self, out: ObsArray | None = None) -> ObsArray:
         """Return what the learner sees now, (N, d): a new array, or `out`."""

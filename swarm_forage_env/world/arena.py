@@ -10,6 +10,7 @@ from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
+from swarm_forage_env.contract.layout import OPTIONAL_SLICES
 from swarm_forage_env.contract.own import OwnSensor, own_sensor
 from swarm_forage_env.contract.policy import CompiledPolicy, layout_for, refused_action, refused_tasks
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
@@ -27,6 +28,7 @@ from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
 from swarm_forage_env.world.kernels.world import World
+from swarm_forage_env.world.neighbourhood import Neighbourhood
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.placement import draw_source, place_all, place_objects, static_cache_centres
 from swarm_forage_env.world.sensors import new_sensors, read_slices
@@ -68,6 +70,8 @@ class ForagingArena:
         self.layout = layout_for(config)
         self.reads = read_slices(reads, self.layout)
         self._own_names = tuple(name for name in config.robots.own_sensors if name in self.reads)
+        further = {*OPTIONAL_SLICES, *config.robots.own_sensors}
+        self._needs_python = not further.isdisjoint(self.reads)
         self._given_reads = reads
         self._snapshots = snapshots
         self._static_caches = len(static_cache_centres(config)) if config.caches == "static" else 0
@@ -110,6 +114,7 @@ class ForagingArena:
         )
         for name in _FUNCTIONS:
             vars(self).pop(name, None)  # those of the run before hold its world
+        self._neighbourhood = Neighbourhood(config.robots, self.layout, self.reads)
         self.has_changed = False
         return self.observe()
 
@@ -127,8 +132,7 @@ class ForagingArena:
     def observe(self) -> ObsArray:
         """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
         self._compiled.observe(self._world)
-        if self._own_names:
-            self._sense_own()
+        self._sense_further()
         return self.obs
 
     @cached_property
@@ -147,8 +151,10 @@ class ForagingArena:
                 )
         return found
 
-    def _sense_own(self) -> None:
-        """Fill in the columns of the user's own sensors; robots that are not in the world sense nothing."""
+    def _sense_further(self) -> None:
+        """Fill in neighbours, messages and the user's own sensors; robots that are not in the world sense nothing."""
+        if self._neighbourhood.is_used:
+            self._neighbourhood.sense(self.swarm, self.obs)
         for sensor in self._own_sensors:
             values = sensor.read(self)
             self.obs[:, self.layout[sensor.name]] = np.where(self.swarm.present[:, None], values, 0.0)
@@ -176,7 +182,7 @@ class ForagingArena:
         The order of a tick stands in `kernels.tick`.
 
         Args:
-            actions: (N, 3) float32, contiguous, in [-1, 1]: left wheel, right wheel, gripper.
+            actions: (N, A) float32, contiguous, in [-1, 1]: left wheel, right wheel, gripper, message.
             wheel_gain: (N, 2) factor on each wheel's limited speed, or None.
             tasks: (N,) int8 `Task` codes, if the policy tells them.
 
@@ -215,7 +221,7 @@ class ForagingArena:
 
         Args:
             outcome: What the compiled part returned, see `kernels.tick`.
-            actions: (N, 3) what it was called with.
+            actions: (N, A) what it was called with; without a message, (N, 3) from compiled policies.
             gain: (N, 2) likewise.
             tasks: (N,) or None, see `step`.
 
@@ -227,8 +233,9 @@ class ForagingArena:
         self.tick, self.has_changed = self.tick + 1, False
         if outcome != DONE:
             self._finish(outcome, actions, tasks)
-        if self._own_names:
-            self._sense_own()
+        if self._needs_python:
+            self._neighbourhood.listen(actions, self.swarm.active)
+            self._sense_further()
 
     def _finish(self, outcome: int, actions: ActionArray, tasks: CodeArray | None) -> None:
         """Do what of a tick compiled code cannot do: more room for pairs of robots, and placing objects."""
@@ -287,9 +294,9 @@ class ForagingArena:
             n_left -= n_done
 
     @property
-    def reads_own_sensors(self) -> bool:
-        """Whether Python is needed in every tick, for sensors of the user."""
-        return bool(self._own_names)
+    def needs_python(self) -> bool:
+        """Whether Python is needed in every tick: for neighbours, messages or sensors of the user."""
+        return self._needs_python
 
     # For `world.rack`
 

@@ -70,7 +70,7 @@ class Rack:
         Args:
             gains: Seat of each arena to be stepped -> (N, 2) factor on the wheels' speeds, or None. The others stay;
                 there may be nothing to step.
-            actions: (B, N, 3) float32, contiguous, for all B seats; see `ForagingArena.step`.
+            actions: (B, N, A) float32, contiguous, for all B seats; see `ForagingArena.step`.
 
         Returns:
             Seat -> why the arena was not stepped: an active robot's action or gain is NaN or infinite.

@@ -8,8 +8,8 @@ from collections.abc import Collection
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import known_name
-from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, ObservationLayout
+from swarm_forage_env._internal.fields import ConfigError, known_name
+from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, MESSAGES, NEIGHBOURS, ObservationLayout
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 from swarm_forage_env.world.kernels.world import Columns, Sensors
@@ -17,17 +17,23 @@ from swarm_forage_env.world.physics import obstacle_rows
 
 PROXIMITY_RANGE_M = 0.1
 """Reach of a proximity beam beyond the body."""
+_SWITCHES = {NEIGHBOURS: "neighbours_seen", MESSAGES: "message_size"}
+"""Slices that only some scenarios have, and the field that gives them."""
 
 
 def read_slices(reads: Collection[str] | None, layout: ObservationLayout) -> tuple[str, ...]:
     """Return the names of the slices that are read: `reads` without conditions, None = all.
 
     Raises:
-        ConfigError: an unknown name.
+        ConfigError: an unknown name, or a slice that this scenario does not have.
     """
     if reads is None:
         return layout.names
     for name in reads:
+        if name in _SWITCHES and name not in layout.names:
+            raise ConfigError(
+                f"Expected a scenario with {name}, which the policy reads, got one without; give it {_SWITCHES[name]}."
+            )
         known_name("entry of reads", name, (*layout.names, LIGHT_IF_CARRYING))
     return tuple("light" if name == LIGHT_IF_CARRYING else name for name in reads)
 

@@ -25,6 +25,7 @@ STACK_ORDER = (
     "Throttle",
     "ActuatorNoise",
     "HandlingCost",
+    "MessageNoise",
     "ForageEnv",
 )
 """The documented stack, outermost first; `SwarmWrapper.stack_position` counts along it."""
@@ -35,7 +36,8 @@ class SwarmWrapper(BaseParallelWrapper):
 
     Hooks of one step, each called once per tick: `before_step` and `gain` from the outermost wrapper inwards, then
     the environment steps, then `observe` and `after_step` from the innermost wrapper outwards. A reset calls
-    `on_reset` and `observe` from the innermost wrapper outwards. Wrappers never rewrite actions. They read the true
+    `on_reset` and `observe` from the innermost wrapper outwards. The wrapper that is stepped calls the hooks of all
+    wrappers inside of it; their own `step_batch` is not called. Wrappers never rewrite actions. They read the true
     state from `self.unwrapped` (`swarm`, `events`, `tick` ...) and change the world only by `set_population` and
     `set_handling_ticks` of `self.unwrapped`.
 
@@ -69,17 +71,20 @@ class SwarmWrapper(BaseParallelWrapper):
                 f"each at most once, is {', '.join(STACK_ORDER)}."
             )
         super().__init__(env)
-        if isinstance(env, SwarmWrapper):
-            env._is_outermost = False
-        self._is_outermost = True
         self.made_from = config
         self._inner = env
         self._unwrapped: ForageEnv = env.unwrapped
+        self._inside: tuple[SwarmWrapper, ...] = env.stack if isinstance(env, SwarmWrapper) else ()
 
     @property
     def unwrapped(self) -> ForageEnv:
         """The ForageEnv at the bottom of the stack."""
         return self._unwrapped  # stored, because every hook of every tick needs it
+
+    @property
+    def stack(self) -> "tuple[SwarmWrapper, ...]":
+        """All wrappers from this one inwards."""
+        return (self, *self._inside)
 
     @property
     def last_obs(self) -> ObsArray:
@@ -112,7 +117,7 @@ class SwarmWrapper(BaseParallelWrapper):
         """Return the wheel gain handed to the next wrapper inwards.
 
         Args:
-            actions: (N, 3) float32, the commands of this step; read only.
+            actions: (N, A) float32, the actions of this step, commands in the first three columns; read only.
             wheel_gain: (N, 2) factors on the left and right wheel speed from the wrappers outside, None = all 1.
                 Write the product into your own array; never change this one.
         """
@@ -159,7 +164,7 @@ class SwarmWrapper(BaseParallelWrapper):
         """Advance the stack by one tick; see `ForageEnv.step_batch`.
 
         Args:
-            actions: (N, 3) float32 in [-1, 1].
+            actions: (N, A) float32 in [-1, 1].
             wheel_gain: (N, 2) factors on the wheel speeds, None = all 1.
             tasks: (N,) int8 `contract.codes.Task` codes, None = the policy has no tasks.
 
@@ -167,36 +172,39 @@ class SwarmWrapper(BaseParallelWrapper):
             ActionError: as `ForageEnv.step_batch`, before any wrapper has done anything. Only a robot that comes back
                 to work in this very tick is looked at later.
         """
-        actions, gain = self._before(actions, wheel_gain)
-        return self._after(self._inner.step_batch(actions, wheel_gain=gain, tasks=tasks), tasks)
+        actions, wheel_gain = self._before(actions, wheel_gain)
+        return self._after(self._unwrapped.step_batch(actions, wheel_gain=wheel_gain, tasks=tasks), tasks)
 
     def begin_step(
         self, actions: ActionArray, wheel_gain: FloatArray | None = None
     ) -> tuple[ActionArray, FloatArray | None]:
         """Do what comes before the arena's step, from here inwards; see `ForageEnv.begin_step`."""
-        return self._inner.begin_step(*self._before(actions, wheel_gain))
+        return self._unwrapped.begin_step(*self._before(actions, wheel_gain))
 
     def end_step(self, tasks: CodeArray | None = None) -> BatchStep:
         """Return the result of a step as seen from here, after the arena's; see `ForageEnv.end_step`."""
-        return self._after(self._inner.end_step(tasks), tasks)
+        return self._after(self._unwrapped.end_step(tasks), tasks)
 
     def _before(self, actions: ActionArray, wheel_gain: FloatArray | None) -> tuple[ActionArray, FloatArray | None]:
-        actions = self.unwrapped.checked_actions(actions)
+        env = self._unwrapped
+        actions = env.checked_actions(actions)
         self._require_reset()
-        if self._is_outermost:  # before any wrapper draws a number or lets a robot die
-            self.unwrapped.refuse_bad_step(actions, wheel_gain)
-        self.before_step()
-        return actions, self.gain(actions, wheel_gain)
+        env.refuse_bad_step(actions, wheel_gain)  # before any wrapper draws a number or lets a robot die
+        for wrapper in self.stack:
+            wrapper.before_step()
+            wheel_gain = wrapper.gain(actions, wheel_gain)
+        return actions, wheel_gain
 
     def _after(self, step: BatchStep, tasks: CodeArray | None) -> BatchStep:
         obs, reward, terminated, truncated = step
-        obs = self._last_obs = self.observe(obs)
-        self.after_step(tasks, terminated, truncated)
+        for wrapper in reversed(self.stack):
+            obs = wrapper._last_obs = wrapper.observe(obs)
+            wrapper.after_step(tasks, terminated, truncated)
         return obs, reward, terminated, truncated
 
     def snapshot(self) -> Snapshot:
         """Return the state of the whole stack; see `ForageEnv.snapshot`."""
-        return self.unwrapped.snapshot_through(self._stack())
+        return self.unwrapped.snapshot_through(self.stack)
 
     def restore(self, snapshot: Snapshot) -> dict[str, Any]:
         """Go back to a snapshot of a whole stack; returns observations per agent. See `ForageEnv.restore`."""
@@ -204,12 +212,8 @@ class SwarmWrapper(BaseParallelWrapper):
 
     def restore_batch(self, snapshot: Snapshot) -> ObsArray:
         """Restore at array level and return the last observations, (N, D) float32; see `ForageEnv.restore_batch`."""
-        self.unwrapped.restore_through(snapshot, self._stack())
+        self.unwrapped.restore_through(snapshot, self.stack)
         return self._last_obs
-
-    def _stack(self) -> list["SwarmWrapper"]:
-        """Return all wrappers from this one inwards."""
-        return [self, *(self._inner._stack() if isinstance(self._inner, SwarmWrapper) else ())]
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)

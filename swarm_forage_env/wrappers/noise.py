@@ -7,23 +7,21 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import known_name, number, one_of, several, table
+from swarm_forage_env._internal.fields import ConfigError, known_name, number, one_of, several, table
 from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.layout import NEIGHBOUR_FIELDS, NEIGHBOURS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.kernels.gaussian import to_normal
-from swarm_forage_env.wrappers.kernels.noise import (
-    noisy_gain,
-    perturb_readings,
-    share_that_sees_obstacles,
-    turn_heading,
-)
+from swarm_forage_env.wrappers.kernels.noise import NOT_NOISY, disturb, noisy_gain, shift_neighbours
 from swarm_forage_env.wrappers.waveform import Signal, Waveform, gather_waveform
 
 NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
 """Groups of sensors that can be noisy, in the order of their columns."""
+NAMED_GROUPS = (NEIGHBOURS,)
+"""Groups that are noisy only where they are named, because few scenarios have them."""
+ALL_GROUPS = (*NOISE_GROUPS, *NAMED_GROUPS)
 POSE_GROUPS = NOISE_GROUPS[4:]
 """Groups that the authors' program leaves exact (quirk `pose_sensors_exact`); the paper speaks of all sensors."""
 DISTRIBUTIONS = ("gaussian", "uniform")
@@ -39,6 +37,20 @@ _UNIFORM_WIDTH = 2.0 * sqrt(3.0)
 """Width of a uniform distribution with standard deviation 1."""
 
 
+def _append_span(spans: list[tuple[int, int, int]], lows: list[float], span: tuple[int, int, int], low: float) -> None:
+    """Append a run of columns, as `kernels.noise.disturb` wants it.
+
+    Where it goes on from the end of the last, it makes that longer, because few long runs are faster.
+    """
+    if spans and lows[-1] == low:
+        start, first, size = spans[-1]
+        if (start + size, first + size) == span[:2]:
+            spans[-1] = start, first, size + span[2]
+            return
+    spans.append(span)
+    lows.append(low)
+
+
 def _is_noisy(sigma: Sigma) -> bool:
     return isinstance(sigma, Waveform) or sigma > 0.0
 
@@ -47,8 +59,9 @@ class SensorNoise(SwarmWrapper):
     """Perturbs what policies see. The rules of the arena and the measure of interference use exact readings.
 
     Unit of sigma: 1 for readings (proximity, light, ground; clamped to [0, 1]), 1 cm/s for wheel speeds and 1 m per
-    axis for positions (both clamped to the ends of their range), 1 rad for the heading, whose angle is perturbed. All
-    other columns stay exact, rows of robots that are not present stay zero.
+    axis for positions (both clamped to the ends of their range), 1 rad for the heading, whose angle is perturbed. Where
+    the group `neighbours` is named, 1 is 1 m forward and left to each neighbour that is seen; nobody is seen wrongly or
+    overlooked. All other columns stay exact, rows of robots that are not present stay zero.
 
     In every tick a number is drawn for each robot and noisy column, whether it is used or not. So a death, the policy's
     choice of slices and the size of sigma do not change the draws of other robots and columns.
@@ -60,12 +73,23 @@ class SensorNoise(SwarmWrapper):
     stack_position: ClassVar[int] = 1
 
     def __init__(self, env: ForageEnv | SwarmWrapper, config: "SensorNoiseConfig") -> None:
-        """Wrap `env`."""
+        """Wrap `env`; raises ConfigError as `reconfigure`."""
         super().__init__(env, config)
+        self._proximity = self.unwrapped.layout.part("proximity").start
+        self._behind_counts = self.unwrapped.scenario.quirks.obstacle_behind_counts
         self.reconfigure(config)
 
     def reconfigure(self, config: "SensorNoiseConfig") -> None:
-        """Go on under another configuration from the next tick on; with other noisy groups, all draws are others."""
+        """Go on under another configuration from the next tick on; with other noisy groups, all draws are others.
+
+        Raises:
+            ConfigError: noise on neighbours where robots see none.
+        """
+        if NEIGHBOURS in config.group_sigmas() and not self.unwrapped.scenario.robots.neighbours_seen:
+            raise ConfigError(
+                "Expected a scenario in which robots see neighbours, for noise on them; give it neighbours_seen, or "
+                "leave the group out."
+            )
         self.made_from = config
         self._is_uniform = config.distribution == "uniform"
         exact = POSE_GROUPS if self.unwrapped.scenario.quirks.pose_sensors_exact else ()
@@ -81,19 +105,24 @@ class SensorNoise(SwarmWrapper):
         lows: list[float] = []
         constant: list[float] = []
         self._varying: list[tuple[slice, Signal]] = []
-        self._heading: tuple[int, int] | None = None
-        for name in (name for name in NOISE_GROUPS if name in sigmas):
+        self._heading = 0, NOT_NOISY
+        self._neighbours: tuple[int, int, int] | None = None
+        for name in (name for name in ALL_GROUPS if name in sigmas):
             part, sigma, first = parts[name], sigmas[name], len(units)
             # Other slices are not read, and the environment does not rewrite them: noise would add up there.
             is_read = part.name in self.unwrapped.arena.reads
             if name == "heading":
                 units.append(1.0)
-                self._heading = (part.start, first) if is_read else None
+                if is_read:
+                    self._heading = part.start, first
+            elif name == NEIGHBOURS:
+                n_seen = part.size // NEIGHBOUR_FIELDS
+                units += [1.0 / part.scale[0]] * (2 * n_seen)
+                self._neighbours = (part.start, first, n_seen) if is_read else None
             else:
                 units += [_NATURAL_UNITS.get(name, 1.0) / scale for scale in part.scale]
                 if is_read:
-                    spans.append((part.start, first, part.size))
-                    lows.append(0.0 if name in _READINGS else -1.0)
+                    _append_span(spans, lows, (part.start, first, part.size), 0.0 if name in _READINGS else -1.0)
             if isinstance(sigma, Waveform):
                 self._varying.append((slice(first, len(units)), sigma.signal(self.unwrapped.scenario.dt_s)))
             constant += [0.0 if isinstance(sigma, Waveform) else sigma] * (len(units) - first)
@@ -110,24 +139,32 @@ class SensorNoise(SwarmWrapper):
 
     def observe(self, obs: ObsArray) -> ObsArray:
         """Perturb `obs` in place."""
-        self._seen = obs
-        if not len(self._factors):
-            return obs
-        centre = _draw(self._rng, self._draws, is_uniform=self._is_uniform)
+        env = self.unwrapped
+        self._rng.random(out=self._draws, dtype=np.float32)
         for columns, signal in self._varying:
-            self._factors[columns] = max(0.0, signal(self.unwrapped.tick)) * self._units[columns]
-        present = self.unwrapped.swarm.present
-        perturb_readings(obs, present, self._draws, centre, self._factors, self._spans, self._lows)
-        if self._heading is not None:
-            turn_heading(obs, present, self._draws, centre, self._factors, *self._heading)
+            self._factors[columns] = max(0.0, signal(env.tick)) * self._units[columns]
+        swarm = env.swarm
+        self._share_that_believes = disturb(
+            obs,
+            swarm.present,
+            swarm.active,
+            self._draws,
+            self._is_uniform,
+            self._factors,
+            self._spans,
+            self._lows,
+            self._heading,
+            self._proximity,
+            self._behind_counts,
+        )
+        if self._neighbours is not None:
+            centre = 0.5 if self._is_uniform else 0.0
+            shift_neighbours(obs, self._draws, centre, self._factors, *self._neighbours)
         return obs
 
     def after_step(self, tasks: CodeArray | None, terminated: BoolArray, truncated: bool) -> None:
         """Count who believes in an obstacle."""
-        env = self.unwrapped
-        behind_counts = env.scenario.quirks.obstacle_behind_counts
-        proximity = env.layout.part("proximity").start
-        self._believing += share_that_sees_obstacles(self._seen, proximity, env.active, behind_counts)
+        self._believing += self._share_that_believes
         self._n_ticks += 1
 
     def interval_columns(self) -> dict[str, float]:
@@ -169,19 +206,11 @@ class ActuatorNoise(SwarmWrapper):
         """Multiply this tick's factors into the gains."""
         if not self._is_noisy:
             return wheel_gain
-        centre = _draw(self._rng, self._draws, is_uniform=self._is_uniform)
+        self._rng.random(out=self._draws, dtype=np.float32)
         factor = max(0.0, self._signal(self.unwrapped.tick + 1)) * (_UNIFORM_WIDTH if self._is_uniform else 1.0)
-        noisy_gain(self._draws, centre, factor, self._unit_gain if wheel_gain is None else wheel_gain, self._gain)
+        outer_gain = self._unit_gain if wheel_gain is None else wheel_gain
+        noisy_gain(self._draws, self._is_uniform, factor, outer_gain, self._gain)
         return self._gain
-
-
-def _draw(rng: np.random.Generator, out: ObsArray, *, is_uniform: bool) -> float:
-    """Fill `out` with standard normal numbers, or with uniform ones in [0, 1); returns their mean."""
-    rng.random(out=out, dtype=np.float32)
-    if is_uniform:
-        return 0.5
-    to_normal(out)
-    return 0.0
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -198,7 +227,7 @@ class SensorNoiseConfig(WrapperConfig):
     sigma: Sigma = 0.0
     """Standard deviation for all of `groups`, in the unit of each."""
     groups: tuple[str, ...] = NOISE_GROUPS
-    """Which of `NOISE_GROUPS` are noisy; kept in that order."""
+    """Which of `ALL_GROUPS` are noisy; kept in that order."""
     sigmas: Mapping[str, Sigma] = field(default_factory=dict, hash=False)
     """Group -> its own standard deviation, instead of `sigma`; the group need not be among `groups`."""
     distribution: str = "gaussian"
@@ -207,12 +236,12 @@ class SensorNoiseConfig(WrapperConfig):
     def __post_init__(self) -> None:
         several("sensor_noise.groups", self.groups, "names of sensors")
         for name in (*self.groups, *table("sensor_noise.sigmas", self.sigmas)):
-            known_name("group of sensors", name, NOISE_GROUPS)
+            known_name("group of sensors", name, ALL_GROUPS)
         _check_sigma("sensor_noise.sigma", self.sigma)
         for name, sigma in self.sigmas.items():
             _check_sigma(f"sensor_noise.sigmas.{name}", sigma)
         one_of("sensor_noise.distribution", self.distribution, DISTRIBUTIONS)
-        object.__setattr__(self, "groups", tuple(name for name in NOISE_GROUPS if name in self.groups))
+        object.__setattr__(self, "groups", tuple(name for name in ALL_GROUPS if name in self.groups))
         object.__setattr__(self, "sigmas", dict(self.sigmas))
 
     def group_sigmas(self) -> dict[str, Sigma]:

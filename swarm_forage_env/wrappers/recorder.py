@@ -200,7 +200,7 @@ class RunRecorder(SwarmWrapper):
         for number, part in enumerate(self._parts, start=1):
             for name, value in part.columns(self._interval_ticks).items():
                 self._contribute(part_column(number, name), value)
-        for wrapper in self._stack()[1:]:
+        for wrapper in self._inside:
             for name, value in wrapper.interval_columns().items():
                 self._contribute(name, value)
         self._interval += 1

@@ -37,6 +37,7 @@ class Throttle(SwarmWrapper):
         scenario = self.unwrapped.scenario
         self.reconfigure(config)
         self._limits = drive_limits(scenario)
+        self._unit_gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
         self._gain: FloatArray = np.ones((scenario.robots.n_robots, 2))
 
     def reconfigure(self, config: "ThrottleConfig") -> None:
@@ -57,9 +58,9 @@ class Throttle(SwarmWrapper):
         self._ticks += 1
         if value <= 0.0:
             return wheel_gain
-        np.copyto(self._gain, 1.0 if wheel_gain is None else wheel_gain)
         carried_object = self.unwrapped.swarm.carried_object
-        throttle(actions, value, self._only_carriers, carried_object, self._limits, self._gain)
+        outer_gain = self._unit_gain if wheel_gain is None else wheel_gain
+        throttle(actions, value, self._only_carriers, carried_object, self._limits, outer_gain, self._gain)
         return self._gain
 
     def interval_columns(self) -> dict[str, float]:

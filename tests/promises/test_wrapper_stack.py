@@ -21,6 +21,7 @@ from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.wrappers.base import STACK_ORDER, WrapperConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig
+from swarm_forage_env.wrappers.messages import MessageNoiseConfig
 from swarm_forage_env.wrappers.noise import ActuatorNoise, ActuatorNoiseConfig, SensorNoise, SensorNoiseConfig
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.registry import WRAPPERS, parse_wrapper, wrapper_config_class, wrappers_from_mapping
@@ -43,6 +44,7 @@ ACTIVE: dict[str, WrapperConfig] = {
     ),
     "actuator_noise": ActuatorNoiseConfig(sigma=0.3, distribution="uniform"),
     "handling_cost": HandlingCostConfig(waveform=Waveform(kind="square", amplitude=2.0, offset=3.0, period_s=3.0)),
+    "message_noise": MessageNoiseConfig(sigma=0.3, loss=0.2),
 }
 """One strong example of each wrapper."""
 
@@ -52,6 +54,7 @@ QUIET: dict[str, WrapperConfig] = {
     "throttle": ThrottleConfig(waveform=Waveform(kind="sine", amplitude=0.0, period_s=10.0)),
     "actuator_noise": ActuatorNoiseConfig(sigma=0.0),
     "handling_cost": HandlingCostConfig(waveform=Waveform(kind="sine", amplitude=0.0, period_s=10.0)),
+    "message_noise": MessageNoiseConfig(),
 }
 """Each wrapper with amplitudes, sigmas and rates of zero."""
 
@@ -67,7 +70,8 @@ each_stack = pytest.mark.parametrize("wrappers", STACKS.values(), ids=STACKS)
 
 
 def world_config(**overrides):
-    options = {"n_robots": ROBOTS, "n_objects": 400, "caches": "dynamic", "walk_probability": 0.01, **overrides}
+    options = {"n_robots": ROBOTS, "n_objects": 400, "caches": "dynamic", "walk_probability": 0.01}
+    options |= {"neighbours_seen": 2, "message_size": 2, "message_range_m": 5.0, **overrides}
     return scenario("warehouse_small", **options)
 
 

@@ -27,12 +27,21 @@ COMPACT_VIEW = Twin(
     "policies/test_interface.py",
     "swarm_forage_env.policies.interface.LearnerInterface.observe",
 )
+SITES = Twin(
+    "site_memory.RobotSites",
+    "policies/test_site_memory.py",
+    "swarm_forage_env.policies.interface.LearnerInterface.observe",
+)
 INTERFERENCE = Twin("sensing.interferes", "world/test_interference.py", "swarm_forage_env.env.ForageEnv.step_batch")
 OBSERVED = Twin("sensing.observe", "world/test_sensors.py", "swarm_forage_env.world.arena.ForagingArena.observe")
 MOTION = Twin("motion.free_motion", "world/test_physics.py", "swarm_forage_env.env.ForageEnv.step_batch")
 INTERACTIONS = Twin(
     "interacting.SlowWorld", "world/test_interactions_twin.py", "swarm_forage_env.world.kernels.interact.serve"
 )
+NEIGHBOURS = Twin(
+    "neighbourhood.neighbours", "world/test_neighbourhood.py", "swarm_forage_env.env.ForageEnv.step_batch"
+)
+MESSAGES = Twin("neighbourhood.heard", "world/test_neighbourhood.py", "swarm_forage_env.env.ForageEnv.step_batch")
 NOISE = Twin("adversity.noisy_row", "wrappers/test_noise.py", "swarm_forage_env.wrappers.noise.SensorNoise.observe")
 
 TWINS = {
@@ -68,6 +77,8 @@ TWINS = {
         "swarm_forage_env.policies.interface.LearnerInterface.command",
     ),
     "swarm_forage_env.policies.kernels.compact.compact_view": COMPACT_VIEW,
+    "swarm_forage_env.policies.kernels.sites.remember_sites": SITES,
+    "swarm_forage_env.policies.kernels.sites.show_sites": SITES,
     "swarm_forage_env.rendering.kernels.shapes.paint_round": Twin(
         "painting.round_share", "rendering/test_paint.py", "swarm_forage_env.rendering.paint.paint_discs"
     ),
@@ -94,6 +105,9 @@ TWINS = {
     "swarm_forage_env.world.kernels.floor.line_of_sight": OBSERVED,
     "swarm_forage_env.world.kernels.interact.serve": INTERACTIONS,
     "swarm_forage_env.world.kernels.interfere.mark": INTERFERENCE,
+    "swarm_forage_env.world.kernels.neighbourhood.hear": MESSAGES,
+    "swarm_forage_env.world.kernels.neighbourhood.say": MESSAGES,
+    "swarm_forage_env.world.kernels.neighbourhood.see_neighbours": NEIGHBOURS,
     "swarm_forage_env.world.kernels.neighbours.bin_robots": OBSERVED,
     "swarm_forage_env.world.kernels.obstacles.hold_outside": Twin(
         "bodies.held_outside", "world/test_obstacles.py", "swarm_forage_env.world.kernels.obstacles.hold_outside"
@@ -106,13 +120,15 @@ TWINS = {
     "swarm_forage_env.world.kernels.walk.walk": Twin(
         "object_walk.walk_slowly", "world/test_object_motion.py", "swarm_forage_env.world.kernels.walk.walk"
     ),
-    "swarm_forage_env.wrappers.kernels.noise.perturb_readings": NOISE,
-    "swarm_forage_env.wrappers.kernels.noise.share_that_sees_obstacles": Twin(
-        "sensing.interferes",
-        "wrappers/test_believed_interference.py",
+    "swarm_forage_env.wrappers.kernels.noise.disturb": NOISE,
+    "swarm_forage_env.wrappers.kernels.noise.garble": Twin(
+        "adversity.garbled", "wrappers/test_messages.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
+    ),
+    "swarm_forage_env.wrappers.kernels.noise.shift_neighbours": Twin(
+        "adversity.shifted_neighbours",
+        "wrappers/test_messages.py",
         "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch",
     ),
-    "swarm_forage_env.wrappers.kernels.noise.turn_heading": NOISE,
     "swarm_forage_env.world.kernels.task_shares.add_task_shares": Twin(
         "task_shares.task_shares",
         "wrappers/test_recorder.py",
@@ -150,7 +166,6 @@ WITHOUT = {
     "tests/study/test_compiled_runs.py",
     "swarm_forage_env.world.kernels.tick.set_out": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.whole": IN_ORDER,
-    "swarm_forage_env.wrappers.kernels.gaussian.to_normal": "compared with the normal distribution function of scipy",
     "swarm_forage_env.wrappers.kernels.noise.noisy_gain": "one product per wheel; by hand in "
     "tests/wrappers/test_noise.py",
 }

@@ -414,9 +414,18 @@ def test_other_algorithms_train(tmp_path, algorithm):
         assert isinstance(result.model.replay_buffer, PresentReplayBuffer)
 
 
-@pytest.mark.parametrize(("algorithm", "interface"), [(PPO, NUMBERED), (PPO, DRIVEN), (DQN, NUMBERED)])
-def test_exported_networks_choose_as_the_model_does(algorithm, interface, tmp_path):
-    env = SwarmVecEnv("warehouse_small", n_robots=30, n_objects=100, interface=interface)
+@pytest.mark.parametrize(
+    ("algorithm", "interface", "fields"),
+    [
+        (PPO, NUMBERED, {}),
+        (PPO, DRIVEN, {}),
+        (PPO, DRIVEN, {"neighbours_seen": 3, "neighbour_range_m": 1.5, "message_size": 2}),
+        (DQN, NUMBERED, {}),
+    ],
+)
+def test_exported_networks_choose_as_the_model_does(algorithm, interface, fields, tmp_path):
+    env = SwarmVecEnv("warehouse_small", n_robots=30, n_objects=100, interface=interface, **fields)
+    interface = env.interface.config
     size = {"buffer_size": 100} if algorithm is DQN else {"n_steps": 8, "batch_size": 240}
     model = algorithm("MlpPolicy", env, seed=3, device="cpu", **size)
     network = export_network(model, interface)

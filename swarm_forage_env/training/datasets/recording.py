@@ -15,7 +15,7 @@ from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, several, 
 from swarm_forage_env._internal.files import check_folder, replacing
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Counter
-from swarm_forage_env.contract.policy import Policy, SwarmSpec
+from swarm_forage_env.contract.policy import COMMANDS, Policy, SwarmSpec
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.learned import LearnedPolicy
@@ -72,7 +72,8 @@ class DatasetPlan:
         n_robots, config = self.spec.scenario.robots.n_robots, self.card.interface
         if self.card.n_actions is not None:
             return (n_robots,)
-        return (n_robots, 2 if config.automatic_gripper else 3)
+        driven = COMMANDS - 1 if config.automatic_gripper else COMMANDS
+        return (n_robots, driven + (config.message_size or 0))
 
     @property
     def run_bytes(self) -> int:
@@ -141,7 +142,9 @@ def _interface_of(spec: RunSpec, world: SwarmSpec) -> InterfaceConfig:
     if not isinstance(policy, LearnedPolicy):
         return InterfaceConfig()
     policy.reset(world, stream_rng(spec.seed, Stream.POLICY))
-    return policy.interface.config
+    config = policy.interface.config
+    # A policy that was trained without messages says none, so its actions have no columns for them.
+    return replace(config, message_size=0) if world.message_size and config.message_size is None else config
 
 
 def record_dataset(
@@ -267,7 +270,8 @@ def _record_run(plan: DatasetPlan, seed: int, folder: Path, tell: Callable[[int]
         for tick in range(config.decision_ticks):
             commands = policy.act(obs, world.active)
             if tick == 0:
-                chunk.actions[row] = policy.chosen if isinstance(policy, LearnedPolicy) else commands
+                is_learned = isinstance(policy, LearnedPolicy)
+                chunk.actions[row] = policy.chosen if is_learned else env.unwrapped.checked_actions(commands)
             tasks = getattr(policy, "task", None)
             obs, rewards, dead, truncated = env.step_batch(commands, tasks=tasks)
             chunk.rewards[row] += rewards

@@ -74,14 +74,14 @@ def note_interface(model: BaseAlgorithm, interface: InterfaceConfig, *, caches: 
         NetworkError: an interface that is not the model's.
     """
     _check_spaces(model, interface)
-    said = replace(interface, own_sensors=interface.sensors)
+    said = replace(interface, own_sensors=interface.own_sensors or ())
     setattr(model, MODEL_NOTE, {"interface": asdict(said), "caches": caches})
 
 
 def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
     _check_spaces(model, interface)
     note = getattr(model, MODEL_NOTE, None)
-    said = replace(interface, own_sensors=interface.sensors)
+    said = replace(interface, own_sensors=interface.own_sensors or ())
     if note is not None and interface_from_mapping({"own_sensors": (), **note["interface"]}) != said:
         raise NetworkError(
             f"Expected the interface that the model was trained with, {note['interface']}, got {interface}."
@@ -91,7 +91,11 @@ def _check_interface(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
 def _check_spaces(model: BaseAlgorithm, interface: InterfaceConfig) -> None:
     """Refuse an interface with other observations or actions than the model has."""
     # Any scenario with these sensors will do: all have the same columns and actions.
-    spec = SwarmSpec.of(scenario("warehouse_small", own_sensors=interface.sensors))
+    shown: dict[str, Any] = {"own_sensors": interface.own_sensors or ()}
+    for name in ("neighbours_seen", "neighbour_range_m", "message_size"):
+        if getattr(interface, name) is not None:
+            shown[name] = getattr(interface, name)
+    spec = SwarmSpec.of(scenario("warehouse_small", **shown))
     bound = LearnerInterface(interface, spec)
     wanted, found = describe_spaces(bound), describe_spaces(model)
     if wanted != found:

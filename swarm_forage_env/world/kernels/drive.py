@@ -56,6 +56,9 @@ def drive(
         is_command = math.isfinite(actions[i, 0]) and math.isfinite(actions[i, 1]) and math.isfinite(actions[i, 2])
         if not (is_command and math.isfinite(wheel_gain[i, 0] + wheel_gain[i, 1])):
             return i
+        for k in range(3, actions.shape[1]):  # what the robot says
+            if not math.isfinite(actions[i, k]):
+                return i
     scale, max_speed, max_difference, wheel_base = limits[0], limits[1], limits[2], limits[3]
     for i in range(facing.shape[0]):
         left = 0.0

@@ -178,7 +178,7 @@ def whole_each(
         worlds_at: (B, 52) addresses of the arrays of each world.
         bodies_are_at: (B, 14) addresses of the arrays of its bodies.
         seats: Which of the B worlds are stepped.
-        actions: (B, N, 3), and all others as in `tick.whole` with one more dimension in front.
+        actions: (B, N, A), and all others as in `tick.whole` with one more dimension in front.
         wheel_gain: (B, N, 2).
         ticks: (B,) int64.
         look_first: (B,) bool.

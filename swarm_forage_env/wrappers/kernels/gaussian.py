@@ -20,20 +20,44 @@ _TAIL = ndtri((np.arange(_CELLS) + 0.5) / _CELLS**2).astype(np.float32)
 
 _N_CELLS = np.float32(_CELLS)
 _HALF_STEP = np.float32(0.5 / _CELLS)
-_LAST = _CELLS - 1
+_FIRST_EDGE, _LAST_EDGE = np.float32(1.0), np.float32(_CELLS - 1)
 
 
 @kernel
 def to_normal(draws: ObsArray) -> None:
     """Turn uniform draws (N, C), multiples of 2^-24 in [0, 1), into standard normal ones, in place."""
     for i in range(draws.shape[0]):
-        for k in range(draws.shape[1]):
-            place = draws[i, k] * _N_CELLS
-            cell = int(place)
-            within = place - np.float32(cell)
-            if 0 < cell < _LAST:
-                draws[i, k] = _EDGES[cell] + (_EDGES[cell + 1] - _EDGES[cell]) * (within + _HALF_STEP)
-            elif cell == 0:
-                draws[i, k] = _TAIL[int(within * _N_CELLS)]
-            else:
-                draws[i, k] = -_TAIL[_LAST - int(within * _N_CELLS)]
+        _row_to_normal(draws[i])
+
+
+@kernel
+def _row_to_normal(draws: ObsArray) -> None:
+    has_outermost = False
+    for k in range(draws.shape[0]):
+        place = draws[k] * _N_CELLS
+        has_outermost |= (place < _FIRST_EDGE) | (place >= _LAST_EDGE)
+    if has_outermost:
+        for k in range(draws.shape[0]):
+            draws[k] = _normal(draws[k])
+    else:  # without branches the processor works on many at a time
+        for k in range(draws.shape[0]):
+            place = draws[k] * _N_CELLS
+            cell = np.uint32(place)
+            draws[k] = _between_edges(cell, place - np.float32(cell))
+
+
+@kernel
+def _normal(draw: np.float32) -> np.float32:
+    place = draw * _N_CELLS
+    cell = np.uint32(place)
+    within = place - np.float32(cell)
+    if place < _FIRST_EDGE:
+        return _TAIL[np.uint32(within * _N_CELLS)]
+    if place >= _LAST_EDGE:
+        return -_TAIL[np.uint32(_CELLS - 1) - np.uint32(within * _N_CELLS)]
+    return _between_edges(cell, within)
+
+
+@kernel
+def _between_edges(cell: np.uint32, within: np.float32) -> np.float32:
+    return _EDGES[cell] + (_EDGES[cell + np.uint32(1)] - _EDGES[cell]) * (within + _HALF_STEP)

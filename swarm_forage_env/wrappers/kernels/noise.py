@@ -4,81 +4,56 @@ import math
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import sees_obstacle
-from swarm_forage_env.contract.layout import RING_SENSORS
+from swarm_forage_env.contract.layout import NEIGHBOUR_FIELDS, RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.wrappers.kernels.gaussian import to_normal
+
+NOT_NOISY = -1
+"""In place of a column of draws: the heading is exact."""
 
 
 @kernel
-def perturb_readings(
+def disturb(
     obs: ObsArray,
     present: BoolArray,
+    active: BoolArray,
     draws: ObsArray,
-    centre: float,
+    is_uniform: bool,
     factors: ObsArray,
     spans: IntArray,
     lows: ObsArray,
-) -> None:
-    """Add (draw - centre) * factor to columns of present robots and clamp them to [low, 1].
+    heading: tuple[int, int],
+    proximity: int,
+    behind_counts: bool,
+) -> float:
+    """Add noise to the rows of present robots, and return the share of active robots that then see an obstacle.
 
     Args:
         obs: (N, D), edited.
         present: (N,) robots with a body; other rows stay as they are.
-        draws: (N, C) float32, one per robot and noisy column.
-        centre: Mean of the draws.
+        active: (N,) robots at work.
+        draws: (N, C) float32 uniform in [0, 1), one per robot and noisy column; edited.
+        is_uniform: Whether noise is uniform; else draws are made normal first.
         factors: (C,) float32, observation units per unit of draw.
         spans: (S, 3) runs of neighbouring columns: first in obs, first in draws, length.
         lows: (S,) float32, lower clamp of each run.
-    """
-    one = lows.dtype.type(1.0)
-    shift = lows.dtype.type(centre)
-    for i in range(obs.shape[0]):
-        if not present[i]:
-            continue
-        for span in range(spans.shape[0]):
-            low = lows[span]
-            size = spans[span, 2]
-            row = obs[i, spans[span, 0] : spans[span, 0] + size]
-            draw = draws[i, spans[span, 1] : spans[span, 1] + size]
-            factor = factors[spans[span, 1] : spans[span, 1] + size]
-            for k in range(size):
-                row[k] = min(one, max(low, row[k] + (draw[k] - shift) * factor[k]))
-
-
-@kernel
-def turn_heading(
-    obs: ObsArray, present: BoolArray, draws: ObsArray, centre: float, factors: ObsArray, start: int, column: int
-) -> None:
-    """Turn the heading (cos, sin), two columns of `obs` from `start`, by (draw - centre) * factor rad.
-
-    `column` is the heading's column in `draws` (N, C) and `factors` (C,); the rest as in `perturb_readings`.
-    """
-    factor = float(factors[column])
-    for i in range(obs.shape[0]):
-        if not present[i]:
-            continue
-        angle = (float(draws[i, column]) - centre) * factor
-        cos = math.cos(angle)
-        sin = math.sin(angle)
-        x = float(obs[i, start])
-        y = float(obs[i, start + 1])
-        # Rounding to float32 can leave the unit circle by one unit in the last place.
-        obs[i, start] = min(1.0, max(-1.0, x * cos - y * sin))
-        obs[i, start + 1] = min(1.0, max(-1.0, x * sin + y * cos))
-
-
-@kernel
-def share_that_sees_obstacles(obs: ObsArray, proximity: int, active: BoolArray, behind_counts: bool) -> float:
-    """Share of active robots that see an obstacle in (N, D) observations; 0 if no robot is active.
-
-    Args:
-        obs: (N, D).
+        heading: First column of the heading in obs, and its column in draws, or `NOT_NOISY`.
         proximity: First column of the proximity readings.
-        active: (N,) robots at work.
         behind_counts: Quirk `obstacle_behind_counts`.
+
+    Returns:
+        The share, 0 if no robot is active.
     """
+    if not is_uniform:
+        to_normal(draws)
+    centre = 0.5 if is_uniform else 0.0
     n_active = 0
     n_seeing = 0
     for i in range(obs.shape[0]):
+        if present[i]:
+            _perturb_readings(obs[i], draws[i], centre, factors, spans, lows)
+            if heading[1] != NOT_NOISY:
+                _turn_heading(obs[i], heading[0], (float(draws[i, heading[1]]) - centre) * float(factors[heading[1]]))
         if active[i]:
             n_active += 1
             n_seeing += sees_obstacle(obs[i, proximity : proximity + RING_SENSORS], behind_counts)
@@ -86,8 +61,94 @@ def share_that_sees_obstacles(obs: ObsArray, proximity: int, active: BoolArray, 
 
 
 @kernel
-def noisy_gain(draws: ObsArray, centre: float, factor: float, outer_gain: FloatArray, wheel_gain: FloatArray) -> None:
-    """Write outer_gain * (1 + (draw - centre) * factor) into `wheel_gain`; all (N, 2)."""
+def _perturb_readings(
+    obs: ObsArray, draws: ObsArray, centre: float, factors: ObsArray, spans: IntArray, lows: ObsArray
+) -> None:
+    """Add (draw - centre) * factor to columns of one row and clamp them to [low, 1]; arguments as in `disturb`."""
+    one = lows.dtype.type(1.0)
+    shift = lows.dtype.type(centre)
+    for span in range(spans.shape[0]):
+        low = lows[span]
+        size = spans[span, 2]
+        row = obs[spans[span, 0] : spans[span, 0] + size]
+        draw = draws[spans[span, 1] : spans[span, 1] + size]
+        factor = factors[spans[span, 1] : spans[span, 1] + size]
+        for k in range(size):
+            row[k] = min(one, max(low, row[k] + (draw[k] - shift) * factor[k]))
+
+
+@kernel
+def _turn_heading(obs: ObsArray, start: int, angle: float) -> None:
+    """Turn the heading (cos, sin), two columns of one row from `start`, by an angle in rad."""
+    cos = math.cos(angle)
+    sin = math.sin(angle)
+    x = float(obs[start])
+    y = float(obs[start + 1])
+    # Rounding to float32 can leave the unit circle by one unit in the last place.
+    obs[start] = min(1.0, max(-1.0, x * cos - y * sin))
+    obs[start + 1] = min(1.0, max(-1.0, x * sin + y * cos))
+
+
+@kernel
+def shift_neighbours(
+    obs: ObsArray, draws: ObsArray, centre: float, factors: ObsArray, start: int, first: int, n_seen: int
+) -> None:
+    """Add (draw - centre) * factor to forward and left of neighbours that are there, and clamp them to [-1, 1].
+
+    Args:
+        obs: (N, D), edited.
+        draws: (N, C) float32, two per robot and neighbour.
+        centre: Mean of the draws.
+        factors: (C,) float32.
+        start: First column of the neighbours in `obs`.
+        first: Their first column in `draws` and `factors`.
+        n_seen: Neighbours that an observation has room for.
+    """
+    one = draws.dtype.type(1.0)
+    shift = draws.dtype.type(centre)
+    for i in range(obs.shape[0]):
+        for k in range(n_seen):
+            at = start + NEIGHBOUR_FIELDS * k
+            if obs[i, at + NEIGHBOUR_FIELDS - 1] > 0.0:
+                for axis in range(2):
+                    column = first + 2 * k + axis
+                    noise = (draws[i, column] - shift) * factors[column]
+                    obs[i, at + axis] = min(one, max(-one, obs[i, at + axis] + noise))
+
+
+@kernel
+def garble(obs: ObsArray, draws: ObsArray, lost: FloatArray, start: int, factor: float, loss: float, size: int) -> None:
+    """Disturb what was heard: some robots hear nothing, the others get draw * factor added, clamped to [-1, 1].
+
+    Args:
+        obs: (N, D), edited.
+        draws: (N, m) float32, standard normal.
+        lost: (N,) uniform in [0, 1).
+        start: First column of the messages in `obs`.
+        factor: Standard deviation of the noise.
+        loss: Probability that a robot hears nothing.
+        size: m, numbers of a message; the column after them is 1 where anything was heard.
+    """
+    one = draws.dtype.type(1.0)
+    scale = draws.dtype.type(factor)
+    for i in range(obs.shape[0]):
+        if obs[i, start + size] == 0.0:
+            continue
+        if lost[i] < loss:
+            obs[i, start : start + size + 1] = 0.0
+            continue
+        for k in range(size):
+            obs[i, start + k] = min(one, max(-one, obs[i, start + k] + draws[i, k] * scale))
+
+
+@kernel
+def noisy_gain(
+    draws: ObsArray, is_uniform: bool, factor: float, outer_gain: FloatArray, wheel_gain: FloatArray
+) -> None:
+    """Write outer_gain * (1 + noise * factor) into `wheel_gain`; all (N, 2). The first two as in `disturb`."""
+    if not is_uniform:
+        to_normal(draws)
+    centre = 0.5 if is_uniform else 0.0
     for i in range(draws.shape[0]):
         for wheel in range(2):
             wheel_gain[i, wheel] = outer_gain[i, wheel] * (1.0 + (float(draws[i, wheel]) - centre) * factor)

@@ -12,16 +12,19 @@ def throttle(
     only_carriers: bool,
     carried_object: IntArray,
     limits: FloatArray,
+    outer_gain: FloatArray,
     wheel_gain: FloatArray,
 ) -> None:
-    """Multiply the gains (N, 2) of both wheels by 1 - strength |l + r| / (|l| + |r|).
+    """Write the gains `outer_gain` of both wheels, times 1 - strength |l + r| / (|l| + |r|), into `wheel_gain`; (N, 2).
 
     l and r are the limited commands in m/s. The factor is 1 - strength with both wheels forward and 1 on the spot, and
-    continuous in between. Gains of robots with standing wheels do not change; with `only_carriers`, those of robots
-    without an object do not change either. `limits` as in `world.kernels.drive.drive`.
+    continuous in between. Gains of robots with standing wheels stay; with `only_carriers`, those of robots without an
+    object stay, too. `limits` as in `world.kernels.drive.drive`.
     """
     scale, max_speed, max_difference = limits[0], limits[1], limits[2]
     for i in range(carried_object.shape[0]):
+        wheel_gain[i, 0] = outer_gain[i, 0]
+        wheel_gain[i, 1] = outer_gain[i, 1]
         if only_carriers and carried_object[i] < 0:
             continue
         left, right = limit_command(float(actions[i, 0]), float(actions[i, 1]), scale, max_speed, max_difference)

@@ -1,0 +1,302 @@
+"""Neighbours and messages: what robots perceive of each other."""
+
+import copy
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from swarm_forage_env import ConfigError, ForageEnv, load_policy, parallel_env, plan_run, run_one, scenario
+from swarm_forage_env.checks import check_policy
+from swarm_forage_env.contract.policy import ActionError, SwarmSpec
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
+from swarm_forage_env.policies.registry import from_callable
+from swarm_forage_env.training.datasets.layout import chunk_file
+from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
+from swarm_forage_env.views.arenas import ArenaBatch
+from swarm_forage_env.views.learner_arena import plan_arena
+from tests.reference import neighbourhood
+from tests.support.branches import pickled
+
+N_ROBOTS = 12
+SMALL: dict[str, Any] = {
+    "n_robots": N_ROBOTS,
+    "n_objects": 60,
+    "width_m": 8.0,
+    "height_m": 6.0,
+    "nest_centre_m": (1.0, 3.0),
+    "nest_size_m": (0.8, 2.0),
+    "start_margin_m": 0.6,
+    "physics": "compiled",
+}
+BOTH: dict[str, Any] = {"neighbours_seen": 3, "neighbour_range_m": 1.3, "message_size": 2, "message_range_m": 1.7}
+
+
+def made(**fields: Any) -> ForageEnv:
+    return ForageEnv(scenario("warehouse_small", **(SMALL | fields)))
+
+
+def drawn(ticks: int, size: int = 5) -> np.ndarray:
+    """Actions with which robots drive on, grasp and say something, some of it out of range."""
+    actions = np.random.default_rng(0).uniform(-1.2, 1.2, (ticks, N_ROBOTS, size)).astype(np.float32)
+    actions[..., :3] = np.abs(actions[..., :3])
+    return actions
+
+
+def part(env: ForageEnv, name: str) -> np.ndarray:
+    return env.last_obs[:, env.layout[name]]
+
+
+@pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
+def test_they_are_those_of_the_twins_and_change_nothing_else(physics):
+    plain, env = made(physics=physics), made(physics=physics, **BOTH)
+    assert env.layout.names == (*plain.layout.names, "neighbours", "messages")
+    plain.reset_batch(seed=1)
+    env.reset_batch(seed=1)
+    assert not part(env, "messages").any(), "nobody has said anything yet"
+    rng, met = np.random.default_rng(1), set[float]()
+    for tick, actions in enumerate(drawn(40)):
+        if tick % 10 == 5:  # some are away, some in repair
+            present = rng.random(N_ROBOTS) < 0.8
+            active = present & (rng.random(N_ROBOTS) < 0.8)
+            for each in (plain, env):
+                each.set_population(active=active, present=present)
+        plain.step_batch(np.ascontiguousarray(actions[:, :3]))
+        env.step_batch(actions)
+        np.testing.assert_array_equal(env.last_obs[:, : plain.layout.size], plain.last_obs)
+        seen = [neighbourhood.neighbours(env, robot) for robot in range(N_ROBOTS)]
+        heard = [neighbourhood.heard(env, robot, actions[:, 3:]) for robot in range(N_ROBOTS)]
+        np.testing.assert_allclose(part(env, "neighbours"), seen, atol=1e-6)
+        np.testing.assert_allclose(part(env, "messages"), heard, atol=1e-6)
+        met.update(part(env, "neighbours")[:, 3::4].sum(axis=1).tolist())
+    assert met == {0.0, 1.0, 2.0, 3.0}
+
+
+def test_cargo_is_seen_and_the_nearest_comes_first():
+    env = made(**BOTH)
+    env.reset_batch(seed=1)
+    env.swarm.position[:] = np.column_stack([np.full(N_ROBOTS, 7.0), 0.4 + 0.4 * np.arange(N_ROBOTS)])
+    env.swarm.position[:3] = (3.0, 3.0), (3.5, 3.0), (3.0, 3.4)
+    env.swarm.facing[0] = 0.0, 1.0
+    env.swarm.carried_object[1] = 5
+    env.arena.observe()
+    forward, left = 0.4 / 1.3, -0.5 / 1.3
+    expected = [forward, 0.0, 0.0, 1.0, 0.0, left, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]
+    np.testing.assert_allclose(part(env, "neighbours")[0], expected, atol=1e-6)
+
+
+def test_of_equally_near_robots_the_lower_row_comes_first():
+    env = made(neighbours_seen=2)
+    env.reset_batch(seed=1)
+    env.swarm.position[:] = np.column_stack([np.full(N_ROBOTS, 7.0), 0.4 + 0.4 * np.arange(N_ROBOTS)])
+    env.swarm.position[:4] = (3.0, 3.0), (3.5, 3.0), (2.5, 3.0), (3.0, 3.5)
+    env.swarm.facing[0] = 1.0, 0.0
+    env.arena.observe()
+    np.testing.assert_allclose(part(env, "neighbours")[0, [0, 1, 4, 5]], [0.25, 0.0, -0.25, 0.0], atol=1e-6)
+
+
+def test_policies_without_messages_say_zeros():
+    env = made(**BOTH | {"message_range_m": 20.0})
+    env.reset_batch(seed=1)
+    env.step_batch(np.zeros((N_ROBOTS, 3), np.float32))
+    np.testing.assert_array_equal(part(env, "messages"), np.tile([0.0, 0.0, 1.0], (N_ROBOTS, 1)))
+
+
+def test_a_message_that_is_not_finite_is_refused():
+    env = made(**BOTH)
+    env.reset_batch(seed=1)
+    actions = np.zeros((N_ROBOTS, 5), np.float32)
+    actions[4, 3] = np.nan
+    with pytest.raises(ActionError, match="robot_4; the world was not stepped"):
+        env.step_batch(actions)
+    with pytest.raises(ActionError, match=r"\(n_robots, 3 \+ message_size\) = \(12, 5\), got \(12, 4\)"):
+        env.step_batch(np.zeros((N_ROBOTS, 4), np.float32))
+    assert env.tick == 0
+
+
+@pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
+def test_runs_of_scripted_policies_stay_what_they_are(physics):
+    small = scenario("warehouse_small", **SMALL | {"physics": physics}, horizon_s=40.0, interval_s=20.0)
+    rich = scenario("warehouse_small", **SMALL | {"physics": physics} | BOTH, horizon_s=40.0, interval_s=20.0)
+    plain, spoken = (run_one(plan_run(world, "crw", seed=1)).columns() for world in (small, rich))
+    for name, column in plain.items():
+        np.testing.assert_array_equal(column, spoken[name])
+
+
+def test_identities_are_those_of_before_where_they_are_off():
+    ids = [
+        plan_run(scenario("warehouse_small", **fields), "crw", seed=1).run_id
+        for fields in (
+            {},
+            {"neighbour_range_m": 3.0, "message_range_m": 3.0},
+            {"neighbours_seen": 1},
+            {"message_size": 1},
+        )
+    ]
+    assert ids[0] == ids[1]
+    assert len(set(ids)) == 3
+
+
+def test_snapshots_and_copies_go_on_alike():
+    env, actions = made(**BOTH), drawn(12)
+    env.reset_batch(seed=1)
+    for action in actions[:6]:
+        env.step_batch(action)
+    snapshot, twin, other = env.snapshot(), copy.deepcopy(env), pickled(env)
+    seen = [env.step_batch(action)[0].copy() for action in actions[6:]]
+    env.restore_batch(snapshot)
+    for branch in (env, twin, other):
+        np.testing.assert_array_equal(seen, [branch.step_batch(action)[0].copy() for action in actions[6:]])
+    env.restore_batch(snapshot)
+    assert part(env, "messages").any()
+    before = env.last_obs.copy()
+    np.testing.assert_array_equal(env.arena.observe(), before)
+
+
+class OneByOne(ArenaBatch):
+    """Arenas that are never taken together."""
+
+    def _chosen_ways(self) -> tuple[None, None]:
+        return None, None
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("observation", "wrappers"), [("full", ()), ("compact", ("message_noise:sigma=0.1,loss=0.2",))]
+)
+def test_arenas_together_are_what_they_are_alone(observation, wrappers):
+    world = scenario("warehouse_small", **SMALL | BOTH)
+    plan = plan_arena(world, {}, interface={"observation": observation}, wrappers=wrappers, max_cycles=12)
+    batches = ArenaBatch(plan, 2), OneByOne(plan, 2)
+    first = [batch.reset([3, 4], [None, None])[0] for batch in batches]
+    np.testing.assert_array_equal(*first)
+    assert batches[0]._chosen_ways()[0] is not None
+    for actions in drawn(20).reshape(10, 2 * N_ROBOTS, 5):
+        together, alone = (batch.step(actions) for batch in batches)
+        np.testing.assert_array_equal(together.obs, alone.obs)
+        np.testing.assert_array_equal(together.rewards, alone.rewards)
+    assert together.obs[:, -1].any()
+
+
+@pytest.mark.parametrize("observation", ["full", "compact"])
+def test_learners_see_and_say_them_through_every_view(observation):
+    fields: dict[str, Any] = {**SMALL, **BOTH, "interface": {"observation": observation}}
+    dicts = parallel_env("warehouse_small", **fields)
+    rows = gymnasium.make_vec("swarm_forage/warehouse_small-v1", **fields)
+    joint = gymnasium.make("swarm_forage/warehouse_small-v1", **fields)
+    size = {"full": 111, "compact": 23}[observation] + 12 + 3
+    assert dicts.action_space("robot_0").shape == rows.single_action_space.shape == (5,)
+    assert joint.action_space.shape == (N_ROBOTS, 5)
+    first = [np.stack(list(dicts.reset(seed=3)[0].values())), rows.reset(seed=3)[0], joint.reset(seed=3)[0]]
+    actions = np.clip(drawn(1)[0], -1.0, 1.0)
+    stepped = [
+        np.stack(list(dicts.step(dict(zip(dicts.possible_agents, actions, strict=True)))[0].values())),
+        rows.step(actions)[0],
+        joint.step(actions)[0],
+    ]
+    for seen in (first, stepped):
+        assert seen[0].shape == (N_ROBOTS, size)
+        np.testing.assert_array_equal(seen[0], seen[1])
+        np.testing.assert_array_equal(seen[0], seen[2])
+    assert stepped[0][:, -1].any()
+    assert (stepped[0][:, -3:-1] != 0.0).any(), "what is heard are not only zeros"
+
+
+def test_an_automatic_gripper_leaves_wheels_and_message():
+    interface = {"observation": "compact", "automatic_gripper": True, "decision_ticks": 2}
+    env = parallel_env("warehouse_small", **SMALL, **BOTH, interface=interface)
+    env.reset(seed=1)
+    assert env.action_space("robot_0").shape == (4,)
+    spec = SwarmSpec.of(scenario("warehouse_small", **SMALL | BOTH))
+    bound = LearnerInterface(env.interface.config, spec)
+    obs = made(**BOTH).reset_batch(seed=1)
+    said = bound.command(np.tile(np.float32([0.1, 0.2, 0.3, 0.4]), (N_ROBOTS, 1)), obs)
+    np.testing.assert_array_equal(said[:, [0, 1, 3, 4]], np.tile(np.float32([0.1, 0.2, 0.3, 0.4]), (N_ROBOTS, 1)))
+
+
+def test_trained_policies_run_where_there_are_messages():
+    env = made(**BOTH)
+    policy = load_policy("ppo_warehouse_small")
+    policy.reset(env.swarm_spec, np.random.default_rng(1))
+    actions = policy.act(env.reset_batch(seed=1), env.active)
+    assert not actions[:, 3:].any()
+    env.step_batch(actions)
+    mixed = load_policy("mixed:ppo_warehouse_small=4,crw=rest")
+    mixed.reset(env.swarm_spec, np.random.default_rng(1))
+    assert not mixed.act(env.last_obs, env.active)[:, 3:].any()
+
+
+def test_a_policy_says_what_it_needs():
+    shown = InterfaceConfig(observation="compact").for_scenario(scenario("warehouse_small", **BOTH))
+    assert (shown.neighbours_seen, shown.neighbour_range_m, shown.message_size) == (3, 1.3, 2)
+    for fields, words in (
+        ({}, r"got none; give the scenario neighbours_seen=3 and neighbour_range_m=1\.3"),
+        ({**BOTH, "neighbour_range_m": 2.0}, r"forward, left / 2 m.*neighbour_range_m=1\.3"),
+        ({**BOTH, "message_size": 1}, r"messages of 2 numbers, .* got 1; give the scenario message_size=2"),
+    ):
+        with pytest.raises(ConfigError, match=words):
+            LearnerInterface(shown, SwarmSpec.of(scenario("warehouse_small", **fields)))
+    with pytest.raises(ConfigError, match=r"a scenario with neighbours, which the policy reads, .* neighbours_seen"):
+        ForageEnv(scenario("warehouse_small"), reads=shown.reads)
+    blind = InterfaceConfig(neighbours_seen=0, message_size=0).for_scenario(scenario("warehouse_small", **BOTH))
+    assert blind.sensors == ()
+
+
+def test_an_interface_can_be_said_in_words():
+    said = {"neighbours_seen": 3, "neighbour_range_m": "1.3", "message_size": 2}
+    assert interface_from_mapping(said) == InterfaceConfig(neighbours_seen=3, neighbour_range_m=1.3, message_size=2)
+    with pytest.raises(ConfigError, match=r"interface\.neighbour_range_m.*'far'"):
+        interface_from_mapping({"neighbour_range_m": "far"})
+
+
+def test_a_data_set_has_the_columns_of_messages(tmp_path):
+    world = scenario("warehouse_small", **SMALL | BOTH, horizon_s=2.0, interval_s=2.0)
+    for policy, size in (("random", 5), ("ppo_warehouse_small", None)):
+        plan = plan_dataset(plan_run(world, policy), [3])
+        record_dataset(plan, tmp_path / policy)
+        with np.load(chunk_file(tmp_path / policy, 3, 0)) as chunk:
+            assert chunk["actions"].shape[2:] == (() if size is None else (size,))
+            assert chunk["observations"].shape[2] == len(plan.card.columns)
+            assert "messages" in plan.card.columns or size is None
+
+
+def test_numbered_actions_carry_no_message():
+    with pytest.raises(ConfigError, match=r"'continuous' for messages of 2 numbers, got 'discrete'.*message_size=0"):
+        parallel_env("warehouse_small", **BOTH, interface={"actions": "discrete"})
+    interface = {"actions": "discrete", "message_size": 0}
+    env = parallel_env("warehouse_small", **SMALL, **BOTH, interface=interface)
+    assert "messages" not in env.interface.layout.names
+    env.reset(seed=1)
+    env.step(dict.fromkeys(env.agents, 1))
+
+
+def test_a_policy_may_speak():
+    speaker = from_callable(lambda obs: np.full((len(obs), 5), 0.5, np.float32), name="speaker")
+    check_policy(speaker, scenario("warehouse_small", **SMALL | BOTH), ticks=30)
+    wrong = from_callable(lambda obs: np.zeros((len(obs), 4), np.float32))
+    wrong.reset(SwarmSpec.of(scenario("warehouse_small", **SMALL | BOTH)), np.random.default_rng(0))
+    with pytest.raises(ValueError, match=r"\(12, 3\) or \(12, 5\), got \(12, 4\)"):
+        wrong.act(np.zeros((N_ROBOTS, 5), np.float32), np.ones(N_ROBOTS, bool))
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"neighbours_seen": -1}, "robots.neighbours_seen"),
+        ({"neighbours_seen": 65}, "from 0 to 64"),
+        ({"neighbour_range_m": 0.0}, "robots.neighbour_range_m"),
+        ({"message_size": 1.5}, "robots.message_size"),
+        ({"message_range_m": -1.0}, "robots.message_range_m"),
+    ],
+)
+def test_fields_are_checked(fields, words):
+    with pytest.raises(ConfigError, match=words):
+        scenario("warehouse_small", **fields)
+
+
+def test_a_reset_keeps_the_spaces():
+    env = parallel_env("warehouse_small", **SMALL, **BOTH, interface={})
+    env.reset(options={"scenario": {"neighbour_range_m": 1.3, "message_range_m": 3.0}})
+    with pytest.raises(ConfigError, match="message_size to stay 2, as spaces promise, got 3"):
+        env.reset(options={"scenario": {"message_size": 3}})
