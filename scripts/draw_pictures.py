@@ -23,9 +23,14 @@ PICTURES = {
     "warehouse_small_dpo.png": ("warehouse_small", "dpo", 300.0, 900, "dark"),
     "warehouse_small_ppo.png": ("warehouse_small", "ppo_warehouse_small", 900.0, 900, "dark"),
     "warehouse_quad_dpo.png": ("warehouse_quad", "dpo", 300.0, 700, "dark"),
+    "obstacles_crw.png": ("warehouse_small", "crw", 300.0, 700, "dark"),
     "warehouse_small_light.png": ("warehouse_small", "stochm", 300.0, 900, "light"),
 }
 """File -> scenario, policy, the time in s at which the picture is taken, its width in pixels, and its theme."""
+FIELDS = {
+    "obstacles_crw.png": {"obstacles": ((14.0, 0.2, 14.4, 6.0), (14.0, 10.0, 14.4, 15.8), (20.0, 7.0, 21.0, 9.0))}
+}
+"""File -> scenario fields that are not those of the preset."""
 WINDOWS = {"window.png": "dark", "window_light.png": "light"}
 """File -> theme of the window."""
 WINDOW_S = 600.0
@@ -35,7 +40,9 @@ SAMPLE_S = 1.0
 
 def draw(file: str, scenario_name: str, policy_name: str, time_s: float, size_px: int, theme: str) -> None:
     """Run a policy with seed 0 and draw the arena as it is at `time_s`."""
-    world = plan_run(scenario(scenario_name), policy_name).scenario  # with the caches that the policy is made for
+    world = plan_run(
+        scenario(scenario_name, **FIELDS.get(file, {})), policy_name
+    ).scenario  # with the caches that the policy is made for
     policy = load_policy(policy_name)
     run = LiveRun(build_env(world), policy, 0)
     env = run.forage_env

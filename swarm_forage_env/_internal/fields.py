@@ -153,6 +153,19 @@ def pair(where: str, value: Any) -> None:
         number(f"{where}[{index}]", part, above=0.0)
 
 
+def pairs(where: str, value: Any) -> None:
+    """Refuse what is no tuple of tuples (x, y) of numbers > 0; it may be empty."""
+    if not isinstance(value, tuple):
+        raise ConfigError(f"Expected {where} to be a tuple of places (x, y), got {shown(value)}.")
+    for index, part in enumerate(_parts(value)):
+        pair(f"{where}[{index}]", part)
+
+
+def as_tuples(value: Any) -> Any:
+    """Return lists, the only sequences of TOML and JSON, as the tuples of configurations, and all else as it is."""
+    return tuple(map(as_tuples, cast("list[Any]", value))) if isinstance(value, list) else value
+
+
 def shares(where: str, value: Any) -> None:
     """Refuse what is no tuple of positive numbers that sum to 1."""
     parts = _parts(value)

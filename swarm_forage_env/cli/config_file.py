@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.fields import ConfigError, table
+from swarm_forage_env._internal.fields import ConfigError, as_tuples, table
 from swarm_forage_env._internal.parsing import parse_toml
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
@@ -31,4 +31,4 @@ def read_config(path: Path) -> "tuple[dict[str, Any], tuple[WrapperConfig, ...]]
         raise ConfigError(f"Cannot use {path}: {error.strerror or error}.") from error
     except ValueError as error:
         raise ConfigError(f"Cannot use {path}: {error}") from error
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()}, wrappers
+    return {name: as_tuples(value) for name, value in fields.items()}, wrappers

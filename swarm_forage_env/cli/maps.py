@@ -74,7 +74,7 @@ def write_maps(every: "Sequence[FloorMaps]", picture: Path, *, per: str = "", ow
     for one in every:
         one.write(picture.with_suffix(f".{as_file_name(one.label)}.npz"))
     columns = {name: (what, f"{unit}, per {per}" if per else unit) for name, (what, unit) in MEANINGS.items()}
-    rows = [(one.label, one.arrays, one.is_difference, one.size_m) for one in every]
+    rows = [(one.label, one.arrays, one.is_difference, one.size_m, one.obstacles_m) for one in every]
     try:
         draw_maps(picture, rows, columns, own_scales=own_scales)
     except ImportError:

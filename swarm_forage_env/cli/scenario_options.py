@@ -4,7 +4,7 @@ import dataclasses
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin
+from typing import Any, TypeVar, get_origin
 
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env._internal.spelling import suggestion
@@ -12,7 +12,7 @@ from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.policies.mixture import leading_mixture
 from swarm_forage_env.policies.registry import split_interface
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.overrides import field_types
+from swarm_forage_env.scenarios.overrides import field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.sizing import checked_density
 from swarm_forage_env.study.spec import RunSpec, plan_run
@@ -22,6 +22,10 @@ from swarm_forage_env.wrappers.registry import parse_wrapper
 _FIELD = re.compile(r"[a-z_]+=[^/\\]*")
 _Number = TypeVar("_Number", int, float)
 
+_EXAMPLES = {
+    "obstacles": "boxes such as 10,4,11,12 or 10,4,11,12+20,4,21,12 (x low, y low, x high, y high in m)",
+    "object_positions_m": "places such as 10,4 or 10,4+20,4 (x, y in m)",
+}
 _TRUTH = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 
@@ -161,18 +165,13 @@ def parse_setting(word: str) -> tuple[str, Any]:
 def _parse_value(name: str, text: str, kind: Any) -> Any:
     try:
         if get_origin(kind) is tuple:
-            parts, kinds = text.split(","), get_args(kind)
-            if kinds[0] is str:
-                return tuple(name for part in parts if (name := part.strip()))
-            if kinds[-1] is Ellipsis:
-                kinds = kinds[:1] * len(parts)
-            return tuple(part_kind(part) for part_kind, part in zip(kinds, parts, strict=True))
+            return parse_tuple(text, kind)
         if kind is bool:
             return _TRUTH[text.lower()]
         return kind(text)
     except (KeyError, ValueError) as error:
         words = {bool: "true or false", int: "a whole number", float: "a number"}
-        wanted = words.get(kind, "numbers separated by commas, like its default")
+        wanted = words.get(kind, _EXAMPLES.get(name, "numbers separated by commas, like its default"))
         raise ConfigError(f"Expected {name} to be {wanted}, got {text!r}.") from error
 
 

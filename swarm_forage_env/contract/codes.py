@@ -57,7 +57,9 @@ class Task(IntEnum):
 CELL_EMPTY = -1
 """Floor code of a cell that holds nothing. Codes >= 0 are the row of the free object lying there."""
 CELL_NEST = -2
-CELL_CACHE = -3
+CELL_OBSTACLE = -3
+"""Floor code of a cell that an obstacle keeps free of objects."""
+CELL_CACHE = -4
 """Floor code of cache slot 0; slot k paints its cells with CELL_CACHE - k."""
 
 

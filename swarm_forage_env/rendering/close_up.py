@@ -126,6 +126,8 @@ def _draw_ground(canvas: Canvas, lens: _Lens, scenario: ScenarioConfig, caches: 
         )
         paint_box(canvas, (left, top, right, bottom), lens.palette.floor)
     paint_box(canvas, lens.box(arena.nest_box_m), lens.palette.nest, NEST_OPACITY)
+    for obstacle in arena.obstacles:
+        paint_box(canvas, lens.box(obstacle), lens.palette.wall)
     half = scenario.cache_side_cells * CELL_M / 2
     for x, y in (caches.cell[caches.alive] + 0.5) * CELL_M:
         box = lens.box((x - half, y - half, x + half, y + half))

@@ -36,7 +36,6 @@ from swarm_forage_env.rendering.view import (
     text_height,
 )
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.regions import source_boxes
 from swarm_forage_env.scenarios.units import CELL_M, WALL_M
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
@@ -158,12 +157,14 @@ def _canvases(scenario: ScenarioConfig, size_px: int, theme: str) -> Canvases:
     )
     nest = view.box(arena.nest_box_m)
     if scenario.objects.placement != "power_law":  # its clusters are drawn anew in each run
-        for cells in source_boxes(scenario.objects.placement, *arena.n_cells):
+        for cells in scenario.source_cells:
             x_low, y_low, x_high, y_high = (CELL_M * cell for cell in cells)
             paint_box(canvas, view.box((x_low, y_low, x_high, y_high)), view.palette.source, SOURCE_OPACITY)
         paint_box(canvas, nest, view.palette.floor)
     paint_box(canvas, nest, view.palette.nest, NEST_OPACITY)
     paint_frame(canvas, nest, max(1.0, 1.5 * view.unit), view.palette.nest)
+    for box in arena.obstacles:
+        paint_box(canvas, view.box(box), view.palette.wall)
     lights = view.pixels(np.asarray(arena.lights_m)[:, :2])
     paint_glows(canvas, lights, 26.0 * view.unit, view.palette.light, 0.5)
     paint_discs(canvas, lights, max(1.5, 3.0 * view.unit), view.palette.light)
@@ -274,6 +275,8 @@ def _draw_symbol(canvas: Canvas, palette: Palette, name: str, x: float, y: float
     elif name == "nest":
         paint_box(canvas, box, palette.nest, NEST_OPACITY)
         paint_frame(canvas, box, 1.0, palette.nest)
+    elif name == "obstacle":
+        paint_box(canvas, box, palette.wall)
     else:
         paint_box(canvas, box, palette.cache, CACHE_OPACITY)
         paint_frame(canvas, box, 1.0, palette.cache)

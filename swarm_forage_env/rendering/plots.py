@@ -11,6 +11,8 @@ from swarm_forage_env.contract.types import FloatArray
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
 """Okabe-Ito palette: told apart by readers with any colour vision."""
+_OBSTACLE = {"facecolor": "white", "edgecolor": "black", "hatch": "////", "linewidth": 0.5}
+"""Hatched: neither a map nor a difference has that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +109,11 @@ def draw_trainings(
     figure.savefig(path, dpi=150)
 
 
-MapRow: TypeAlias = tuple[str, Mapping[str, FloatArray], bool, tuple[float, float]]
-"""Label; arrays (ny, nx) by name, row = y from below; whether they are differences; extent of the floor in m."""
+Box: TypeAlias = tuple[float, float, float, float]
+"""x low, y low, x high, y high, m."""
+MapRow: TypeAlias = tuple[str, Mapping[str, FloatArray], bool, tuple[float, float], Sequence[Box]]
+"""Label; arrays (ny, nx) by name, row = y from below; whether they are differences; extent of the floor in m; the boxes on
+it, which are hatched."""
 
 
 def draw_maps(
@@ -128,13 +133,14 @@ def draw_maps(
         ImportError: matplotlib is not installed.
     """
     from matplotlib.figure import Figure
+    from matplotlib.patches import Rectangle
 
     shape = rows[0][3][1] / rows[0][3][0]
     width, height = 4.4, 3.5 * shape + 0.9
     figure = Figure(figsize=(width * len(columns), height * len(rows)), layout="constrained")
     panels = figure.subplots(len(rows), len(columns), squeeze=False)
     bar = min(1.0, 1.2 * shape)  # as long as a panel is high
-    for (label, arrays, is_difference, size_m), line in zip(rows, panels, strict=True):
+    for (label, arrays, is_difference, size_m, obstacles), line in zip(rows, panels, strict=True):
         alike = [row for row in rows if row[2] == is_difference]
         for (name, (what, unit)), axes in zip(columns.items(), line, strict=True):
             top = _map_top([arrays[name]] if own_scales else [row[1][name] for row in alike])
@@ -142,6 +148,8 @@ def draw_maps(
             image = axes.imshow(
                 arrays[name], origin="lower", extent=(0, size_m[0], 0, size_m[1]), vmin=low, vmax=top, cmap=colours
             )
+            for x_low, y_low, x_high, y_high in obstacles:
+                axes.add_patch(Rectangle((x_low, y_low), x_high - x_low, y_high - y_low, **_OBSTACLE))
             axes.set_title(f"{_unread(label)}\n{what}", fontsize=9)
             axes.set_xlabel("x [m]", fontsize=7)
             axes.set_ylabel("y [m]", fontsize=7)

@@ -169,6 +169,8 @@ def legend_rows(scenario: ScenarioConfig, width: int, scale: float) -> list[list
     if scenario.objects.placement != "power_law":
         names.append("source")
     names.append("nest")
+    if scenario.arena.obstacles:
+        names.append("obstacle")
     if scenario.caches != "none":
         names.append("cache")
     text_px = text_height(width / _REFERENCE_PX)

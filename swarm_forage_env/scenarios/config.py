@@ -12,9 +12,19 @@ from typing import Any, TypeVar, cast
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.obstacles import Rectangle, blocked_cells, check_obstacles, covered_area_m2
 from swarm_forage_env.scenarios.performance import quantity
 from swarm_forage_env.scenarios.quirks import Quirks
-from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, cache_centre_box, capacity, distributable_box
+from swarm_forage_env.scenarios.regions import (
+    PLACEMENTS,
+    POSITIONS,
+    Box,
+    cache_centre_box,
+    capacity,
+    distributable_box,
+    overlap_cells,
+    source_boxes,
+)
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, EAST_WALL_M, WALL_M, WHEEL_SCALE_MPS
 
 CACHE_KINDS = ("none", "static", "dynamic")
@@ -56,6 +66,8 @@ class ArenaConfig:
     nest_centre_m: tuple[float, float]
     nest_size_m: tuple[float, float]
     """The nest is snapped to whole cells."""
+    obstacles: tuple[Rectangle, ...] = ()
+    """Boxes (x low, y low, x high, y high) in m that robots cannot enter (`scenarios.obstacles`)."""
 
     def __post_init__(self) -> None:
         for name, extent in (("width_m", self.width_m), ("height_m", self.height_m)):
@@ -82,6 +94,7 @@ class ArenaConfig:
             f"Expected the nest inside the {self.width_m} x {self.height_m} m arena, got centre "
             f"{self.nest_centre_m} and size {self.nest_size_m}.",
         )
+        check_obstacles(self.obstacles, self.width_m, self.height_m, self.nest_box_m)
 
     @property
     def n_cells(self) -> tuple[int, int]:
@@ -176,7 +189,9 @@ class ObjectConfig:
 
     n_objects: int
     placement: str
-    """One of `regions.PLACEMENTS`."""
+    """One of `regions.PLACEMENTS`, or `regions.POSITIONS`."""
+    object_positions_m: tuple[tuple[float, float], ...] = ()
+    """With placement "positions": places (x, y) in m; an object lies on the cell around one of them."""
     walk_probability: float = 0.0
     """Probability p_rw that a free object takes a one-cell step, per object and tick."""
     pickup_ticks: int = 1
@@ -186,7 +201,13 @@ class ObjectConfig:
 
     def __post_init__(self) -> None:
         fields.whole("objects.n_objects", self.n_objects, at_least=1)
-        fields.one_of("objects.placement", self.placement, PLACEMENTS)
+        fields.one_of("objects.placement", self.placement, (*PLACEMENTS, POSITIONS))
+        fields.pairs("objects.object_positions_m", self.object_positions_m)
+        _require(
+            bool(self.object_positions_m) == (self.placement == POSITIONS),
+            f"Expected objects.object_positions_m with placement {POSITIONS!r}, and only with it, got "
+            f"{len(self.object_positions_m)} positions with {self.placement!r}.",
+        )
         fields.number("objects.walk_probability", self.walk_probability, at_least=0.0, at_most=1.0)
         for name in ("pickup_ticks", "drop_ticks"):
             fields.whole(f"objects.{name}", getattr(self, name), at_least=1, at_most=MAX_HANDLING_TICKS)
@@ -312,28 +333,41 @@ class ScenarioConfig:
     def _check_room_for_robots(self) -> None:
         margin, radius, n_robots = self.robots.start_margin_m, self.robots.radius_m, self.robots.n_robots
         width, height = self.arena.width_m - 2 * margin, self.arena.height_m - 2 * margin
+        obstacles = self.arena.obstacles
         _require(
             width > 0 and height > 0,
             f"Expected an arena larger than twice robots.start_margin_m = {margin} m, got "
             f"{self.arena.width_m} x {self.arena.height_m} m; lower the margin or enlarge the arena.",
         )
         disc = math.pi * radius**2
-        most = int(MAX_DISC_SHARE * width * height / disc)
+        starts = margin, margin, self.arena.width_m - margin, self.arena.height_m - margin
+        covered = covered_area_m2(starts, obstacles, radius) if obstacles else 0.0
+        most = int(MAX_DISC_SHARE * (width * height - covered) / disc)
+        besides = f" less {covered:.1f} m^2 for obstacles" if covered else ""
         _require(
             n_robots <= most,
-            f"Expected at most {most} robots in a start area of {width:.1f} x {height:.1f} m (discs may cover "
+            f"Expected at most {most} robots in a start area of {width:.1f} x {height:.1f} m{besides} (discs may cover "
             f"{MAX_DISC_SHARE:.0%} of it), got {n_robots}; use a larger arena or fewer robots.",
         )
 
     def _check_room_for_objects(self) -> None:
         if self.objects.placement == "power_law":
             return  # clusters are drawn at reset, which raises when they cannot hold the objects
-        room = _capacity(self.objects.placement, self.arena)
+        taken = (self.arena.nest_cells, *self.obstacle_cells)
+        for place, cell in zip(self.objects.object_positions_m, self._cells_of_positions, strict=True):
+            _require(
+                bool(overlap_cells(cell, self.arena.distributable_cells))
+                and not any(overlap_cells(cell, box) for box in taken),
+                f"Expected objects.object_positions_m between 15 % and 85 % of each axis, clear of nest and obstacles, "
+                f"got {place}.",
+            )
+        room = _capacity(self.source_cells, self.arena.n_cells, taken)
+        besides = ", or move obstacles" if self.arena.obstacles else ""
         _require(
             self.objects.n_objects <= room,
             f"Expected at most {room} objects for placement {self.objects.placement!r} in "
             f"{self.arena.width_m} x {self.arena.height_m} m (one per free cell of the source), "
-            f"got {self.objects.n_objects}; ask for fewer objects or a larger arena.",
+            f"got {self.objects.n_objects}; ask for fewer objects or a larger arena{besides}.",
         )
 
     def _check_room_for_caches(self) -> None:
@@ -346,6 +380,21 @@ class ScenarioConfig:
             f"got a side of {self.cache_side_cells * CELL_M:.1f} m, which their centres also keep from the border; "
             f"lower cache.side_share to {math.floor(1000 * most / longer) / 1000:g}, or choose a wider arena."
         )
+
+    @property
+    def obstacle_cells(self) -> tuple[Box, ...]:
+        """Cells that obstacles keep free of objects, half-open."""
+        return tuple(blocked_cells(box, *self.arena.n_cells, self.robots.radius_m) for box in self.arena.obstacles)
+
+    @property
+    def source_cells(self) -> tuple[Box, ...]:
+        """Cells of the source regions, half-open; power-law clusters are drawn at reset (`regions.source_boxes`)."""
+        return self._cells_of_positions or source_boxes(self.objects.placement, *self.arena.n_cells)
+
+    @property
+    def _cells_of_positions(self) -> tuple[Box, ...]:
+        cells = (tuple(math.floor(at * CELLS_PER_M) for at in place) for place in self.objects.object_positions_m)
+        return tuple((x, y, x + 1, y + 1) for x, y in cells)
 
     @property
     def horizon_ticks(self) -> int:
@@ -409,8 +458,8 @@ def whole_intervals(scenario: ScenarioConfig, horizon_ticks: int | None = None) 
 
 
 @lru_cache(maxsize=64)
-def _capacity(placement: str, arena: ArenaConfig) -> int:
-    return capacity(placement, *arena.n_cells, arena.nest_cells)
+def _capacity(sources: tuple[Box, ...], n_cells: tuple[int, int], taken: tuple[Box, ...]) -> int:
+    return capacity(sources, *n_cells, taken)
 
 
 SECTIONS: dict[str, type] = {
@@ -446,10 +495,8 @@ def from_mapping(config_class: type[_C], mapping: Mapping[str, Any], *, where: s
         nested = SECTIONS.get(key)
         if nested is not None and isinstance(value, Mapping):
             values[key] = from_mapping(nested, cast("Mapping[str, Any]", value), where=f"{where}{key}.")
-        elif isinstance(value, list):
-            values[key] = tuple(cast("list[Any]", value))
         else:
-            values[key] = value
+            values[key] = fields.as_tuples(value)
     missing = [
         name
         for name, item in items.items()

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
@@ -23,6 +23,28 @@ def field_types() -> dict[str, Any]:
     hints = {section: get_type_hints(section_class) for section, section_class in SECTIONS.items()}
     hints[""] = get_type_hints(ScenarioConfig)
     return {name: hints[section][name] for name, section in field_sections().items()}
+
+
+def parse_tuple(text: str, kind: Any) -> tuple[Any, ...]:
+    """Return the tuple that a text stands for, by its type; an empty text is an empty tuple where there can be one.
+
+    Example: "1.6,8" for a pair of numbers; "10,4,11,12+20,4,21,12" for any number of boxes.
+
+    Args:
+        text: Entries between commas. Of a tuple of tuples: tuples between plus signs.
+        kind: Type of a scenario field, such as `tuple[float, float]`.
+
+    Raises:
+        ValueError: another number of entries, or an entry of another type.
+    """
+    kinds = get_args(kind)
+    is_nested = get_origin(kinds[0]) is tuple
+    words = [word.strip() for word in text.split("+" if is_nested else ",")]
+    if kinds[-1] is Ellipsis:
+        words = [word for word in words if word]
+        kinds = kinds[:1] * len(words)
+    pieces = zip(words, kinds, strict=True)
+    return tuple(parse_tuple(word, part) if is_nested else part(word) for word, part in pieces)
 
 
 def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:

@@ -4,6 +4,7 @@ A box is (x low, y low, x high, y high) in cells, half-open: x low <= x < x high
 Integer arithmetic throughout, because 0.2 m and the shares below are not exact in binary.
 """
 
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import numpy as np
@@ -11,6 +12,8 @@ import numpy as np
 Box: TypeAlias = tuple[int, int, int, int]
 
 PLACEMENTS = ("single_source", "dual_source", "quad_source", "random", "power_law")
+POSITIONS = "positions"
+"""The placement with places of one's own instead of regions by rule."""
 
 
 def distributable_box(nx: int, ny: int) -> Box:
@@ -19,7 +22,7 @@ def distributable_box(nx: int, ny: int) -> Box:
 
 
 def source_boxes(placement: str, nx: int, ny: int) -> tuple[Box, ...]:
-    """Return the source regions of a placement on an nx x ny grid.
+    """Return the source regions of a placement on an nx x ny grid; `POSITIONS` has those of its scenario instead.
 
     Power-law clusters are drawn at reset; for them the answer is the whole distributable range.
     The bands are 0.75/0.85 and 0.25/0.85 of the upper distributable index, as in the paper's study; like there, the
@@ -62,14 +65,13 @@ def overlap_cells(a: Box, b: Box) -> int:
     return max(0, min(a[2], b[2]) - max(a[0], b[0])) * max(0, min(a[3], b[3]) - max(a[1], b[1]))
 
 
-def capacity(placement: str, nx: int, ny: int, nest: Box) -> int:
-    """Number of objects that fit the source regions when the nest cells are left free.
+def capacity(sources: Iterable[Box], nx: int, ny: int, taken: Iterable[Box]) -> int:
+    """Number of objects that fit the source regions when the cells of `taken`, such as the nest, are left free.
 
     Regions of the quad source overlap in their corners; those cells count once.
     """
     is_source = np.zeros((ny, nx), np.bool_)
-    for x_low, y_low, x_high, y_high in source_boxes(placement, nx, ny):
-        is_source[y_low:y_high, x_low:x_high] = True
-    x_low, y_low, x_high, y_high = nest
-    is_source[y_low:y_high, x_low:x_high] = False
+    for boxes, is_free in ((sources, True), (taken, False)):
+        for x_low, y_low, x_high, y_high in boxes:
+            is_source[y_low:y_high, x_low:x_high] = is_free
     return int(np.count_nonzero(is_source))

@@ -8,10 +8,11 @@ from typing import Any
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.obstacles import stretched
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M
 
-ARENA_FIELDS = ("width_m", "height_m", "nest_centre_m", "nest_size_m")
+ARENA_FIELDS = ("width_m", "height_m", "nest_centre_m", "nest_size_m", "obstacles")
 """What a density decides, and what therefore cannot be given beside it."""
 
 
@@ -31,7 +32,7 @@ def arena_at_density(config: ScenarioConfig, density: float, n_robots: int) -> d
     """Return the fields of the smallest arena in the proportions of `config` that holds a swarm at a density.
 
     The sides are whole cells in exactly the same ratio, so that strips and caches keep their shapes. Each edge of the
-    nest lies on the line between cells nearest to its place in proportion.
+    nest lies on the line between cells nearest to its place in proportion. Obstacles keep their places and shares.
 
     Args:
         config: Gives the ratio of the sides and the place of the nest.
@@ -55,6 +56,7 @@ def arena_at_density(config: ScenarioConfig, density: float, n_robots: int) -> d
         "height_m": unit_y * factor / CELLS_PER_M,
         "nest_centre_m": ((x_low + x_high) / 2 / CELLS_PER_M, (y_low + y_high) / 2 / CELLS_PER_M),
         "nest_size_m": ((x_high - x_low) / CELLS_PER_M, (y_high - y_low) / CELLS_PER_M),
+        "obstacles": stretched(config.arena.obstacles, factor / common, factor / common),
     }
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.scenarios.obstacles import Rectangle
 from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.study.replay.frames import Replay, Status
 
@@ -38,6 +39,8 @@ class FloorMaps:
     arrays: Mapping[str, FloatArray]
     """Name, as in `MEANINGS` -> (ny, nx), row = y from below."""
     is_difference: bool = False
+    obstacles_m: tuple[Rectangle, ...] = ()
+    """Boxes on the floor; of a difference, those of the first."""
 
     def minus(self, other: "FloorMaps") -> "FloorMaps":
         """Return what is more here than in `other`, square by square.
@@ -113,6 +116,7 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
         side_m=side_m,
         size_m=(arena.width_m, arena.height_m),
         n_robots=replay.scenario.robots.n_robots,
+        obstacles_m=arena.obstacles,
         arrays={
             "density": count(position_m[active]) * of_frames,
             "interference": count(position_m[active & replay.has(Status.INTERFERING)]) * of_frames,

@@ -31,6 +31,13 @@ if TYPE_CHECKING:
 RUN_ID_DIGITS = 16
 """Hexadecimal digits of a run_id: 64 bits, so that a million runs collide with probability 3e-8."""
 _MAX_SEED = 2**63 - 1
+_LATER_FIELDS = (
+    ("robots", "own_sensors"),
+    ("reward", "own_reward"),
+    ("arena", "obstacles"),
+    ("objects", "object_positions_m"),
+)
+"""Fields that are no part of an identity where they are empty: runs without them are those of before there were any."""
 _KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion_value", "seed")
 
 
@@ -87,7 +94,8 @@ class RunSpec:
 
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
         `physics` is left out where it is the default, so that runs in Chipmunk have the same ids with and without it;
-        so are own sensors, an own reward, neighbours and messages where there are none.
+        so are own sensors, an own reward, neighbours, messages, obstacles and positions of objects where there are
+        none.
         """
         return identity_of({**self._others(), "scenario": _identifying_fields(self.scenario)})
 
@@ -160,8 +168,8 @@ def _identifying_fields(scenario: ScenarioConfig) -> dict[str, Any]:
     del mapping["performance"]
     if mapping["physics"] == "chipmunk":
         del mapping["physics"]
-    for section, name in (("robots", "own_sensors"), ("reward", "own_reward")):
-        if not mapping[section][name]:  # runs without them are those of before there were any
+    for section, name in _LATER_FIELDS:
+        if not mapping[section][name]:
             del mapping[section][name]
     robots = mapping["robots"]
     for size, range_m in (("neighbours_seen", "neighbour_range_m"), ("message_size", "message_range_m")):

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_args, get_origin
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_origin
 
 from swarm_forage_env._internal.fields import (
     ConfigError,
+    as_tuples,
     check_file_name,
     known_keys,
     known_name,
@@ -24,7 +25,7 @@ from swarm_forage_env._internal.fields import (
 )
 from swarm_forage_env.policies.mixture import SHARE, has_open_share
 from swarm_forage_env.policies.registry import policy_label
-from swarm_forage_env.scenarios.overrides import field_sections, field_types
+from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import READINGS
 from swarm_forage_env.study.experiments import CRITERIA, UNDISTURBED, Experiment, swarms_of_sizes, wrappers_at
@@ -107,14 +108,19 @@ def _kind(value: Any) -> str:
 
 
 def list_word(entries: Sequence[Any]) -> str:
-    """Return a list as a place on an axis: ["nest_distance", "x"] is "nest_distance,x", [] is "none"."""
+    """Return a list as a place on an axis: ["nest_distance", "x"] is "nest_distance,x", [] is "none".
+
+    Lists in it are joined by plus signs: [[1, 2], [3, 4]] is "1,2+3,4".
+    """
+    if any(isinstance(entry, list | tuple) for entry in entries):
+        return "+".join(map(list_word, entries))
     return ",".join(map(str, entries)) or NOTHING
 
 
 @cache
-def _list_fields() -> dict[str, type]:
-    """Scenario fields that hold a list -> the type of its entries."""
-    return {name: get_args(kind)[0] for name, kind in field_types().items() if get_origin(kind) is tuple}
+def _list_fields() -> dict[str, Any]:
+    """Scenario fields that hold a list -> their type."""
+    return {name: kind for name, kind in field_types().items() if get_origin(kind) is tuple}
 
 
 def _field_value(name: str, value: Value) -> Any:
@@ -122,9 +128,8 @@ def _field_value(name: str, value: Value) -> Any:
     kind = _list_fields().get(name)
     if kind is None:
         return value
-    words = [] if value == NOTHING else [word.strip() for word in str(value).split(",")]
     try:
-        return tuple(kind(word) for word in words)
+        return parse_tuple("" if value == NOTHING else str(value), kind)
     except ValueError as error:
         raise ConfigError(f"Expected lists of numbers on axis {name}, got {value!r}.") from error
 
@@ -463,7 +468,7 @@ def _with_value(mapping: Mapping[str, Any], path: Sequence[str], value: Value) -
 
 def plain_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return scenario fields as scenarios take them: lists of a file become tuples."""
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
+    return {name: as_tuples(value) for name, value in settings.items()}
 
 
 def _plain(policy: StudyPolicy) -> dict[str, Any]:

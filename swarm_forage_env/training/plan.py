@@ -7,7 +7,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, known_keys, number, one_of, table, text, whole
+from swarm_forage_env._internal.fields import (
+    MOST_SEEDS,
+    ConfigError,
+    as_tuples,
+    known_keys,
+    number,
+    one_of,
+    table,
+    text,
+    whole,
+)
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json, parse_toml
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
@@ -273,4 +283,4 @@ def _known(config_class: type, mapping: Mapping[str, Any], where: str) -> dict[s
 
 def _tuples(mapping: Mapping[str, Any]) -> dict[str, Any]:
     """Turn lists, the only sequences of TOML and JSON, into the tuples of configurations."""
-    return {key: tuple(value) if isinstance(value, list) else value for key, value in mapping.items()}
+    return {key: as_tuples(value) for key, value in mapping.items()}

@@ -15,6 +15,7 @@ from typing import Any
 from swarm_forage_env._internal.fields import ConfigError, known_keys, table
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.obstacles import stretched
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.scenarios.units import CELLS_PER_M
@@ -209,7 +210,7 @@ def _stages(
 
 
 def small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
-    """Return fields that shrink the arena to SMALL_START of its size with the nest in proportion.
+    """Return fields that shrink the arena to SMALL_START of its size with nest and obstacles in proportion.
 
     Only along x for a single and a dual source, which lie beside the nest: the other axis is no way home.
     """
@@ -226,4 +227,5 @@ def small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
         "height_m": height_m,
         "nest_centre_m": (centre_x * shares[0], centre_y * shares[1]),
         "nest_size_m": (size_x * shares[0], size_y * shares[1]),
+        **({"obstacles": stretched(arena.obstacles, *shares)} if arena.obstacles else {}),
     }

@@ -1,7 +1,7 @@
 """Robots as discs in compiled code: what `world.physics` does with Chipmunk, with the same model of contact.
 
-Chipmunk is for bodies of every kind; this is for equal discs in a rectangle, and takes the neighbours that proximity
-sensing found. Only robots that can touch something within the tick are moved in substeps.
+Chipmunk is for bodies of every kind; this is for equal discs among boxes in a rectangle, and takes the neighbours that
+proximity sensing found. Only robots that can touch something within the tick are moved in substeps.
 `swarm_forage_env/world/kernels/bodies.py` says how contacts are resolved.
 """
 
@@ -15,7 +15,7 @@ from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.kernels.bodies import WALLS, BodyState, move_bodies, tell_poses
-from swarm_forage_env.world.physics import PARKED_M, room_of_centres
+from swarm_forage_env.world.physics import PARKED_M, obstacle_rows, room_of_centres
 from swarm_forage_env.world.state import SwarmState
 
 PAIRS_PER_ROBOT = 8
@@ -54,14 +54,16 @@ class Bodies:
         poses = np.zeros((n_robots + 1, 3))
         poses[:-1, :2], poses[:-1, 2] = position, heading
         self._dt_s = config.dt_s
+        obstacles = obstacle_rows(config)
         self.state = BodyState(
             poses=poses,
             near=near,
             bins=bins,
             room=room_of_centres(config),
+            obstacles=obstacles,
             radius_m=config.robots.radius_m,
             n_substeps=len(config.physics_substeps),
-            **_room_for(n_robots, PAIRS_PER_ROBOT * n_robots),
+            **_room_for(n_robots, PAIRS_PER_ROBOT * n_robots, WALLS + len(obstacles)),
         )
 
     @cached_property
@@ -85,7 +87,7 @@ class Bodies:
     def make_room(self) -> None:
         """Make room for twice as many pairs; what is remembered of the last tick is kept."""
         before = self.state.memory
-        more = _room_for(len(self.twist) - 1, 2 * len(self.state.pairs))
+        more = _room_for(len(self.twist) - 1, 2 * len(self.state.pairs), WALLS + len(self.state.obstacles))
         n_contacts, contacts = more["memory"]
         n_contacts[:] = before[0]
         contacts[: len(before[1])] = before[1]
@@ -110,9 +112,9 @@ class Bodies:
         self.state.poses[row] = x, y, angle
 
 
-def _room_for(n_robots: int, n_pairs: int) -> dict[str, Any]:
-    """Return the fields of `BodyState` that depend on the number of pairs, empty."""
-    n_contacts = n_pairs + WALLS * n_robots
+def _room_for(n_robots: int, n_pairs: int, n_fixed: int) -> dict[str, Any]:
+    """Return the fields of `BodyState` that depend on the numbers of pairs and of walls and boxes, empty."""
+    n_contacts = n_pairs + n_fixed * n_robots
     return {
         "pairs": np.zeros((n_pairs, 2), np.int32),
         "work": (

@@ -41,7 +41,7 @@ def create_cache(
 ) -> int:
     """Make a cache of free or waiting objects `rows`, all moved to its centre; returns the slot.
 
-    The square must hold no nest, no other cache, and no free object that is not in `rows`.
+    The square must hold no nest, no obstacle, no other cache, and no free object that is not in `rows`.
     """
     slot = int(np.flatnonzero(~caches.alive)[0])
     lying = rows[objects.status[rows] == ObjectStatus.FREE]
@@ -158,12 +158,12 @@ def cache_members(first: int, config: ScenarioConfig, objects: ObjectState, prot
 
 
 def clear_centre(
-    centre_cell: tuple[int, int], config: ScenarioConfig, obstacles: list[Box], rng: np.random.Generator
+    centre_cell: tuple[int, int], config: ScenarioConfig, taken: list[Box], rng: np.random.Generator
 ) -> tuple[int, int] | None:
-    """Push a cache centre clear of `obstacles`, or None after `MAX_PASSES` passes.
+    """Push a cache centre clear of the boxes `taken`, or None after `MAX_PASSES` passes.
 
     Each pass wraps the centre back to at least D from the border and shifts it by one cell in x and in y, with random
-    signs, for every obstacle that its square overlaps; a pass without overlap accepts. The centre also keeps to the
+    signs, for every box that its square overlaps; a pass without overlap accepts. The centre also keeps to the
     cells on which objects may lie, because the last object of a cache is left there (only caches with a side below
     15 % of the arena can come near those limits).
     """
@@ -172,8 +172,8 @@ def clear_centre(
     for _ in range(MAX_PASSES):
         x, y = min(max(x, x_low), x_end - 1), min(max(y, y_low), y_end - 1)
         overlapped = 0
-        for obstacle in obstacles:
-            if overlap_cells(square_box((x, y), config.cache_side_cells), obstacle):
+        for box in taken:
+            if overlap_cells(square_box((x, y), config.cache_side_cells), box):
                 overlapped += 1
                 x += 1 if rng.random() < 0.5 else -1
                 y += 1 if rng.random() < 0.5 else -1
@@ -189,17 +189,19 @@ def place_for_cache(
     standing: list[Box],
     rng: np.random.Generator,
 ) -> tuple[int, int] | None:
-    """Centre for a cache of objects with mean `mean_cell`: clear of nest, `protected` and `standing` caches, or None.
+    """Centre for a cache of objects with mean `mean_cell`: clear of nest, obstacles, `protected` and `standing` caches.
+
+    None where there is no such place.
 
     Power-law clusters are only avoided where possible (study: strict constraints on new caches in scenario 1, loose
-    ones in scenario 2): if they leave no room, the passes start again with the nest and standing caches alone. The
+    ones in scenario 2): if they leave no room, the passes start again without them. The
     objects of a cluster under the square join; the cluster then takes objects on the cells left to it.
     """
-    nest = config.arena.nest_cells
-    centre = clear_centre(mean_cell, config, [nest, *protected, *standing], rng)
+    fixed = [config.arena.nest_cells, *config.obstacle_cells]
+    centre = clear_centre(mean_cell, config, [*fixed, *protected, *standing], rng)
     loose = config.objects.placement == "power_law" and not config.quirks.dynamic_cache_avoids_clusters
     if centre is None and loose:
-        centre = clear_centre(mean_cell, config, [nest, *standing], rng)
+        centre = clear_centre(mean_cell, config, [*fixed, *standing], rng)
     return centre
 
 

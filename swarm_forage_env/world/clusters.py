@@ -92,7 +92,7 @@ def draw_clusters(config: ScenarioConfig, floor: IntArray, rng: np.random.Genera
 
     Args:
         config: Scenario with power-law placement.
-        floor: (ny, nx) floor codes with nest and static caches painted; clusters keep off both.
+        floor: (ny, nx) floor codes with nest, obstacles and static caches painted; clusters keep off these.
         rng: Generator of the placement stream.
 
     Returns:
@@ -115,7 +115,7 @@ def draw_clusters(config: ScenarioConfig, floor: IntArray, rng: np.random.Genera
     raise ConfigError(
         f"Expected room for {len(sizes)} clusters of {sizes.min()} to {sizes.max()} objects in a power-law arena of "
         f"{arena.width_m} x {arena.height_m} m, found none in {LAYOUTS} random layouts; use a larger arena, a smaller "
-        "nest or smaller caches."
+        "nest, smaller caches or fewer obstacles."
     )
 
 
@@ -140,8 +140,8 @@ def _draw_box(
         x = int(rng.integers(area[0], area[2] - width, endpoint=True))
         y = int(rng.integers(area[1], area[3] - height, endpoint=True))
         box = (x, y, x + width, y + height)
-        on_nest_or_cache = np.any(floor[y : y + height, x : x + width] <= CELL_NEST)
-        if not on_nest_or_cache and not any(_touch(box, other) for other in placed):
+        is_taken = np.any(floor[y : y + height, x : x + width] <= CELL_NEST)  # nest, obstacle or cache
+        if not is_taken and not any(_touch(box, other) for other in placed):
             return box
     return None
 

@@ -7,7 +7,7 @@ Facts this file relies on, each held by a test:
   at a speed worked out for the length of the first: substeps are equal. `tests/science/test_physics_convergence.py`
   shows the choice.
 * In a crowd that is pushed against a wall the solver does not come to rest, and bodies end a tick a little inside the
-  wall. They are put back onto the floor at the end of the tick, so that nobody ever comes through.
+  wall or a box. They are put back onto the floor at the end of the tick, so that nobody ever comes through.
 * A batch lists dynamic bodies in the order they were added, then the space's static body. Bodies are never removed
   (removal would reorder them): a robot that leaves the world is parked, out of reach and colliding with nothing.
 * Chipmunk's search tree pads each box by what the body covers in 0.1 time units. Speeds are of the order of
@@ -27,6 +27,7 @@ from swarm_forage_env.contract.types import BoolArray, FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.kernels.bodies import COLLISION_SLOP_M, FRICTION, WALL_INSET_M
 from swarm_forage_env.world.kernels.drive import hold_inside, unpack_poses
+from swarm_forage_env.world.kernels.obstacles import hold_outside
 from swarm_forage_env.world.snapshots import SnapshotError
 from swarm_forage_env.world.state import SwarmState
 
@@ -94,7 +95,7 @@ class History:
 
 
 class Physics:
-    """Bodies and walls of one run.
+    """Bodies, walls and boxes of one run.
 
     With a history, copies and pickles are made by repeating all ticks, which takes as long as the bodies took: about
     1 microsecond per robot and tick. Without, they raise a SnapshotError.
@@ -123,6 +124,8 @@ class Physics:
         self._room = room_of_centres(config)
         self._space.iterations = ITERATIONS
         self._add_walls(config)
+        self._obstacles = obstacle_rows(config)
+        self._add_obstacles()
         self._bodies: list[pymunk.Body] = []
         self._shapes: list[pymunk.Circle] = []
         moment = pymunk.moment_for_circle(MASS_KG, 0.0, config.robots.radius_m)
@@ -150,6 +153,13 @@ class Physics:
             wall.friction = FRICTION
             self._space.add(wall)
 
+    def _add_obstacles(self) -> None:
+        for x_low, y_low, x_high, y_high in self._obstacles.tolist():
+            corners = [(x_low, y_low), (x_high, y_low), (x_high, y_high), (x_low, y_high)]
+            box = pymunk.Poly(self._space.static_body, corners, radius=WALL_INSET_M)
+            box.friction = FRICTION
+            self._space.add(box)
+
     def advance(self, swarm: SwarmState) -> None:
         """Move all bodies by one tick along `twist` and write position, heading and facing of present robots."""
         if self._history is not None:
@@ -163,7 +173,10 @@ class Physics:
         for substep in self._substeps:
             self._space.step(substep)
         poses = self.poses()
-        if hold_inside(poses, present, self._room):
+        n_moved = hold_inside(poses, present, self._room)
+        if len(self._obstacles):
+            n_moved += hold_outside(poses, present, self._obstacles, self._room, self._config.robots.radius_m)
+        if n_moved:
             pymunk.batch.set_space_bodies(self._space, _POSE, self._poses)
         return poses
 
@@ -241,3 +254,8 @@ def room_of_centres(config: ScenarioConfig) -> FloatArray:
     x_low, y_low, x_high, y_high = config.arena.interior_m
     radius = config.robots.radius_m
     return np.array([x_low + radius, y_low + radius, x_high - radius, y_high - radius])
+
+
+def obstacle_rows(config: ScenarioConfig) -> FloatArray:
+    """Obstacles as kernels take them: (B, 4) x low, y low, x high, y high in m."""
+    return np.array(config.arena.obstacles, np.float64).reshape(-1, 4)

@@ -1,6 +1,6 @@
 """Where objects appear: the source of a run, the first placement, later placements; and where static caches stand.
 
-Every object lies on its own free cell: inside the distributable box, empty, neither nest nor cache.
+Every object lies on its own free cell: inside the distributable box, empty, neither nest, obstacle nor cache.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.types import IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.regions import Box, overlap_cells, source_boxes, square_box
+from swarm_forage_env.scenarios.regions import Box, overlap_cells, square_box
 from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.clusters import draw_clusters
 from swarm_forage_env.world.kernels.scatter import DRAWS, UNLIMITED, scatter
@@ -39,14 +39,14 @@ def draw_source(config: ScenarioConfig, floor: IntArray, rng: np.random.Generato
 
     Args:
         config: The scenario.
-        floor: (ny, nx) floor codes with nest and static caches painted; clusters keep off both.
+        floor: (ny, nx) floor codes with nest, obstacles and static caches painted; clusters keep off these.
         rng: Generator of the placement stream.
 
     Raises:
         ConfigError: the clusters drawn hold fewer objects than the scenario has, or find no room.
     """
     if config.objects.placement != "power_law":
-        regions = np.array(source_boxes(config.objects.placement, *config.arena.n_cells), np.int32)
+        regions = np.array(config.source_cells, np.int32)
         n_regions = len(regions)
         return Source(regions, np.full(n_regions, UNLIMITED, np.int32), np.array([0, n_regions], np.int32))
     regions, capacity = draw_clusters(config, floor, rng)
@@ -155,12 +155,12 @@ def static_cache_centres(config: ScenarioConfig) -> tuple[tuple[int, int], ...]:
     its squares would reach into the nest (our choice: a floor cell is either nest or cache).
 
     Raises:
-        ConfigError: a cache square leaves the arena, reaches into the nest or overlaps another.
+        ConfigError: a cache square leaves the arena, reaches into nest or obstacles or overlaps another.
     """
     nx, ny = config.arena.n_cells
     nest = config.arena.nest_cells
     half = config.cache_half_side_cells
-    boxes = source_boxes(config.objects.placement, nx, ny)
+    boxes = config.source_cells
     centres: tuple[tuple[int, int], ...]
     if config.objects.placement in ("single_source", "dual_source"):
         centres = tuple(
@@ -183,15 +183,15 @@ def static_cache_centres(config: ScenarioConfig) -> tuple[tuple[int, int], ...]:
 
 def _check_cache_squares(config: ScenarioConfig, centres: tuple[tuple[int, int], ...]) -> None:
     nx, ny = config.arena.n_cells
-    taken: list[Box] = [config.arena.nest_cells]
+    taken: list[Box] = [config.arena.nest_cells, *config.obstacle_cells]
     for x, y in centres:
         square = square_box((x, y), config.cache_side_cells)
         inside = square[0] >= 0 and square[1] >= 0 and square[2] <= nx and square[3] <= ny
         if not inside or any(overlap_cells(square, other) for other in taken):
             side_m = config.cache_side_cells * CELL_M
             raise ConfigError(
-                f"Expected static caches inside the arena, clear of the nest and of each other, got a square of "
+                f"Expected static caches inside the arena, clear of nest, obstacles and each other, got a square of "
                 f"{side_m:.1f} m centred at ({(x + 0.5) * CELL_M:.1f}, {(y + 0.5) * CELL_M:.1f}) m; lower "
-                "cache.side_share or move the nest."
+                "cache.side_share or move nest or obstacles."
             )
         taken.append(square)

@@ -13,6 +13,7 @@ from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, MESSAGES, NEIGHB
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 from swarm_forage_env.world.kernels.world import Columns, Sensors
+from swarm_forage_env.world.physics import obstacle_rows
 
 PROXIMITY_RANGE_M = 0.1
 """Reach of a proximity beam beyond the body."""
@@ -60,6 +61,7 @@ def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collec
         scales=np.array([WHEEL_SCALE_MPS, config.arena.width_m, config.arena.height_m]),
         sizes=(*config.arena.n_cells, config.objects.n_objects),
         shares=(np.arange(config.objects.n_objects + 1) / config.objects.n_objects).astype(np.float32),
+        obstacles=obstacle_rows(config),
         cache_half_side=config.cache_half_side_cells,
         reads_light="light" in read,
         light_of_carriers_only=reads is not None and "light" not in reads,

@@ -6,6 +6,7 @@ from scipy.spatial import KDTree
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.obstacles import distances_m
 
 _TRIALS = 1000
 """Redraws before giving up, as in the study."""
@@ -14,8 +15,8 @@ _TRIALS = 1000
 def draw_start_poses(config: ScenarioConfig, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Draw start positions (N, 2) m and headings (N,) rad in (-pi, pi].
 
-    Positions are uniform at least `start_margin_m` from the arena border; of two overlapping robots the one with
-    the higher row is drawn again. Robots may start inside the nest.
+    Positions are uniform at least `start_margin_m` from the arena border; robots that overlap an obstacle are drawn
+    again, and of two overlapping robots the one with the higher row. Robots may start inside the nest.
 
     Raises:
         ConfigError: no layout without overlap was found.
@@ -26,9 +27,10 @@ def draw_start_poses(config: ScenarioConfig, rng: np.random.Generator) -> tuple[
     position = rng.uniform(low, high, (n_robots, 2))
     for _ in range(_TRIALS):
         pairs = KDTree(position).query_pairs(2 * config.robots.radius_m, output_type="ndarray")
-        if len(pairs) == 0:
+        blocked = np.flatnonzero(distances_m(config.arena.obstacles, position) < config.robots.radius_m)
+        if len(pairs) == 0 and len(blocked) == 0:
             return position, -rng.uniform(-np.pi, np.pi, n_robots)
-        again = np.unique(pairs.max(axis=1))
+        again = np.union1d(pairs.max(axis=1), blocked)
         position[again] = rng.uniform(low, high, (len(again), 2))
     raise ConfigError(
         f"Found no start positions without overlap for {n_robots} robots in {_TRIALS} trials; "

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_NEST, Counter, ObjectStatus
+from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_NEST, CELL_OBSTACLE, Counter, ObjectStatus
 from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 
@@ -69,7 +69,7 @@ class ObjectState:
     """All objects and the floor they lie on."""
 
     floor: IntArray
-    """(ny, nx) code per cell, row = y: object row, CELL_EMPTY, CELL_NEST or CELL_CACHE - slot."""
+    """(ny, nx) code per cell, row = y: object row, CELL_EMPTY, CELL_NEST, CELL_OBSTACLE or CELL_CACHE - slot."""
     status: CodeArray
     """(M,) ObjectStatus."""
     cell: IntArray
@@ -83,12 +83,14 @@ class ObjectState:
 
     @classmethod
     def empty(cls, config: ScenarioConfig) -> "ObjectState":
-        """All objects waiting, the floor painted with the nest only."""
+        """All objects waiting, the floor painted with obstacles and nest only."""
         n_objects = config.objects.n_objects
         nx, ny = config.arena.n_cells
         floor = np.full((ny, nx), CELL_EMPTY, np.int32)
-        x_low, y_low, x_high, y_high = config.arena.nest_cells
-        floor[y_low:y_high, x_low:x_high] = CELL_NEST
+        # The nest comes last: an obstacle beside it may keep cells free that reach into it.
+        painted = [*((box, CELL_OBSTACLE) for box in config.obstacle_cells), (config.arena.nest_cells, CELL_NEST)]
+        for (x_low, y_low, x_high, y_high), code in painted:
+            floor[y_low:y_high, x_low:x_high] = code
         return cls(
             floor=floor,
             status=np.full(n_objects, ObjectStatus.WAITING, np.int8),

@@ -7,6 +7,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, number, one_of, whole
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.population_process import (
     EventClocks,
@@ -123,10 +124,12 @@ class PopulationDynamics(SwarmWrapper):
         self.unwrapped.set_population(active=state.active, present=state.present, terminated=gone)
 
     def _find_place(self, row: int, rng: np.random.Generator) -> bool:
-        """Place a robot that is to be born at a uniform position without overlap, if one is found."""
+        """Place a robot that is to be born at a uniform position clear of robots and obstacles, if one is found."""
         swarm = self.unwrapped.swarm
         others = swarm.position[swarm.present]
-        for x, y in rng.uniform(self._birth_low, self._birth_high, (BIRTH_TRIALS, 2)).tolist():
+        places = rng.uniform(self._birth_low, self._birth_high, (BIRTH_TRIALS, 2))
+        is_free = distances_m(self.unwrapped.scenario.arena.obstacles, places) >= 0.5 * self._body_m
+        for x, y in places[is_free].tolist():
             if np.all(np.hypot(others[:, 0] - x, others[:, 1] - y) > self._body_m):
                 swarm.position[row] = x, y
                 swarm.heading[row] = 0.0

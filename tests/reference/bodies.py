@@ -1,9 +1,10 @@
-"""Discs in a rectangle told slowly: all pairs in every substep, places and velocities as complex numbers.
+"""Discs among boxes in a rectangle told slowly: all pairs in every substep, places and velocities as complex numbers.
 
 Masses are in kg and impulses in kg m/s, as in a textbook; impulses that a contact starts with are in a dictionary.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from swarm_forage_env.world.kernels.bodies import ROUNDS, SETTLED_M_S
@@ -18,6 +19,8 @@ WALLS = {"west": -1, "east": 1, "south": -1j, "north": 1j}
 Key = tuple[int, int | str]
 Impulses = dict[Key, tuple[float, float]]
 Pose = tuple[float, float, float]
+Box = tuple[float, float, float, float]
+"""x low, y low, x high, y high in m."""
 
 
 @dataclass
@@ -74,7 +77,20 @@ class Touch:
         return max(map(abs, more)) / MASS_KG
 
 
-def touches(discs: dict[int, Disc], room: tuple[float, float, float, float], radius: float) -> dict[Key, Touch]:
+def towards(place: complex, box: Box) -> tuple[complex, float]:
+    """Direction to the nearest point of a box, and its distance; from within, that of the nearest side, negative."""
+    x_low, y_low, x_high, y_high = box
+    at = complex(min(max(place.real, x_low), x_high), min(max(place.imag, y_low), y_high))
+    if at != place:
+        return (at - place) / abs(at - place), abs(at - place)
+    depths = {1: place.real - x_low, -1: x_high - place.real, 1j: place.imag - y_low, -1j: y_high - place.imag}
+    inwards = min(depths, key=lambda way: depths[way])
+    return inwards, -depths[inwards]
+
+
+def touches(
+    discs: dict[int, Disc], room: tuple[float, float, float, float], radius: float, boxes: Sequence[Box]
+) -> dict[Key, Touch]:
     """All contacts, pairs first."""
     found: dict[Key, Touch] = {}
     for i, one in discs.items():
@@ -90,6 +106,10 @@ def touches(discs: dict[int, Disc], room: tuple[float, float, float, float], rad
         for wall, normal in WALLS.items():
             if gaps[wall] < INSET_M:
                 found[i, wall] = Touch(disc, None, normal, gaps[wall] - INSET_M)
+        for number, box in enumerate(boxes):
+            normal, distance = towards(disc.place, box)
+            if distance - radius < INSET_M:
+                found[i, f"box {number}"] = Touch(disc, None, normal, distance - radius - INSET_M)
     return found
 
 
@@ -100,6 +120,7 @@ def moved(
     room: tuple[float, float, float, float],
     sizes: tuple[float, float, int],
     before: Impulses,
+    boxes: Sequence[Box] = (),
 ) -> tuple[list[Pose], Impulses]:
     """Poses after a tick, and the impulses of the contacts that stopped the bodies.
 
@@ -110,7 +131,7 @@ def moved(
     substep_s = dt_s / n_substeps
     after: Impulses = {}
     for substep in range(n_substeps):
-        contacts = touches(discs, room, radius)
+        contacts = touches(discs, room, radius, boxes)
         if substep == 1:
             for key in contacts.keys() & before.keys():
                 contacts[key].give([*before[key], 0.0], radius)
@@ -128,6 +149,25 @@ def moved(
             disc.push = 0j
     ended = list(poses)
     for i, disc in discs.items():
-        x = min(max(disc.place.real, room[0]), room[2])
-        ended[i] = x, min(max(disc.place.imag, room[1]), room[3]), disc.angle
+        ended[i] = (*held_outside(held(disc.place, room), room, radius, boxes), disc.angle)
     return ended, after
+
+
+def held(place: complex, room: tuple[float, float, float, float]) -> complex:
+    """The nearest place on the floor."""
+    return complex(min(max(place.real, room[0]), room[2]), min(max(place.imag, room[1]), room[3]))
+
+
+def held_outside(
+    place: complex, room: tuple[float, float, float, float], radius: float, boxes: Sequence[Box]
+) -> tuple[float, float]:
+    """Place (x, y) of a disc after it was moved out of each box in turn, at most four times round."""
+    for _ in range(4):
+        before = place
+        for box in boxes:
+            inwards, distance = towards(place, box)
+            if distance < radius:
+                place = held(place - (radius - distance) * inwards, room)
+        if place == before:
+            break
+    return place.real, place.imag

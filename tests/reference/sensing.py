@@ -5,12 +5,13 @@ import math
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, CELL_OBSTACLE
 from swarm_forage_env.env import ForageEnv
 
 RADIUS_M = 0.085036758
 REACH_M = 0.1
 GROUND_SENSORS_M = ((0.063, 0.0116), (0.063, -0.0116), (-0.063, 0.0116), (-0.063, -0.0116))
+Pair = tuple[float, float]
 RING_DEG = [7.5 + 15.0 * k for k in range(24)]
 
 
@@ -21,8 +22,22 @@ def reading(gap_m: float) -> float:
     return 1.0 if gap_m < 0.00989 else 0.0100527 / (gap_m + 0.000163144)
 
 
+def to_box(place: Pair, way: Pair, box: tuple[float, float, float, float]) -> float:
+    """Way to the first of a box's four sides that a beam meets: where it crosses the side's line, within its ends."""
+    (x, y), (ux, uy) = place, way
+    x_low, y_low, x_high, y_high = box
+    nearest = math.inf
+    for side in (x_low, x_high):
+        if (side - x) * ux > 0 and y_low <= y + (side - x) / ux * uy <= y_high:
+            nearest = min(nearest, (side - x) / ux)
+    for side in (y_low, y_high):
+        if (side - y) * uy > 0 and x_low <= x + (side - y) / uy * ux <= x_high:
+            nearest = min(nearest, (side - y) / uy)
+    return nearest
+
+
 def proximity(env: ForageEnv, robot: int) -> list[float]:
-    """24 beams against all other robots and all four walls."""
+    """24 beams against all other robots, all four walls and all boxes."""
     swarm = env.swarm
     x, y = swarm.position[robot].tolist()
     x_low, y_low, x_high, y_high = env.scenario.arena.interior_m
@@ -34,6 +49,8 @@ def proximity(env: ForageEnv, robot: int) -> list[float]:
         for wall, at, along in ((x_low, x, ux), (x_high, x, ux), (y_low, y, uy), (y_high, y, uy)):
             if (wall - at) * along > 0:
                 nearest = min(nearest, (wall - at) / along)
+        for box in env.scenario.arena.obstacles:
+            nearest = min(nearest, to_box((x, y), (ux, uy), box))
         for other in np.flatnonzero(swarm.present).tolist():
             dx, dy = swarm.position[other] - (x, y)
             ahead = dx * ux + dy * uy
@@ -81,7 +98,7 @@ def grey(env: ForageEnv, x: float, y: float) -> float:
     code = env.objects.floor[row, column]
     if code >= 0:
         return 0.0
-    return {CELL_EMPTY: 1.0, CELL_NEST: 179 / 255}.get(code, 102 / 255)
+    return {CELL_EMPTY: 1.0, CELL_OBSTACLE: 1.0, CELL_NEST: 179 / 255}.get(code, 102 / 255)
 
 
 def ground(env: ForageEnv, robot: int) -> list[float]:

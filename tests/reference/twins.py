@@ -109,6 +109,9 @@ TWINS = {
     "swarm_forage_env.world.kernels.neighbourhood.say": MESSAGES,
     "swarm_forage_env.world.kernels.neighbourhood.see_neighbours": NEIGHBOURS,
     "swarm_forage_env.world.kernels.neighbours.bin_robots": OBSERVED,
+    "swarm_forage_env.world.kernels.obstacles.hold_outside": Twin(
+        "bodies.held_outside", "world/test_obstacles.py", "swarm_forage_env.world.kernels.obstacles.hold_outside"
+    ),
     "swarm_forage_env.world.kernels.proprioception.own_motion": OBSERVED,
     "swarm_forage_env.world.kernels.proprioception.own_status": OBSERVED,
     "swarm_forage_env.world.kernels.scatter.scatter": Twin(

@@ -8,6 +8,7 @@ from swarm_forage_env.contract.layout import observation_layout
 from swarm_forage_env.contract.policy import RememberedPlaces
 from swarm_forage_env.rendering.close_up import render_close_up
 from swarm_forage_env.rendering.view import PALETTE, THEMES
+from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.state import CacheState, ObjectState, SwarmState
 
@@ -105,3 +106,11 @@ def test_a_light_close_up_has_the_light_colours(place):
     assert place.pixel(picture, -0.05, 0.0) == light.empty
     assert place.pixel(picture, 0.0, 0.35) == light.floor
     assert place.pixel(place.draw(), 0.0, 0.35) == PALETTE.floor, "the dark one is as before"
+
+
+def test_obstacles_have_the_colour_of_walls(place):
+    boxed = with_overrides(CONFIG, obstacles=((16.3, 8.0, 16.6, 8.4),))
+    state = (place.swarm, place.objects, CacheState.empty(2))
+    picture = render_close_up(boxed, *state, robot=0, obs=place.obs, layout=LAYOUT)
+    assert place.pixel(picture, 0.4, 0.2) == PALETTE.wall
+    assert place.pixel(picture, 0.4, -0.2) == PALETTE.floor

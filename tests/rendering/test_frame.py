@@ -268,6 +268,16 @@ def test_the_legend_names_only_what_the_world_has():
     assert "source" not in names
 
 
+def test_obstacles_have_the_colour_of_walls_and_a_place_in_the_legend():
+    config = scenario("warehouse_small", n_robots=2, n_objects=2, obstacles=((10.0, 5.0, 11.0, 7.0),))
+    walled = World(config)
+    picture = walled.draw()
+    assert walled.pixel(picture, 10.1, 6.9) == walled.pixel(picture, 10.9, 5.1) == PALETTE.wall
+    assert walled.pixel(picture, 11.2, 6.0) == PALETTE.floor
+    assert "obstacle" in {name for row in legend_rows(config, 900, 20.0) for name, _, _ in row}
+    assert "obstacle" not in {name for row in legend_rows(scenario("warehouse_small"), 900, 20.0) for name, _, _ in row}
+
+
 def test_trails_fade_towards_the_past(world):
     trails = Trails(4, 30)
     for step in range(30):

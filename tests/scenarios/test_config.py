@@ -40,6 +40,7 @@ OTHER_VALUES: dict[str, Any] = {
     "height_m": 52.0,
     "nest_centre_m": (20.0, 22.0),
     "nest_size_m": (4.0, 6.0),
+    "obstacles": ((10.0, 10.0, 10.4, 12.0), (30.0, 8.0, 31.0, 9.0)),
     "n_robots": 3,
     "radius_m": 0.07,
     "wheel_base_m": 0.12,
@@ -48,6 +49,7 @@ OTHER_VALUES: dict[str, Any] = {
     "start_margin_m": 3.0,
     "n_objects": 7,
     "placement": "dual_source",
+    "object_positions_m": ((30.0, 30.0),),
     "walk_probability": 0.026,
     "pickup_ticks": 5,
     "drop_ticks": 3,
@@ -71,6 +73,10 @@ OTHER_VALUES: dict[str, Any] = {
 }
 
 
+OWN_PLACES: dict[str, Any] = {"placement": "positions", "n_objects": 1}
+"""What goes with positions of one's own."""
+
+
 def refusal(preset: str = "warehouse_medium", **overrides: Any) -> str:
     with pytest.raises(ConfigError) as caught:
         with_overrides(scenario(preset), **overrides)
@@ -82,11 +88,13 @@ def test_every_field_can_be_overridden_by_name():
     table = field_sections()
     assert set(OTHER_VALUES) == set(table)
     for name, value in OTHER_VALUES.items():
-        changed = with_overrides(base, **{name: value})
+        beside = OWN_PLACES if name == "object_positions_m" else {}
+        changed = with_overrides(base, **{name: value, **beside})
         holder = getattr(changed, table[name]) if table[name] else changed
         assert getattr(holder, name) == value
         back = getattr(base, table[name]) if table[name] else base
-        assert with_overrides(changed, **{name: getattr(back, name)}) == base
+        before = {field: getattr(base.objects, field) for field in beside}
+        assert with_overrides(changed, **{name: getattr(back, name), **before}) == base
 
 
 def test_field_names_are_unique_across_sections():
@@ -112,7 +120,7 @@ def test_mapping_round_trip(config):
 
 
 def test_mapping_round_trip_keeps_every_changed_field():
-    changed = with_overrides(scenario("warehouse_medium"), **OTHER_VALUES)
+    changed = with_overrides(scenario("warehouse_medium"), **{**OTHER_VALUES, **OWN_PLACES})
     assert from_mapping(ScenarioConfig, json.loads(json.dumps(to_mapping(changed)))) == changed
 
 

@@ -37,13 +37,13 @@ def test_small_warehouse_source_strip():
     (box,) = source_boxes("single_source", *config.arena.n_cells)
     assert box == (120, 12, 136, 68)  # 16 x 56 cells: x 24.0 .. 27.2 m, y 2.4 .. 13.6 m
     assert tuple(edge * CELL_M for edge in box) == pytest.approx((24.0, 2.4, 27.2, 13.6))
-    assert capacity("single_source", *config.arena.n_cells, config.arena.nest_cells) == 16 * 56
+    assert capacity(config.source_cells, *config.arena.n_cells, [config.arena.nest_cells]) == 16 * 56
 
 
 def test_medium_warehouse_source():
     config = scenario("warehouse_medium")
     assert source_boxes("random", *config.arena.n_cells) == ((36, 36, 204, 204),)  # 7.2 .. 40.8 m on both axes
-    assert capacity("random", *config.arena.n_cells, config.arena.nest_cells) == 168 * 168 - 48 * 48
+    assert capacity(config.source_cells, *config.arena.n_cells, [config.arena.nest_cells]) == 168 * 168 - 48 * 48
 
 
 def test_dual_source():
@@ -51,7 +51,7 @@ def test_dual_source():
     right, left = source_boxes("dual_source", *config.arena.n_cells)
     assert tuple(edge * CELL_M for edge in right) == pytest.approx((24.0, 2.4, 27.2, 13.6))
     assert tuple(edge * CELL_M for edge in left) == pytest.approx((4.8, 2.4, 8.0, 13.6))
-    assert capacity("dual_source", *config.arena.n_cells, config.arena.nest_cells) == 2 * 16 * 56
+    assert capacity(config.source_cells, *config.arena.n_cells, [config.arena.nest_cells]) == 2 * 16 * 56
 
 
 def test_quad_source():
@@ -64,7 +64,7 @@ def test_quad_source():
 def test_quad_source_corners_count_once():
     strips = 4 * 24 * 168
     corners = 4 * 24 * 24
-    assert capacity("quad_source", 240, 240, (96, 96, 144, 144)) == strips - corners
+    assert capacity(source_boxes("quad_source", 240, 240), 240, 240, [(96, 96, 144, 144)]) == strips - corners
 
 
 @pytest.mark.parametrize("placement", PLACEMENTS)
@@ -77,7 +77,7 @@ def test_capacity_is_the_number_of_source_cells_off_the_nest(placement):
         for y in range(y_low, y_high)
         if not (20 <= x < 60 and 4 <= y < 40)
     }
-    assert capacity(placement, 70, 50, nest) == len(cells)
+    assert capacity(source_boxes(placement, 70, 50), 70, 50, [nest]) == len(cells)
 
 
 @pytest.mark.parametrize("placement", PLACEMENTS)

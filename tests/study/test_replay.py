@@ -393,6 +393,15 @@ def test_performance_that_the_world_does_not_count_is_shown_as_deliveries(replay
         assert header["runs"][0]["performance"] == {"counter": "collected", "words": expected}
 
 
+def test_the_page_is_told_where_obstacles_are(replay):
+    boxes = ((3.0, 5.0, 4.0, 6.0), (5.0, 2.0, 5.2, 4.0))
+    arena = dataclasses.replace(CROWDED.arena, obstacles=boxes)
+    spec = dataclasses.replace(replay.spec, scenario=dataclasses.replace(CROWDED, arena=arena))
+    for one, expected in ((replay, []), (dataclasses.replace(replay, spec=spec), [list(box) for box in boxes])):
+        header, _ = files_module.take_page_apart(files_module.page_of([one]))
+        assert header["runs"][0]["world"]["obstacles_m"] == expected
+
+
 # Coding
 
 

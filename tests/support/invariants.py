@@ -5,6 +5,7 @@ from scipy.spatial import cKDTree
 
 from swarm_forage_env.contract.codes import Counter, ObjectStatus
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 from swarm_forage_env.wrappers.recorder import TICK_MEANS, TOTALS, RunRecorder
 from tests.support.stage import assert_conserved
@@ -30,6 +31,8 @@ def look_at(env: ForageEnv, obs: np.ndarray) -> float:
     assert np.isfinite(swarm.heading).all(), "headings are numbers"
     inside = np.hstack((position - (x_low, y_low), (x_high, y_high) - position))
     assert inside.min(initial=np.inf) >= radius - 1e-9, f"a robot left the arena by {radius - inside.min():.3g} m"
+    deep = radius - distances_m(arena.obstacles, position).min(initial=np.inf)
+    assert deep <= 1e-9, f"a robot is {deep:.3g} m deep in an obstacle"
     assert_conserved(env)
     return _deepest_overlap(env, position)
 

@@ -9,7 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST, Counter, Event, Grip, ObjectStatus
+from swarm_forage_env.contract.codes import (
+    CELL_CACHE,
+    CELL_EMPTY,
+    CELL_NEST,
+    CELL_OBSTACLE,
+    Counter,
+    Event,
+    Grip,
+    ObjectStatus,
+)
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.caches import create_cache
@@ -50,7 +59,7 @@ def begin(wrapper: SwarmWrapper, seed: int = 0) -> None:
 def clear(env: ForageEnv) -> None:
     """Take all objects and caches out of the world; the test has to lay down every object before it goes on."""
     objects, caches = env.objects, env.caches
-    objects.floor[objects.floor != CELL_NEST] = CELL_EMPTY
+    objects.floor[(objects.floor >= 0) | (objects.floor <= CELL_CACHE)] = CELL_EMPTY
     caches.alive[:], caches.count[:], caches.serial[:], caches.last_serial = False, 0, 0, 0
     objects.status[:], objects.cache_slot[:], objects.carriers[:], objects.cell[:] = ObjectStatus.WAITING, -1, 0, -1
     objects.waiting.clear()
@@ -180,16 +189,18 @@ def assert_conserved(env: ForageEnv) -> None:
     x_low, y_low, x_high, y_high = env.scenario.arena.distributable_cells
     low, high = np.array([x_low, y_low]), np.array([x_high, y_high])
     assert np.all((objects.cell[rows] >= low) & (objects.cell[rows] < high))
-    # Nest and caches: every special code where it belongs, and nowhere else.
+    # Obstacles, nest and caches: every special code where it belongs, and nowhere else.
     painted = np.where(floor >= 0, CELL_EMPTY, floor)
     expected = np.full_like(floor, CELL_EMPTY)
+    for left, bottom, right, top in env.scenario.obstacle_cells:
+        expected[bottom:top, left:right] = CELL_OBSTACLE
     nest = env.scenario.arena.nest_cells
     expected[nest[1] : nest[3], nest[0] : nest[2]] = CELL_NEST
     half = env.scenario.cache_side_cells // 2
     for slot in np.flatnonzero(caches.alive).tolist():
         x, y = caches.cell[slot].tolist()
         square = expected[y - half : y + half + 1, x - half : x + half + 1]
-        assert np.all(square == CELL_EMPTY), "cache square overlaps nest or another cache"
+        assert np.all(square == CELL_EMPTY), "cache square overlaps nest, obstacle or another cache"
         square[:] = CELL_CACHE - slot
     np.testing.assert_array_equal(painted, expected)
     # Caches: contents and counts.

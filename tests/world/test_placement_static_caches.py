@@ -80,7 +80,7 @@ def test_squares_share_no_cell_with_nest_or_each_other(config):
 def test_squares_that_cannot_be_told_apart_are_refused(overrides):
     config = scenario("warehouse_medium", **overrides)
     with pytest.raises(
-        ConfigError, match=r"clear of the nest and of each other, got a square .* lower cache\.side_share"
+        ConfigError, match=r"clear of nest, obstacles and each other, got a square .* lower cache\.side_share"
     ):
         static_cache_centres(config)
 

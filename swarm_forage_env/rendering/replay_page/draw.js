@@ -62,6 +62,7 @@ class Painter {
     pen.beginPath();
     this.box(pen, world.nest_box_m);
     pen.stroke();
+    for (const box of world.obstacles_m) this.fillBox(pen, box, colour.wall, 1);
     pen.fillStyle = colour.light;
     pen.beginPath();
     for (const [x, y] of world.lights_m) disc(pen, this.view.px(x), this.view.py(y), 3);

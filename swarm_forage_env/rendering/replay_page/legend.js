@@ -29,6 +29,7 @@ const signs = {
     pen.fillRect(8, 8, 6, 6);
   },
   nest: (pen) => areaSign(pen, theme.colours.nest, 0.3),
+  obstacle: (pen) => areaSign(pen, theme.colours.wall, 1, false),
   source: (pen) => areaSign(pen, theme.colours.source, 0.25, false),
   cache: (pen) => areaSign(pen, theme.colours.cache, 0.3),
 };
@@ -86,6 +87,7 @@ class Legend {
     if (this.hasRepair) names.push("in repair");
     if (this.hasDead) names.push("dead");
     names.push("delivered", "object", "nest");
+    if (anyRun((run) => run.header.world.obstacles_m.length > 0)) names.push("obstacle");
     if (anyRun((run) => run.header.world.sources_m.length > 0)) names.push("source");
     if (anyRun((run) => run.header.world.caches !== "none")) names.push("cache");
     const tasks = byTask ? this.tasksInUse().map((task) => [this.runs[0].header.tasks[task], taskSign(task)]) : [];

@@ -19,7 +19,6 @@ from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.rendering.page import PageError, build_page, take_page_apart
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.performance import quantity
-from swarm_forage_env.scenarios.regions import source_boxes
 from swarm_forage_env.scenarios.units import CELL_M, WALL_M
 from swarm_forage_env.study.replay.coding import pack, unpack
 from swarm_forage_env.study.replay.frames import Replay, ReplayError
@@ -204,7 +203,7 @@ def _world(scenario: ScenarioConfig) -> dict[str, Any]:
     arena = scenario.arena
     sources: Iterable[tuple[int, ...]] = ()
     if scenario.objects.placement != "power_law":  # its clusters differ from run to run
-        sources = source_boxes(scenario.objects.placement, *arena.n_cells)
+        sources = scenario.source_cells
     return {
         "width_m": arena.width_m,
         "height_m": arena.height_m,
@@ -212,6 +211,7 @@ def _world(scenario: ScenarioConfig) -> dict[str, Any]:
         "cell_m": CELL_M,
         "interior_m": list(arena.interior_m),
         "nest_box_m": list(arena.nest_box_m),
+        "obstacles_m": [list(box) for box in arena.obstacles],
         "lights_m": [[x, y] for x, y, _ in arena.lights_m],
         "sources_m": [[CELL_M * edge for edge in box] for box in sources],
         "robot_radius_m": scenario.robots.radius_m,

@@ -1,4 +1,4 @@
-"""Proximity readings: a ring of beams against the discs of other robots and the four walls."""
+"""Proximity readings: a ring of beams against the discs of other robots, the four walls and boxes on the floor."""
 
 import math
 
@@ -9,6 +9,7 @@ from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray, Row
 from swarm_forage_env.world.kernels.neighbours import bin_of, cell_of
+from swarm_forage_env.world.kernels.obstacles import is_within
 
 _BEAM_COS = np.cos(BEAM_ANGLES_RAD)
 _BEAM_SIN = np.sin(BEAM_ANGLES_RAD)
@@ -51,6 +52,23 @@ def _beam_to_wall(to_low: float, to_high: float, direction: float, radius: float
 
 
 @kernel
+def _beam_to_box(x: float, y: float, cos: float, sin: float, obstacles: FloatArray, b: int, radius: float) -> float:
+    """Free distance from a disc at (x, y) along (cos, sin) to box b: the beam is in the box while it is in both slabs.
+
+    The small number stands for 0 in a direction, so that nothing is divided by 0.
+    """
+    cos = cos if abs(cos) > 1e-12 else 1e-12
+    sin = sin if abs(sin) > 1e-12 else 1e-12
+    to_west, to_east = (obstacles[b, 0] - x) / cos, (obstacles[b, 2] - x) / cos
+    to_south, to_north = (obstacles[b, 1] - y) / sin, (obstacles[b, 3] - y) / sin
+    enters = max(min(to_west, to_east), min(to_south, to_north))
+    leaves = min(max(to_west, to_east), max(to_south, to_north))
+    if leaves < max(0.0, enters):
+        return math.inf
+    return enters - radius
+
+
+@kernel
 def _see_walls(
     gaps: tuple[float, float, float, float], facing: FloatArray, i: int, radius: float, reach: float, row: Row
 ) -> None:
@@ -64,6 +82,28 @@ def _see_walls(
         gap = min(_beam_to_wall(west, east, cos, radius), _beam_to_wall(south, north, sin, radius))
         if gap <= reach:
             row[k] = proximity_reading(gap)
+
+
+@kernel
+def _see_box(
+    place: tuple[float, float],
+    obstacles: FloatArray,
+    b: int,
+    facing: FloatArray,
+    i: int,
+    radius: float,
+    reach: float,
+    row: Row,
+) -> None:
+    """Raise robot i's readings in `row` to those of box b; `place` = x, y of the robot."""
+    cos_h = facing[i, 0]
+    sin_h = facing[i, 1]
+    for k in range(RING_SENSORS):
+        cos = cos_h * _BEAM_COS[k] - sin_h * _BEAM_SIN[k]
+        sin = sin_h * _BEAM_COS[k] + cos_h * _BEAM_SIN[k]
+        gap = _beam_to_box(place[0], place[1], cos, sin, obstacles, b, radius)
+        if gap <= reach:
+            row[k] = max(row[k], proximity_reading(gap))
 
 
 @kernel
@@ -86,6 +126,7 @@ def proximity(
     present: BoolArray,
     bins: tuple[float, IntArray, IntArray],
     interior: FloatArray,
+    obstacles: FloatArray,
     radius: float,
     reach: float,
     obs: ObsArray,
@@ -95,7 +136,8 @@ def proximity(
     """Write readings into `obs` from column `start`, and into `near` (N,) whether anything is within reach of a beam.
 
     `bins` = (cell size in m, first_in_bin, next_in_bin) from `bin_robots` with cells of at least
-    2 radius + reach; `interior` = x low, y low, x high, y high of the free floor; `reach` is measured from the body.
+    2 radius + reach; `interior` = x low, y low, x high, y high of the free floor; `obstacles` (B, 4) likewise, of
+    boxes on it; `reach` is measured from the body.
     """
     cell_m, first_in_bin, next_in_bin = bins
     n_bins = first_in_bin.shape[0]
@@ -113,6 +155,10 @@ def proximity(
             if min(gaps[0], gaps[1], gaps[2], gaps[3]) < wall_sight:
                 near[i] = True
                 _see_walls(gaps, facing, i, radius, reach, row)
+            for b in range(obstacles.shape[0]):
+                if is_within(x, y, obstacles, b, wall_sight):
+                    near[i] = True
+                    _see_box((x, y), obstacles, b, facing, i, radius, reach, row)
     for i in range(position.shape[0]):
         if not present[i]:
             continue

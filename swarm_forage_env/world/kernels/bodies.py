@@ -1,9 +1,9 @@
-"""Discs in a rectangle: who can touch whom in a tick, and a tick of motion with contacts.
+"""Discs among boxes in a rectangle: who can touch whom in a tick, and a tick of motion with contacts.
 
 The model of contact is Chipmunk's, for bodies that are all equal. In every substep
 
     1. bodies move by their velocity, and by the push that undoes overlap;
-    2. contacts are looked up where they stand now: two discs that overlap, a disc that overlaps a wall;
+    2. contacts are looked up where they stand now: two discs that overlap, a disc that overlaps a wall or a box;
     3. impulses are worked out, contact by contact in rounds, until they settle.
 
 An impulse along the normal n stops bodies that run into each other and never pulls: it is >= 0. The impulse across it,
@@ -15,13 +15,14 @@ substep follow from them and are worked out first. The impulses that then stop t
 before, which changes nothing where they settle. In a heap that goes on pushing they are nearly right already.
 
 All masses are equal and cancel. An impulse is given per mass, in m/s: an impulse j along n changes the velocity of a
-disc by j, friction f its turn rate by 2 f / r (the moment of a disc is m r^2 / 2). Effective masses of contacts are
+disc by j, friction f its turn rate by 2 f / r (the moment of a disc is m r^2 / 2). A box that stands on the floor is a
+wall that ends: the normal goes from the centre of a disc to the nearest point of the box. Effective masses of contacts:
 
     along n:   two discs m / 2, disc and wall m          across:   two discs m / 6, disc and wall m / 3
 
-Contacts are taken in the order of rows: pairs (i, j) with i < j first, then walls, robot by robot, west, east, south,
-north. Each has a number that grows in this order, by which it is found again in the next tick (a float, which holds
-whole numbers up to 2^53).
+Contacts are taken in the order of rows: pairs (i, j) with i < j first, then robot by robot walls, west, east, south,
+north, and boxes. Each has a number that grows in this order, by which it is found again in the next tick (a float,
+which holds whole numbers up to 2^53).
 """
 
 import math
@@ -31,16 +32,17 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.world.kernels.drive import hold_inside
 from swarm_forage_env.world.kernels.neighbours import bin_of, cell_of
+from swarm_forage_env.world.kernels.obstacles import hold_outside, is_within, nearest
 
 FRICTION = 0.7
-"""Of robots and of walls."""
+"""Of robots, walls and boxes."""
 GRIP = FRICTION * FRICTION
 """Friction of a contact: the product of both sides."""
 COLLISION_SLOP_M = 0.001
 """Overlap that is left alone. Chipmunk's default of 0.1 m would be more than a robot's radius."""
 WALL_INSET_M = COLLISION_SLOP_M + 1e-5
-"""How far a wall stands inside of the floor's border, so that a robot that leans on it is on the floor in spite of the
-slop; a hundredth of the slop more, or rounding would have it put back in every tick."""
+"""How far a wall stands inside of the floor's border, and a box out of its sides, so that a robot that leans on it is
+on the floor in spite of the slop; a hundredth of the slop more, or rounding would have it put back in every tick."""
 ROUNDS = 160
 """Most rounds per substep; few are needed outside of heaps. Mean of the deepest overlap per tick of robots, packed into
 a corner, that all push into it, as a share of a diameter: 512 robots 0.009 with 80 rounds and 0.007 with 160; 1,000
@@ -48,7 +50,7 @@ robots 0.99, which is one robot on top of another, and 0.017. Chipmunk with its 
 SETTLED_M_S = 1e-9
 """Impulses have settled when a round changes no velocity by more than this: a tick moves no body by 1e-9 m of it."""
 WALLS = 4
-"""Most walls that a robot can touch."""
+"""Most walls that a robot can touch, besides all the boxes."""
 MARGIN_M = 0.01
 """How much farther than by their commands two bodies may come closer in a tick, because others shove them."""
 
@@ -85,6 +87,8 @@ class BodyState(NamedTuple):
     """Robots by place as of that sweep: cell size in m, first_in_bin, next_in_bin."""
     room: FloatArray
     """x low, y low, x high, y high of centres on the floor, m."""
+    obstacles: FloatArray
+    """(B, 4) boxes on the floor: x low, y low, x high, y high in m."""
     radius_m: float
     n_substeps: int
     pairs: IntArray
@@ -159,14 +163,18 @@ def top_speed(twist: FloatArray) -> float:
 
 
 @kernel
-def list_busy(
-    poses: FloatArray, present: BoolArray, room: FloatArray, wall_m: float, pairs: IntArray, n_pairs: int, work: Work
-) -> int:
-    """List the rows of robots that are in a pair, or within `wall_m` of where a wall holds them; returns how many."""
+def list_busy(b: BodyState, present: BoolArray, wall_m: float, n_pairs: int) -> int:
+    """List the rows of robots that are in a pair, or within `wall_m` of where a wall or a box holds them.
+
+    Returns how many there are.
+    """
+    poses, room, obstacles, pairs, work = b.poses, b.room, b.obstacles, b.pairs, b.work
     busy, is_busy = work[1], work[2]
     for i in range(present.shape[0]):
         to_west_or_east = min(poses[i, 0] - room[0], room[2] - poses[i, 0])
         is_busy[i] = min(to_west_or_east, poses[i, 1] - room[1], room[3] - poses[i, 1]) < wall_m
+        for k in range(obstacles.shape[0]):
+            is_busy[i] |= is_within(float(poses[i, 0]), float(poses[i, 1]), obstacles, k, b.radius_m + wall_m)
     for k in range(n_pairs):
         is_busy[pairs[k, 0]] = True
         is_busy[pairs[k, 1]] = True
@@ -183,7 +191,7 @@ def list_busy(
 def add_contact(
     n: int, i: int, j: int, number: float, normal: tuple[float, float], gap_m: float, substep_s: float, work: Work
 ) -> int:
-    """Write contact n of body i with body j (-1 = wall) along the normal from i; returns n + 1.
+    """Write contact n of body i with body j (-1 = wall or box) along the normal from i; returns n + 1.
 
     `gap_m` is negative; the push undoes what is beyond the slop in one substep.
     """
@@ -207,6 +215,7 @@ def find_contacts(
     n_pairs: int,
     n_busy: int,
     room: FloatArray,
+    obstacles: FloatArray,
     radius: float,
     substep_s: float,
     work: Work,
@@ -229,7 +238,7 @@ def find_contacts(
     busy = work[1]
     for k in range(n_busy):
         i = busy[k]
-        number = float(n_robots) * n_robots + WALLS * i
+        number = float(n_robots) * n_robots + (WALLS + obstacles.shape[0]) * i
         west = poses[i, 0] - room[0] - WALL_INSET_M
         east = room[2] - poses[i, 0] - WALL_INSET_M
         south = poses[i, 1] - room[1] - WALL_INSET_M
@@ -242,6 +251,11 @@ def find_contacts(
             n = add_contact(n, i, -1, number + 2, (0.0, -1.0), south, substep_s, work)
         if north < 0.0:
             n = add_contact(n, i, -1, number + 3, (0.0, 1.0), north, substep_s, work)
+        for b in range(obstacles.shape[0]):
+            to_x, to_y, distance = nearest(float(poses[i, 0]), float(poses[i, 1]), obstacles, b)
+            gap = distance - radius - WALL_INSET_M
+            if gap < 0.0:
+                n = add_contact(n, i, -1, number + WALLS + b, (to_x, to_y), gap, substep_s, work)
     return n
 
 
@@ -267,7 +281,7 @@ def push_discs(velocity: FloatArray, i: int, j: int, contact: FloatArray, k: int
 
 @kernel
 def push_wall(velocity: FloatArray, i: int, contact: FloatArray, k: int, radius: float) -> float:
-    """One round of the contact k of a disc and a wall; returns the largest change of an impulse, m/s."""
+    """One round of the contact k of a disc and a wall or a box; returns the largest change of an impulse, m/s."""
     nx, ny = contact[k, 0], contact[k, 1]
     along = -(velocity[i, 0] * nx + velocity[i, 1] * ny)
     across = velocity[i, 0] * ny - velocity[i, 1] * nx - radius * velocity[i, 2]
@@ -402,7 +416,7 @@ def tell_poses(
 
 @kernel
 def move_bodies(b: BodyState, twist: FloatArray, present: BoolArray, dt_s: float) -> bool:
-    """Move present robots by one tick along `twist` (>= N, 3), with contacts; nobody ends outside of `b.room`.
+    """Move present robots by one tick along `twist` (>= N, 3), with contacts; nobody ends in a wall or a box.
 
     Returns False if there are more pairs than `b.pairs` holds. Then nobody was moved: call again with more room.
     """
@@ -412,7 +426,7 @@ def move_bodies(b: BodyState, twist: FloatArray, present: BoolArray, dt_s: float
     n_pairs = find_pairs(poses, present, b.near, b.bins, sight_m, b.pairs)
     if n_pairs > b.pairs.shape[0]:
         return False
-    n_busy = list_busy(poses, present, room, WALL_INSET_M + fastest_m + MARGIN_M, b.pairs, n_pairs, work)
+    n_busy = list_busy(b, present, WALL_INSET_M + fastest_m + MARGIN_M, n_pairs)
     velocity, busy, is_busy = work[0], work[1], work[2]
     for i in range(present.shape[0]):
         if present[i] and not is_busy[i]:
@@ -424,7 +438,7 @@ def move_bodies(b: BodyState, twist: FloatArray, present: BoolArray, dt_s: float
             velocity[busy[k], column] = 0.0
     substep_s = dt_s / b.n_substeps
     for substep in range(b.n_substeps):
-        n_contacts = find_contacts(poses, b.pairs, n_pairs, n_busy, room, b.radius_m, substep_s, work)
+        n_contacts = find_contacts(poses, b.pairs, n_pairs, n_busy, room, b.obstacles, b.radius_m, substep_s, work)
         if substep == 1:
             recall(n_contacts, b.radius_m, work, b.memory)
         settle(n_contacts, b.radius_m, work)
@@ -436,4 +450,6 @@ def move_bodies(b: BodyState, twist: FloatArray, present: BoolArray, dt_s: float
                     velocity[busy[k], column] = twist[busy[k], column]
         move_busy(poses, n_busy, substep_s, work)
     hold_inside(poses, present, room)
+    if b.obstacles.shape[0] > 0:
+        hold_outside(poses, present, b.obstacles, room, b.radius_m)
     return True

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_NEST
+from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import (
     CACHE_FIELDS,
@@ -34,14 +34,14 @@ _HALF_WINDOW = WINDOW_CELLS // 2
 
 @kernel
 def grey_of(code: int) -> float:
-    """Grey level of a floor code of `contract.codes`: object 0, nest 0.70, cache 0.40, empty 1."""
+    """Grey level of a floor code of `contract.codes`: object 0, nest 0.70, cache 0.40, empty 1, also by an obstacle."""
     if code >= 0:
         return _GREY_OBJECT
     if code == CELL_EMPTY:
         return _GREY_EMPTY
     if code == CELL_NEST:
         return _GREY_NEST
-    return _GREY_CACHE
+    return _GREY_CACHE if code <= CELL_CACHE else _GREY_EMPTY
 
 
 @kernel

@@ -25,7 +25,7 @@ def mark(
     counters: np.ndarray,
     interference_sum: FloatArray,
 ) -> None:
-    """Flag active robots for which the obstacle rule holds in this tick, walls included, and count the tick.
+    """Flag active robots for which the obstacle rule holds in this tick, walls and boxes included, and count the tick.
 
     The rule uses geometry only, so it is the same for every policy.
 

@@ -78,7 +78,7 @@ def state_at(s: InteractionState, at: np.ndarray) -> InteractionState:
 
 @kernel
 def sensors_at(s: Sensors, at: np.ndarray) -> Sensors:
-    """Sensors like `s` whose arrays are `at` (8,) these addresses."""
+    """Sensors like `s` whose arrays are `at` (9,) these addresses."""
     return Sensors(
         array_at(s.obs, at[0]),
         array_at(s.near, at[1]),
@@ -92,6 +92,7 @@ def sensors_at(s: Sensors, at: np.ndarray) -> Sensors:
         array_at(s.scales, at[6]),
         s.sizes,
         array_at(s.shares, at[7]),
+        array_at(s.obstacles, at[8]),
         s.cache_half_side,
         s.reads_light,
         s.light_of_carriers_only,
@@ -103,7 +104,7 @@ def sensors_at(s: Sensors, at: np.ndarray) -> Sensors:
 
 @kernel
 def world_at(w: World, at: np.ndarray) -> World:
-    """World like `w` whose arrays are `at` (51,) these addresses, in the order of `world.rack.addresses`."""
+    """World like `w` whose arrays are `at` (52,) these addresses, in the order of `world.rack.addresses`."""
     before, now = w.pressing
     return World(
         state_at(w.state, at[:28]),
@@ -121,9 +122,9 @@ def world_at(w: World, at: np.ndarray) -> World:
             (array_at(before[0], at[35]), array_at(before[1], at[36]), array_at(before[2], at[37])),
             (array_at(now[0], at[38]), array_at(now[1], at[39]), array_at(now[2], at[40])),
         ),
-        sensors_at(w.sensors, at[41:49]),
-        array_at(w.interfering, at[49]),
-        array_at(w.interference_sum, at[50]),
+        sensors_at(w.sensors, at[41:50]),
+        array_at(w.interfering, at[50]),
+        array_at(w.interference_sum, at[51]),
         w.wandering,
         w.n_static_caches,
         w.has_caches,
@@ -132,24 +133,25 @@ def world_at(w: World, at: np.ndarray) -> World:
 
 @kernel
 def bodies_at(b: BodyState, at: np.ndarray) -> BodyState:
-    """Bodies like `b` whose arrays are `at` (13,) these addresses."""
+    """Bodies like `b` whose arrays are `at` (14,) these addresses."""
     work, memory = b.work, b.memory
     return BodyState(
         array_at(b.poses, at[0]),
         array_at(b.near, at[1]),
         (b.bins[0], array_at(b.bins[1], at[2]), array_at(b.bins[2], at[3])),
         array_at(b.room, at[4]),
+        array_at(b.obstacles, at[5]),
         b.radius_m,
         b.n_substeps,
-        array_at(b.pairs, at[5]),
+        array_at(b.pairs, at[6]),
         (
-            array_at(work[0], at[6]),
-            array_at(work[1], at[7]),
-            array_at(work[2], at[8]),
-            array_at(work[3], at[9]),
-            array_at(work[4], at[10]),
+            array_at(work[0], at[7]),
+            array_at(work[1], at[8]),
+            array_at(work[2], at[9]),
+            array_at(work[3], at[10]),
+            array_at(work[4], at[11]),
         ),
-        (array_at(memory[0], at[11]), array_at(memory[1], at[12])),
+        (array_at(memory[0], at[12]), array_at(memory[1], at[13])),
     )
 
 
@@ -173,8 +175,8 @@ def whole_each(
     Args:
         w: Any of the worlds: gives types, shapes and constants.
         bodies: Its bodies.
-        worlds_at: (B, 51) addresses of the arrays of each world.
-        bodies_are_at: (B, 13) addresses of the arrays of its bodies.
+        worlds_at: (B, 52) addresses of the arrays of each world.
+        bodies_are_at: (B, 14) addresses of the arrays of its bodies.
         seats: Which of the B worlds are stepped.
         actions: (B, N, A), and all others as in `tick.whole` with one more dimension in front.
         wheel_gain: (B, N, 2).

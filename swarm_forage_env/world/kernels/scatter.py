@@ -1,6 +1,6 @@
 """Drawing free cells for objects: which region, which cell. Random numbers are passed in.
 
-Floor codes are those of `contract.codes`: an object row >= 0, else CELL_EMPTY, nest or cache.
+Floor codes are those of `contract.codes`: an object row >= 0, else CELL_EMPTY, nest, obstacle or cache.
 """
 
 import numpy as np

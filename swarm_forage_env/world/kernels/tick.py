@@ -51,6 +51,7 @@ def look(w: World) -> None:
         w.present,
         s.bins,
         s.interior,
+        s.obstacles,
         s.radius_m,
         s.reach_m,
         s.obs,

@@ -49,6 +49,8 @@ class Sensors(NamedTuple):
     """Cells along x, along y, objects."""
     shares: ObsArray
     """(M + 1,) what the window shows: 0 for no object, (row + 1) / M for each."""
+    obstacles: FloatArray
+    """(B, 4) boxes on the floor: x low, y low, x high, y high in m."""
     cache_half_side: int
     reads_light: bool
     light_of_carriers_only: bool

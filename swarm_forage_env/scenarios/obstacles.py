@@ -1,0 +1,131 @@
+"""Obstacles: boxes on the floor that robots cannot enter, and the cells and the area that they take.
+
+Example: `scenario("warehouse_small", obstacles=((14.0, 4.0, 14.4, 12.0),))` puts a wall of 0.4 x 8 m into the small
+warehouse. An obstacle is (x low, y low, x high, y high) in m, like `ArenaConfig.nest_box_m`. It stands exactly there.
+Obstacles may touch and overlap each other, and reach into the walls.
+"""
+
+import math
+from collections.abc import Iterable
+from typing import Any, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_forage_env._internal import fields
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.printable import shown
+from swarm_forage_env.scenarios.regions import Box
+from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M
+
+Rectangle: TypeAlias = tuple[float, float, float, float]
+"""x low, y low, x high, y high in m."""
+
+MAX_OBSTACLES = 200
+"""Most obstacles (our choice: every robot looks at all of them in every tick)."""
+MIN_SIDE_M = CELL_M
+"""Shortest side: a cell, as of the nest. A robot that is pushed never gets past the middle of one in a tick."""
+_ROUNDING_CELLS = 1e-6
+"""Edges this close to a line between cells lie on it."""
+
+
+def check_obstacles(obstacles: Any, width_m: float, height_m: float, nest: Rectangle) -> None:
+    """Refuse what is no tuple of boxes inside of an arena and clear of its nest.
+
+    Args:
+        obstacles: What was given.
+        width_m: Extent of the arena along x, m.
+        height_m: Along y, m.
+        nest: The nest's rectangle, m.
+
+    Raises:
+        ConfigError: names the first box that cannot be.
+    """
+    if not isinstance(obstacles, tuple):
+        raise ConfigError(
+            "Expected arena.obstacles to be a tuple of boxes (x low, y low, x high, y high) in m, such as "
+            f"((14.0, 4.0, 14.4, 12.0),), got {shown(obstacles)}."
+        )
+    boxes = cast("tuple[Any, ...]", obstacles)
+    if len(boxes) > MAX_OBSTACLES:
+        raise ConfigError(f"Expected at most {MAX_OBSTACLES} arena.obstacles, got {len(boxes)}.")
+    for index, box in enumerate(boxes):
+        _check_obstacle(f"arena.obstacles[{index}]", box, width_m, height_m, nest)
+
+
+def _check_obstacle(where: str, box: Any, width_m: float, height_m: float, nest: Rectangle) -> None:
+    edges = cast("tuple[Any, ...]", box) if isinstance(box, tuple) else ()
+    if len(edges) != 4:
+        raise ConfigError(f"Expected {where} to be (x low, y low, x high, y high) in m, got {shown(box)}.")
+    for index, edge in enumerate(edges):
+        fields.number(f"{where}[{index}]", edge)
+    x_low, y_low, x_high, y_high = edges
+    if min(x_high - x_low, y_high - y_low) < MIN_SIDE_M - 1e-9:
+        raise ConfigError(
+            f"Expected {where} with x low < x high and y low < y high, at least {MIN_SIDE_M} m apart, got {edges}."
+        )
+    if min(x_low, y_low) < 0.0 or x_high > width_m or y_high > height_m:
+        raise ConfigError(f"Expected {where} inside the {width_m} x {height_m} m arena, got {edges}.")
+    if x_low < nest[2] and nest[0] < x_high and y_low < nest[3] and nest[1] < y_high:
+        raise ConfigError(f"Expected {where} clear of the nest {nest}, got {edges}; move the box or the nest.")
+
+
+def blocked_cells(box: Rectangle, nx: int, ny: int, radius_m: float) -> Box:
+    """Return the cells that an obstacle keeps free of objects, half-open.
+
+    These are the cells that it covers, also in part, and those whose centre is nearer to it than a robot's radius: no
+    robot could stand on an object there. (Near corners that is a little more than needed.)
+    """
+    low: list[int] = []
+    high: list[int] = []
+    for start, end, n_cells in ((box[0], box[2], nx), (box[1], box[3], ny)):
+        covered = math.floor(start * CELLS_PER_M + _ROUNDING_CELLS), math.ceil(end * CELLS_PER_M - _ROUNDING_CELLS)
+        first_near = math.floor((start - radius_m) * CELLS_PER_M - 0.5) + 1
+        last_near = math.ceil((end + radius_m) * CELLS_PER_M - 0.5) - 1
+        low.append(max(0, min(covered[0], first_near)))
+        high.append(min(n_cells, max(covered[1], last_near + 1)))
+    return low[0], low[1], high[0], high[1]
+
+
+def covered_area_m2(area: Rectangle, obstacles: Iterable[Rectangle], radius_m: float) -> float:
+    """Return how much of an area obstacles close to the centres of robots, m^2; corners count as square.
+
+    Args:
+        area: Where centres may be, m.
+        obstacles: Boxes, m.
+        radius_m: Of a robot.
+    """
+    grown = [
+        (
+            max(area[0], box[0] - radius_m),
+            max(area[1], box[1] - radius_m),
+            min(area[2], box[2] + radius_m),
+            min(area[3], box[3] + radius_m),
+        )
+        for box in obstacles
+    ]
+    inside = [box for box in grown if box[0] < box[2] and box[1] < box[3]]
+    x = np.unique([area[0], area[2], *(edge for box in inside for edge in (box[0], box[2]))])
+    y = np.unique([area[1], area[3], *(edge for box in inside for edge in (box[1], box[3]))])
+    is_covered = np.zeros((len(y) - 1, len(x) - 1), np.bool_)
+    for box in inside:
+        rows = slice(*np.searchsorted(y, (box[1], box[3])))
+        is_covered[rows, slice(*np.searchsorted(x, (box[0], box[2])))] = True
+    return float((is_covered * np.diff(y)[:, None] * np.diff(x)).sum())
+
+
+def stretched(obstacles: Iterable[Rectangle], x_factor: float, y_factor: float) -> tuple[Rectangle, ...]:
+    """Return obstacles that keep their places and shares in an arena so much wider and higher."""
+    return tuple(
+        (x_low * x_factor, y_low * y_factor, x_high * x_factor, y_high * y_factor)
+        for x_low, y_low, x_high, y_high in obstacles
+    )
+
+
+def distances_m(obstacles: Iterable[Rectangle], position: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far positions (N, 2) m are from the nearest obstacle, (N,) m: 0 inside, inf where there is none."""
+    nearest = np.full(len(position), np.inf)
+    for box in obstacles:
+        away = np.maximum(0.0, np.maximum(np.array(box[:2]) - position, position - np.array(box[2:])))
+        nearest = np.minimum(nearest, np.hypot(away[:, 0], away[:, 1]))
+    return nearest

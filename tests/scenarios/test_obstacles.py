@@ -1,0 +1,143 @@
+"""Obstacles and positions of objects as fields of a scenario: what is refused, where from they come, what they take."""
+
+import json
+
+import numpy as np
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli.config_file import read_config
+from swarm_forage_env.cli.scenario_options import parse_setting
+from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
+from swarm_forage_env.scenarios.obstacles import MAX_OBSTACLES, blocked_cells, covered_area_m2, distances_m
+from swarm_forage_env.scenarios.presets import at_density, scenario
+from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.study.study_file import load_study
+
+WALL = (14.0, 4.0, 14.4, 12.0)
+PILLAR = (18.0, 7.5, 19.0, 8.5)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        ({"obstacles": [WALL]}, ("arena.obstacles to be a tuple of boxes", "got [(14.0")),
+        ({"obstacles": WALL}, ("arena.obstacles[0] to be (x low, y low, x high, y high)", "got 14.0")),
+        ({"obstacles": (WALL, (1.0, 2.0, 3.0))}, ("arena.obstacles[1]", "got (1.0, 2.0, 3.0)")),
+        ({"obstacles": ((14.0, 4.0, "a", 12.0),)}, ("arena.obstacles[0][2]", "'a'")),
+        ({"obstacles": ((14.4, 4.0, 14.0, 12.0),)}, ("x low < x high", "(14.4, 4.0, 14.0, 12.0)")),
+        ({"obstacles": ((14.0, 4.0, 14.1, 12.0),)}, ("at least 0.2 m apart",)),
+        ({"obstacles": ((30.0, 4.0, 33.0, 12.0),)}, ("inside the 32.0 x 16.0 m arena",)),
+        (
+            {"obstacles": ((4.0, 4.0, 6.0, 5.0),)},
+            ("clear of the nest (1.6, 1.6, 4.8, 14.4)", "move the box or the nest"),
+        ),
+        ({"obstacles": (WALL,) * (MAX_OBSTACLES + 1)}, (f"at most {MAX_OBSTACLES} arena.obstacles, got 201",)),
+        ({"obstacles": ((24.0, 0.0, 28.0, 16.0),)}, ("at most 0 objects", "or move obstacles")),
+        ({"obstacles": ((24.0, 0.0, 27.0, 16.0),)}, ("at most 56 objects", "got 200")),
+        (
+            {"obstacles": ((4.8, 0.0, 23.0, 16.0),), "n_robots": 50_000},
+            ("26.4 x 10.4 m less 191.0 m^2 for obstacles", "got 50000"),
+        ),
+        ({"placement": "positions"}, ("object_positions_m with placement 'positions'", "got 0 positions")),
+        ({"object_positions_m": ((20.0, 8.0),)}, ("and only with it, got 1 positions with 'single_source'",)),
+        (
+            {"placement": "positions", "object_positions_m": ((20.0, 8.0, 1.0),)},
+            ("object_positions_m[0] to be (x, y)",),
+        ),
+        ({"placement": "positions", "object_positions_m": [(20.0, 8.0)]}, ("a tuple of places (x, y)",)),
+        ({"placement": "positions", "object_positions_m": ((20.0, 8.0),)}, ("at most 1 objects", "got 200")),
+        ({"placement": "positions", "object_positions_m": ((30.0, 8.0),)}, ("between 15 % and 85 %", "(30.0, 8.0)")),
+        (
+            {"placement": "positions", "object_positions_m": ((14.2, 8.0),), "obstacles": (WALL,), "n_objects": 1},
+            ("clear of nest and obstacles, got (14.2, 8.0)",),
+        ),
+    ],
+)
+def test_nonsense_is_refused_with_one_clear_line(overrides, words):
+    with pytest.raises(ConfigError) as caught:
+        scenario("warehouse_small", **overrides)
+    message = str(caught.value)
+    assert all(word in message for word in words), message
+    assert "\n" not in message
+
+
+def test_obstacles_come_from_the_command_line_and_from_files(tmp_path):
+    assert parse_setting("obstacles=14,4,14.4,12") == ("obstacles", (WALL,))
+    assert parse_setting("obstacles=14,4,14.4,12 + 18,7.5,19,8.5") == ("obstacles", (WALL, PILLAR))
+    assert parse_setting("obstacles=") == ("obstacles", ())
+    assert parse_setting("object_positions_m=20,8+21,8") == ("object_positions_m", ((20.0, 8.0), (21.0, 8.0)))
+    for word in ("obstacles=1,2", "obstacles=a,b,c,d", "obstacles=1,2,3,4,5"):
+        with pytest.raises(ConfigError, match=r"Expected obstacles to be boxes such as 10,4,11,12 or"):
+            parse_setting(word)
+    file = tmp_path / "world.toml"
+    file.write_text("[scenario]\nobstacles = [[14.0, 4.0, 14.4, 12.0], [18.0, 7.5, 19.0, 8.5]]\n")
+    assert read_config(file)[0] == {"obstacles": (WALL, PILLAR)}
+
+
+def test_obstacles_come_back_from_json_and_make_another_run():
+    bare, walled = scenario("warehouse_small"), scenario("warehouse_small", obstacles=(WALL, PILLAR))
+    assert from_mapping(ScenarioConfig, json.loads(json.dumps(to_mapping(walled)))) == walled
+    one, other = RunSpec(scenario=bare, policy="crw"), RunSpec(scenario=walled, policy="crw")
+    assert one.run_id != other.run_id
+    assert RunSpec.from_json(other.to_json()) == other
+
+
+def test_runs_without_obstacles_keep_the_identity_of_before():
+    mapping = RunSpec(scenario=scenario("warehouse_small"), policy="crw").to_mapping()
+    del mapping["scenario"]["arena"]["obstacles"], mapping["scenario"]["objects"]["object_positions_m"]
+    assert RunSpec.from_mapping(mapping).run_id == RunSpec(scenario=scenario("warehouse_small"), policy="crw").run_id
+
+
+def test_obstacles_are_an_axis_of_a_study(tmp_path):
+    file = tmp_path / "walls.toml"
+    file.write_text(
+        'name = "walls"\nscenario = "warehouse_small"\npolicies = ["crw"]\nreadings = ["described"]\n'
+        "[set]\nn_robots = 4\n[[axis]]\nfield = 'obstacles'\n"
+        "values = [[], [[14.0, 4.0, 14.4, 12.0]], [[14.0, 4.0, 14.4, 12.0], [18.0, 7.5, 19.0, 8.5]]]\n"
+        "[budget.smoke]\nseeds = 1\nhorizon_s = 400.0\n"
+    )
+    study = load_study(file, "smoke")
+    assert study.axes[0].values == ("none", "14.0,4.0,14.4,12.0", "14.0,4.0,14.4,12.0+18.0,7.5,19.0,8.5")
+    assert [spec.scenario.arena.obstacles for spec in study.expand()] == [(), (WALL,), (WALL, PILLAR)]
+
+
+def test_obstacles_keep_their_share_of_an_arena_at_another_density():
+    grown = at_density(scenario("warehouse_small", obstacles=(WALL,)), 0.05, n_robots=200)
+    factor = grown.arena.width_m / 32.0
+    np.testing.assert_allclose(grown.arena.obstacles[0], np.array(WALL) * factor)
+    rescue = scenario("search_and_rescue", obstacles=((10.0, 10.0, 12.0, 11.0),))
+    np.testing.assert_allclose(
+        at_density(rescue, 0.05, n_robots=700).arena.obstacles[0], (20.0, 20.0, 24.0, 22.0), rtol=1
+    )
+    with pytest.raises(ConfigError, match="either density, which chooses the arena, or obstacles"):
+        scenario("warehouse_small", density=0.05, obstacles=(WALL,))
+
+
+@pytest.mark.parametrize("radius", [0.085, 0.15])
+@pytest.mark.parametrize("box", [WALL, PILLAR, (10.1, 3.37, 10.34, 4.0), (0.0, 0.0, 0.2, 16.0)])
+def test_objects_keep_off_cells_that_a_box_covers_or_no_robot_can_stand_on(box, radius):
+    x_low, y_low, x_high, y_high = blocked_cells(box, 160, 80, radius)
+    centres = np.stack(np.meshgrid(np.arange(160) + 0.5, np.arange(80) + 0.5), axis=-1) * 0.2
+    low, high = np.array(box[:2]), np.array(box[2:])
+    is_covered = np.all((centres + 0.1 > low + 1e-6) & (centres - 0.1 < high - 1e-6), axis=2)
+    is_near = np.all((centres > low - radius) & (centres < high + radius), axis=2)
+    expected = np.zeros((80, 160), np.bool_)
+    expected[y_low:y_high, x_low:x_high] = True
+    np.testing.assert_array_equal(is_covered | is_near, expected)
+
+
+def test_covered_area_and_distances_are_those_of_many_points():
+    boxes = (WALL, PILLAR, (18.5, 8.0, 20.0, 9.0), (2.0, 2.0, 5.0, 3.0))
+    area = (2.8, 2.8, 29.2, 13.2)
+    points = np.random.default_rng(0).uniform(area[:2], area[2:], (40_000, 2))
+    is_covered = np.zeros(len(points), np.bool_)
+    nearest = np.full(len(points), np.inf)
+    for box in boxes:
+        low, high = np.array(box[:2]), np.array(box[2:])
+        is_covered |= np.all((points > low - 0.1) & (points < high + 0.1), axis=1)
+        nearest = np.minimum(nearest, np.linalg.norm(points - np.clip(points, low, high), axis=1))
+    share = covered_area_m2(area, boxes, 0.1) / ((area[2] - area[0]) * (area[3] - area[1]))
+    assert share == pytest.approx(is_covered.mean(), abs=0.003)
+    np.testing.assert_allclose(distances_m(boxes, points), nearest)
+    assert np.all(distances_m((), points[:3]) == np.inf)
