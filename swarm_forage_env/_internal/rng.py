@@ -22,6 +22,7 @@ class Stream(IntEnum):
     SENSOR_NOISE = 6
     ACTUATOR_NOISE = 7
     POPULATION = 8
+    SCENARIO = 12
 
 
 def stream_rng(seed: int, stream: Stream) -> np.random.Generator:
