@@ -271,16 +271,17 @@ def _check_wrapper(title: str, name: str, settings: Mapping[str, Any], smallest:
 
 def _check_columns(built: list[ScenarioConfig], largest: ScenarioConfig) -> None:
     """Refuse worlds whose observations have other columns than those of the largest."""
-    expected = _columns(largest)
+    expected = columns_of(largest)
     for config in built:
-        if _columns(config) != expected:
+        if columns_of(config) != expected:
             raise ConfigError(
                 f"Expected worlds with the same columns of observations, got {dict(expected)} in {largest.name} and "
-                f"{dict(_columns(config))} in {config.name}; give all worlds the same sensors."
+                f"{dict(columns_of(config))} in {config.name}; give all worlds the same sensors."
             )
 
 
-def _columns(config: ScenarioConfig) -> tuple[tuple[str, int], ...]:
+def columns_of(config: ScenarioConfig) -> tuple[tuple[str, int], ...]:
+    """Return names and sizes of the slices of a scenario's observations: what worlds of one policy have in common."""
     return tuple((part.name, part.size) for part in layout_for(config))
 
 
