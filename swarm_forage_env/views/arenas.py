@@ -22,9 +22,9 @@ from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.interface import MOTIONS
 from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
 from swarm_forage_env.views.settlement import Settlement, can_settle
+from swarm_forage_env.views.spare import spare_masks, with_spare_rows
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.kernels.rows import book_rows
 from swarm_forage_env.world.rack import Rack, can_share_a_rack
@@ -208,10 +208,7 @@ class ArenaBatch:
         out[n_robots:] = 0.0
 
     def _active(self) -> BoolArray:
-        active = np.zeros((self.n_arenas, self.n_robots), np.bool_)
-        for arena, rows in zip(self.arenas, active, strict=True):
-            rows[: arena.n_robots] = arena.forage_env.active
-        return active.ravel()
+        return np.concatenate([with_spare_rows(arena.forage_env.active, self.n_robots) for arena in self.arenas])
 
     def step(self, actions: np.ndarray) -> ArenaStep:
         """Step every arena by one decision.
@@ -415,13 +412,7 @@ class ArenaBatch:
             ValueError: the actions are continuous.
         """
         self._require_reset("action_masks")
-        return np.concatenate([self._padded_mask(arena) for arena in self.arenas])
-
-    def _padded_mask(self, arena: LearnerArena) -> BoolArray:
-        mask = arena.mask()
-        spare = np.zeros((self.n_robots - len(mask), mask.shape[1]), np.bool_)
-        spare[:, MOTIONS.index("stand")] = True
-        return np.concatenate([mask, spare])
+        return np.concatenate([spare_masks(arena.mask(), self.n_robots) for arena in self.arenas])
 
     def _require_reset(self, what: str) -> None:
         if self._is_closed:

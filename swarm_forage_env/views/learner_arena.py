@@ -67,6 +67,8 @@ class ArenaPlan:
 
 DEFAULT_SCENARIO = "warehouse_small"
 """The world of environments that are told nothing about it."""
+SAMPLED = "sampled"
+"""Stands for the scenario in the id swarm_forage/sampled-v1, whose worlds a sampler draws."""
 
 
 def plan_arena(
@@ -98,15 +100,18 @@ def plan_arena(
     """
     disturbing = wrapper_configs(wrappers)
     if sampler is None:
+        if scenario == SAMPLED:
+            raise ConfigError(
+                "Expected a sampler for swarm_forage/sampled-v1, got none; give sampler=ScenarioSampler(...)."
+            )
         world = chosen_scenario(scenario or DEFAULT_SCENARIO, overrides)
     else:
         instance("sampler", sampler, ScenarioSampler, hint="; ScenarioSampler.from_mapping reads a table")
-        given = ["scenario"] * (scenario is not None) + ["wrappers"] * bool(disturbing) + list(overrides)
+        given = ["scenario"] * (scenario not in (None, SAMPLED)) + ["wrappers"] * bool(disturbing) + list(overrides)
         if given:
             raise ConfigError(
                 f"Expected either a sampler, which decides on the worlds, or {', '.join(given)}; got both. Write it "
-                "into the sampler, where it can be shared by all worlds. "
-                "(By an id, an environment with a sampler is made as swarm_forage/sampled-v1.)"
+                "into the sampler, where all worlds can share it. By id, make swarm_forage/sampled-v1."
             )
         world = sampler.largest
     return ArenaPlan(
