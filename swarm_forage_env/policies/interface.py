@@ -5,6 +5,7 @@ or a gripper that works by itself. Training environments and trained policies us
 runs exactly as it was trained.
 """
 
+import copy
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
@@ -27,6 +28,14 @@ from swarm_forage_env.policies.kernels.commands import (
     numbered_actions,
 )
 from swarm_forage_env.policies.kernels.compact import COMPACT_COLUMNS, compact_view
+from swarm_forage_env.policies.kernels.sites import (
+    N_SITES,
+    SITE_COLUMNS,
+    SiteMemory,
+    new_site_memory,
+    remember_sites,
+    show_sites,
+)
 from swarm_forage_env.scenarios.config import ScenarioConfig
 
 OBSERVATIONS = ("full", "compact")
@@ -38,6 +47,13 @@ GRIPS = tuple(GRIP_COMMANDS)
 """Discrete actions of the gripper, in order after the motions; the wheels stand."""
 _SHARED = ("wheel_speed", "position", "heading", "carrying", "interacting", "active")
 """Slices that the compact view takes as they are, in order."""
+_SITE_ROWS: tuple[LayoutRow, ...] = tuple(
+    (name, (1.0,) * SITE_COLUMNS, "", f"{what}: m forward, m left, at most 1 m long; 1 if it is known; distance / 20 m")
+    for name, what in (
+        ("pickup_site", "where the robot picked an object up last"),
+        ("sighting_site", "where it last saw an object while carrying"),
+    )
+)
 _COMPACT_READS = ("proximity", "light", "ground", *_SHARED, "los_cell", "los_object", "los_cache")
 
 
@@ -58,6 +74,8 @@ class InterfaceConfig:
     """Grasp when empty and over an object or a cache, deliver when carrying in the nest; the learner only drives."""
     decision_ticks: int = 1
     """Ticks for which an action is kept; rewards add up. An automatic gripper decides in every tick."""
+    site_memory: bool = False
+    """Two places that a robot remembers, see `policies.kernels.sites`: eight more columns."""
     own_sensors: tuple[str, ...] | None = None
     """Names of own sensors that the learner sees beside the columns of the package, in this order. Where nothing is
     said (None), environments and trainings fill in those of their scenario, and a policy sees none."""
@@ -67,6 +85,7 @@ class InterfaceConfig:
         one_of("interface.actions", self.actions, ACTIONS)
         switch("interface.automatic_gripper", self.automatic_gripper)
         whole("interface.decision_ticks", self.decision_ticks, at_least=1)
+        switch("interface.site_memory", self.site_memory)
         if self.own_sensors is not None:
             unique_names("interface.own_sensors", self.own_sensors)
 
@@ -132,7 +151,12 @@ class LearnerInterface:
         self.passes_on = not (self._is_discrete or config.automatic_gripper)
         own = [source[name] for name in config.sensors]
         self._own_columns = np.array([column for part in own for column in range(part.start, part.stop)], np.intp)
-        self._n_built_in = self.layout.size - len(self._own_columns)
+        self._n_shown = (
+            self.layout.size - len(self._own_columns) - (N_SITES * SITE_COLUMNS if config.site_memory else 0)
+        )
+        self._sites = new_site_memory(spec.n_robots) if config.site_memory else None
+        self._pose_starts = (start["position"], start["heading"])
+        self._cargo_starts = (start["carrying"], start["los_cell"], start["los_object"])
         self.observation_space = self.new_observation_space()
         self.action_space = self.new_action_space()
         self._actions_shape = (spec.n_robots, *(self.action_space.shape or ()))
@@ -152,11 +176,27 @@ class LearnerInterface:
         """Column of what the learner sees that is 1 for robots at work, 0 for all others."""
         return self.layout.part("active").start
 
+    def forget(self) -> None:
+        """Forget what robots remember: a run begins."""
+        if self._sites is not None:
+            for part in self._sites:
+                part[...] = 0
+
+    def memory(self) -> SiteMemory | None:
+        """Return a copy of what robots remember; None without memory."""
+        return copy.deepcopy(self._sites)
+
+    def recall(self, memory: SiteMemory | None) -> None:
+        """Let robots remember what `memory()` of an interface of the same choices and swarm returned."""
+        if self._sites is not None and memory is not None:
+            for part, kept in zip(self._sites, memory, strict=True):
+                np.copyto(part, kept)
+
     def observe(self, obs: ObsArray, out: ObsArray | None = None) -> ObsArray:
-        """Return what the learner sees, a new array or `out`.
+        """Return what the learner sees, a new array or `out`; with `site_memory`, robots remember it.
 
         Args:
-            obs: (N, D) observations of the environment.
+            obs: (N, D) observations of the environment, in each decision of a run.
             out: (N, d) float32 to write into.
         """
         if out is None:
@@ -164,9 +204,15 @@ class LearnerInterface:
         if self._is_compact:
             compact_view(obs, self._view_starts, self._half_x, self._half_y, self._behind_counts, out)
         else:
-            np.copyto(out[:, : self._n_built_in], obs[:, : self._n_built_in])
+            np.copyto(out[:, : self._n_shown], obs[:, : self._n_shown])
+        at = self._n_shown
+        if self._sites is not None:
+            half = self._half_x, self._half_y
+            remember_sites(obs, self._pose_starts, self._cargo_starts, half, self._sites)
+            show_sites(obs, self._pose_starts, half, self._sites, out[:, at:])
+            at += N_SITES * SITE_COLUMNS
         if len(self._own_columns):
-            out[:, self._n_built_in :] = obs[:, self._own_columns]
+            out[:, at:] = obs[:, self._own_columns]
         return out
 
     def command(self, actions: np.ndarray, obs: ObsArray) -> ActionArray:
@@ -244,10 +290,12 @@ def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> Observ
         )
     if config.observation == "compact":
         built_in = [part.row for part in compact_layout(source)]
-    elif source.names == (*BUILT_IN_SLICES, *config.sensors):
+    elif source.names == (*BUILT_IN_SLICES, *config.sensors) and not config.site_memory:
         return source
     else:
         built_in = [part.row for part in source if part.name in BUILT_IN_SLICES]
+    if config.site_memory:
+        built_in += _SITE_ROWS
     taken = sorted({row[0] for row in built_in}.intersection(config.sensors))
     if taken:
         raise ConfigError(f"Expected slices of different names, got {taken[0]!r} twice; rename the own sensor.")

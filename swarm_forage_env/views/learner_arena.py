@@ -13,6 +13,7 @@ from swarm_forage_env.contract.calls import OPTION_OF_TESTS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, LearnerInterface, chosen_interface
+from swarm_forage_env.policies.kernels.sites import SiteMemory
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
 from swarm_forage_env.scenarios.overrides import field_sections, scenario_of_same_size
 from swarm_forage_env.scenarios.presets import chosen_scenario
@@ -140,6 +141,8 @@ class LearnerSnapshot:
     """State of the generator of the next seeds."""
     agents: tuple[str, ...] = ()
     """Agents of a parallel environment that are left."""
+    memory: SiteMemory | None = None
+    """What robots remember, where the interface lets them."""
 
 
 class LearnerArena:
@@ -193,6 +196,7 @@ class LearnerArena:
         if self._plan.sampler is not None:
             self._change(overrides, self._plan.sampler.world_of(seed))
         self.env.reset_batch(seed)
+        self.interface.forget()
 
     def _change(self, overrides: dict[str, Any], world: DrawnWorld | None) -> None:
         """Build another environment, if the one that there is has another world."""
@@ -248,6 +252,7 @@ class LearnerArena:
             world=self._world,
             seeds=self._seeds.bit_generator.state,
             agents=tuple(agents),
+            memory=self.interface.memory(),
         )
 
     def restore(self, snapshot: LearnerSnapshot) -> None:
@@ -273,6 +278,7 @@ class LearnerArena:
             self._adopt(env)
             self._overrides, self._world = dict(snapshot.overrides), snapshot.world
         self._seeds.bit_generator.state = snapshot.seeds
+        self.interface.recall(snapshot.memory)
 
     def observe(self, out: ObsArray | None = None) -> ObsArray:
         """Return what the learner sees now, (N, d): a new array, or `out`."""

@@ -27,6 +27,11 @@ COMPACT_VIEW = Twin(
     "policies/test_interface.py",
     "swarm_forage_env.policies.interface.LearnerInterface.observe",
 )
+SITES = Twin(
+    "site_memory.RobotSites",
+    "policies/test_site_memory.py",
+    "swarm_forage_env.policies.interface.LearnerInterface.observe",
+)
 INTERFERENCE = Twin("sensing.interferes", "world/test_interference.py", "swarm_forage_env.env.ForageEnv.step_batch")
 OBSERVED = Twin("sensing.observe", "world/test_sensors.py", "swarm_forage_env.world.arena.ForagingArena.observe")
 MOTION = Twin("motion.free_motion", "world/test_physics.py", "swarm_forage_env.env.ForageEnv.step_batch")
@@ -68,6 +73,8 @@ TWINS = {
         "swarm_forage_env.policies.interface.LearnerInterface.command",
     ),
     "swarm_forage_env.policies.kernels.compact.compact_view": COMPACT_VIEW,
+    "swarm_forage_env.policies.kernels.sites.remember_sites": SITES,
+    "swarm_forage_env.policies.kernels.sites.show_sites": SITES,
     "swarm_forage_env.rendering.kernels.shapes.paint_round": Twin(
         "painting.round_share", "rendering/test_paint.py", "swarm_forage_env.rendering.paint.paint_discs"
     ),

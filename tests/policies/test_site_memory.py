@@ -1,0 +1,134 @@
+"""Site memory of learners: against a slow twin along runs, and its rules by hand."""
+
+import numpy as np
+import pytest
+
+from swarm_forage_env import RunSpec, load_policy, run_policy
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
+from swarm_forage_env.policies.kernels.sites import SiteMemory
+from swarm_forage_env.policies.learned import LearnedPolicy
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.views.learner_arena import LearnerArena, plan_arena
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.reference.site_memory import RobotSites
+from tests.support.stage import cell_centre, lay, load, put, tidy_world
+
+INTERFACE = {"observation": "compact", "actions": "discrete", "automatic_gripper": True, "decision_ticks": 5,
+             "site_memory": True}  # fmt: skip
+PLACE = cell_centre((60, 40))
+
+
+def remembering(env: ForageEnv, **choices) -> LearnerInterface:
+    return LearnerInterface(InterfaceConfig(site_memory=True, **choices), env.swarm_spec)
+
+
+def remembered(interface: LearnerInterface) -> SiteMemory:
+    memory = interface.memory()
+    assert memory is not None
+    return memory
+
+
+def seen(interface: LearnerInterface, env: ForageEnv, name: str) -> np.ndarray:
+    """What robot 0 remembers of a site, (4,): forward, left, known, distance."""
+    return interface.observe(env.arena.observe())[0, interface.layout[name]]
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("observation", ["compact", "full"])
+def test_sites_match_their_twin_along_a_run(observation):
+    env = ForageEnv(scenario("search_and_rescue", n_robots=30, side_m=16.0, physics="compiled"))
+    stack = parse_wrapper("sensor_noise:sigma=0.02").wrap(env)
+    policy = load_policy("dpo")
+    policy.reset(env.swarm_spec, stream_rng(0, Stream.POLICY))
+    interface, twins = remembering(env, observation=observation), [RobotSites() for _ in range(30)]
+    columns = slice(interface.layout["pickup_site"].start, interface.layout["sighting_site"].stop)
+    obs, kinds = stack.reset_batch(3), np.zeros(8)
+    for tick in range(2000):
+        obs, *_ = stack.step_batch(policy.act(obs, env.active))
+        if tick == 1500:
+            away = np.arange(30) % 7 == 3
+            env.set_population(active=~away, present=~away)
+        if tick % 5 == 0:
+            rows = interface.observe(obs)[:, columns]
+            np.testing.assert_allclose(
+                rows, [twin.look(row, env.layout) for twin, row in zip(twins, obs, strict=True)], atol=1e-5
+            )
+            np.testing.assert_array_equal(interface.observe(obs)[:, columns], rows, "looking twice changes nothing")
+            kinds += np.abs(rows).sum(axis=0)
+    assert kinds.all(), "every column is put to the test"
+    interface.forget()
+    assert not remembered(interface).is_known.any()
+
+
+def test_a_robot_remembers_where_it_picked_up_until_it_comes_back_and_finds_nothing():
+    env = tidy_world(n_robots=1)
+    interface = remembering(env, observation="compact")
+    put(env, 0, *PLACE)
+    assert not seen(interface, env, "pickup_site").any()
+    load(env, 0, 0)
+    np.testing.assert_allclose(seen(interface, env, "pickup_site"), [0, 0, 1, 0], atol=1e-6)
+    put(env, 0, PLACE[0] - 4.0, PLACE[1], np.pi / 2)  # the place lies to the right
+    np.testing.assert_allclose(seen(interface, env, "pickup_site"), [0, -1, 1, 0.2], atol=1e-6)
+    env.swarm.carried_object[0] = -1
+    assert seen(interface, env, "pickup_site")[2] == 1.0, "a delivery changes nothing"
+    lay(env, 1, (61, 40))
+    put(env, 0, *PLACE)
+    assert seen(interface, env, "pickup_site")[2] == 1.0, "there is another one"
+    lay(env, 1, (10, 10))
+    assert seen(interface, env, "pickup_site")[2] == 0.0
+
+
+def test_a_robot_remembers_an_object_seen_on_its_way_home():
+    env = tidy_world(n_robots=1)
+    interface = remembering(env, observation="compact")
+    lay(env, 1, (62, 40))
+    put(env, 0, *PLACE)
+    assert seen(interface, env, "sighting_site")[2] == 0.0, "without cargo it takes the object and need not remember it"
+    load(env, 0, 0)
+    np.testing.assert_allclose(seen(interface, env, "sighting_site"), [0.4, 0, 1, 0.02], atol=1e-5)
+    env.swarm.carried_object[0] = -1
+    put(env, 0, *cell_centre((62, 40)))
+    seen(interface, env, "sighting_site")
+    load(env, 0, 1)
+    assert seen(interface, env, "sighting_site")[2] == 0.0, "that was the object"
+
+
+def test_a_new_run_begins_without_memory_and_a_snapshot_brings_it_back():
+    plan = plan_arena("warehouse_small", {"n_robots": 2, "physics": "compiled"}, interface=INTERFACE, snapshots=True)
+    arena = LearnerArena(plan)
+    sites = slice(arena.interface.layout["pickup_site"].start, arena.interface.layout["sighting_site"].stop)
+    arena.reset(0)
+    arena.interface.recall(SiteMemory(np.full((2, 2, 2), 3.0), np.ones((2, 2), np.bool_), np.ones(2, np.bool_)))
+    shown = remembered(arena.interface)
+    snapshot = arena.snapshot()
+    arena.reset()
+    assert not arena.observe()[:, sites].any()
+    arena.restore(snapshot)
+    for part, kept in zip(remembered(arena.interface), shown, strict=True):
+        np.testing.assert_array_equal(part, kept)
+
+
+def test_a_policy_sees_in_a_run_what_it_saw_in_training():
+    """The same actions along the same run: arenas of learners and policies remember alike."""
+    world = scenario("search_and_rescue", n_robots=8, side_m=16.0, physics="compiled", horizon_s=200.0)
+    rng = np.random.default_rng(0)
+    actions = np.repeat(rng.choice(6, (100, 8), p=[0, 0.6, 0.15, 0.15, 0.05, 0.05]), 2, axis=0)
+    arena = LearnerArena(plan_arena(world, {}, interface=INTERFACE))
+    arena.reset(5)
+    trained_on, looked_at = [], []
+    for chosen in actions:
+        trained_on.append(arena.observe())
+        arena.step(chosen, np.zeros(8))
+
+    def choose(rows, _rng):
+        looked_at.append(rows.copy())
+        return actions[len(looked_at) - 1]
+
+    run_policy(
+        LearnedPolicy(InterfaceConfig(**INTERFACE), choose),
+        RunSpec(scenario=world, policy="mine", seed=5),
+    )
+    np.testing.assert_array_equal(looked_at, trained_on)
+    assert np.array(trained_on)[..., arena.interface.layout["pickup_site"]].any()
