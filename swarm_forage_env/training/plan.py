@@ -7,7 +7,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, known_keys, number, one_of, table, text, whole
+from swarm_forage_env._internal.fields import (
+    MOST_SEEDS,
+    ConfigError,
+    known_keys,
+    number,
+    one_of,
+    switch,
+    table,
+    text,
+    whole,
+)
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json, parse_toml
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
@@ -23,6 +33,8 @@ from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
 ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
 """Algorithms of stable-baselines3 that train; the first two on rollouts, the others from replay."""
+SAMPLING = ("ppo", "a2c")
+"""Those whose networks give probabilities of discrete actions."""
 MOST_ARENAS, MOST_LAYERS, MOST_UNITS = 10_000, 20, 10_000
 """Sizes of a training that are far beyond sense and still fit into the memory of a machine; our choice."""
 _COUNTS = ("n_steps", "batch_size", "n_epochs", "buffer_size")
@@ -172,6 +184,9 @@ class TrainingPlan:
     stages: tuple[Stage, ...] = (Stage(steps=DEFAULT_STEPS),)
     evaluation: EvaluationPlan = field(default_factory=EvaluationPlan)
     seed: int = 0
+    samples: bool = False
+    """Whether the policy that comes of it draws its discrete actions by their probabilities, as it did while it learnt
+    (PPO, A2C). Robots that always take the likeliest one may block each other for ever."""
     sampler: ScenarioSampler | None = None
     """Draws the world of each episode; None = it is always `scenario`. Then `evaluation` has worlds."""
 
@@ -182,6 +197,12 @@ class TrainingPlan:
         unfit = {"dqn": "continuous", "sac": "discrete"}.get(self.algorithm)
         if self.interface.actions == unfit:
             raise ConfigError(f"Expected actions that {self.algorithm} can choose, got {unfit} ones.")
+        switch("samples", self.samples)
+        if self.samples and (self.algorithm not in SAMPLING or self.interface.actions != "discrete"):
+            raise ConfigError(
+                f"Expected samples only with discrete actions of {' or '.join(SAMPLING)}, which have probabilities, "
+                f"got {self.interface.actions} ones of {self.algorithm}."
+            )
         whole("n_arenas", self.n_arenas, at_least=1, at_most=MOST_ARENAS)
         if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything
             raise ConfigError(f"Expected hidden to be sizes of layers, for example [64, 64], got {self.hidden!r}.")

@@ -31,6 +31,7 @@ from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_choice
+from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.study.first_run import compile_world
 from swarm_forage_env.study.record import software_versions
@@ -410,8 +411,12 @@ class _Watch(BaseCallback):
                 "torch": str(torch.__version__),
             },
         }
-        network = export_network(self.model, plan.interface, caches=plan.scenario.caches, card=card)
+        network = self._network(card)
         network.save(self._folder / POLICY_FILE)
+
+    def _network(self, card: dict[str, Any] | None = None) -> Network:
+        plan = self._plan
+        return export_network(self.model, plan.interface, samples=plan.samples, caches=plan.scenario.caches, card=card)
 
     def _judged_in_scenario(self) -> Evaluation:
         """Run the policy in the plan's scenario, beside the baseline."""
@@ -431,6 +436,9 @@ class _Watch(BaseCallback):
         return judged(make_policy, self._plan.judging_runs("policy"))
 
     def _policy(self) -> Policy:
+        """The policy as it is now; one that draws its actions does so by the chance of its run, not of the training."""
+        if self._plan.samples:
+            return NetworkPolicy(self._network())
         return LearnedPolicy(self._plan.interface, remember=deterministic_choice(self.model))
 
     def _judged_in_worlds(self) -> Evaluation:
