@@ -164,9 +164,9 @@ def test_vector_environments_of_gymnasium_have_spare_rows():
 
 
 def test_a_sampler_decides_alone():
-    with pytest.raises(ConfigError, match="either a sampler.* or scenario, n_robots"):
+    with pytest.raises(ConfigError, match=r"either a sampler.* or scenario, n_robots"):
         parallel_env("warehouse_small", sampler=WORLDS, n_robots=3)
-    with pytest.raises(ConfigError, match="either a sampler.* or wrappers"):
+    with pytest.raises(ConfigError, match=r"either a sampler.* or wrappers"):
         SwarmVectorEnv(sampler=WORLDS, swarm_wrappers=["sensor_noise:sigma=0.1"])
     with pytest.raises(ConfigError, match="Expected a sampler for"):
         pettingzoo.make("parallel", "swarm_forage/sampled-v1")
