@@ -140,20 +140,28 @@ class ArenaBatch:
         interface: Spaces and layout of what learners see and do.
     """
 
-    def __init__(self, plan: ArenaPlan, n_arenas: int, *, first_arena: int = 0) -> None:
+    def __init__(
+        self, plan: ArenaPlan, n_arenas: int, *, first_arena: int = 0, n_arenas_in_all: int | None = None
+    ) -> None:
         """Build the arenas; `reset` must be called before `step`.
+
+        Where a sampler draws the worlds, each arena keeps to one of its kinds, see `ScenarioSampler.shares`.
 
         Args:
             plan: What every arena is made from.
             n_arenas: How many.
             first_arena: Number of the first of them, where this is part of a larger batch.
+            n_arenas_in_all: Arenas of that batch; None = `n_arenas`.
 
         Raises:
             ConfigError: n_arenas below 1, or a plan that cannot be built.
         """
         n_arenas = as_whole("n_arenas", n_arenas, at_least=1)
         self._first_arena = first_arena
-        self.arenas = [LearnerArena(plan) for _ in range(n_arenas)]
+        shares: list[float | None] = [None] * n_arenas
+        if plan.sampler is not None:
+            shares = plan.sampler.shares(n_arenas_in_all or n_arenas)[first_arena : first_arena + n_arenas]
+        self.arenas = [LearnerArena(plan, share) for share in shares]
         self.interface = self.arenas[0].interface
         self.n_arenas = n_arenas
         self.n_robots = plan.scenario.robots.n_robots

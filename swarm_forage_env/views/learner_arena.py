@@ -154,9 +154,18 @@ class LearnerArena:
         interface: Translates for the learner; its spaces stay the same, but a reset may make a new object.
     """
 
-    def __init__(self, plan: ArenaPlan) -> None:
-        """Build the environment of `plan`; raises ConfigError where it cannot be built."""
+    def __init__(self, plan: ArenaPlan, share: float | None = None) -> None:
+        """Build the environment.
+
+        Args:
+            plan: What it is made from.
+            share: Which of a sampler's worlds this arena has, see `ScenarioSampler.draw`; None = any.
+
+        Raises:
+            ConfigError: it cannot be built.
+        """
         self._plan = plan
+        self._share = share
         self._overrides: dict[str, Any] = {}
         self._world: DrawnWorld | None = None
         self._seeds = np.random.default_rng()
@@ -194,7 +203,7 @@ class LearnerArena:
         else:
             self._seeds = np.random.default_rng(seed)
         if self._plan.sampler is not None:
-            self._change(overrides, self._plan.sampler.world_of(seed))
+            self._change(overrides, self._plan.sampler.world_of(seed, self._share))
         self.env.reset_batch(seed)
         self.interface.forget()
 

@@ -153,17 +153,19 @@ class ScenarioSampler:
     corners: tuple[ScenarioConfig, ...] = field(init=False, repr=False, compare=False)
     """The scenarios that bound the distribution: all combinations of the ends of ranges and of choices."""
 
-    def draw(self, rng: np.random.Generator) -> DrawnWorld:
+    def draw(self, rng: np.random.Generator, share: float | None = None) -> DrawnWorld:
         """Return a world.
 
         Args:
             rng: Where chance comes from; `world_of` takes that of a run.
+            share: Which of the worlds, as a place in [0, 1) among their weights; None = by chance, too.
 
         Raises:
             ConfigError: the values that were drawn do not fit together, although all combinations of ends do.
         """
         weights = np.cumsum([world.weight for world in self.worlds])
-        chosen = int(np.searchsorted(weights, rng.random() * weights[-1], side="right"))
+        by_chance = rng.random()
+        chosen = int(np.searchsorted(weights, (by_chance if share is None else share) * weights[-1], side="right"))
         fields, wrappers = self._tables(chosen)
         values = draw_fields(fields, _grains(fields), rng)
         drawn: dict[str, Any] = {}
@@ -180,9 +182,23 @@ class ScenarioSampler:
                 f"{self._title(chosen)} cannot be, as it was drawn with {_said(fields, values)}: {error}"
             ) from error
 
-    def world_of(self, seed: int) -> DrawnWorld:
+    def world_of(self, seed: int, share: float | None = None) -> DrawnWorld:
         """Return the world of the run with this seed; see `draw`."""
-        return self.draw(stream_rng(seed, Stream.SCENARIO))
+        return self.draw(stream_rng(seed, Stream.SCENARIO), share)
+
+    def shares(self, n_arenas: int) -> list[float | None]:
+        """Return the `share` of `draw` for each arena of a batch, so that all kinds of worlds are there in every step.
+
+        Each arena then keeps to one kind, and there are as many of a kind as its weight says. A few arenas that each
+        draw any kind would often lack one for a whole long run, and a learner forgets (our choice). Where there are too
+        few arenas for all kinds, each draws any.
+        """
+        places = (np.arange(n_arenas) + 0.5) / n_arenas
+        weights = np.cumsum([world.weight for world in self.worlds])
+        kinds = np.searchsorted(weights, places * weights[-1], side="right")
+        if len(set(kinds.tolist())) < len(self.worlds) or len(self.worlds) == 1:
+            return [None] * n_arenas
+        return places.tolist()
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the sampler as plain values, ready for JSON; `from_mapping` reads it back."""

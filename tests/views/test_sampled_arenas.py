@@ -27,8 +27,13 @@ def numbers(n_rows, rng):
     return rng.integers(0, 6, n_rows)
 
 
+def drawn(seeds=SEEDS):
+    """The worlds that the arenas of a batch draw with these seeds."""
+    return [WORLDS.world_of(seed, share) for seed, share in zip(seeds, WORLDS.shares(len(seeds)), strict=True)]
+
+
 def sizes(seeds=SEEDS):
-    return [WORLDS.world_of(seed)[0].robots.n_robots for seed in seeds]
+    return [config.robots.n_robots for config, _ in drawn(seeds)]
 
 
 def test_the_seeds_of_these_tests_leave_rows_to_spare():
@@ -41,8 +46,7 @@ def test_each_arena_is_bit_for_bit_that_of_its_world_alone():
     obs, _ = batch.reset(SEEDS, [None] * len(SEEDS))
     rng = np.random.default_rng(0)
     alone = []
-    for seed in SEEDS:
-        config, wrappers = WORLDS.world_of(seed)
+    for config, wrappers in drawn():
         alone.append(ArenaBatch(plan_arena(config, {}, wrappers=wrappers, interface=COMPACT, max_cycles=20), 1))
     first = [one.reset([seed], [None])[0] for one, seed in zip(alone, SEEDS, strict=True)]
     for arena, own in enumerate(first):
