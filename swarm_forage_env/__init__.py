@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.study.study_run import StudyFolder, run_study
     from swarm_forage_env.study.study_table import StudyTable, read_study
     from swarm_forage_env.views.pettingzoo import parallel_env
+    from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
     from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
     from swarm_forage_env.wrappers.handling import HandlingCost, HandlingCostConfig
     from swarm_forage_env.wrappers.messages import MessageNoise, MessageNoiseConfig
@@ -72,7 +73,9 @@ __all__ = [
     "RunRecord",
     "RunRecorder",
     "RunSpec",
+    "SampledWorld",
     "ScenarioConfig",
+    "ScenarioSampler",
     "SensorNoise",
     "SensorNoiseConfig",
     "Snapshot",
@@ -134,7 +137,9 @@ _HOMES = {
     "RunRecord": "study.record",
     "RunRecorder": "wrappers.recorder",
     "RunSpec": "study.spec",
+    "SampledWorld": "views.sampler",
     "ScenarioConfig": "scenarios.config",
+    "ScenarioSampler": "views.sampler",
     "SensorNoise": "wrappers.noise",
     "SensorNoiseConfig": "wrappers.noise",
     "Snapshot": "world.snapshots",
@@ -192,7 +197,7 @@ def __dir__() -> list[str]:
 
 
 def _register_environments() -> None:
-    for name in SCENARIO_NAMES:
+    for name in (*SCENARIO_NAMES, "sampled"):
         env_id = f"swarm_forage/{name}-v1"
         kwargs = {"scenario": name}
         pettingzoo.register("parallel", env_id, "swarm_forage_env.views.pettingzoo:parallel_env", kwargs=kwargs)

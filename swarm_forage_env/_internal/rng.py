@@ -23,6 +23,7 @@ class Stream(IntEnum):
     ACTUATOR_NOISE = 7
     POPULATION = 8
     MESSAGE_NOISE = 9
+    SCENARIO = 12
 
 
 def stream_rng(seed: int, stream: Stream) -> np.random.Generator:

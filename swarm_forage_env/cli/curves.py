@@ -10,6 +10,7 @@ import typer
 
 from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, Jobs, complain, no_picture
 from swarm_forage_env.cli.terminal import output
+from swarm_forage_env.training.defaults import SCRIPTED
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from swarm_forage_env.training.evaluations import TrainingCurve
     from swarm_forage_env.training.plan import TrainingPlan
 
-SCRIPTED = "crw,dpo,stochm,stochx"
 PICTURE_FILE = "curves.png"
 
 
@@ -25,7 +25,7 @@ def curves(
     folders: Annotated[list[Path], typer.Argument(metavar="DIR ...", help="Folders of trainings in one scenario.")],
     beside: Annotated[
         str, typer.Option("--beside", help="Policies to compare with, separated by commas; none for no others.")
-    ] = SCRIPTED,
+    ] = ",".join(SCRIPTED),
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help=f"Picture; default {PICTURE_FILE} in the first folder.")
     ] = None,
@@ -38,9 +38,8 @@ def curves(
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.cli.scenario_options import split_names
-    from swarm_forage_env.cli.training_report import points_of, stage_ends
+    from swarm_forage_env.cli.training_report import counted_in, place_of, points_of, stage_ends
     from swarm_forage_env.rendering.plots import draw_trainings
-    from swarm_forage_env.scenarios.performance import quantity
 
     found = _told_apart(folders)
     plan = found[0].plan
@@ -52,8 +51,8 @@ def curves(
             )
     picture = out or folders[0] / PICTURE_FILE
     check_file(picture)
-    levels = _levels(plan, () if beside == "none" else split_names(beside), jobs)
-    output().print(_table(found, levels))
+    levels = _levels(found[0], () if beside == "none" else split_names(beside), jobs)
+    output().print(_table(found, levels, counted_in(plan) if plan.evaluation.worlds else "per 1,000 s"))
     try:
         picture.parent.mkdir(parents=True, exist_ok=True)
         draw_trainings(
@@ -61,8 +60,8 @@ def curves(
             {one.label: points_of(one.evaluations) for one in found},
             beside=levels,
             stage_ends=stage_ends(plan) if len(found) == 1 else (),
-            title=f"{plan.scenario.name}, {plan.scenario.robots.n_robots} robots",
-            ylabel=f"{quantity(plan.scenario.performance).title} per 1,000 s",
+            title=place_of(plan),
+            ylabel=counted_in(plan),
         )
     except ImportError:
         raise typer.Exit(complain(NO_PICTURE, EXIT_FAILURE)) from None
@@ -93,18 +92,25 @@ def _told_apart(folders: Sequence[Path]) -> "list[TrainingCurve]":
 
 def _judged_by(plan: "TrainingPlan") -> tuple[str, ...]:
     """What decides the runs that a training is judged by."""
-    return tuple(spec.to_json() for spec in plan.evaluation.specs(plan.scenario, plan.wrappers, "policy"))
+    return (
+        plan.evaluation.chosen_by,
+        *(f"{world.name} {world.baseline}" for world in plan.evaluation.worlds),
+        *(spec.to_json() for spec in plan.judging_runs("policy")),
+    )
 
 
-def _levels(plan: "TrainingPlan", names: Sequence[str], jobs: int | None) -> dict[str, tuple[float, float]]:
-    """Run other policies as in the evaluations; returns performance per 1,000 s and interference of each, means."""
+def _levels(curve: "TrainingCurve", names: Sequence[str], jobs: int | None) -> dict[str, tuple[float, float]]:
+    """Run other policies as in the evaluations; returns what each has in them, and its interference.
+
+    That is performance per 1,000 s, and with several worlds what counts of the ratios to their baselines.
+    """
     import numpy as np
 
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.study.runner import run_all
     from swarm_forage_env.study.spec import plan_run
 
-    judged = plan.evaluation.specs(plan.scenario, plan.wrappers, "policy")
+    judged = curve.plan.judging_runs("policy")
     try:
         planned = {
             name: [plan_run(spec.scenario, name, wrappers=spec.wrappers, seed=spec.seed) for spec in judged]
@@ -116,31 +122,50 @@ def _levels(plan: "TrainingPlan", names: Sequence[str], jobs: int | None) -> dic
     if result.failures:
         raise ConfigError(f"Expected runs of {', '.join(names)} beside the training, got {result.failures[0].error}")
     records = {record.run_id: record for record in result.records}
-    return {
-        name: (
-            float(np.mean([records[spec.run_id].rate_per_1000_s("performance") for spec in specs])),
-            float(np.mean([records[spec.run_id].interference_fraction.mean() for spec in specs])),
-        )
-        for name, specs in planned.items()
+    rates = {
+        name: [records[spec.run_id].rate_per_1000_s("performance") for spec in specs] for name, specs in planned.items()
     }
+    interference = {
+        name: [records[spec.run_id].interference_fraction.mean() for spec in specs] for name, specs in planned.items()
+    }
+    return {name: (_level(curve, rates[name]), float(np.mean(interference[name]))) for name in planned}
 
 
-def _table(found: "Sequence[TrainingCurve]", levels: dict[str, tuple[float, float]]) -> "Table":
-    """Return the best evaluation of each training, and the others."""
+def _level(curve: "TrainingCurve", rates: Sequence[float]) -> float:
+    """Return what counts of the performances in all runs of an evaluation, which are in the order of the worlds."""
+    import numpy as np
+
+    from swarm_forage_env.training.evaluation_worlds import CHOSEN_BY, ratio_to
+
+    worlds = curve.evaluations[-1].worlds
+    if not worlds:
+        return float(np.mean(rates))
+    plan = curve.plan.evaluation
+    of_worlds = np.mean(np.reshape(rates, (len(worlds), plan.n_runs)), axis=1)
+    runs = [plan.specs(world.scenario, world.wrappers, "policy") for world in plan.worlds]
+    ratios = [
+        ratio_to(world.baseline, float(rate), specs) for world, rate, specs in zip(worlds, of_worlds, runs, strict=True)
+    ]
+    return float(CHOSEN_BY[plan.chosen_by](ratios))
+
+
+def _table(found: "Sequence[TrainingCurve]", levels: dict[str, tuple[float, float]], counted: str) -> "Table":
+    """Return the best evaluation of each training, and the others; `counted` says what the numbers are."""
     from rich.table import Table
 
+    digits = 2 if found[0].plan.evaluation.worlds else 1  # ratios are about 1
     table = Table()
     table.add_column("policy")
-    for heading in ("decisions", "per 1,000 s", "interference"):
+    for heading in ("decisions", counted, "interference"):
         table.add_column(heading, justify="right")
     for one in found:
         best = max(one.evaluations, key=lambda evaluation: evaluation.performance)
         table.add_row(
             f"{one.label}, at its best",
             f"{best.steps:,}",
-            f"{best.performance:.1f}",
+            f"{best.performance:.{digits}f}",
             f"{best.interference_fraction:.3f}",
         )
     for name, (performance, interference) in levels.items():
-        table.add_row(name, "", f"{performance:.1f}", f"{interference:.3f}")
+        table.add_row(name, "", f"{performance:.{digits}f}", f"{interference:.3f}")
     return table

@@ -15,6 +15,7 @@ from swarm_forage_env.cli.options import EXIT_INTERRUPTED, NO_PICTURE, complain,
 from swarm_forage_env.rendering.plots import draw_trainings
 from swarm_forage_env.scenarios.performance import quantity
 from swarm_forage_env.study.progress import duration
+from swarm_forage_env.training.evaluation_worlds import ALL_WORLDS
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.training.status import Evaluation, TrainingStatus
 
@@ -70,10 +71,10 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
         draw_trainings(
             path,
             {"trained policy": points_of(evaluations)},
-            beside={plan.evaluation.baseline: (evaluations[-1].baseline, math.nan)},
+            beside={baseline_of(plan): (evaluations[-1].baseline, math.nan)},
             stage_ends=stage_ends(plan),
-            title=f"{plan.algorithm} in {plan.scenario.name}, {plan.scenario.robots.n_robots} robots",
-            ylabel=f"{quantity(plan.scenario.performance).title} per 1,000 s",
+            title=f"{plan.algorithm} in {place_of(plan)}",
+            ylabel=counted_in(plan),
         )
     except ImportError:
         console.print(NO_PICTURE)
@@ -82,6 +83,25 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
         console.print(no_picture(path, error))
         return None
     return path
+
+
+def place_of(plan: TrainingPlan) -> str:
+    """Say where policies of a plan are judged."""
+    if plan.evaluation.worlds:
+        return counted(len(plan.evaluation.worlds), "world")
+    return f"{plan.scenario.name}, {plan.scenario.robots.n_robots} robots"
+
+
+def counted_in(plan: TrainingPlan) -> str:
+    """Say what the numbers of a plan's evaluations are."""
+    if plan.evaluation.worlds:
+        return f"{plan.evaluation.chosen_by} ratio to the baselines"
+    return f"{quantity(plan.scenario.performance).title} per 1,000 s"
+
+
+def baseline_of(plan: TrainingPlan) -> str:
+    """Say what the policy is compared with."""
+    return "baseline of each world" if plan.evaluation.worlds else plan.evaluation.baseline
 
 
 def points_of(evaluations: Sequence[Evaluation]) -> tuple[list[int], list[float], list[float]]:
@@ -100,10 +120,7 @@ def stage_ends(plan: TrainingPlan) -> list[int]:
 
 def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | Evaluation], None]:
     task = bar.add_task("training", total=plan.total_steps)
-    heading = (
-        f"Evaluated in {counted(plan.evaluation.n_runs, 'run')} of {_evaluated_s(plan):,.0f} s:\n"
-        f"{'decisions':>12} {'per 1,000 s':>12} {plan.evaluation.baseline:>8} {'interference':>13}"
-    )
+    heading = _heading(plan)
     told: TrainingStatus | None = None
     told_at = time.monotonic()
 
@@ -113,9 +130,8 @@ def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | E
             if heading:
                 bar.console.print(heading)
                 heading = ""
-            bar.console.print(
-                f"{news.steps:>12,} {news.performance:>12.1f} {news.baseline:>8.1f} {news.interference_fraction:>13.3f}"
-            )
+            for line in _evaluation_lines(news):
+                bar.console.print(line)
         elif not bar.disable:
             bar.update(task, completed=news.steps, description=f"mean return {news.episode_return:.2f}")
         elif time.monotonic() - told_at >= LINE_EVERY_S:
@@ -125,9 +141,31 @@ def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | E
     return report
 
 
-def _evaluated_s(plan: TrainingPlan) -> float:
-    (first, *_) = plan.evaluation.specs(plan.scenario, plan.wrappers, plan.evaluation.baseline)
-    return first.scenario.horizon_s
+def _heading(plan: TrainingPlan) -> str:
+    (first, *_) = plan.judging_runs("policy")
+    runs = f"Evaluated in {counted(plan.evaluation.n_runs, 'run')} of {first.scenario.horizon_s:,.0f} s"
+    if plan.evaluation.worlds:
+        return (
+            f"{runs} in each of {place_of(plan)}; what counts is the {plan.evaluation.chosen_by} ratio:\n"
+            f"{'decisions':>10}  {'world':<20} {'per 1,000 s':>11} {'baseline':>13} {'ratio':>6} {'interference':>12}"
+        )
+    baseline = plan.evaluation.baseline
+    return f"{runs}:\n{'decisions':>12} {'per 1,000 s':>12} {baseline:>8} {'interference':>13}"
+
+
+def _evaluation_lines(news: Evaluation) -> list[str]:
+    interference = news.interference_fraction
+    if not news.worlds:
+        return [f"{news.steps:>12,} {news.performance:>12.1f} {news.baseline:>8.1f} {interference:>13.3f}"]
+    lines = [
+        f"{'':>10}  {world.world:<20} {world.performance:>11.1f} {f'{world.baseline_policy} {world.baseline:.1f}':>13} "
+        f"{world.ratio:>6.2f} {world.interference_fraction:>12.3f}"
+        for world in news.worlds
+    ]
+    return [
+        *lines,
+        f"{news.steps:>10,}  {ALL_WORLDS:<20} {'':>11} {'':>13} {news.performance:>6.2f} {interference:>12.3f}",
+    ]
 
 
 def _progress_line(plan: TrainingPlan, now: TrainingStatus, before: TrainingStatus | None) -> str:

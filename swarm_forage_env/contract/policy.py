@@ -100,7 +100,7 @@ class SwarmSpec:
     @property
     def state_size(self) -> int:
         """Numbers in the global view `ForageEnv.state()`: six per robot, three per object."""
-        return 6 * self.n_robots + 3 * self.n_objects
+        return state_size(self.n_robots, self.n_objects)
 
     @classmethod
     def of(cls, scenario: ScenarioConfig, *, horizon_s: float | None = None) -> "SwarmSpec":
@@ -138,6 +138,11 @@ class SwarmSpec:
             message_size=robots.message_size,
             quirks=scenario.quirks,
         )
+
+
+def state_size(n_robots: int, n_objects: int) -> int:
+    """Return how many numbers there are in a global view: six per robot first, then three per object."""
+    return 6 * n_robots + 3 * n_objects
 
 
 def layout_for(scenario: ScenarioConfig) -> ObservationLayout:

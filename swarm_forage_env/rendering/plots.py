@@ -112,8 +112,8 @@ def draw_trainings(
 Box: TypeAlias = tuple[float, float, float, float]
 """x low, y low, x high, y high, m."""
 MapRow: TypeAlias = tuple[str, Mapping[str, FloatArray], bool, tuple[float, float], Sequence[Box]]
-"""Label; arrays (ny, nx) by name, row = y from below; whether they are differences; extent of the floor in m; the boxes on
-it, which are hatched."""
+"""Label; arrays (ny, nx) by name, row = y from below; whether they are differences; extent of the floor in m; the boxes
+on it, which are hatched."""
 
 
 def draw_maps(

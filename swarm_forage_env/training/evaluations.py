@@ -1,20 +1,29 @@
 """What the folder of a training tells of how it went, readable without the library that trained.
 
-`plan.json` holds the plan, `evaluations.csv` a row per evaluation.
+`plan.json` holds the plan, `evaluations.csv` a row per evaluation, with several worlds a row for each of them and one
+for all.
 """
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
+from swarm_forage_env.training.evaluation_worlds import ALL_WORLDS
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
-from swarm_forage_env.training.status import Evaluation
+from swarm_forage_env.training.status import Evaluation, WorldEvaluation
 
 PLAN_FILE = "plan.json"
 EVALUATIONS_FILE = "evaluations.csv"
+_TOLD_ONCE = ("steps", "wall_time_s")
+"""Columns that are the same in the rows of all worlds of an evaluation."""
+_COLUMNS = tuple(item.name for item in fields(Evaluation) if item.name != "worlds")
+_WORLD_COLUMNS = (*_TOLD_ONCE, *(item.name for item in fields(WorldEvaluation)))
+_WORDS = ("world", "baseline_policy")
+"""Columns that hold no numbers."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -45,11 +54,22 @@ def read_training(folder: Path) -> TrainingCurve:
 
 
 def write_evaluations(path: Path, evaluations: Sequence[Evaluation]) -> None:
-    """Write all evaluations of a training, whole or not at all."""
+    """Write all evaluations of a training, whole or not at all.
+
+    Where there are several worlds, an evaluation has a row for each and one for "all" of them, in which performance is
+    the ratio that counts; see `evaluation_worlds`.
+    """
+    in_worlds = any(evaluation.worlds for evaluation in evaluations)
     with replacing(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, [item.name for item in fields(Evaluation)])
+        table = csv.DictWriter(file, _WORLD_COLUMNS if in_worlds else _COLUMNS, restval="")
         table.writeheader()
-        table.writerows(asdict(evaluation) for evaluation in evaluations)
+        for evaluation in evaluations:
+            plain = {name: getattr(evaluation, name) for name in _COLUMNS}
+            if in_worlds:
+                told = {name: plain[name] for name in _TOLD_ONCE}
+                table.writerows({**told, **asdict(world)} for world in evaluation.worlds)
+                plain |= {"world": ALL_WORLDS, "ratio": evaluation.performance}
+            table.writerow(plain)
 
 
 def read_evaluations(path: Path) -> list[Evaluation]:
@@ -62,7 +82,23 @@ def read_evaluations(path: Path) -> list[Evaluation]:
         return []
     try:
         with path.open(newline="", encoding="utf-8") as file:
-            rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
-        return [Evaluation(**{**row, "steps": int(row["steps"])}) for row in rows]
+            return _evaluations_of(csv.DictReader(file))
     except (ValueError, TypeError, KeyError, csv.Error) as error:
         raise ConfigError(f"Cannot read the evaluations in {path}: {error}; repair or remove the file.") from error
+
+
+def _evaluations_of(rows: Iterable[dict[str, str]]) -> list[Evaluation]:
+    found: list[Evaluation] = []
+    worlds: list[WorldEvaluation] = []
+    for row in rows:
+        words = {name: row.pop(name) for name in _WORDS if name in row}
+        if words.get("world", ALL_WORLDS) != ALL_WORLDS:
+            told: dict[str, Any] = {name: float(text) for name, text in row.items() if name not in _TOLD_ONCE}
+            worlds.append(WorldEvaluation(**{**told, **words}))
+            continue
+        if words:
+            del row["ratio"]  # of all worlds: it is the performance
+        numbers = {name: float(text) for name, text in row.items()}
+        found.append(Evaluation(**{**numbers, "steps": int(numbers["steps"]), "worlds": tuple(worlds)}))  # type: ignore[arg-type] - worlds are the only tuple
+        worlds = []
+    return found

@@ -10,10 +10,10 @@ from typing import Any
 from swarm_forage_env._internal.fields import (
     MOST_SEEDS,
     ConfigError,
-    as_tuples,
     known_keys,
     number,
     one_of,
+    switch,
     table,
     text,
     whole,
@@ -23,16 +23,18 @@ from swarm_forage_env._internal.parsing import parse_json, parse_toml
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
 from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.config import from_mapping as config_from_mapping
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size, with_overrides
-from swarm_forage_env.scenarios.presets import scenario as preset
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.training.defaults import DEFAULT_ARENAS, DEFAULT_HIDDEN, DEFAULT_STEPS, EVALUATE_EVERY
+from swarm_forage_env.training.evaluation_worlds import CHOSEN_BY, COUNTED, EvaluationWorld, scenario_of, tuples
+from swarm_forage_env.views.sampler import ScenarioSampler, columns_of
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
 ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
 """Algorithms of stable-baselines3 that train; the first two on rollouts, the others from replay."""
+SAMPLING = ("ppo", "a2c")
+"""Those whose networks give probabilities of discrete actions."""
 MOST_ARENAS, MOST_LAYERS, MOST_UNITS = 10_000, 20, 10_000
 """Sizes of a training that are far beyond sense and still fit into the memory of a machine; our choice."""
 _COUNTS = ("n_steps", "batch_size", "n_epochs", "buffer_size")
@@ -57,10 +59,6 @@ def _check_options(name: str, options: Any) -> None:
             number(f"{name}.{key}", value, **_RANGES[key])
 
 
-COUNTED = ("collected", "first_picked")
-"""Performances by which a training can be followed: arenas for learners count these."""
-
-
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Stage:
     """A part of the training with a scenario of its own: a step of a curriculum."""
@@ -71,16 +69,35 @@ class Stage:
     """Fields of the plan's scenario that differ, by name; the number of robots cannot."""
     options: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Arguments of the algorithm that differ from here on (`learning_rate`, `gamma` ...)."""
+    sampler: ScenarioSampler | None = None
+    """Draws the worlds of this stage; None = as the plan says."""
 
     def __post_init__(self) -> None:
         whole("stage.steps", self.steps, at_least=1)
         table("stage.scenario", self.scenario)
         _check_options("stage.options", self.options)
 
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the stage as plain values; `sampler` only where there is one."""
+        plain: dict[str, Any] = {"steps": self.steps, "scenario": dict(self.scenario), "options": dict(self.options)}
+        return plain if self.sampler is None else {**plain, "sampler": self.sampler.to_mapping()}
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "Stage":
+        """Build a stage from nested plain values; raises ConfigError where one cannot be."""
+        values = _known(cls, mapping, "stages.")
+        values["scenario"] = tuples(table("stages.scenario", values.get("scenario", {})))
+        if "sampler" in values:
+            values["sampler"] = ScenarioSampler.from_mapping(values["sampler"])
+        return cls(**values)
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class EvaluationPlan:
-    """How the policy is judged meanwhile: whole runs of the plan's scenario, beside a scripted controller."""
+    """How the policy is judged meanwhile: whole runs of the plan's scenario, beside a scripted controller.
+
+    With `worlds`, there are runs in each of them instead, beside its own baseline.
+    """
 
     every_steps: int = EVALUATE_EVERY
     """Decisions between two evaluations; there is one more at the end."""
@@ -90,9 +107,17 @@ class EvaluationPlan:
     first_seed: int = 1_000_000
     """Seeds are counted up from here, away from those of training."""
     baseline: str = "crw"
-    """Controller to compare with, run once under the same seeds."""
+    """Controller to compare with, run once under the same seeds; worlds have their own."""
+    worlds: tuple[EvaluationWorld, ...] = ()
+    """Worlds to judge the policy in; none = the plan's scenario and wrappers."""
+    chosen_by: str = "mean"
+    """By which ratio to the baselines of all worlds the network is chosen: their "mean" or the "worst"."""
 
     def __post_init__(self) -> None:
+        one_of("evaluation.chosen_by", self.chosen_by, CHOSEN_BY)
+        names = [world.name for world in self.worlds]
+        if len(set(names)) < len(names):
+            raise ConfigError(f"Expected evaluation.worlds with different names, got {', '.join(names)}; give names.")
         whole("evaluation.every_steps", self.every_steps, at_least=1)
         whole("evaluation.n_runs", self.n_runs, at_least=1, at_most=MOST_SEEDS)
         whole("evaluation.first_seed", self.first_seed, at_least=0)
@@ -114,6 +139,26 @@ class EvaluationPlan:
         seeds = range(self.first_seed, self.first_seed + self.n_runs)
         return tuple(RunSpec(scenario=whole_run, policy=policy, wrappers=wrappers, seed=seed) for seed in seeds)
 
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the plan as plain values, with what is about worlds only where there are some."""
+        plain = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
+        if not self.worlds:
+            return {name: value for name, value in plain.items() if name not in ("worlds", "chosen_by")}
+        return {**plain, "worlds": [world.to_mapping() for world in self.worlds]}
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "EvaluationPlan":
+        """Build a plan from nested plain values; raises ConfigError where one cannot be."""
+        values = _known(cls, table("evaluation", mapping), "evaluation.")
+        if "worlds" in values:
+            if not isinstance(values["worlds"], list):
+                raise ConfigError(
+                    "Expected evaluation.worlds to be a list of tables, [[evaluation.worlds]], got "
+                    f"{values['worlds']!r}."
+                )
+            values["worlds"] = tuple(EvaluationWorld.from_mapping(world) for world in values["worlds"])
+        return cls(**values)
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class TrainingPlan:
@@ -125,7 +170,8 @@ class TrainingPlan:
     """
 
     scenario: ScenarioConfig
-    """What is to be mastered, rewards included; evaluations take place in it. Stages may have shorter episodes."""
+    """What is to be mastered, rewards included; evaluations take place in it. Stages may have shorter episodes. Beside
+    a sampler it is its largest world, which stands for all where spaces are asked for."""
     wrappers: tuple[WrapperConfig, ...] = ()
     """What disturbs the swarm, in training and in evaluations."""
     algorithm: str = "ppo"
@@ -138,6 +184,11 @@ class TrainingPlan:
     stages: tuple[Stage, ...] = (Stage(steps=DEFAULT_STEPS),)
     evaluation: EvaluationPlan = field(default_factory=EvaluationPlan)
     seed: int = 0
+    samples: bool = False
+    """Whether the policy that comes of it draws its discrete actions by their probabilities, as it did while it learnt
+    (PPO, A2C). Robots that always take the likeliest one may block each other for ever."""
+    sampler: ScenarioSampler | None = None
+    """Draws the world of each episode; None = it is always `scenario`. Then `evaluation` has worlds."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "interface", self.interface.for_scenario(self.scenario))
@@ -146,6 +197,12 @@ class TrainingPlan:
         unfit = {"dqn": "continuous", "sac": "discrete"}.get(self.algorithm)
         if self.interface.actions == unfit:
             raise ConfigError(f"Expected actions that {self.algorithm} can choose, got {unfit} ones.")
+        switch("samples", self.samples)
+        if self.samples and (self.algorithm not in SAMPLING or self.interface.actions != "discrete"):
+            raise ConfigError(
+                f"Expected samples only with discrete actions of {' or '.join(SAMPLING)}, which have probabilities, "
+                f"got {self.interface.actions} ones of {self.algorithm}."
+            )
         whole("n_arenas", self.n_arenas, at_least=1, at_most=MOST_ARENAS)
         if not isinstance(self.hidden, tuple):  # pyright: ignore[reportUnnecessaryIsInstance] - files hold anything
             raise ConfigError(f"Expected hidden to be sizes of layers, for example [64, 64], got {self.hidden!r}.")
@@ -157,9 +214,37 @@ class TrainingPlan:
             raise ConfigError("Expected at least one stage, got none.")
         whole("seed", self.seed, at_least=0)
         _check_options("options", self.options)
+        self._check_worlds()
+        self.judging_runs("policy")  # refuses horizons that cannot be
+
+    def _check_worlds(self) -> None:
+        """Refuse worlds that are said twice, that cannot be, or that one policy cannot have in common."""
+        if self.sampler is not None and (self.scenario != self.sampler.largest or self.wrappers):
+            raise ConfigError(
+                "Expected a plan with a sampler without scenario and wrappers, which it draws; in Python, give "
+                "scenario=sampler.largest."
+            )
+        is_sampled = any(stage.sampler or self.sampler for stage in self.stages)
+        if is_sampled and not self.evaluation.worlds:
+            raise ConfigError(
+                "Expected evaluation.worlds beside a sampler: fixed worlds, in which policies can be compared."
+            )
         for stage in self.stages:
-            scenario_of_same_size(self.scenario, stage.scenario)
-        self.evaluation.specs(self.scenario, self.wrappers, self.evaluation.baseline)
+            sampler = stage.sampler or self.sampler
+            for config in (self.scenario,) if sampler is None else sampler.corners:
+                one_of("performance of a scenario to train in", config.performance, COUNTED)
+                if is_sampled and _common(config) != _common(self.scenario):
+                    raise ConfigError(
+                        f"Expected stages and worlds with the same caches and columns of observations as "
+                        f"{self.scenario.name}, which are those of the policy; {config.name} has others."
+                    )
+                scenario_of_same_size(config, stage.scenario)
+
+    def judging_runs(self, policy: str) -> tuple[RunSpec, ...]:
+        """Return the runs of an evaluation of a policy, in all worlds; raises ConfigError where one cannot be."""
+        worlds = self.evaluation.worlds
+        places = [(world.scenario, world.wrappers) for world in worlds] or [(self.scenario, self.wrappers)]
+        return tuple(spec for place in places for spec in self.evaluation.specs(*place, policy))
 
     @property
     def total_steps(self) -> int:
@@ -169,9 +254,15 @@ class TrainingPlan:
     def to_mapping(self) -> dict[str, Any]:
         """Return the plan as nested plain values."""
         plain = {item.name: getattr(self, item.name) for item in dataclasses.fields(self)}
-        nested = {name: dataclasses.asdict(plain[name]) for name in ("scenario", "interface", "evaluation")}
-        wrappers = {config.name: config.to_mapping() for config in self.wrappers}
-        return {**plain, **nested, "wrappers": wrappers, "stages": [dataclasses.asdict(item) for item in self.stages]}
+        nested: dict[str, Any] = {name: dataclasses.asdict(plain[name]) for name in ("scenario", "interface")}
+        nested["evaluation"] = self.evaluation.to_mapping()
+        nested["wrappers"] = {config.name: config.to_mapping() for config in self.wrappers}
+        nested["stages"] = [item.to_mapping() for item in self.stages]
+        if self.sampler is None:
+            del plain["sampler"]
+            return {**plain, **nested}
+        del plain["scenario"], plain["wrappers"], nested["scenario"], nested["wrappers"]
+        return {**plain, **nested, "sampler": self.sampler.to_mapping()}
 
     def settings(self) -> dict[str, Any]:
         """Return all plain values of the plan by their names with dots, such as "interface.observation"."""
@@ -218,34 +309,31 @@ class TrainingPlan:
         """Build a plan from nested plain values.
 
         `scenario` is either complete, as `to_mapping` writes it, or a table with the `preset` it starts from and
-        fields by name. `wrappers` is a table of tables by name.
+        fields by name. `wrappers` is a table of tables by name. `sampler` stands instead of both.
 
         Raises:
             ConfigError: unknown keys, or values that a plan cannot have.
         """
         values = _known(cls, mapping, "")
-        scenario = dict(table("scenario", values.get("scenario")))
-        if "preset" in scenario:
-            values["scenario"] = preset(scenario.pop("preset"), **_tuples(scenario))
+        if "sampler" in values:
+            given = [name for name in ("scenario", "wrappers") if name in values]
+            if given:
+                raise ConfigError(f"Expected a plan with either sampler or {' and '.join(given)}, got both.")
+            values["sampler"] = ScenarioSampler.from_mapping(values["sampler"])
+            values["scenario"] = values["sampler"].largest
         else:
-            values["scenario"] = config_from_mapping(ScenarioConfig, scenario, where="scenario.")
+            values["scenario"] = scenario_of(values.get("scenario"))
         if "wrappers" in values:
             values["wrappers"] = wrappers_from_mapping(table("wrappers", values["wrappers"]))
         if "interface" in values:
             values["interface"] = interface_from_mapping(dict(table("interface", values["interface"])))
         if "evaluation" in values:
-            values["evaluation"] = EvaluationPlan(
-                **_known(EvaluationPlan, table("evaluation", values["evaluation"]), "evaluation.")
-            )
+            values["evaluation"] = EvaluationPlan.from_mapping(values["evaluation"])
         if "stages" in values:
             if not isinstance(values["stages"], list):
                 raise ConfigError(f"Expected stages to be a list of tables, [[stages]], got {values['stages']!r}.")
-            stages = [_known(Stage, stage, "stages.") for stage in values["stages"]]
-            values["stages"] = tuple(
-                Stage(**{**stage, "scenario": _tuples(table("stages.scenario", stage.get("scenario", {})))})
-                for stage in stages
-            )
-        return cls(**_tuples(values))
+            values["stages"] = tuple(Stage.from_mapping(stage) for stage in values["stages"])
+        return cls(**tuples(values))
 
 
 def read_plan(path: Path) -> TrainingPlan:
@@ -261,6 +349,11 @@ def read_plan(path: Path) -> TrainingPlan:
         raise ConfigError(f"Cannot read the plan {path}: {error.strerror or error}.") from error
     except (ValueError, TypeError) as error:  # ConfigError, and what the two parsers raise
         raise ConfigError(f"Cannot use the plan {path}: {error}") from error
+
+
+def _common(config: ScenarioConfig) -> tuple[Any, ...]:
+    """Return what all worlds of a policy have in common."""
+    return config.caches, columns_of(config)
 
 
 def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
@@ -279,8 +372,3 @@ def _known(config_class: type, mapping: Mapping[str, Any], where: str) -> dict[s
     table(where.rstrip(".") or "the plan", mapping)
     known_keys(mapping, [item.name for item in dataclasses.fields(config_class)], prefix=where)
     return dict(mapping)
-
-
-def _tuples(mapping: Mapping[str, Any]) -> dict[str, Any]:
-    """Turn lists, the only sequences of TOML and JSON, into the tuples of configurations."""
-    return {key: as_tuples(value) for key, value in mapping.items()}

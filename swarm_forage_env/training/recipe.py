@@ -29,7 +29,10 @@ from swarm_forage_env.training.defaults import (
     EVALUATE_EVERY,
     EVALUATION_SHARE,
 )
+from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.views.learner_arena import DEFAULT_SCENARIO
+from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_configs
 
@@ -53,8 +56,9 @@ SMALL_START = 0.4
 
 
 def recipe(
-    scenario: str | ScenarioConfig = "warehouse_small",
+    scenario: str | ScenarioConfig | None = None,
     *,
+    sampler: ScenarioSampler | None = None,
     algorithm: str = "ppo",
     steps: int = DEFAULT_STEPS,
     n_arenas: int = DEFAULT_ARENAS,
@@ -67,12 +71,15 @@ def recipe(
     seed: int = 0,
     **overrides: Any,
 ) -> TrainingPlan:
-    """Return the plan of a training in a scenario.
+    """Return the plan of a training in a scenario, or in many.
 
     Args:
-        scenario: Name of a preset, which gets the recipe's length of episodes (`EPISODE_S`), where deliveries count its
-            rewards (`DEFAULT_REWARDS`), and what `recipes.toml` says; or a complete configuration, which is taken as it
-            is.
+        scenario: Name of a preset (default warehouse_small), which gets the recipe's length of episodes (`EPISODE_S`),
+            where deliveries count its rewards (`DEFAULT_REWARDS`), and what `recipes.toml` says; or a complete
+            configuration, which is taken as it is.
+        sampler: Draws the world of each episode, instead of `scenario`, `wrappers`, `small_start` and `overrides`; its
+            worlds are taken as they are, with their rewards and horizons. Evaluations take place in the largest world
+            of each name that it draws, unless `evaluation` has worlds.
         algorithm: One of `plan.ALGORITHMS`.
         steps: Decisions of single robots in all stages.
         n_arenas: Arenas side by side.
@@ -94,6 +101,13 @@ def recipe(
         ConfigError: an unknown name or field, values that are refused by what they are for (see `TrainingPlan`), or
             a smaller arena that cannot be.
     """
+    if sampler is not None:
+        refused = {"scenario": scenario, "wrappers": tuple(wrappers), "small_start": small_start, **overrides}
+        given = [name for name, value in refused.items() if value not in (None, ())]
+        if given:
+            raise ConfigError(f"Expected either a sampler or {', '.join(given)}, which it decides; got both.")
+        scenario = sampler.largest
+    scenario = scenario or DEFAULT_SCENARIO
     measured = Measured() if isinstance(scenario, ScenarioConfig) else measured_recipe(scenario)
     fields = {name: value for name, value in overrides.items() if name != "horizon_s"}
     config = _training_scenario(scenario, fields, measured)
@@ -112,9 +126,15 @@ def recipe(
         options=_algorithm_options(
             algorithm, n_arenas * config.robots.n_robots, {**measured.options.get(algorithm, {}), **(options or {})}
         ),
-        stages=_stages(config, steps, episodes, small_start=counts_deliveries if small_start is None else small_start),
-        evaluation=_evaluation(evaluation, config, chosen.decision_ticks),
+        stages=_stages(
+            config,
+            steps,
+            episodes,
+            small_start=counts_deliveries and sampler is None if small_start is None else small_start,
+        ),
+        evaluation=_evaluation(evaluation, config, chosen.decision_ticks, sampler),
         seed=seed,
+        sampler=sampler,
     )
 
 
@@ -150,20 +170,33 @@ def _training_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any]
 
 
 def _evaluation(
-    given: EvaluationPlan | Mapping[str, Any] | None, scenario: ScenarioConfig, decision_ticks: int
+    given: EvaluationPlan | Mapping[str, Any] | None,
+    scenario: ScenarioConfig,
+    decision_ticks: int,
+    sampler: ScenarioSampler | None,
 ) -> EvaluationPlan:
     if isinstance(given, EvaluationPlan):
         return given
     fields = dict(table("evaluation", given or {}))
     known_keys(fields, [item.name for item in dataclasses.fields(EvaluationPlan)], prefix="evaluation.")
+    if sampler is not None:
+        fields.setdefault("worlds", _largest_worlds(sampler))
     plan = EvaluationPlan(**fields)
     if "every_steps" in fields:
         return plan
-    (first, *_) = plan.specs(scenario, (), plan.baseline)
+    places = [(world.scenario, world.wrappers) for world in plan.worlds] or [(scenario, ())]
+    robot_ticks = sum(spec.robot_ticks for place in places for spec in plan.specs(*place, plan.baseline))
     return dataclasses.replace(
-        plan,
-        every_steps=max(EVALUATE_EVERY, round(plan.n_runs * first.robot_ticks / decision_ticks / EVALUATION_SHARE)),
+        plan, every_steps=max(EVALUATE_EVERY, round(robot_ticks / decision_ticks / EVALUATION_SHARE))
     )
+
+
+def _largest_worlds(sampler: ScenarioSampler) -> tuple[EvaluationWorld, ...]:
+    """Return the world with the most robots of each name that a sampler draws, undisturbed."""
+    largest: dict[str, ScenarioConfig] = {}
+    for config in sorted(sampler.corners, key=lambda config: config.robots.n_robots):
+        largest[config.name] = config
+    return tuple(EvaluationWorld(scenario=config) for config in largest.values())
 
 
 def _default_interface(algorithm: str) -> InterfaceConfig:

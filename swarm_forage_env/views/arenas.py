@@ -1,6 +1,7 @@
 """Many arenas stepped as one batch of rows, one row per robot: what vector environments are made of.
 
-Row `a * N + i` is always robot i of arena a. The life of a row:
+Row `a * N + i` is always robot i of arena a. Where a sampler draws the worlds, N is the most robots of all, and the
+last rows of an arena with fewer are *spare*: absent from the first step of the run to the last. The life of a row:
 
 * While its robot is in the world, or not yet born, the row is part of an episode.
 * When the robot dies, the row terminates once, with its last observation (zeros: it has left the world). Until its
@@ -24,6 +25,7 @@ from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, Obs
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
 from swarm_forage_env.views.settlement import Settlement, can_settle
+from swarm_forage_env.views.spare import spare_masks, with_spare_rows
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.kernels.rows import book_rows
 from swarm_forage_env.world.rack import Rack, can_share_a_rack
@@ -42,6 +44,10 @@ class RunOutcome:
     """Objects delivered."""
     first_picked: int
     """Objects picked up for the first time."""
+    scenario: str
+    """Name of the scenario."""
+    n_robots: int
+    """Robots of this run."""
 
 
 @dataclass(kw_only=True, slots=True)
@@ -130,30 +136,39 @@ class ArenaBatch:
     """Arenas of one kind in this process, stepped together.
 
     Attributes:
-        n_arenas, n_robots, n_rows: Sizes; n_rows = n_arenas * n_robots.
+        n_arenas, n_robots, n_rows: Sizes; n_rows = n_arenas * n_robots, the rows of an arena.
         arenas: The arenas.
         interface: Spaces and layout of what learners see and do.
     """
 
-    def __init__(self, plan: ArenaPlan, n_arenas: int, *, first_arena: int = 0) -> None:
+    def __init__(
+        self, plan: ArenaPlan, n_arenas: int, *, first_arena: int = 0, n_arenas_in_all: int | None = None
+    ) -> None:
         """Build the arenas; `reset` must be called before `step`.
+
+        Where a sampler draws the worlds, each arena keeps to one of its kinds, see `ScenarioSampler.shares`.
 
         Args:
             plan: What every arena is made from.
             n_arenas: How many.
             first_arena: Number of the first of them, where this is part of a larger batch.
+            n_arenas_in_all: Arenas of that batch; None = `n_arenas`.
 
         Raises:
             ConfigError: n_arenas below 1, or a plan that cannot be built.
         """
         n_arenas = as_whole("n_arenas", n_arenas, at_least=1)
         self._first_arena = first_arena
-        self.arenas = [LearnerArena(plan) for _ in range(n_arenas)]
+        shares: list[float | None] = [None] * n_arenas
+        if plan.sampler is not None:
+            shares = plan.sampler.shares(n_arenas_in_all or n_arenas)[first_arena : first_arena + n_arenas]
+        self.arenas = [LearnerArena(plan, share) for share in shares]
         self.interface = self.arenas[0].interface
         self.n_arenas = n_arenas
         self.n_robots = plan.scenario.robots.n_robots
         self.n_rows = n_arenas * self.n_robots
         self._is_reset = self._is_closed = False
+        self._is_sampled = plan.sampler is not None
         self._absent = np.zeros((n_arenas, self.n_robots), np.bool_)
         self._present = np.zeros((n_arenas, self.n_robots), np.bool_)
         self._returns = np.zeros((n_arenas, self.n_robots), np.float64)
@@ -192,14 +207,18 @@ class ArenaBatch:
         """Start a run in one arena; writes the learner's observations to `out`."""
         arena = self.arenas[number]
         arena.reset(seed, options)
-        self._present[number] = arena.forage_env.swarm.present
-        self._absent[number] = False
+        n_robots = arena.n_robots
+        self._present[number, :n_robots] = arena.forage_env.swarm.present
+        self._present[number, n_robots:] = False
+        self._absent[number, :n_robots] = False
+        self._absent[number, n_robots:] = True
         self._returns[number] = 0.0
         self._lengths[number] = 0
-        arena.observe(out)
+        arena.observe(out[:n_robots])
+        out[n_robots:] = 0.0
 
     def _active(self) -> BoolArray:
-        return np.concatenate([arena.forage_env.active for arena in self.arenas])
+        return np.concatenate([with_spare_rows(arena.forage_env.active, self.n_robots) for arena in self.arenas])
 
     def step(self, actions: np.ndarray) -> ArenaStep:
         """Step every arena by one decision.
@@ -295,12 +314,18 @@ class ArenaBatch:
             n_terminated = settlement.book(rewards, self._rows, flags, obs)
         else:
             n_terminated = [
-                book_rows(ticks[number][0], arena.forage_env.swarm.present, arena.forage_env.active, *rows)
+                book_rows(
+                    ticks[number][0],
+                    arena.forage_env.swarm.present,
+                    arena.forage_env.active,
+                    *(row[: arena.n_robots] for row in rows),
+                )
                 for number, (arena, *rows) in enumerate(zip(self.arenas, rewards, *self._rows, *flags, strict=True))
             ]
         if settlement is None or not settlement.copies:
             for arena, out in zip(self.arenas, obs, strict=True):
-                arena.observe(out)
+                arena.observe(out[: arena.n_robots])
+                out[arena.n_robots :] = 0.0
         return n_terminated
 
     def _begin(self, number: int, actions: np.ndarray) -> FloatArray | None:
@@ -314,8 +339,9 @@ class ArenaBatch:
         return gain
 
     def _alone(self, number: int, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
+        arena = self.arenas[number]
         try:
-            return self.arenas[number].step(actions, rewards)
+            return arena.step(actions[: arena.n_robots], rewards[: arena.n_robots])
         except ValueError as error:
             self._note(error, number)
             raise
@@ -334,7 +360,7 @@ class ArenaBatch:
         """
         worlds = [arena.forage_env.arena for arena in self.arenas]
         if self._ways is None or worlds != self._ways[0]:  # by identity
-            in_parts = all(map(_steps_in_parts, self.arenas))
+            in_parts = not self._is_sampled and all(map(_steps_in_parts, self.arenas))
             rack = Rack(worlds) if in_parts and can_share_a_rack(worlds) else None
             self._ways = worlds, rack, Settlement(self.arenas) if in_parts and can_settle() else None
         elif self._ways[2] is not None:
@@ -361,10 +387,12 @@ class ArenaBatch:
             self._note_endings(number, np.arange(self.n_robots), obs, endings)
             endings.outcomes.append(self._outcome(number))
             self._start(number, obs)
-            active[:] = self.arenas[number].forage_env.active
+            arena = self.arenas[number]
+            active[: arena.n_robots] = arena.forage_env.active
+            active[arena.n_robots :] = False
         else:
             self._note_endings(number, np.flatnonzero(terminated), obs, endings)
-            absent |= dead
+            absent[: len(dead)] |= dead
 
     def _note_endings(self, number: int, robots: np.ndarray, obs: ObsArray, endings: _Endings) -> None:
         endings.rows.append((robots + number * self.n_robots).astype(np.int32))
@@ -382,17 +410,19 @@ class ArenaBatch:
             seconds=env.tick * env.scenario.dt_s,
             collected=int(env.events.counters[Counter.COLLECTED]),
             first_picked=int(env.events.counters[Counter.FIRST_PICKED]),
+            scenario=env.scenario.name,
+            n_robots=env.scenario.robots.n_robots,
         )
 
     def action_masks(self) -> BoolArray:
-        """Return which discrete actions make sense now, (R, number of actions).
+        """Return which discrete actions make sense now, (R, number of actions); spare rows can only stand.
 
         Raises:
             RuntimeError: not reset yet, or closed.
             ValueError: the actions are continuous.
         """
         self._require_reset("action_masks")
-        return np.concatenate([arena.mask() for arena in self.arenas])
+        return np.concatenate([spare_masks(arena.mask(), self.n_robots) for arena in self.arenas])
 
     def _require_reset(self, what: str) -> None:
         if self._is_closed:

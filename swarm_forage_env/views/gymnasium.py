@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
@@ -16,6 +17,8 @@ from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.arenas import ArenaStep
 from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot, plan_arena
 from swarm_forage_env.views.processes import open_arenas
+from swarm_forage_env.views.sampler import ScenarioSampler
+from swarm_forage_env.views.spare import spare_masks, with_spare_rows
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_configs
 
@@ -37,8 +40,9 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
 
     def __init__(
         self,
-        scenario: str | ScenarioConfig = "warehouse_small",
+        scenario: str | ScenarioConfig | None = None,
         *,
+        sampler: ScenarioSampler | None = None,
         interface: GivenInterface = None,
         wrappers: Iterable[WrapperConfig | str] = (),
         max_cycles: int | None = None,
@@ -49,7 +53,9 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         """Create the environment.
 
         Args:
-            scenario: Name of a preset, or a complete configuration.
+            scenario: Name of a preset, or a complete configuration; default warehouse_small.
+            sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`. There are as many
+                rows as the largest world has robots; those to spare are zeros, and their actions are ignored.
             interface: What is seen and done of each robot, an `InterfaceConfig` or its fields by name; default full
                 observations and continuous actions.
             wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
@@ -65,6 +71,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         plan = plan_arena(
             scenario,
             overrides,
+            sampler=sampler,
             interface=interface,
             wrappers=wrappers,
             max_cycles=max_cycles,
@@ -74,9 +81,9 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         self._arena = LearnerArena(plan)
         self._is_discrete = plan.interface.actions == "discrete"
         self.render_mode = render_mode
-        n_robots = plan.scenario.robots.n_robots
-        self.observation_space = batch_space(self.interface.observation_space, n_robots)
-        self.action_space = batch_space(self.interface.action_space, n_robots)
+        self._n_rows = plan.scenario.robots.n_robots
+        self.observation_space = batch_space(self.interface.observation_space, self._n_rows)
+        self.action_space = batch_space(self.interface.action_space, self._n_rows)
 
     @property
     def interface(self) -> LearnerInterface:
@@ -99,7 +106,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         """
         super().reset(seed=seed)
         self._arena.reset(seed, options)
-        return self._arena.observe(), self._info()
+        return self._observed(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[ObsArray, float, bool, bool, dict[str, Any]]:
         """Advance by one decision.
@@ -110,9 +117,15 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         Raises:
             ActionError: wrong shape, numbers outside of `action_space`, or an active robot's action that is not finite.
         """
-        rewards = np.zeros(self.forage_env.scenario.robots.n_robots)  # float64: sums do not depend on the order
-        _, terminated, truncated = self._arena.step(np.asarray(action), rewards)
-        return self._arena.observe(), float(rewards.sum()), terminated, truncated, self._info()
+        n_robots = self._arena.n_robots
+        rewards = np.zeros(n_robots)  # float64: sums do not depend on the order
+        chosen = np.asarray(action)
+        if n_robots < self._n_rows:
+            if chosen.shape[:1] != (self._n_rows,):
+                raise ActionError(f"Expected actions for {self._n_rows} rows, got shape {chosen.shape}.")
+            chosen = chosen[:n_robots]
+        _, terminated, truncated = self._arena.step(chosen, rewards)
+        return self._observed(), float(rewards.sum()), terminated, truncated, self._info()
 
     def snapshot(self) -> LearnerSnapshot:
         """Return the state of the run as a value; see `ForageEnv.snapshot`."""
@@ -121,7 +134,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
     def restore(self, snapshot: LearnerSnapshot) -> tuple[ObsArray, dict[str, Any]]:
         """Go back to a snapshot; returns observations (N, d) and info. See `ForageEnv.restore`."""
         self._arena.restore(snapshot)
-        return self._arena.observe(), self._info()
+        return self._observed(), self._info()
 
     def render(self) -> np.ndarray | None:
         """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
@@ -131,10 +144,13 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         """Close the wrapped stack."""
         self._arena.env.close()
 
+    def _observed(self) -> ObsArray:
+        return with_spare_rows(self._arena.observe(), self._n_rows)
+
     def _info(self) -> dict[str, Any]:
-        info: dict[str, Any] = {"active": self.forage_env.active.copy()}
+        info: dict[str, Any] = {"active": with_spare_rows(self.forage_env.active, self._n_rows)}
         if self._is_discrete:
-            info["action_mask"] = self._arena.mask().astype(np.int8)
+            info["action_mask"] = spare_masks(self._arena.mask(), self._n_rows).astype(np.int8)
         return info
 
 
@@ -162,8 +178,9 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
 
     def __init__(
         self,
-        scenario: str | ScenarioConfig = "warehouse_small",
+        scenario: str | ScenarioConfig | None = None,
         *,
+        sampler: ScenarioSampler | None = None,
         num_envs: int = 1,
         n_arenas: int | None = None,
         n_processes: int = 0,
@@ -177,7 +194,9 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         """Create the environment.
 
         Args:
-            scenario: Name of a preset, or a complete configuration.
+            scenario: Name of a preset, or a complete configuration; default warehouse_small.
+            sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`. An arena then has
+                as many rows as the largest world has robots; those that are to spare in a run are absent all through.
             num_envs: Robots in all arenas together, a multiple of the scenario's number. 1, the default of
                 `gymnasium.make_vec`, leaves the choice to `n_arenas`.
             n_arenas: Arenas that run side by side; default as many as `num_envs` needs, at least one.
@@ -198,6 +217,7 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         plan = plan_arena(
             scenario,
             overrides,
+            sampler=sampler,
             interface=interface,
             wrappers=(*wrapper_configs(wrappers), *wrapper_configs(swarm_wrappers)),
             max_cycles=max_cycles,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, table
+from swarm_forage_env._internal.fields import ConfigError, instance, table
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.calls import OPTION_OF_TESTS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
@@ -17,6 +17,7 @@ from swarm_forage_env.policies.kernels.sites import SiteMemory
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
 from swarm_forage_env.scenarios.overrides import field_sections, scenario_of_same_size
 from swarm_forage_env.scenarios.presets import chosen_scenario
+from swarm_forage_env.views.sampler import DrawnWorld, ScenarioSampler
 from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.registry import wrapper_configs
@@ -30,8 +31,11 @@ class ArenaPlan:
     """Everything that an arena is made from; picklable."""
 
     scenario: ScenarioConfig
+    """The world; with a sampler its largest one, which says how many rows and which columns there are."""
     wrappers: tuple[WrapperConfig, ...] = ()
-    """What disturbs the swarm, in any order."""
+    """What disturbs the swarm, in any order; with a sampler nothing beside what it draws."""
+    sampler: ScenarioSampler | None = None
+    """Where the world of each run comes from; None = it is always `scenario`."""
     interface: InterfaceConfig = field(default_factory=InterfaceConfig)
     """What a learner sees and does."""
     max_cycles: int | None = None
@@ -40,13 +44,18 @@ class ArenaPlan:
     snapshots: bool = False
     """Keep what copies and snapshots need; see `ForageEnv`."""
 
-    def build(self, overrides: Mapping[str, Any]) -> ForageEnv | SwarmWrapper:
-        """Build the environment with its wrappers, with scenario fields overridden by name.
+    def build(self, overrides: Mapping[str, Any], world: DrawnWorld | None = None) -> ForageEnv | SwarmWrapper:
+        """Build the environment with its wrappers.
+
+        Args:
+            overrides: Scenario fields by name.
+            world: What the sampler has drawn; None = the scenario and wrappers of the plan.
 
         Raises:
             ConfigError: unknown fields, values that do not fit together, or another number of robots.
         """
-        scenario = scenario_of_same_size(self.scenario, overrides)
+        given, wrappers = (self.scenario, self.wrappers) if world is None else world
+        scenario = scenario_of_same_size(given, overrides)
         env = ForageEnv(
             scenario,
             max_cycles=self.max_cycles,
@@ -54,13 +63,20 @@ class ArenaPlan:
             reads=self.interface.reads,
             snapshots=self.snapshots,
         )
-        return wrap_in_order(env, self.wrappers)
+        return wrap_in_order(env, wrappers)
+
+
+DEFAULT_SCENARIO = "warehouse_small"
+"""The world of environments that are told nothing about it."""
+SAMPLED = "sampled"
+"""Stands for the scenario in the id swarm_forage/sampled-v1, whose worlds a sampler draws."""
 
 
 def plan_arena(
-    scenario: str | ScenarioConfig,
+    scenario: str | ScenarioConfig | None,
     overrides: Mapping[str, Any],
     *,
+    sampler: ScenarioSampler | None = None,
     interface: GivenInterface = None,
     wrappers: Iterable[WrapperConfig | str] = (),
     max_cycles: int | None = None,
@@ -70,8 +86,9 @@ def plan_arena(
     """Plan an arena from the arguments that the constructors of environments take.
 
     Args:
-        scenario: Name of a preset, or a complete configuration.
+        scenario: Name of a preset, or a complete configuration; None = `DEFAULT_SCENARIO`, or what `sampler` draws.
         overrides: Scenario fields by name.
+        sampler: Where the world of each run comes from, instead of `scenario`, `overrides` and `wrappers`.
         interface: See `chosen_interface`.
         wrappers: See `wrapper_configs`.
         max_cycles: Ticks until truncation; default the scenario's horizon.
@@ -79,12 +96,29 @@ def plan_arena(
         snapshots: Keep what copies and snapshots need; see `ForageEnv`.
 
     Raises:
-        ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
+        ConfigError: unknown preset, field, wrapper or choice of the interface, values that do not fit together, or a
+            sampler beside what it decides.
     """
-    world = chosen_scenario(scenario, overrides)
+    disturbing = wrapper_configs(wrappers)
+    if sampler is None:
+        if scenario == SAMPLED:
+            raise ConfigError(
+                "Expected a sampler for swarm_forage/sampled-v1, got none; give sampler=ScenarioSampler(...)."
+            )
+        world = chosen_scenario(scenario or DEFAULT_SCENARIO, overrides)
+    else:
+        instance("sampler", sampler, ScenarioSampler, hint="; ScenarioSampler.from_mapping reads a table")
+        given = ["scenario"] * (scenario not in (None, SAMPLED)) + ["wrappers"] * bool(disturbing) + list(overrides)
+        if given:
+            raise ConfigError(
+                f"Expected either a sampler, which decides on the worlds, or {', '.join(given)}; got both. Write it "
+                "into the sampler, where all worlds can share it. By id, make swarm_forage/sampled-v1."
+            )
+        world = sampler.largest
     return ArenaPlan(
         scenario=world,
-        wrappers=wrapper_configs(wrappers),
+        wrappers=disturbing,
+        sampler=sampler,
         interface=chosen_interface(interface).for_scenario(world),
         max_cycles=max_cycles,
         render_mode=render_mode,
@@ -101,6 +135,8 @@ class LearnerSnapshot:
     interface: InterfaceConfig
     overrides: Mapping[str, Any]
     """Scenario fields that a reset has overridden."""
+    world: DrawnWorld | None
+    """What the sampler drew for the run; None without a sampler, and before the first reset."""
     seeds: Mapping[str, Any]
     """State of the generator of the next seeds."""
     agents: tuple[str, ...] = ()
@@ -118,12 +154,27 @@ class LearnerArena:
         interface: Translates for the learner; its spaces stay the same, but a reset may make a new object.
     """
 
-    def __init__(self, plan: ArenaPlan) -> None:
-        """Build the environment of `plan`; raises ConfigError where it cannot be built."""
+    def __init__(self, plan: ArenaPlan, share: float | None = None) -> None:
+        """Build the environment.
+
+        Args:
+            plan: What it is made from.
+            share: Which of a sampler's worlds this arena has, see `ScenarioSampler.draw`; None = any.
+
+        Raises:
+            ConfigError: it cannot be built.
+        """
         self._plan = plan
+        self._share = share
         self._overrides: dict[str, Any] = {}
+        self._world: DrawnWorld | None = None
         self._seeds = np.random.default_rng()
         self._adopt(plan.build({}))
+
+    @property
+    def n_robots(self) -> int:
+        """Robots of this run; a sampler may draw fewer than there are rows for."""
+        return self.forage_env.scenario.robots.n_robots
 
     def _adopt(self, env: ForageEnv | SwarmWrapper) -> None:
         self.env = env
@@ -143,16 +194,25 @@ class LearnerArena:
                 robots; the arena stays as it was.
         """
         overrides = _scenario_overrides(options)
-        if overrides is not None and overrides != self._overrides:
-            self.env.close()
-            self._adopt(self._plan.build(overrides))
-            self._overrides = overrides
+        if overrides is None:
+            overrides = self._overrides
+        if self._plan.sampler is None:
+            self._change(overrides, None)
         if seed is None:
             seed = int(self._seeds.integers(2**31))
         else:
             self._seeds = np.random.default_rng(seed)
+        if self._plan.sampler is not None:
+            self._change(overrides, self._plan.sampler.world_of(seed, self._share))
         self.env.reset_batch(seed)
         self.interface.forget()
+
+    def _change(self, overrides: dict[str, Any], world: DrawnWorld | None) -> None:
+        """Build another environment, if the one that there is has another world."""
+        if (overrides, world) != (self._overrides, self._world):
+            self.env.close()
+            self._adopt(self._plan.build(overrides, world))
+            self._overrides, self._world = overrides, world
 
     def step(self, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
         """Carry out a decision: step until its ticks are done or the run ends.
@@ -198,6 +258,7 @@ class LearnerArena:
             stack=self.env.snapshot(),
             interface=self._plan.interface,
             overrides=dict(self._overrides),
+            world=self._world,
             seeds=self._seeds.bit_generator.state,
             agents=tuple(agents),
             memory=self.interface.memory(),
@@ -219,12 +280,12 @@ class LearnerArena:
             raise SnapshotError(
                 f"Expected a snapshot of an environment with {self._plan.interface}, got one with {snapshot.interface}."
             )
-        is_same = snapshot.overrides == self._overrides
-        env = self.env if is_same else self._plan.build(snapshot.overrides)
+        is_same = (snapshot.overrides, snapshot.world) == (self._overrides, self._world)
+        env = self.env if is_same else self._plan.build(snapshot.overrides, snapshot.world)
         env.restore_batch(snapshot.stack)
         if not is_same:
             self._adopt(env)
-            self._overrides = dict(snapshot.overrides)
+            self._overrides, self._world = dict(snapshot.overrides), snapshot.world
         self._seeds.bit_generator.state = snapshot.seeds
         self.interface.recall(snapshot.memory)
 

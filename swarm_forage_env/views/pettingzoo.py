@@ -9,10 +9,12 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils.conversions import parallel_to_aec
 
 from swarm_forage_env.contract.calls import is_over
+from swarm_forage_env.contract.policy import state_size
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot, plan_arena
+from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 
 Infos = dict[str, dict[str, Any]]
@@ -30,8 +32,9 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
 
     def __init__(
         self,
-        scenario: str | ScenarioConfig = "warehouse_small",
+        scenario: str | ScenarioConfig | None = None,
         *,
+        sampler: ScenarioSampler | None = None,
         interface: GivenInterface = None,
         wrappers: Iterable[WrapperConfig | str] = (),
         max_cycles: int | None = None,
@@ -42,7 +45,9 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         """Create the environment.
 
         Args:
-            scenario: Name of a preset, or a complete configuration.
+            scenario: Name of a preset, or a complete configuration; default warehouse_small.
+            sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`. `possible_agents`
+                are those of the largest world; `agents` are those of the run.
             interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
                 observations and continuous actions.
             wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
@@ -59,6 +64,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         plan = plan_arena(
             scenario,
             overrides,
+            sampler=sampler,
             interface=interface,
             wrappers=wrappers,
             max_cycles=max_cycles,
@@ -67,6 +73,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         )
         self._is_discrete = plan.interface.actions == "discrete"
         self._arena = LearnerArena(plan)
+        self._sampler = sampler
         self.render_mode = render_mode
         self.possible_agents = list(self._arena.forage_env.possible_agents)
         self.agents: list[str] = []
@@ -100,12 +107,22 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
 
     @property
     def state_space(self) -> spaces.Box:
-        """Space of `state()`."""
-        return self.forage_env.state_space
+        """Space of `state()`; with a sampler, as large as the most robots and the most objects need."""
+        if self._sampler is None:
+            return self.forage_env.state_space
+        return spaces.Box(-1.0, 1.0, (state_size(self._sampler.n_robots, self._sampler.n_objects),), np.float32)
 
     def state(self) -> np.ndarray:
-        """Return the global view, see `ForageEnv.state`."""
-        return self.forage_env.state()
+        """Return the global view, see `ForageEnv.state`; zeros for robots and objects that this run does not have."""
+        state = self.forage_env.state()
+        if self._sampler is None:
+            return state
+        robots, things = np.split(state, [state_size(self._arena.n_robots, 0)])
+        padded = np.zeros(self.state_space.shape, np.float32)
+        padded[: len(robots)] = robots
+        first_object = state_size(self._sampler.n_robots, 0)
+        padded[first_object : first_object + len(things)] = things
+        return padded
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -117,7 +134,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
             options: `{"scenario": {field: value}}` overrides scenario fields from now on; see `LearnerArena.reset`.
         """
         self._arena.reset(seed, options)
-        self.agents = list(self.possible_agents)
+        self.agents = self.possible_agents[: self._arena.n_robots]
         return self._per_agent(self._arena.observe()), self._infos()
 
     def step(
@@ -135,7 +152,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         if missing:
             raise ValueError(f"Expected an action for each of the {len(self.agents)} agents, missing {missing[:3]}.")
         chosen = self._chosen(actions)
-        rewards = np.zeros(len(self.possible_agents))
+        rewards = np.zeros(self._arena.n_robots)
         dead, _, truncated = self._arena.step(chosen, rewards)
         results = (
             self._per_agent(self._arena.observe()),
@@ -167,7 +184,7 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
                 raise ValueError(
                     f"Expected an action of {space} for {agent}, got {action.dtype} with shape {action.shape}."
                 )
-        chosen = np.zeros((len(self.possible_agents), *(space.shape or ())), space.dtype)
+        chosen = np.zeros((self._arena.n_robots, *(space.shape or ())), space.dtype)
         for agent, action in given.items():
             chosen[self._row_of[agent]] = action
         return chosen
@@ -195,8 +212,9 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
 
 @overload
 def parallel_env(
-    scenario: str | ScenarioConfig = ...,
+    scenario: str | ScenarioConfig | None = ...,
     *,
+    sampler: None = ...,
     interface: None = ...,
     wrappers: tuple[()] = ...,
     max_cycles: int | None = ...,
@@ -206,8 +224,9 @@ def parallel_env(
 ) -> ForageEnv: ...
 @overload
 def parallel_env(
-    scenario: str | ScenarioConfig = ...,
+    scenario: str | ScenarioConfig | None = ...,
     *,
+    sampler: ScenarioSampler | None = ...,
     interface: GivenInterface = ...,
     wrappers: Iterable[WrapperConfig | str] = ...,
     max_cycles: int | None = ...,
@@ -216,8 +235,9 @@ def parallel_env(
     **overrides: Any,
 ) -> ForageEnv | SwarmWrapper | ParallelLearnerEnv: ...
 def parallel_env(
-    scenario: str | ScenarioConfig = "warehouse_small",
+    scenario: str | ScenarioConfig | None = None,
     *,
+    sampler: ScenarioSampler | None = None,
     interface: GivenInterface = None,
     wrappers: Iterable[WrapperConfig | str] = (),
     max_cycles: int | None = None,
@@ -228,7 +248,8 @@ def parallel_env(
     """Create a parallel environment; `pettingzoo.make("parallel", id, ...)` calls this function, too.
 
     Args:
-        scenario: Name of a preset, or a complete configuration.
+        scenario: Name of a preset, or a complete configuration; default warehouse_small.
+        sampler: Draws the world of each run, see `ParallelLearnerEnv`.
         interface: What a learner sees and does, see `ParallelLearnerEnv`; None = full observations and continuous
             actions.
         wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
@@ -239,14 +260,16 @@ def parallel_env(
         overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
 
     Returns:
-        A `ForageEnv`; with wrappers the outermost of them; with an interface a `ParallelLearnerEnv` around them all.
+        A `ForageEnv`; with wrappers the outermost of them; with an interface or a sampler a
+        `ParallelLearnerEnv` around them all.
 
     Raises:
         ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
     """
-    if interface is not None:
+    if interface is not None or sampler is not None:
         return ParallelLearnerEnv(
             scenario,
+            sampler=sampler,
             interface=interface,
             wrappers=wrappers,
             max_cycles=max_cycles,
@@ -260,7 +283,7 @@ def parallel_env(
     return plan.build({})
 
 
-def env(scenario: str | ScenarioConfig = "warehouse_small", **options: Any) -> Any:
+def env(scenario: str | ScenarioConfig | None = None, **options: Any) -> Any:
     """Create the agent-by-agent (AEC) form by PettingZoo's own conversion; arguments as `parallel_env`."""
     parallel = parallel_env(scenario, **options)
     return parallel_to_aec(parallel)  # pyright: ignore[reportArgumentType] - its type asks for actions that may be None

@@ -26,7 +26,7 @@ class ArenaProcessError(RuntimeError):
     """A process with arenas failed or is gone; the message holds its traceback or exit code."""
 
 
-def _serve(pipe: Connection, plan: ArenaPlan, n_arenas: int, first_arena: int) -> None:
+def _serve(pipe: Connection, plan: ArenaPlan, n_arenas: int, first_arena: int, n_arenas_in_all: int) -> None:
     """Main function of a process: answer numbered calls of `ArenaBatch` methods until told to close."""
     # Ctrl-C reaches every process of a terminal. Only the parent handles it, and closes this process if needed.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -38,7 +38,7 @@ def _serve(pipe: Connection, plan: ArenaPlan, n_arenas: int, first_arena: int) -
             return
         try:
             if batch is None:
-                batch = ArenaBatch(plan, n_arenas, first_arena=first_arena)
+                batch = ArenaBatch(plan, n_arenas, first_arena=first_arena, n_arenas_in_all=n_arenas_in_all)
             pipe.send((number, getattr(batch, method)(*args, **kwargs), None))
         except BrokenPipeError:  # the parent no longer waits for the answer
             return
@@ -91,7 +91,7 @@ class ArenaProcesses:
         self._has_answered = [False] * n_processes
         for share in self._shares:
             ours, theirs = starter.Pipe()
-            arguments = (theirs, plan, len(share), share[0])
+            arguments = (theirs, plan, len(share), share[0], n_arenas)
             process = starter.Process(target=_serve, args=arguments, daemon=True)
             process.start()
             theirs.close()

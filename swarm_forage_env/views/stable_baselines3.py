@@ -17,6 +17,7 @@ from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.arenas import ArenaStep
 from swarm_forage_env.views.learner_arena import plan_arena
 from swarm_forage_env.views.processes import open_arenas
+from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 
 
@@ -31,20 +32,22 @@ class SwarmVecEnv(VecEnv):
       the robot could have gone on. Only then the value of the terminal observation is bootstrapped.
     * `infos[row]["episode"]` (return "r", steps "l", seconds since creation "t") is there when an episode ended, also
       by death; no `VecMonitor` is needed, and one would count absent rows as episodes.
-    * `infos[row]["run"]`, on the first row of an arena that ended: seed, simulated seconds, collected, first_picked.
+    * `infos[row]["run"]`, on the first row of an arena that ended: seed, simulated seconds, collected, first_picked,
+      and of which world: scenario (its name), n_robots.
     * Learners must leave out robots that are absent or in repair: build the algorithm with `ActiveRolloutBuffer`
       (on-policy) or `PresentReplayBuffer` (off-policy).
 
     Attributes:
-        n_arenas, n_robots: num_envs = n_arenas * n_robots.
+        n_arenas, n_robots: num_envs = n_arenas * n_robots; with a sampler, n_robots is that of its largest world.
         interface: What a learner sees and does.
         active: (num_envs,) bool, robots at work in the last observation.
     """
 
     def __init__(
         self,
-        scenario: str | ScenarioConfig = "warehouse_small",
+        scenario: str | ScenarioConfig | None = None,
         *,
+        sampler: ScenarioSampler | None = None,
         n_arenas: int = 1,
         n_processes: int = 0,
         interface: GivenInterface = None,
@@ -56,7 +59,9 @@ class SwarmVecEnv(VecEnv):
         """Create the environment.
 
         Args:
-            scenario: Name of a preset, or a complete configuration.
+            scenario: Name of a preset, or a complete configuration; default warehouse_small.
+            sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`. An arena then has
+                as many rows as the largest world has robots; those that are to spare in a run are absent all through.
             n_arenas: Arenas that run side by side.
             n_processes: Processes that the arenas are spread over; 0 = all in this process.
             interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
@@ -74,7 +79,13 @@ class SwarmVecEnv(VecEnv):
         if "num_envs" in overrides:
             raise ConfigError("Expected n_arenas, not num_envs: each arena gives one sub-environment per robot.")
         plan = plan_arena(
-            scenario, overrides, interface=interface, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode
+            scenario,
+            overrides,
+            sampler=sampler,
+            interface=interface,
+            wrappers=wrappers,
+            max_cycles=max_cycles,
+            render_mode=render_mode,
         )
         self._arenas = open_arenas(plan, n_arenas, n_processes)
         self.n_arenas, self.n_robots = n_arenas, self._arenas.n_robots
@@ -136,6 +147,8 @@ class SwarmVecEnv(VecEnv):
                     "seconds": outcome.seconds,
                     "collected": outcome.collected,
                     "first_picked": outcome.first_picked,
+                    "scenario": outcome.scenario,
+                    "n_robots": outcome.n_robots,
                 }
         return infos
 

@@ -111,6 +111,12 @@ def test_a_plan_is_read_back_from_what_it_writes(plan, tmp_path):
         ("scenario = { width_m = 20.0, nest_centre_m = [2.0, 8.0] }", "scenario = 5", "stages.scenario to be a table"),
         ("options = { learning_rate = 0.1 }", "options = 5", "stage.options to be a table"),
         ("horizon_s = 400.0", 'horizon_s = 400.0\nbaseline = "crv"', "Did you mean 'crw'"),
+        ("n_arenas = 2", "n_arenas = 2\nsamples = 1", "samples to be"),
+        (
+            "n_arenas = 2",
+            "n_arenas = 2\nsamples = true",
+            "only with discrete actions of ppo or a2c, .* got discrete ones of dqn",
+        ),
     ],
 )
 def test_plans_that_cannot_be_are_refused_with_their_file(tmp_path, old, new, reason):

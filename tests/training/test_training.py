@@ -298,6 +298,19 @@ def test_checkpoints_run_as_they_were_trained(tmp_path, algorithm):
         obs, *_ = env.step_batch(actions)
 
 
+def test_a_policy_that_draws_its_actions_is_judged_and_kept_as_such(tmp_path):
+    plan = tiny_plan(samples=True, stages=(Stage(steps=128),))
+    result = train(plan, tmp_path / "drawn")
+    network = Network.load(tmp_path / "drawn" / "policy.npz")
+    assert network.about.samples
+    assert not Network.load(train(SHORT, tmp_path / "likeliest").policy_file).about.samples
+    rows = np.random.default_rng(0).uniform(-1, 1, (400, 23)).astype(np.float32)
+    assert len(set(network.choose(rows[:1].repeat(400, axis=0), np.random.default_rng(0)).tolist())) > 1
+    assert same(weights(result.model), weights(train(SHORT, tmp_path / "same").model)), (
+        "drawing takes no chance from learning"
+    )
+
+
 def test_the_last_checkpoint_holds_all_that_was_learnt(tmp_path):
     """Also where an evaluation is due with the last step of a stage."""
     evaluation = dataclasses.replace(tiny_plan().evaluation, every_steps=128)

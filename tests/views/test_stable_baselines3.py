@@ -48,7 +48,8 @@ def test_infos_by_hand():
     last = steps[4][3]
     position = env.interface.layout["position"]
     np.testing.assert_array_equal(last[0]["terminal_observation"][position], steps[0][0][0, position])
-    assert last[0]["run"] == {"seed": 7, "seconds": 1.0, "collected": 0, "first_picked": 0}
+    told = {"seed": 7, "seconds": 1.0, "collected": 0, "first_picked": 0, "scenario": "warehouse_small", "n_robots": 3}
+    assert last[0]["run"] == told
 
 
 def test_results_of_earlier_steps_stay_valid():

@@ -46,3 +46,14 @@ class PPOWarehouseSmall(NetworkPolicy):
     def __init__(self) -> None:
         """Open the network."""
         super().__init__(_network("ppo_warehouse_small"))
+
+
+class Generalist(NetworkPolicy):
+    """Trained by PPO in all scenarios, calm and under adversity; `generalist.md` is its card."""
+
+    caches: ClassVar[str] = "none"
+    """Kind of caches that it was trained with."""
+
+    def __init__(self) -> None:
+        """Open the network."""
+        super().__init__(_network("generalist"))

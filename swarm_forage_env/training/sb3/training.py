@@ -10,7 +10,7 @@ import inspect
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -31,16 +31,17 @@ from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.model_files import MODEL_FAULTS, deterministic_choice
+from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.study.first_run import compile_world
 from swarm_forage_env.study.record import software_versions
-from swarm_forage_env.study.run import run_policy
 from swarm_forage_env.study.runner import available_cores
+from swarm_forage_env.training.evaluation_worlds import BEST, CHOSEN_BY, judged, judged_baseline, judged_in_world
 from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, PLAN_FILE, read_evaluations, write_evaluations
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
 from swarm_forage_env.training.sb3.export import export_network, note_interface
-from swarm_forage_env.training.status import Evaluation, TrainingStatus
+from swarm_forage_env.training.status import Evaluation, TrainingStatus, WorldEvaluation
 from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
 ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
@@ -50,7 +51,7 @@ MODEL_FILE = "model.zip"
 POLICY_FILE = "policy.npz"
 _REPORT_EVERY_S = 1.0
 _TOLD = ("algorithm", "seed", "n_arenas", "hidden", "interface", "options", "stages", "scenario.reward",
-         "scenario.name", "scenario.robots.n_robots")  # fmt: skip
+         "scenario.name", "scenario.robots.n_robots", "sampler")  # fmt: skip
 """Settings of a plan that TensorBoard shows beside the evaluations, by name or by what their names begin with."""
 _NO_LINE = ("stdout", "log", "json", "csv")
 """Outputs of the library that hold numbers only."""
@@ -121,13 +122,8 @@ def train(
     together = _Together(watch, callbacks)
     if available_cores() > 1:
         compile_world(plan.scenario)
-    env = SwarmVecEnv(
-        plan.scenario,
-        n_arenas=plan.n_arenas,
-        n_processes=n_processes,
-        interface=plan.interface,
-        wrappers=plan.wrappers,
-    )
+    env = _arenas(plan, plan.stages[0], n_processes)
+    sampler = plan.stages[0].sampler
     try:
         model = _checkpoint(plan, folder, env) if resume else None
         begun = 0 if model is None else model.num_timesteps
@@ -136,13 +132,16 @@ def train(
             ends += stage.steps
             done = 0 if model is None else model.num_timesteps
             if done < ends:
+                if stage.sampler != sampler:
+                    env.close()
+                    env, sampler = _arenas(plan, stage, n_processes), stage.sampler
                 model = _prepared(plan, stage, folder, env, done)
                 _learn(model, ends - done, together, f"stage {number}{_changes(stage)}")
             if together.ended:
                 break
         assert model is not None, "a plan has a stage"
         if watch.lacks_evaluation(model.num_timesteps) and not together.ended:
-            model = _prepared(plan, plan.stages[-1], folder, env, model.num_timesteps)
+            model = _prepared(plan, plan.stages[-1], folder, env, model.num_timesteps)  # nothing is stepped any more
             _learn(model, 0, _Together(watch), "its last evaluation")
     finally:
         env.close()
@@ -152,6 +151,19 @@ def train(
         evaluations=tuple(watch.evaluations),
         policy_file=policy_file,
         steps=model.num_timesteps - begun,
+    )
+
+
+def _arenas(plan: TrainingPlan, stage: Stage, n_processes: int) -> SwarmVecEnv:
+    """Return the arenas of a stage."""
+    sampler = stage.sampler or plan.sampler
+    return SwarmVecEnv(
+        plan.scenario if sampler is None else None,
+        sampler=sampler,
+        n_arenas=plan.n_arenas,
+        n_processes=n_processes,
+        interface=plan.interface,
+        wrappers=plan.wrappers if sampler is None else (),
     )
 
 
@@ -186,10 +198,13 @@ def _check_folder(folder: Path, plan: TrainingPlan, *, resume: bool) -> None:
 
 def _check_baseline(plan: TrainingPlan) -> None:
     """Refuse a controller to compare with that cannot be opened; the first evaluation would be late for that."""
-    try:
-        load_policy(plan.evaluation.baseline)
-    except (ValueError, OSError) as error:
-        raise ConfigError(f"Expected evaluation.baseline to be a controller: {error}") from error
+    worlds = plan.evaluation.worlds
+    named = [(f"the baseline of {world.name}", world.baseline) for world in worlds if world.baseline != BEST]
+    for where, baseline in named if worlds else [("evaluation.baseline", plan.evaluation.baseline)]:
+        try:
+            load_policy(baseline)
+        except (ValueError, OSError) as error:
+            raise ConfigError(f"Expected {where} to be a controller: {error}") from error
 
 
 def kept_plan(folder: Path) -> TrainingPlan:
@@ -292,6 +307,13 @@ class _Watch(BaseCallback):
         self._next_evaluation = 0
         self._baseline: float | None = None
         self.evaluations = read_evaluations(folder / EVALUATIONS_FILE)
+        known = self.evaluations[-1].worlds if self.evaluations else ()
+        self._baselines = {world.world: (world.baseline_policy, world.baseline) for world in known}
+        self._counted = {
+            config.name: config.performance
+            for sampler in (plan.sampler, *(stage.sampler for stage in plan.stages))
+            for config in (() if sampler is None else sampler.corners)
+        }
         self._spent_s = self.evaluations[-1].wall_time_s if self.evaluations else 0.0
 
     def _wall_time_s(self) -> float:
@@ -340,8 +362,11 @@ class _Watch(BaseCallback):
     def _on_step(self) -> bool:
         for info in self.locals["infos"]:
             if "run" in info:
-                counted = info["run"][self._plan.scenario.performance]
-                self.logger.record_mean("rollout/performance_per_1000_s", 1000.0 * counted / info["run"]["seconds"])
+                run = info["run"]
+                name = run["scenario"]
+                counted = run[self._counted.get(name, self._plan.scenario.performance)]
+                of_world = f"/{name}" if self._counted else ""
+                self.logger.record_mean(f"rollout/performance_per_1000_s{of_world}", 1000.0 * counted / run["seconds"])
         return True
 
     def _on_rollout_start(self) -> None:
@@ -366,23 +391,16 @@ class _Watch(BaseCallback):
         """Keep a checkpoint, run the policy, and note how it did."""
         self._next_evaluation = self.num_timesteps + self._plan.evaluation.every_steps
         self.keep(self.model)
-        if self._baseline is None:
-            self._baseline, _ = self._judged(lambda: load_policy(self._plan.evaluation.baseline))
-        performance, interference = self._judged(
-            lambda: LearnedPolicy(self._plan.interface, remember=deterministic_choice(self.model))
-        )
-        evaluation = Evaluation(
-            steps=self.num_timesteps,
-            wall_time_s=round(self._wall_time_s(), 1),
-            performance=performance,
-            baseline=self._baseline,
-            interference_fraction=interference,
-        )
+        evaluation = self._judged_in_worlds() if self._plan.evaluation.worlds else self._judged_in_scenario()
         for name in ("performance", "baseline", "interference_fraction"):
             self.logger.record(f"evaluation/{name}", getattr(evaluation, name))
+        for world in evaluation.worlds:
+            self.logger.record(f"evaluation/ratio/{world.world}", world.ratio)
         self.evaluations.append(evaluation)
         # The network before the table: a table must not boast of a network that is not there.
-        if self._plan.algorithm in EXPORTABLE and performance >= max(past.performance for past in self.evaluations):
+        if self._plan.algorithm in EXPORTABLE and evaluation.performance >= max(
+            past.performance for past in self.evaluations
+        ):
             self._export(evaluation)
         write_evaluations(self._folder / EVALUATIONS_FILE, self.evaluations)
         self._report(evaluation)
@@ -391,23 +409,60 @@ class _Watch(BaseCallback):
         plan = self._plan
         card = {
             "plan": plan.to_mapping(),
-            "evaluation": asdict(evaluation),
+            "evaluation": evaluation.to_mapping(),
             "versions": {
                 **software_versions(),
                 "stable-baselines3": stable_baselines3.__version__,
                 "torch": str(torch.__version__),
             },
         }
-        network = export_network(self.model, plan.interface, caches=plan.scenario.caches, card=card)
+        network = self._network(card)
         network.save(self._folder / POLICY_FILE)
+
+    def _network(self, card: dict[str, Any] | None = None) -> Network:
+        plan = self._plan
+        return export_network(self.model, plan.interface, samples=plan.samples, caches=plan.scenario.caches, card=card)
+
+    def _judged_in_scenario(self) -> Evaluation:
+        """Run the policy in the plan's scenario, beside the baseline."""
+        if self._baseline is None:
+            self._baseline, _ = self._judged(lambda: load_policy(self._plan.evaluation.baseline))
+        performance, interference = self._judged(self._policy)
+        return Evaluation(
+            steps=self.num_timesteps,
+            wall_time_s=round(self._wall_time_s(), 1),
+            performance=performance,
+            baseline=self._baseline,
+            interference_fraction=interference,
+        )
 
     def _judged(self, make_policy: Callable[[], Policy]) -> tuple[float, float]:
         """Return performance per 1,000 s and interference, means over the runs of the evaluation."""
-        plan = self._plan
-        specs = plan.evaluation.specs(plan.scenario, plan.wrappers, "policy")
-        records = [run_policy(make_policy(), spec) for spec in specs]
-        performance = np.mean([record.rate_per_1000_s("performance") for record in records])
-        return float(performance), float(np.mean([record.interference_fraction.mean() for record in records]))
+        return judged(make_policy, self._plan.judging_runs("policy"))
+
+    def _policy(self) -> Policy:
+        """The policy as it is now; one that draws its actions does so by the chance of its run, not of the training."""
+        if self._plan.samples:
+            return NetworkPolicy(self._network())
+        return LearnedPolicy(self._plan.interface, remember=deterministic_choice(self.model))
+
+    def _judged_in_worlds(self) -> Evaluation:
+        """Run the policy in each of the worlds of the evaluation."""
+        plan = self._plan.evaluation
+        found: list[WorldEvaluation] = []
+        for world in plan.worlds:
+            specs = plan.specs(world.scenario, world.wrappers, "policy")
+            if world.name not in self._baselines:  # the runs of a baseline are made once, by a resumed training, too
+                self._baselines[world.name] = judged_baseline(world, specs)
+            found.append(judged_in_world(world, self._policy, specs, self._baselines[world.name]))
+        return Evaluation(
+            steps=self.num_timesteps,
+            wall_time_s=round(self._wall_time_s(), 1),
+            performance=float(CHOSEN_BY[plan.chosen_by]([world.ratio for world in found])),
+            baseline=1.0,
+            interference_fraction=float(np.mean([world.interference_fraction for world in found])),
+            worlds=tuple(found),
+        )
 
 
 class _Together(CallbackList):

@@ -1,0 +1,174 @@
+"""Training in drawn worlds: rows to spare teach nobody, and policies are judged world by world."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-baselines3 and torch")
+
+from stable_baselines3 import DQN, PPO
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.network import Network
+from swarm_forage_env.scenarios.presets import warehouse_small
+from swarm_forage_env.training import evaluation_worlds
+from swarm_forage_env.training.evaluation_worlds import EvaluationWorld, judged_baseline, ratio_to
+from swarm_forage_env.training.evaluations import read_evaluations
+from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.recipe import recipe
+from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
+from swarm_forage_env.training.sb3.training import train
+from swarm_forage_env.training.status import Evaluation
+from tests.support.sampled import TWO_WORLDS, sampler
+
+WORLDS = sampler()
+NUMBERED = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
+QUICK = {"n_robots": 2, "n_objects": 20, "horizon_s": 200.0, "physics": "compiled"}
+JUDGED = (
+    EvaluationWorld(scenario=warehouse_small(**QUICK), baseline="random"),
+    EvaluationWorld(scenario=warehouse_small(**QUICK), name="other", baseline="crw"),
+)
+
+
+def tiny_plan(**changes) -> TrainingPlan:
+    """Two rollouts in drawn worlds."""
+    plan = TrainingPlan(
+        scenario=WORLDS.largest,
+        sampler=WORLDS,
+        interface=NUMBERED,
+        n_arenas=2,
+        hidden=(8,),
+        options={"n_steps": 8, "batch_size": 48},
+        stages=(Stage(steps=192),),
+        evaluation=EvaluationPlan(every_steps=1000, worlds=JUDGED),
+    )
+    return dataclasses.replace(plan, **changes)
+
+
+def test_rollouts_hold_nothing_of_rows_to_spare():
+    """Runs of 40 decisions, so that the sizes of the swarms change within the rollout."""
+    env = SwarmVecEnv(sampler=WORLDS, n_arenas=2, interface=NUMBERED, max_cycles=200)
+    model = PPO(
+        "MlpPolicy",
+        env,
+        n_steps=60,
+        batch_size=360,
+        n_epochs=1,
+        policy_kwargs={"net_arch": [4]},
+        rollout_buffer_class=ActiveRolloutBuffer,
+        rollout_buffer_kwargs=env.rollout_buffer_kwargs,
+        seed=0,
+        device="cpu",
+    )
+    _, callback = model._setup_learn(720)
+    model.collect_rollouts(env, callback, model.rollout_buffer, 60)
+    buffer = model.rollout_buffer
+    present = buffer.observations.any(axis=2)
+    assert len({tuple(row) for row in present}) > 1
+    assert 0 < present.sum() < present.size
+    assert not buffer.rewards[~present].any()
+    n_taught = sum(len(batch.observations) for batch in buffer.get(360))
+    assert n_taught == present.sum()
+    # One episode for each robot of the runs that ended; none for rows to spare.
+    assert len(model.ep_info_buffer) == present[:40].any(axis=0).sum()
+
+
+def test_a_replay_memory_never_samples_rows_to_spare():
+    env = SwarmVecEnv(sampler=WORLDS, n_arenas=2, interface=NUMBERED)
+    model = DQN(
+        "MlpPolicy", env, replay_buffer_class=PresentReplayBuffer, buffer_size=480, learning_starts=10_000, seed=0
+    )
+    model.learn(120)
+    buffer = model.replay_buffer
+    stored = buffer.observations[: buffer.size()]
+    assert not stored.any(axis=2).all()
+    samples = buffer.sample(500)
+    assert samples.observations.any(dim=1).all()
+
+
+def test_a_plan_with_a_sampler_is_carried_out_and_tells_world_by_world(tmp_path):
+    narrow = {"preset": "warehouse_small", "n_robots": 3, "n_objects": 10, "horizon_s": 200.0, "physics": "compiled"}
+    first = type(WORLDS).from_mapping({"worlds": [{"scenario": narrow}]})  # other rows than in the next stage
+    plan = tiny_plan(stages=(Stage(steps=48, sampler=first), Stage(steps=192)))
+    result = train(plan, tmp_path)
+    assert result.model.num_timesteps == 240
+    assert [evaluation.steps for evaluation in result.evaluations] == [48, 240]
+    last = result.evaluations[-1]
+    assert [world.world for world in last.worlds] == ["warehouse_small_2", "other"]
+    assert [world.baseline_policy for world in last.worlds] == ["random", "crw"]
+    assert last.performance == np.mean([world.ratio for world in last.worlds])
+    assert read_evaluations(tmp_path / "evaluations.csv") == list(result.evaluations)
+    assert read_plan(tmp_path / "plan.json") == plan
+    card = Network.load(tmp_path / "policy.npz").about.card
+    assert card["plan"]["sampler"] == json.loads(json.dumps(WORLDS.to_mapping()))
+    assert len(card["evaluation"]["worlds"]) == 2
+    assert train(plan, tmp_path, resume=True).steps == 0
+
+
+def test_plans_without_worlds_write_what_they_always_wrote():
+    plan = dataclasses.replace(
+        tiny_plan(), sampler=None, scenario=warehouse_small(**QUICK), evaluation=EvaluationPlan(every_steps=5)
+    )
+    mapping = plan.to_mapping()
+    assert "sampler" not in mapping
+    assert list(mapping["evaluation"]) == ["every_steps", "horizon_s", "n_runs", "first_seed", "baseline"]
+    assert list(mapping["stages"][0]) == ["steps", "scenario", "options"]
+    plain = Evaluation(steps=1, wall_time_s=1.0, performance=1.0, baseline=1.0, interference_fraction=0.0)
+    assert list(plain.to_mapping()) == ["steps", "wall_time_s", "performance", "baseline", "interference_fraction"]
+
+
+def test_a_baseline_that_finds_nothing_counts_as_one_object():
+    specs = EvaluationPlan(n_runs=2).specs(warehouse_small(**QUICK), (), "policy")
+    assert ratio_to(0.0, 5.0, specs) == pytest.approx(5.0 / (1000.0 / 400.0))
+    assert ratio_to(10.0, 5.0, specs) == 0.5
+
+
+def test_the_best_of_the_scripted_controllers_runs_with_its_own_caches(monkeypatch):
+    reached = {"none": 3.0, "static": 9.0, "dynamic": 5.0}
+    monkeypatch.setattr(
+        evaluation_worlds, "judged", lambda make_policy, specs: (reached[specs[0].scenario.caches], 0.0)
+    )
+    world = EvaluationWorld(scenario=warehouse_small(**QUICK))
+    assert judged_baseline(world, EvaluationPlan().specs(world.scenario, (), "policy")) == ("stochm", 9.0)
+
+
+def test_the_recipe_judges_in_the_largest_world_of_each_name():
+    plan = recipe(sampler=WORLDS)
+    assert [world.name for world in plan.evaluation.worlds] == ["warehouse_small_6", "search_and_rescue_4"]
+    assert plan.stages == (Stage(steps=plan.total_steps),)
+    with pytest.raises(ConfigError, match="either a sampler or n_robots"):
+        recipe(sampler=WORLDS, n_robots=3)
+
+
+@pytest.mark.parametrize(
+    ("mapping", "reason"),
+    [
+        ({"sampler": TWO_WORLDS}, r"evaluation\.worlds beside a sampler"),
+        ({"sampler": TWO_WORLDS, "scenario": {"preset": "warehouse_small"}}, "either sampler or scenario"),
+        (
+            {"sampler": TWO_WORLDS, "evaluation": {"worlds": [{"scenario": {"preset": "warehouse_small"}}] * 2}},
+            "different names",
+        ),
+        ({"sampler": TWO_WORLDS, "evaluation": {"worlds": {}}}, r"\[\[evaluation\.worlds\]\]"),
+        (
+            {
+                "sampler": TWO_WORLDS,
+                "evaluation": {"worlds": [{"scenario": {"preset": "warehouse_small"}, "name": "all"}]},
+            },
+            "means all of them",
+        ),
+        ({"scenario": {"preset": "warehouse_small"}, "evaluation": {"chosen_by": "best"}}, "mean, worst"),
+    ],
+)
+def test_plans_that_are_refused(mapping, reason):
+    with pytest.raises(ConfigError, match=reason):
+        TrainingPlan.from_mapping(mapping)
+
+
+def test_stages_share_the_caches_of_the_policy():
+    cached = type(WORLDS).from_mapping({"worlds": [{"scenario": {"preset": "warehouse_small", "caches": "static"}}]})
+    with pytest.raises(ConfigError, match="same caches"):
+        tiny_plan(stages=(Stage(steps=5, sampler=cached),))

@@ -1,0 +1,137 @@
+"""Worlds drawn from a distribution: what a sampler says, what it refuses, and what is drawn."""
+
+import json
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.own import register_sensor
+from swarm_forage_env.scenarios.draws import Drawn
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
+from tests.support.sampled import TWO_WORLDS, sampler
+
+
+def drawn(worlds: ScenarioSampler, n_seeds: int = 200):
+    return [worlds.world_of(seed) for seed in range(n_seeds)]
+
+
+def test_a_seed_gives_the_same_world_and_others_give_others():
+    again = ScenarioSampler.from_mapping(TWO_WORLDS)
+    assert [again.world_of(seed) for seed in range(20)] == drawn(sampler(), 20)
+    assert len({config.robots.n_robots for config, _ in drawn(sampler(), 20)}) > 2
+
+
+def test_worlds_come_as_often_as_their_weights_say_and_wrappers_as_their_probability():
+    found = drawn(sampler())
+    names = Counter(config.name for config, _ in found)
+    assert names["search_and_rescue"] / len(found) == pytest.approx(0.25, abs=0.1)
+    with_noise = sum("sensor_noise" in [wrapper.name for wrapper in wrappers] for _, wrappers in found)
+    assert with_noise / len(found) == pytest.approx(0.5, abs=0.12)
+
+
+def test_values_lie_within_their_ranges_and_are_whole_where_the_field_is():
+    for config, wrappers in drawn(sampler()):
+        assert isinstance(config.robots.n_robots, int)
+        assert 2 <= config.robots.n_robots <= 6
+        assert config.reward.delivery == (0.0 if config.name == "search_and_rescue" else 1.0)
+        for wrapper in wrappers:
+            if wrapper.name == "throttle":
+                assert 0.1 <= wrapper.waveform.amplitude <= 0.4
+                assert wrapper.waveform.offset == wrapper.waveform.amplitude
+
+
+def test_a_density_chooses_the_arena_of_each_swarm():
+    config = {"preset": "warehouse_small", "n_robots": {"log_uniform": [8, 64]}, "density": {"uniform": [0.02, 0.1]}}
+    worlds = ScenarioSampler(worlds=(SampledWorld(scenario=config),))
+    for made, _ in drawn(worlds, 30):
+        assert 0.015 < made.robots.n_robots / (made.arena.width_m * made.arena.height_m) <= 0.1
+    assert worlds.n_robots == worlds.largest.robots.n_robots == 64
+    assert worlds.n_objects == max(made.objects.n_objects for made in worlds.corners)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "grain", "at_zero", "at_half", "at_one"),
+    [
+        ("uniform", (2, 4), None, 2.0, 3.0, 4.0),
+        ("uniform", (2, 4), 1, 2, 3, 4),
+        ("uniform", (1.0, 2.0), 0.2, 1.0, 1.6, 2.0),
+        ("log_uniform", (1, 100), None, 1.0, 10.0, 100.0),
+        ("log_uniform", (1, 99), 1, 1, 10, 99),
+        ("choice", ("a", "b", "c"), None, "a", "b", "c"),
+    ],
+)
+def test_shares_of_the_draws_by_hand(kind, values, grain, at_zero, at_half, at_one):
+    drawn_value = Drawn(kind, values)
+    assert (
+        [drawn_value.at(share, grain) for share in (0.0, 0.5, 1.0)] == pytest.approx([at_zero, at_half, at_one])
+        if (kind != "choice")
+        else [drawn_value.at(share, grain) for share in (0.0, 0.5, 1.0)] == [at_zero, at_half, at_one]
+    )
+
+
+def test_log_uniform_whole_numbers_are_as_frequent_as_their_ranges_are_wide():
+    shares = np.random.default_rng(0).random(20_000)
+    counts = Counter(Drawn("log_uniform", (1, 3)).at(share, 1) for share in shares)
+    for number in (1, 2, 3):
+        expected = np.log((number + 1) / number) / np.log(4)
+        assert counts[number] / len(shares) == pytest.approx(expected, abs=0.015)
+
+
+def test_a_sampler_is_read_back_from_json():
+    worlds = sampler()
+    assert ScenarioSampler.from_mapping(json.loads(json.dumps(worlds.to_mapping()))) == worlds
+    whole = ScenarioSampler(worlds=(SampledWorld(scenario=scenario("warehouse_small", n_robots=3)),))
+    assert ScenarioSampler.from_mapping(json.loads(json.dumps(whole.to_mapping()))) == whole
+    assert whole.world_of(0) == (scenario("warehouse_small", n_robots=3), ())
+
+
+def changed(**fields):
+    return {"worlds": [{"scenario": {"preset": "warehouse_small", "n_robots": 3, **fields}}]}
+
+
+@pytest.mark.parametrize(
+    ("mapping", "reason"),
+    [
+        ({}, "list of tables"),
+        ({"worlds": []}, "one or more SampledWorld"),
+        ({"worlds": [{}]}, "Missing key 'scenario'"),
+        ({"worlds": [{"scenario": "warehouse_smal"}]}, "Did you mean 'warehouse_small'"),
+        ({"worlds": [{"scenario": "warehouse_small", "weight": 0}]}, "weight"),
+        ({"world": []}, "'sampler.world'"),
+        (changed(n_robot=3), "'n_robot'"),
+        (changed(n_objects={"unifrom": [1, 2]}), "'n_objects.unifrom'"),
+        (changed(n_objects={"uniform": [2]}), r"Cannot draw n_objects: Expected uniform to be \[low, high\]"),
+        (changed(n_objects={"uniform": [3, 2]}), "high end"),
+        (changed(n_objects={"log_uniform": [0, 2]}), "low end"),
+        (changed(n_objects={"uniform": [1.5, 3]}), "multiples of 1"),
+        (changed(n_objects={"choice": []}), "one or more"),
+        (changed(n_objects={"same_as": "n_caches"}), "n_caches"),
+        (changed(n_objects={"uniform": [10, 100_000]}), "World 1 .* cannot be with n_objects = 100000"),
+        (changed(width_m={"uniform": [4.0, 16.0]}), "width_m = 4.0"),
+        (changed(n_objects={"choice": list(range(1, 2000))}), "at most 1,024 combinations"),
+        ({**changed(), "wrappers": {"trottle": {}}}, "throttle"),
+        ({**changed(), "wrappers": {"sensor_noise": {"sigma": 0.1, "probability": 2}}}, "probability"),
+        ({**changed(), "wrappers": {"sensor_noise": {"sigma": {"uniform": [-0.1, 0.1]}}}}, "sigma = -0.1"),
+        ({**changed(), "wrappers": {"population": {"initial_robots": {"uniform": [1, 4]}}}}, "initial_robots = 4"),
+    ],
+)
+def test_what_is_refused(mapping, reason):
+    with pytest.raises(ConfigError, match=reason):
+        ScenarioSampler.from_mapping(mapping)
+
+
+def test_worlds_with_other_columns_are_refused():
+    register_sensor("of_sampled_worlds", lambda world: np.zeros(len(world.swarm.active)), meaning="nothing")
+    sensing = {"preset": "warehouse_small", "own_sensors": ("of_sampled_worlds",)}
+    with pytest.raises(ConfigError, match="same columns"):
+        ScenarioSampler(worlds=(SampledWorld(scenario="warehouse_small"), SampledWorld(scenario=sensing)))
+
+
+def test_what_only_a_draw_finds_impossible_says_what_was_drawn():
+    between = {"preset": "search_and_rescue", "n_robots": 4, "side_m": {"uniform": [16.0, 32.0]}}
+    worlds = ScenarioSampler(worlds=(SampledWorld(scenario=between),))
+    with pytest.raises(ConfigError, match=r"as it was drawn with side_m = .*one of 16, 32"):
+        drawn(worlds, 5)
