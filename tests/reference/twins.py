@@ -159,6 +159,8 @@ WITHOUT = {
     "swarm_forage_env.world.kernels.many.whole_each": "`tick.whole` for each world; compared with arenas that are "
     "stepped alone in tests/world/test_rack.py",
     "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",
+    "swarm_forage_env.wrappers.kernels.gaussian.to_normal": "held against the distribution function in "
+    "tests/wrappers/test_noise.py",
     "swarm_forage_env.world.kernels.tick.close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.meet_and_close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.observe": IN_ORDER,
