@@ -8,6 +8,7 @@ Robots have trails of 40 s. The window needs no display. Needs the render extra.
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -27,7 +28,7 @@ PICTURES = {
     "warehouse_small_light.png": ("warehouse_small", "stochm", 300.0, 900, "light"),
 }
 """File -> scenario, policy, the time in s at which the picture is taken, its width in pixels, and its theme."""
-FIELDS = {
+FIELDS: dict[str, dict[str, Any]] = {
     "obstacles_crw.png": {"obstacles": ((14.0, 0.2, 14.4, 6.0), (14.0, 10.0, 14.4, 15.8), (20.0, 7.0, 21.0, 9.0))}
 }
 """File -> scenario fields that are not those of the preset."""
@@ -40,9 +41,8 @@ SAMPLE_S = 1.0
 
 def draw(file: str, scenario_name: str, policy_name: str, time_s: float, size_px: int, theme: str) -> None:
     """Run a policy with seed 0 and draw the arena as it is at `time_s`."""
-    world = plan_run(
-        scenario(scenario_name, **FIELDS.get(file, {})), policy_name
-    ).scenario  # with the caches that the policy is made for
+    world = scenario(scenario_name, **FIELDS.get(file, {}))
+    world = plan_run(world, policy_name).scenario  # with the caches that the policy is made for
     policy = load_policy(policy_name)
     run = LiveRun(build_env(world), policy, 0)
     env = run.forage_env

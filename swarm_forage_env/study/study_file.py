@@ -176,7 +176,9 @@ def _study(
     interval_s = allowed.get("interval_s", of_paper.interval_s)
     settings = plain_settings(table("set", content.get("set", {})))
     axes, reference = _axes(content, settings, allowed)
-    told = {} if readings is None and "readings" not in content else {"readings": readings or content["readings"]}
+    told: dict[str, Any] = {}
+    if readings is not None or "readings" in content:
+        told["readings"] = tuple(_listed("readings", readings or content["readings"]))
     return StudySpec(
         name=content["name"],
         title=content.get("title", ""),
@@ -190,7 +192,7 @@ def _study(
         seeds=_seeds(allowed.get("seeds", of_paper.n_seeds) if n_seeds is None else n_seeds),
         horizon_s=horizon_s,
         interval_s=interval_s,
-        **{name: tuple(_listed(name, words)) for name, words in told.items()},
+        **told,
     )
 
 
