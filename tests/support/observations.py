@@ -43,6 +43,7 @@ def make_spec(n_robots: int = 1, **changes: Any) -> SwarmSpec:
         cache_side_nominal_m=6.4,
         min_dist_m=3.2,
         cache_proximity_m=12.8,
+        message_size=0,
         quirks=Quirks(),
     )
     return dataclasses.replace(task, **changes)
