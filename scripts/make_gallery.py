@@ -43,10 +43,11 @@ class Exhibit:
     wrapper: str = ""
     """Disturbance of the last run; the others have none."""
     frame_s: float = FRAME_S
+    horizon_s: float = HORIZON_S
 
     def specs(self) -> list[RunSpec]:
         """The runs, with the same seed."""
-        world = scenario(self.scenario, horizon_s=HORIZON_S, physics="compiled")
+        world = scenario(self.scenario, horizon_s=self.horizon_s, physics="compiled")
         last = len(self.policies) - 1
         return [
             plan_run(
@@ -72,6 +73,32 @@ EXHIBITS = (
         "warehouse_small",
         ("crw", "ppo_warehouse_small"),
         "The trained policy beside CRW: straight to the source and straight home.",
+    ),
+    Exhibit(
+        "generalist",
+        "warehouse_small",
+        ("dpo", "generalist"),
+        "One network for all scenarios, beside the scripted controller that delivers most: a whole run in the small "
+        "warehouse.",
+        frame_s=10.0,
+        horizon_s=10_000.0,
+    ),
+    Exhibit(
+        "generalist_medium",
+        "warehouse_medium",
+        ("dpo", "generalist"),
+        "The same network in the medium warehouse, a whole run: nothing jams.",
+        frame_s=10.0,
+        horizon_s=10_000.0,
+    ),
+    Exhibit(
+        "generalist_rescue",
+        "search_and_rescue",
+        ("dpo", "generalist"),
+        "The same network in search and rescue, a whole run. Each robot remembers where it picked up last and what it "
+        "saw on its way home, and comes back.",
+        frame_s=10.0,
+        horizon_s=10_000.0,
     ),
     Exhibit(
         "warehouse_dual",
@@ -140,6 +167,7 @@ FILMS = (
     Film("film_stochm", "STOCHM: static caches", "warehouse_small", 2),
     Film("film_stochx", "STOCHX: dynamic caches", "warehouse_small", 3),
     Film("film_trained", "a trained policy", "trained_policy"),
+    Film("film_generalist", "one network for all scenarios", "generalist_rescue"),
     Film("film_throttle", "throttled robots", "throttle"),
     Film("film_handling_cost", "long pick-ups and drops", "handling_cost"),
     Film("film_sensor_noise", "sensor noise", "sensor_noise"),
@@ -167,7 +195,7 @@ def draw(exhibit: Exhibit) -> None:
     run = LiveRun(build_env(spec.scenario, spec.wrappers), policy, spec.seed)
     env, trails = run.forage_env, Trails(spec.scenario.robots.n_robots, TRAIL_S + 1)
     for second in range(TRAIL_S + 1):
-        run.advance(to_tick=round((HORIZON_S - TRAIL_S + second) / spec.scenario.dt_s))
+        run.advance(to_tick=round((exhibit.horizon_s - TRAIL_S + second) / spec.scenario.dt_s))
         trails.add(env.swarm)
     state = (env.swarm, env.objects, env.caches, env.events)
     title = f"{spec.scenario.name}, {spec.policy}".replace("_", " ")
@@ -194,7 +222,7 @@ def page() -> str:
     lines = [
         "# Gallery",
         "",
-        "Every scenario, every controller and every kind of adversity, a thousand seconds each, as",
+        "Every scenario, every controller and every kind of adversity, most for a thousand seconds, as",
         "[replays](replay.md): download a file and open it in a browser. Runs side by side have the same seed.",
         "`scripts/make_gallery.py` makes them.",
     ]
