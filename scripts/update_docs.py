@@ -35,6 +35,7 @@ BLOCK = re.compile(
 )
 PACKAGES = ("numpy", "scipy", "numba", "pymunk")
 FIVE = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
+WITH_ALL = ("crw", "dpo", "stochm", "stochx", "generalist")
 SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": ((f"swarm-forage run --scenario warehouse_small --policy {','.join(FIVE)} --robots 50 --seeds 4",), FIVE),
     "medium": (
@@ -55,6 +56,17 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ),
         ("crw", "policy"),
     ),
+    **{
+        f"generalist_{short}": (
+            (f"swarm-forage run --scenario {name} --policy {','.join(WITH_ALL)} --seeds 4 --set physics=compiled",),
+            WITH_ALL,
+        )
+        for short, name in (
+            ("small", "warehouse_small"),
+            ("medium", "warehouse_medium"),
+            ("rescue", "search_and_rescue"),
+        )
+    },
     "sets": (("swarm-forage study list",), ()),
     "smoke": (("swarm-forage study list --budget smoke",), ()),
     "reduced": (("swarm-forage study list --budget reduced",), ()),
