@@ -114,12 +114,31 @@ def covered_area_m2(area: Rectangle, obstacles: Iterable[Rectangle], radius_m: f
     return float((is_covered * np.diff(y)[:, None] * np.diff(x)).sum())
 
 
-def stretched(obstacles: Iterable[Rectangle], x_factor: float, y_factor: float) -> tuple[Rectangle, ...]:
-    """Return obstacles that keep their places and shares in an arena so much wider and higher."""
-    return tuple(
-        (x_low * x_factor, y_low * y_factor, x_high * x_factor, y_high * y_factor)
-        for x_low, y_low, x_high, y_high in obstacles
-    )
+def stretched(
+    obstacles: Iterable[Rectangle], factors: tuple[float, float], extents_m: tuple[float, float]
+) -> tuple[Rectangle, ...]:
+    """Return obstacles that keep their places and shares in an arena so much wider and higher.
+
+    A side that shrinks below `MIN_SIDE_M` is widened to it about its middle, and stays inside the arena.
+
+    Args:
+        obstacles: Boxes, m.
+        factors: How much wider along x and along y.
+        extents_m: Of the new arena along x and along y, m.
+    """
+    found: list[Rectangle] = []
+    for x_low, y_low, x_high, y_high in obstacles:
+        x = _widened(x_low * factors[0], x_high * factors[0], extents_m[0])
+        y = _widened(y_low * factors[1], y_high * factors[1], extents_m[1])
+        found.append((x[0], y[0], x[1], y[1]))
+    return tuple(found)
+
+
+def _widened(low: float, high: float, extent_m: float) -> tuple[float, float]:
+    if high - low >= MIN_SIDE_M - 1e-9:
+        return low, high
+    start = min(max(0.0, (low + high - MIN_SIDE_M) / 2), extent_m - MIN_SIDE_M)
+    return start, start + MIN_SIDE_M
 
 
 def distances_m(obstacles: Iterable[Rectangle], position: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -182,9 +182,9 @@ def at_density(
     side_m = side_for(n_robots, checked_density(density))
     of_side = search_and_rescue(side_m=side_m).arena
     arena = {name: getattr(of_side, name) for name in ARENA_FIELDS}
-    arena["obstacles"] = stretched(
-        config.arena.obstacles, of_side.width_m / config.arena.width_m, of_side.height_m / config.arena.height_m
-    )
+    extents_m = of_side.width_m, of_side.height_m
+    factors = of_side.width_m / config.arena.width_m, of_side.height_m / config.arena.height_m
+    arena["obstacles"] = stretched(config.arena.obstacles, factors, extents_m)
     objects = SEARCH_AND_RESCUE_OBJECTS[int(side_m)] if n_objects is None else n_objects
     return in_arena(config, arena, n_robots=n_robots, n_objects=objects)
 

@@ -51,12 +51,13 @@ def arena_at_density(config: ScenarioConfig, density: float, n_robots: int) -> d
     factor = max(1, math.ceil(math.sqrt(n_robots / (density * unit_m2)) - 1e-9))
     x_low, y_low, x_high, y_high = (round(edge * factor / common) for edge in config.arena.nest_cells)
     x_high, y_high = max(x_low + 1, x_high), max(y_low + 1, y_high)
+    width_m, height_m = unit_x * factor / CELLS_PER_M, unit_y * factor / CELLS_PER_M
     return {
-        "width_m": unit_x * factor / CELLS_PER_M,
-        "height_m": unit_y * factor / CELLS_PER_M,
+        "width_m": width_m,
+        "height_m": height_m,
         "nest_centre_m": ((x_low + x_high) / 2 / CELLS_PER_M, (y_low + y_high) / 2 / CELLS_PER_M),
         "nest_size_m": ((x_high - x_low) / CELLS_PER_M, (y_high - y_low) / CELLS_PER_M),
-        "obstacles": stretched(config.arena.obstacles, factor / common, factor / common),
+        "obstacles": stretched(config.arena.obstacles, (factor / common,) * 2, (width_m, height_m)),
     }
 
 

@@ -228,6 +228,11 @@ def _stages(
 ) -> tuple[Stage, ...]:
     if not small_start:
         return (Stage(steps=steps, scenario=episodes),)
+    if scenario.objects.object_positions_m:
+        raise ConfigError(
+            "Expected no object_positions_m where a training begins in a smaller arena (small_start), which may not "
+            "hold these places; train in the whole arena from the beginning: small_start=False (--no-small-start)."
+        )
     small = small_arena(scenario)
     try:
         with_overrides(scenario, **small)
@@ -260,5 +265,5 @@ def small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
         "height_m": height_m,
         "nest_centre_m": (centre_x * shares[0], centre_y * shares[1]),
         "nest_size_m": (size_x * shares[0], size_y * shares[1]),
-        **({"obstacles": stretched(arena.obstacles, *shares)} if arena.obstacles else {}),
+        **({"obstacles": stretched(arena.obstacles, shares, (width_m, height_m))} if arena.obstacles else {}),
     }

@@ -179,3 +179,18 @@ def test_a_small_start_that_cannot_hold_the_objects_is_refused():
     with pytest.raises(ConfigError, match=r"objects for placement .* small_start=False"):
         recipe("warehouse_small", n_objects=800, small_start=True)
     assert len(recipe("warehouse_small", n_objects=800, small_start=False).stages) == 1
+
+
+def test_a_small_start_keeps_thin_walls_as_thick_as_walls_must_be():
+    walls = ((14.0, 4.0, 14.4, 12.0), (31.6, 4.0, 32.0, 12.0))  # 0.16 m after shrinking; the second at the border
+    plan = recipe("warehouse_small", obstacles=walls)
+    small = with_overrides(plan.scenario, **plan.stages[0].scenario).arena.obstacles
+    assert small[0] == pytest.approx((5.58, 4.0, 5.78, 12.0))
+    assert small[1] == pytest.approx((12.6, 4.0, 12.8, 12.0))
+
+
+def test_a_small_start_refuses_places_of_objects_that_it_may_not_hold():
+    places = {"placement": "positions", "object_positions_m": ((8.0, 4.0), (8.0, 12.0)), "n_objects": 2}
+    with pytest.raises(ConfigError, match=r"object_positions_m .*--no-small-start"):
+        recipe("warehouse_small", **places)
+    assert len(recipe("warehouse_small", small_start=False, **places).stages) == 1
