@@ -57,7 +57,7 @@ def arena_at_density(config: ScenarioConfig, density: float, n_robots: int) -> d
         "height_m": height_m,
         "nest_centre_m": ((x_low + x_high) / 2 / CELLS_PER_M, (y_low + y_high) / 2 / CELLS_PER_M),
         "nest_size_m": ((x_high - x_low) / CELLS_PER_M, (y_high - y_low) / CELLS_PER_M),
-        "obstacles": stretched(config.arena.obstacles, (factor / common,) * 2, (width_m, height_m)),
+        "obstacles": stretched(config.arena.obstacles, (factor / common, factor / common), (width_m, height_m)),
     }
 
 
