@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.contract.policy import Memories, RememberedPlaces, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 
@@ -28,9 +28,12 @@ class LearnedPolicy:
         reads: Observation slices that are used, None = all.
         caches: Kind of caches that the controller was trained with; missing if that is unknown.
         interface: The interface for the swarm; set by `reset`.
+        remembered_places, describe_memories: See `Policy`; missing without site memory.
     """
 
     interface: LearnerInterface
+    remembered_places: Callable[[int], RememberedPlaces]
+    describe_memories: Callable[[], Memories]
 
     def __init__(
         self,
@@ -61,12 +64,15 @@ class LearnedPolicy:
         if caches is not None:
             self.caches = caches
         self._config = interface
+        if interface.site_memory:
+            self.remembered_places, self.describe_memories = self._sites_of, self._all_sites
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run."""
         self._rng = rng
         self.interface = LearnerInterface(self._config, spec)
         self._view = np.empty((spec.n_robots, self.interface.layout.size), np.float32)
+        self._middle_m = np.array(spec.arena_size_m) / 2.0
         self._ticks_left = 0
         self._memory: Any = None
 
@@ -84,6 +90,19 @@ class LearnedPolicy:
             self._ticks_left = self._config.decision_ticks
         self._ticks_left -= 1
         return self.interface.carry_out(self._checked, obs)
+
+    def _sites_of(self, row: int) -> RememberedPlaces:
+        """Return the sites of one robot, where it expects objects."""
+        told = self._all_sites()
+        return RememberedPlaces(told.place_m[told.robot == row], np.zeros((0, 2)))
+
+    def _all_sites(self) -> Memories:
+        sites = self.interface.memory()
+        assert sites is not None, "only policies with site memory are asked"
+        robot, site = np.nonzero(sites.is_known)
+        return Memories(
+            robot.astype(np.int32), sites.place[robot, site] + self._middle_m, np.zeros(len(robot), np.bool_)
+        )
 
 
 def _forgetful(choose: Choose, rows: ObsArray, memory: Any, rng: np.random.Generator) -> tuple[np.ndarray, Any]:

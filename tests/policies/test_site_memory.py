@@ -1,5 +1,7 @@
 """Site memory of learners: against a slow twin along runs, and its rules by hand."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -132,3 +134,28 @@ def test_a_policy_sees_in_a_run_what_it_saw_in_training():
     )
     np.testing.assert_array_equal(looked_at, trained_on)
     assert np.array(trained_on)[..., arena.interface.layout["pickup_site"]].any()
+
+
+def still(rows, _rng):
+    return np.zeros(len(rows), np.int64)
+
+
+def test_a_policy_with_site_memory_tells_its_places_from_the_corner_of_the_arena():
+    env = tidy_world(n_robots=2)
+    policy = LearnedPolicy(InterfaceConfig(**INTERFACE), still)
+    policy.reset(env.swarm_spec, np.random.default_rng(0))
+    put(env, 1, *PLACE)
+    load(env, 1, 0)
+    policy.act(env.arena.observe(), env.active)
+    for asked in (policy, pickle.loads(pickle.dumps(policy))):  # noqa: S301 - what was pickled here
+        np.testing.assert_allclose(asked.remembered_places(1).objects_m, [PLACE], atol=1e-4)
+        assert len(asked.remembered_places(0).objects_m) == 0
+        told = asked.describe_memories()
+        assert (told.robot.tolist(), told.is_cache.tolist()) == ([1], [False])
+        np.testing.assert_allclose(told.place_m, [PLACE], atol=1e-4)
+
+
+def test_a_policy_without_site_memory_tells_no_places():
+    policy = LearnedPolicy(InterfaceConfig(), still)
+    assert not hasattr(policy, "remembered_places")
+    assert not hasattr(policy, "describe_memories")

@@ -179,7 +179,7 @@ def places_at(replay: Replay, frame: int, robot: int) -> set[tuple[int, float, f
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("name", ["dpo", "stochm", "mixed:crw=2,dpo=rest"])
+@pytest.mark.parametrize("name", ["dpo", "stochm", "mixed:crw=2,dpo=rest", "generalist"])
 def test_places_are_those_that_robots_remember(name, tmp_path):
     spec = spec_of(name, ())
     kept, _ = record_replay(spec, frame_s=10.0)
@@ -191,8 +191,11 @@ def test_places_are_those_that_robots_remember(name, tmp_path):
         run.advance(to_tick=tick)
         for robot in range(spec.scenario.robots.n_robots):
             told = policy.remembered_places(robot)
-            expected = {(1, *place) for place in np.round(told.objects_m, 3).tolist()}
-            expected |= {(2, *place) for place in np.round(told.caches_m, 3).tolist()}
+            expected = {
+                (kind, *(round(kept.position_step_m * step, 3) for step in steps))
+                for kind, places_m in ((1, told.objects_m), (2, told.caches_m))
+                for steps in np.rint(places_m / kept.position_step_m).tolist()
+            }
             assert places_at(kept, frame, robot) == expected
             n_places += len(expected)
     assert n_places > 0
