@@ -4,7 +4,8 @@
     entry.performance("two sources, 8 robots")  # per 1,000 s, (policies, seeds)
 
 A file is taken only if it is whole: of this version of the protocol, every run of every world, and the digest that was
-written with it. So numbers that were altered by hand, or by a broken copy, are noticed.
+written with it. This finds mistakes, such as a broken copy or a slip of the hand. It does not find intent: who alters
+numbers can also write a new digest. To be sure of an entry, run its command again.
 """
 
 import json
@@ -57,9 +58,9 @@ class EntryPolicy:
     """One policy of an entry: one training seed of a learner."""
 
     name: str
-    """As it was named on the command line, a file without its folder."""
+    """For people, see `policies.registry.policy_label`: of a file without folder and ending."""
     digest: str = ""
-    """Hash of the content of its file; empty for a policy in Python."""
+    """Hash of the content of its file; of a mixed swarm those of all its files, joined by +. Empty without any file."""
     training_seed: int | None = None
 
 
@@ -100,8 +101,8 @@ class Entry:
     """World -> "performance" (per 1,000 s) and "interference" (share of robot time), (policies, seeds) each."""
     measures: tuple[EntryMeasure, ...] = ()
     training: Training = field(default_factory=Training)
-    core_hours: float = 0.0
-    """That the runs of the entry took."""
+    core_hours: float | None = 0.0
+    """That the runs of the entry took, as far as their records tell; None where none of them does."""
     versions: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def performance(self, world: str) -> FloatArray:
@@ -111,6 +112,11 @@ class Entry:
     def interference(self, world: str) -> FloatArray:
         """Return the share of robot time lost to interference, (policies, seeds)."""
         return np.asarray(self.runs[world]["interference"], dtype=np.float64)
+
+    @property
+    def digest(self) -> str:
+        """Hash of everything that the entry holds."""
+        return self.to_mapping()["digest"]
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the entry as plain values, its digest last."""
@@ -175,7 +181,7 @@ def read_entry(path: str | Path, protocol: Protocol) -> Entry:
     """Read an entry file.
 
     Raises:
-        BenchmarkError: the file cannot be read, holds no whole entry of `protocol`, or was altered.
+        BenchmarkError: the file cannot be read, holds no whole entry of `protocol`, or its digest does not fit.
     """
     from swarm_forage_env._internal.parsing import parse_json
 
@@ -192,7 +198,7 @@ def read_entry(path: str | Path, protocol: Protocol) -> Entry:
     except (TypeError, KeyError, ValueError) as error:
         raise BenchmarkError(f"Cannot use the entry {path}: {error}") from error
     entry.check(protocol, str(path))
-    if entry.to_mapping()["digest"] != content["digest"]:
+    if entry.digest != content["digest"]:
         raise BenchmarkError(
             f"Expected the numbers of {path} as swarm-forage benchmark wrote them, got others: the digest does not "
             "fit. Make the entry again."

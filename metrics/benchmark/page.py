@@ -133,7 +133,7 @@ def _origins(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str,
             " ".join(filter(None, (entry.training.library, _code(entry.training.command)))) or "-",
             "-" if entry.training.core_hours is None else number(entry.training.core_hours),
             _code(entry.command) or "-",
-            number(entry.core_hours),
+            "-" if entry.core_hours is None else number(entry.core_hours),
         )
         for entry in entries
     ]

@@ -1,5 +1,6 @@
 """From policies to an entry: the runs of the protocol, and the measures that they allow."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -70,6 +71,7 @@ def run_benchmark(
         ValueError: an unknown policy, or a file that cannot be opened.
         swarm_forage_env.study.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
     """
+    from swarm_forage_env.policies.registry import policy_label
     from swarm_forage_env.study.record import software_versions
     from swarm_forage_env.study.runner import run_all
     from swarm_forage_env.study.store import RunStore
@@ -101,7 +103,7 @@ def run_benchmark(
         command=command,
         policies=tuple(
             EntryPolicy(
-                name=Path(policy).name,
+                name=policy_label(policy),
                 digest=about["digest"],
                 training_seed=training_seeds[k] if training_seeds else about["seed"],
             )
@@ -110,7 +112,7 @@ def run_benchmark(
         runs=_runs(chosen, records),
         measures=_measures(chosen, [contestant.label for contestant in contestants], records),
         training=training or Training(),
-        core_hours=float(f"{sum(record.cpu_time_s for record in result.records) / 3600.0:.3g}"),
+        core_hours=_core_hours(result.records),
         versions={package: version for package, version in software_versions().items() if version},
     )
 
@@ -137,13 +139,23 @@ def _planned(contestant: Contestant, protocol: Protocol) -> "dict[tuple[str, int
     }
 
 
+def _core_hours(records: "Sequence[RunRecord]") -> float | None:
+    """What runs took, of those whose records tell it; three digits, as time is never the same twice."""
+    known = [record.cpu_time_s for record in records if math.isfinite(record.cpu_time_s)]
+    return float(f"{sum(known) / 3600.0:.3g}") if known else None
+
+
 def _told_by_file(policy: str) -> dict[str, Any]:
-    """What the file of a policy tells: the hash of its content, and the seed of its training."""
+    """What the files of a policy tell: the hashes of their contents, and the seed of its training."""
+    from swarm_forage_env.policies.mixture import is_mixture, mixture_parts
     from swarm_forage_env.policies.model_files import file_digest
     from swarm_forage_env.policies.network import Network
     from swarm_forage_env.policies.pretrained import network_file
     from swarm_forage_env.policies.registry import file_of, is_policy_file
 
+    if is_mixture(policy):
+        digests = [_told_by_file(part.policy)["digest"] for part in mixture_parts(policy)]
+        return {"digest": "+".join(filter(None, digests)), "seed": None}
     file = Path(file_of(policy)) if is_policy_file(policy) else network_file(policy)
     if file is None:
         return {"digest": "", "seed": None}

@@ -15,7 +15,7 @@ from metrics.benchmark.entry import Entry, Training, read_entry
 from metrics.benchmark.page import BOARD_HEADER, board_rows, page_block, sorted_standings, with_block
 from metrics.benchmark.protocol import BenchmarkError, Protocol, load_protocol, scenario_fields
 from metrics.benchmark.running import benchmark_specs, run_benchmark
-from metrics.benchmark.standing import Reference, Standing, reference_of, scripted_entries, standing_of
+from metrics.benchmark.standing import SCRIPTED, Reference, Standing, reference_of, scripted_entries, standing_of
 from metrics.scoring.texts import aligned, counted, plain
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
@@ -43,9 +43,14 @@ class Wanted:
 
     @property
     def command(self) -> str:
-        """What makes the same entry again; files without their folders, which are nobody's business."""
-        policies = [word for policy in self.policies for word in ("--policy", Path(policy).name)]
+        """What makes the same entry again, in the words that were given; files are found from the same folder."""
+        policies = [word for policy in self.policies for word in ("--policy", policy)]
         return shlex.join(["swarm-forage", "benchmark", *policies, "--name", self.name])
+
+    @property
+    def is_scripted(self) -> bool:
+        """Whether this makes the entry of a scripted controller again, which comes with the package."""
+        return self.name in SCRIPTED and self.policies == (self.name,) and not self.quick
 
 
 def run_and_show(wanted: Wanted, file: Path | None, records: Path, jobs: int | None, *, as_json: bool) -> None:
@@ -54,10 +59,12 @@ def run_and_show(wanted: Wanted, file: Path | None, records: Path, jobs: int | N
     Raises:
         typer.Exit: Ctrl-C.
         ConfigError: an unknown policy, or a file that cannot be opened.
-        BenchmarkError: runs failed.
+        BenchmarkError: runs failed, the name is that of a scripted controller, or one of their entries is missing.
     """
     protocol = load_protocol(quick=wanted.quick)
     _planned(wanted, protocol)  # refuses what cannot be run, before anything is
+    if not wanted.is_scripted:
+        scripted_entries(load_protocol())  # what it will be shown beside
     training = Training(
         worlds=wanted.trained_in,
         command=wanted.training,
@@ -122,6 +129,7 @@ def plan_text(wanted: Wanted, records: Path, jobs: int | None) -> str:
 
     Raises:
         ConfigError: an unknown policy, or a file that cannot be opened.
+        BenchmarkError: the name is that of a scripted controller.
     """
     protocol = load_protocol(quick=wanted.quick)
     store = RunStore(records)
@@ -139,7 +147,17 @@ def plan_text(wanted: Wanted, records: Path, jobs: int | None) -> str:
 
 
 def _planned(wanted: Wanted, protocol: Protocol) -> list[RunSpec]:
-    """Return all runs; raises ConfigError for an unknown policy, or a file that cannot be opened."""
+    """Return all runs.
+
+    Raises:
+        ConfigError: an unknown policy, or a file that cannot be opened.
+        BenchmarkError: the name is that of a scripted controller.
+    """
+    if wanted.name in SCRIPTED and not wanted.is_scripted:
+        raise BenchmarkError(
+            f"Expected another name than {wanted.name!r}, which is that of an entry that comes with the package; "
+            "choose one with --name."
+        )
     try:
         return [spec for policy in wanted.policies for spec in benchmark_specs(policy, protocol)]
     except ValueError as error:  # of a policy or its file
@@ -166,21 +184,35 @@ def worlds_text() -> str:
 def _standings(entries: Sequence[Entry], protocol: Protocol) -> tuple[list[Standing], Reference]:
     """What entries are worth, and what the scripted controllers are beside them.
 
+    An entry of a scripted controller that was made again is shown in place of the one that comes with the package. All
+    are held against those that come with the package.
+
     Raises:
-        BenchmarkError: two entries of one name.
+        BenchmarkError: two entries of one name, or one with the name of a scripted controller that is none of it.
     """
     full = load_protocol()
     scripted = scripted_entries(full)
     reference = reference_of(scripted, full)
-    own_names = {entry.name for entry in scripted}
-    added = [entry for entry in entries if entry.name not in own_names]
+    digests = {entry.digest for entry in scripted}
+    added = [entry for entry in entries if entry.digest not in digests]
     counts = Counter(entry.name for entry in added)
     twice = [name for name, count in counts.items() if count > 1]
     if twice:
         raise BenchmarkError(f"Expected entries of different names, got {twice[0]!r} twice.")
-    standings = [standing_of(entry, reference, full) for entry in scripted]
+    foreign = [entry.name for entry in added if entry.name in SCRIPTED and not _is_scripted(entry)]
+    if foreign:
+        raise BenchmarkError(
+            f"Expected entries with names of their own, got one of another policy with the name {foreign[0]!r} of a "
+            "scripted controller; make it again with another --name."
+        )
+    standings = [standing_of(entry, reference, full) for entry in scripted if entry.name not in counts]
     standings += [standing_of(entry, reference, protocol) for entry in added]
     return sorted_standings(standings), reference
+
+
+def _is_scripted(entry: Entry) -> bool:
+    """Whether an entry is of the installed policy whose name it has."""
+    return [(policy.name, policy.digest) for policy in entry.policies] == [(entry.name, "")]
 
 
 def _show(entries: Sequence[Entry], protocol: Protocol, *, as_json: bool) -> None:

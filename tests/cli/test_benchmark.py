@@ -1,13 +1,16 @@
 """The command `benchmark`, with a tiny protocol in place of the real one."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from metrics.benchmark import load_protocol
+from metrics.benchmark.entry import EntryPolicy
 from metrics.benchmark.page import BEGIN, END
 from metrics.benchmark.standing import SCRIPTED
+from swarm_forage_env.cli.benchmark_report import Wanted
 from tests.support.entries import TINY, made_up_entry
 
 
@@ -29,8 +32,9 @@ def tiny(folder, monkeypatch):
 
 @pytest.fixture
 def mine(tiny, tmp_path):
-    """An entry in the folder of the command."""
-    made_up_entry(load_protocol(), "mine", lambda k: 30.0).write(tmp_path / "mine.json")
+    """Entries in the folder of the command; the second one has the name of a scripted controller."""
+    for name in ("mine", "dpo"):
+        made_up_entry(load_protocol(), name, lambda k: 30.0).write(tmp_path / f"{name}.json")
 
 
 def test_a_policy_becomes_an_entry_that_can_be_shown(command, tiny):
@@ -86,6 +90,38 @@ def test_a_page_is_written_with_its_figure(command, mine):
     assert text.endswith(f"{END}\n\nend\n")
 
 
+def test_a_mixed_swarm_can_be_run_again_with_the_command_of_its_entry():
+    policy = "mixed:runs/a.npz=20%,crw=rest"
+    assert Wanted(policies=(policy,), name="a few").command == (
+        f"swarm-forage benchmark --policy {policy} --name 'a few'"
+    )
+
+
+def test_the_entry_of_a_scripted_controller_that_was_made_again_is_shown(command, folder, tiny, tmp_path):
+    again = made_up_entry(load_protocol(), "dpo", lambda k: 40.0)
+    replace(again, policies=(EntryPolicy(name="dpo"),)).write(tmp_path / "dpo.json")
+    shipped = folder / "dpo.json"
+    code, out, err = command("benchmark", "show", str(shipped), "dpo.json", "--json")
+    assert code == 0, err
+    scores = {standing["name"]: standing["score"][0] for standing in json.loads(out)}
+    assert scores.keys() == set(SCRIPTED)
+    assert max(scores, key=scores.get) == "dpo"
+
+
+def test_nothing_is_run_under_the_name_of_a_scripted_controller_or_without_their_entries(
+    command, tiny, tmp_path, monkeypatch
+):
+    for words in (("--policy", "random", "--name", "dpo"), ("--policy", "dpo", "--quick")):
+        code, _, err = command("benchmark", *words, "--jobs", "1")
+        assert (code, len(err.splitlines())) == (2, 1)
+        assert "Expected another name than 'dpo'" in err
+    monkeypatch.setattr("metrics.benchmark.standing.scripted_folder", lambda: tmp_path)
+    code, _, err = command("benchmark", "--policy", "random", "--jobs", "1")
+    assert (code, len(err.splitlines())) == (2, 1)
+    assert "crw.json" in err
+    assert not Path("results").exists()
+
+
 def spoil(name, change):
     file = Path(name)
     file.write_text(change(file.read_text()))
@@ -111,6 +147,7 @@ def test_an_altered_entry_is_refused_in_one_line(command, mine):
         (("--policy", "crw", "--training-seed", "1", "--training-seed", "2"), "got 2 for 1 policies"),
         (("show", "none.json"), "Cannot read the entry none.json"),
         (("show", "mine.json", "mine.json"), "'mine' twice"),
+        (("show", "dpo.json"), "another policy with the name 'dpo'"),
         (("page", "mine.json", "--into", "none.md"), "none.md"),
         (("page", "mine.json", "--into", "mine.json"), "write these two lines"),
     ],

@@ -1,12 +1,16 @@
 """From policies to an entry, in a tiny protocol: the runs, and the measures that they allow."""
 
 import math
+import shutil
 
 import pytest
 
 from metrics.benchmark import BenchmarkError, Training, benchmark_specs, load_protocol, read_entry, run_benchmark
 from metrics.scoring.measures import MEASURE_CRITERIA
 from swarm_forage_env import run_one
+from swarm_forage_env.policies.model_files import file_digest
+from swarm_forage_env.policies.pretrained import network_file
+from swarm_forage_env.study.record import RunRecord
 from tests.support.entries import TINY
 
 FROM_RATES_ALONE = {"availability"}
@@ -83,3 +87,13 @@ def test_training_seeds_are_one_per_policy(protocol):
 def test_an_unknown_policy_is_refused(protocol):
     with pytest.raises(ValueError, match="Unknown policy 'cwr'"):
         benchmark_specs("cwr", protocol)
+
+
+def test_an_entry_of_a_mixed_swarm_keeps_its_name_and_the_digest_of_its_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(RunRecord, "cpu_time_s", math.nan)  # as of records that do not tell it
+    net = shutil.copy(network_file("ppo_warehouse_small"), tmp_path / "net.npz")
+    quick = load_protocol(TINY, quick=True)
+    made = run_benchmark([f"mixed:{net}=50%,crw=rest"], name="both", protocol=quick, jobs=1, progress=False)
+    (told,) = made.policies
+    assert (told.name, told.digest) == ("mixed:net=0.5,crw=rest", file_digest(net))
+    assert made.core_hours is None
