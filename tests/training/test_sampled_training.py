@@ -11,6 +11,7 @@ pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-b
 from stable_baselines3 import DQN, PPO
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli.training_report import heading
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.scenarios.presets import warehouse_small
@@ -204,3 +205,10 @@ def test_worlds_of_one_name_have_one_performance():
     ]
     with pytest.raises(ConfigError, match=r"warehouse_small to have one performance, .* collected and first_picked"):
         tiny_plan(stages=(Stage(steps=5, sampler=type(WORLDS).from_mapping({"worlds": worlds})),))
+
+
+def test_the_heading_tells_one_horizon_only_where_all_runs_have_it():
+    longer = EvaluationWorld(scenario=warehouse_small(**{**QUICK, "horizon_s": 400.0}), name="longer", baseline="crw")
+    for worlds, words in ((JUDGED, "in 1 run of 200 s in each of 2 worlds"), ((*JUDGED, longer), "in 1 whole run in")):
+        plan = dataclasses.replace(FIXED, evaluation=EvaluationPlan(worlds=worlds))
+        assert words in heading(plan)
