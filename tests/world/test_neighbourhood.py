@@ -261,6 +261,20 @@ def test_a_data_set_has_the_columns_of_messages(tmp_path):
             assert "messages" in plan.card.columns or size is None
 
 
+def test_a_learner_without_messages_passes_no_actions_on():
+    spec = SwarmSpec.of(scenario("warehouse_small", **SMALL | BOTH))
+    passes_on = {size: LearnerInterface(InterfaceConfig(message_size=size), spec).passes_on for size in (None, 0, 2)}
+    assert passes_on == {None: False, 0: False, 2: True}
+
+
+def test_a_random_policy_says_something():
+    policy = load_policy("random")
+    policy.reset(SwarmSpec.of(scenario("warehouse_small", **SMALL | BOTH)), np.random.default_rng(0))
+    actions = policy.act(np.zeros((N_ROBOTS, 5), np.float32), np.ones(N_ROBOTS, np.bool_))
+    assert actions.shape == (N_ROBOTS, 5)
+    assert (actions != 0.0).all()
+
+
 def test_numbered_actions_carry_no_message():
     with pytest.raises(ConfigError, match=r"'continuous' for messages of 2 numbers, got 'discrete'.*message_size=0"):
         parallel_env("warehouse_small", **BOTH, interface={"actions": "discrete"})
