@@ -120,16 +120,16 @@ def stage_ends(plan: TrainingPlan) -> list[int]:
 
 def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | Evaluation], None]:
     task = bar.add_task("training", total=plan.total_steps)
-    heading = _heading(plan)
+    first_words = heading(plan)
     told: TrainingStatus | None = None
     told_at = time.monotonic()
 
     def report(news: TrainingStatus | Evaluation) -> None:
-        nonlocal heading, told, told_at
+        nonlocal first_words, told, told_at
         if isinstance(news, Evaluation):
-            if heading:
-                bar.console.print(heading)
-                heading = ""
+            if first_words:
+                bar.console.print(first_words)
+                first_words = ""
             for line in _evaluation_lines(news):
                 bar.console.print(line)
         elif not bar.disable:
@@ -141,9 +141,12 @@ def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | E
     return report
 
 
-def _heading(plan: TrainingPlan) -> str:
-    (first, *_) = plan.judging_runs("policy")
-    runs = f"Evaluated in {counted(plan.evaluation.n_runs, 'run')} of {first.scenario.horizon_s:,.0f} s"
+def heading(plan: TrainingPlan) -> str:
+    """Return what stands above the evaluations: their runs, and the names of the columns."""
+    horizons = {spec.scenario.horizon_s for spec in plan.judging_runs("policy")}
+    runs = f"Evaluated in {counted(plan.evaluation.n_runs, 'run' if len(horizons) == 1 else 'whole run')}"
+    if len(horizons) == 1:
+        runs += f" of {horizons.pop():,.0f} s"
     if plan.evaluation.worlds:
         return (
             f"{runs} in each of {place_of(plan)}; what counts is the {plan.evaluation.chosen_by} ratio:\n"

@@ -192,7 +192,8 @@ class LearnerInterface:
         self._n_driven = 2 if config.automatic_gripper else COMMANDS
         self.layout = learner_layout(source, config)
         self.shows_all = self.layout == source
-        self.passes_on = not (self._is_discrete or config.automatic_gripper)
+        says_all = (config.message_size or 0) == spec.message_size
+        self.passes_on = says_all and not (self._is_discrete or config.automatic_gripper)
         own = [source[name] for name in config.sensors]
         self._own_columns = np.array([column for part in own for column in range(part.start, part.stop)], np.intp)
         self._n_shown = (

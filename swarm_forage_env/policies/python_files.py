@@ -1,7 +1,8 @@
 """Policies in plain Python files: `my_module.py:MyPolicy` is the class MyPolicy of the file my_module.py.
 
 The file is run as a module when the policy is made. Its folder is searched last for what it imports, so that a file
-beside it can be imported, and nothing that is installed is hidden by one.
+beside it can be imported, and nothing that is installed is hidden by one. A process has one module of each name, so a
+file is refused that would import another folder's module instead of the one beside it.
 """
 
 import ast
@@ -10,7 +11,8 @@ import inspect
 import sys
 import traceback
 from functools import lru_cache
-from importlib.util import module_from_spec, spec_from_file_location
+from importlib.machinery import ModuleSpec, PathFinder
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -20,6 +22,9 @@ from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.model_files import checked_digest
 from swarm_forage_env.policies.registry import split_class
+
+_INSTALLED = frozenset({"site-packages", "dist-packages"})
+"""Names of the folders into which packages are installed."""
 
 
 class PythonFileError(ConfigError):
@@ -36,7 +41,8 @@ def open_class(place: str, *, digest: str | None = None, **parameters: Any) -> P
 
     Raises:
         ModelError: the file is missing or has changed.
-        PythonFileError: no class is named, the file has none of that name, or its code raises an error.
+        PythonFileError: no class is named, the file has none of that name, its code raises an error, or it would
+            import another folder's module instead of the one beside it.
     """
     file, name = split_class(place)
     if "interface" in parameters:
@@ -75,13 +81,16 @@ def classes_of(file: str | Path) -> tuple[str, ...]:
     Raises:
         PythonFileError: the file cannot be read, or is no Python.
     """
+    return tuple(node.name for node in _tree(file).body if isinstance(node, ast.ClassDef))
+
+
+def _tree(file: str | Path) -> ast.Module:
     try:
-        tree = ast.parse(Path(file).read_bytes(), str(file))
+        return ast.parse(Path(file).read_bytes(), str(file))
     except OSError as error:
         raise PythonFileError(f"Cannot read the policy file {file}: {error.strerror or error}.") from error
     except (SyntaxError, ValueError) as error:
         raise PythonFileError(f"Expected Python in {file}, got: {error}.") from error
-    return tuple(node.name for node in tree.body if isinstance(node, ast.ClassDef))
 
 
 def _known(file: str) -> str:
@@ -96,6 +105,7 @@ def _module(path: Path, digest: str) -> ModuleType:
     assert spec is not None, "its name ends in .py"
     assert spec.loader is not None, "a file has a loader"
     module = module_from_spec(spec)
+    _check_neighbours(path)
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))
     sys.modules[spec.name] = module  # dataclasses look there for the module of a class
@@ -105,6 +115,49 @@ def _module(path: Path, digest: str) -> ModuleType:
         del sys.modules[spec.name]
         raise PythonFileError(f"Cannot run {path}: {_told(error, path)}.") from error
     return module
+
+
+def _check_neighbours(path: Path) -> None:
+    """Refuse a file that would import another folder's module where one of that name lies beside it.
+
+    Files beside it that it imports are looked at, too. What is installed hides a file beside it, as it always does.
+    """
+    to_read, seen = [path], set[str]()
+    while to_read:
+        for name in _imported_names(_tree(to_read.pop())) - seen - sys.stdlib_module_names:
+            seen.add(name)
+            beside = PathFinder.find_spec(name, [str(path.parent)])
+            if beside is None:
+                continue
+            loaded = sys.modules.get(name)
+            found = find_spec(name) if loaded is None else getattr(loaded, "__spec__", None)
+            home = path.parent if found is None else _home(found)  # none: not found before, or made by a program
+            if home == path.parent:
+                if beside.origin is not None and beside.origin.endswith(".py"):
+                    to_read.append(Path(beside.origin))
+            elif not _INSTALLED.intersection(home.parts):
+                raise PythonFileError(
+                    f"Expected {path} to import the module {name} that lies beside it, but this process has the one "
+                    f"of {home}; rename one of the two, or run the policies in commands of their own."
+                )
+
+
+def _imported_names(tree: ast.Module) -> set[str]:
+    """Return the first words of all modules that a file imports, wherever it does."""
+    names = set[str]()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names.update(alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module is not None and node.level == 0:
+            names.add(node.module.partition(".")[0])
+    return names
+
+
+def _home(spec: ModuleSpec) -> Path:
+    """Return the folder in which a module lies, or the folder of its package."""
+    folders = spec.submodule_search_locations
+    place = next(iter(folders)) if folders else spec.origin
+    return Path(place or "").resolve().parent
 
 
 def _told(error: Exception, file: str | Path) -> str:

@@ -38,11 +38,11 @@ class RandomPolicy:
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Keep the swarm size and the generator."""
-        self._shape = (spec.n_robots, 3)
+        self._shape = (spec.n_robots, spec.action_size)
         self._rng = rng
 
     def act(self, obs: ObsArray, active: BoolArray) -> ActionArray:
-        """Return (N, 3) actions drawn uniformly from [-1, 1]."""
+        """Return (N, A) actions drawn uniformly from [-1, 1]: commands, and messages if there are any."""
         return self._rng.uniform(-1.0, 1.0, self._shape).astype(np.float32)
 
 

@@ -96,6 +96,12 @@ def scenario_of_same_size(scenario: ScenarioConfig, overrides: Mapping[str, Any]
             raise ConfigError(
                 f"Expected {name} to stay {before}, as spaces promise, got {now}; make another environment."
             )
+    before, now = scenario.robots.neighbour_range_m, changed.robots.neighbour_range_m
+    if changed.robots.neighbours_seen and now != before:  # seen distances are shares of the range
+        raise ConfigError(
+            f"Expected neighbour_range_m to stay {before:g}, the scale of columns that spaces promise, got {now:g}; "
+            "make another environment."
+        )
     if changed.robots.n_robots != n_robots:
         raise ConfigError(
             f"Expected n_robots to stay {n_robots}, the number of rows that spaces promise, got "

@@ -20,7 +20,8 @@ from swarm_forage_env._internal.fields import (
 )
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json, parse_toml
-from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
+from swarm_forage_env.contract.policy import layout_for
+from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping, learner_layout
 from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size, with_overrides
@@ -173,7 +174,7 @@ class TrainingPlan:
     """What is to be mastered, rewards included; evaluations take place in it. Stages may have shorter episodes. Beside
     a sampler it is its largest world, which stands for all where spaces are asked for."""
     wrappers: tuple[WrapperConfig, ...] = ()
-    """What disturbs the swarm, in training and in evaluations."""
+    """What disturbs the swarm, in training and in evaluations; samplers and worlds to be judged in have their own."""
     algorithm: str = "ppo"
     interface: InterfaceConfig = field(default_factory=InterfaceConfig)
     n_arenas: int = DEFAULT_ARENAS
@@ -229,6 +230,13 @@ class TrainingPlan:
             raise ConfigError(
                 "Expected evaluation.worlds beside a sampler: fixed worlds, in which policies can be compared."
             )
+        if self.wrappers and (is_sampled or self.evaluation.worlds):
+            raise ConfigError(
+                "Expected a plan without wrappers beside samplers and evaluation.worlds, which have their own, got "
+                f"{', '.join(config.name for config in self.wrappers)}; write them into each sampler and each world, "
+                "with a sampler of one world where the scenario is fixed."
+            )
+        performances: dict[str, str] = {}
         for stage in self.stages:
             sampler = stage.sampler or self.sampler
             for config in (self.scenario,) if sampler is None else sampler.corners:
@@ -239,6 +247,26 @@ class TrainingPlan:
                         f"{self.scenario.name}, which are those of the policy; {config.name} has others."
                     )
                 scenario_of_same_size(config, stage.scenario)
+                known = performances.setdefault(config.name, config.performance)
+                if known != config.performance:
+                    raise ConfigError(
+                        f"Expected worlds with the name {config.name} to have one performance, because progress is "
+                        f"told by name, got {known} and {config.performance}; give one of them another name."
+                    )
+        for world in self.evaluation.worlds:
+            self._check_evaluation_world(world)
+
+    def _check_evaluation_world(self, world: EvaluationWorld) -> None:
+        """Refuse a world in which the policy cannot be judged."""
+        try:
+            learner_layout(layout_for(world.scenario), self.interface)
+        except ConfigError as error:
+            raise ConfigError(f"Cannot judge the policy in the evaluation world {world.name}: {error}") from error
+        if world.scenario.caches != self.scenario.caches:
+            raise ConfigError(
+                f"Expected the evaluation world {world.name} with the caches of the training, "
+                f"{self.scenario.caches!r}, got {world.scenario.caches!r}; give both the same."
+            )
 
     def judging_runs(self, policy: str) -> tuple[RunSpec, ...]:
         """Return the runs of an evaluation of a policy, in all worlds; raises ConfigError where one cannot be."""

@@ -459,13 +459,14 @@ class ArenaBatch:
 
 
 def _steps_in_parts(arena: LearnerArena) -> bool:
-    """Whether a step of the stack is `begin_step`, the arena's step and `end_step`, and nobody has replaced it."""
-    layer = arena.env
-    while isinstance(layer, SwarmWrapper):
-        if type(layer).step_batch is not SwarmWrapper.step_batch or "step_batch" in vars(layer):
-            return False
-        layer = cast("ForageEnv | SwarmWrapper", layer.env)
-    return type(layer).step_batch is ForageEnv.step_batch and "step_batch" not in vars(layer)
+    """Whether a step of the stack is `begin_step`, the arena's step and `end_step`, and nobody has replaced it.
+
+    The outermost layer and the environment are asked; `step_batch` of what is between them is never called.
+    """
+    ours = SwarmWrapper.step_batch, ForageEnv.step_batch
+    return all(
+        type(layer).step_batch in ours and "step_batch" not in vars(layer) for layer in (arena.env, arena.forage_env)
+    )
 
 
 def _joined(parts: list[np.ndarray], nothing: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """One arena for learning: environment, wrappers, interface, seeds, and fields overridden for a curriculum."""
 
+import copy
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -52,10 +53,13 @@ class ArenaPlan:
             world: What the sampler has drawn; None = the scenario and wrappers of the plan.
 
         Raises:
-            ConfigError: unknown fields, values that do not fit together, or another number of robots.
+            ConfigError: unknown fields, values that do not fit together, another number of robots, or more robots or
+                objects than the largest worlds of the sampler have.
         """
         given, wrappers = (self.scenario, self.wrappers) if world is None else world
         scenario = scenario_of_same_size(given, overrides)
+        if self.sampler is not None:
+            self._check_room(scenario, self.sampler)
         env = ForageEnv(
             scenario,
             max_cycles=self.max_cycles,
@@ -64,6 +68,20 @@ class ArenaPlan:
             snapshots=self.snapshots,
         )
         return wrap_in_order(env, wrappers)
+
+    @staticmethod
+    def _check_room(scenario: ScenarioConfig, sampler: ScenarioSampler) -> None:
+        """Refuse a world that has no room in the rows of the sampler's worlds."""
+        sizes = {
+            "n_robots": (scenario.robots.n_robots, sampler.n_robots),
+            "n_objects": (scenario.objects.n_objects, sampler.n_objects),
+        }
+        for name, (n_there, most) in sizes.items():
+            if n_there > most:
+                raise ConfigError(
+                    f"Expected {name} of at most {most}, for which spaces have room, got {n_there}; give the sampler "
+                    "a world with as many."
+                )
 
 
 DEFAULT_SCENARIO = "warehouse_small"
@@ -136,7 +154,7 @@ class LearnerSnapshot:
     overrides: Mapping[str, Any]
     """Scenario fields that a reset has overridden."""
     world: DrawnWorld | None
-    """What the sampler drew for the run; None without a sampler, and before the first reset."""
+    """What the sampler drew for the run; None without a sampler."""
     seeds: Mapping[str, Any]
     """State of the generator of the next seeds."""
     agents: tuple[str, ...] = ()
@@ -169,17 +187,24 @@ class LearnerArena:
         self._overrides: dict[str, Any] = {}
         self._world: DrawnWorld | None = None
         self._seeds = np.random.default_rng()
-        self._adopt(plan.build({}))
+        self._adopt(*self._built({}, None))
 
     @property
     def n_robots(self) -> int:
         """Robots of this run; a sampler may draw fewer than there are rows for."""
         return self.forage_env.scenario.robots.n_robots
 
-    def _adopt(self, env: ForageEnv | SwarmWrapper) -> None:
+    def _built(
+        self, overrides: Mapping[str, Any], world: DrawnWorld | None
+    ) -> tuple[ForageEnv | SwarmWrapper, LearnerInterface]:
+        """Build an environment and its interface, of which one may be refused; the arena stays as it is."""
+        env = self._plan.build(overrides, world)
+        return env, LearnerInterface(self._plan.interface, env.unwrapped.swarm_spec)
+
+    def _adopt(self, env: ForageEnv | SwarmWrapper, interface: LearnerInterface) -> None:
         self.env = env
         self.forage_env: ForageEnv = env.unwrapped
-        self.interface = LearnerInterface(self._plan.interface, self.forage_env.swarm_spec)
+        self.interface = interface
 
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
         """Start a run.
@@ -190,29 +215,28 @@ class LearnerArena:
                 ones; `{"scenario": {}}` goes back to the plan. Without that key nothing changes.
 
         Raises:
-            ConfigError: another option, a scenario field beside `scenario`, an unknown field, or another number of
-                robots; the arena stays as it was.
+            ConfigError: another option, a scenario field beside `scenario`, an unknown field, another number of robots,
+                or more objects than a sampler's worlds have; the arena stays as it was.
         """
         overrides = _scenario_overrides(options)
         if overrides is None:
             overrides = self._overrides
-        if self._plan.sampler is None:
-            self._change(overrides, None)
+        seeds = copy.deepcopy(self._seeds) if seed is None else np.random.default_rng(seed)
         if seed is None:
-            seed = int(self._seeds.integers(2**31))
-        else:
-            self._seeds = np.random.default_rng(seed)
-        if self._plan.sampler is not None:
-            self._change(overrides, self._plan.sampler.world_of(seed, self._share))
+            seed = int(seeds.integers(2**31))
+        sampler = self._plan.sampler
+        self._change(overrides, None if sampler is None else sampler.world_of(seed, self._share))
+        self._seeds = seeds  # not before the world is known to be possible
         self.env.reset_batch(seed)
         self.interface.forget()
 
     def _change(self, overrides: dict[str, Any], world: DrawnWorld | None) -> None:
         """Build another environment, if the one that there is has another world."""
         if (overrides, world) != (self._overrides, self._world):
-            self.env.close()
-            self._adopt(self._plan.build(overrides, world))
+            before = self.env
+            self._adopt(*self._built(overrides, world))
             self._overrides, self._world = overrides, world
+            before.close()
 
     def step(self, actions: np.ndarray, rewards: np.ndarray) -> tuple[BoolArray, bool, bool]:
         """Carry out a decision: step until its ticks are done or the run ends.
@@ -268,8 +292,8 @@ class LearnerArena:
         """Go back to a snapshot of this arena or of one of the same plan; see `ForageEnv.restore`.
 
         Raises:
-            SnapshotError: not such a snapshot, or one of another interface, scenario, stack or version; nothing
-                changes.
+            SnapshotError: not such a snapshot, or one of another interface, scenario, sampler, stack or version;
+                nothing changes.
         """
         if not isinstance(snapshot, LearnerSnapshot):  # pyright: ignore[reportUnnecessaryIsInstance] - from users
             raise SnapshotError(
@@ -280,12 +304,26 @@ class LearnerArena:
             raise SnapshotError(
                 f"Expected a snapshot of an environment with {self._plan.interface}, got one with {snapshot.interface}."
             )
+        if (snapshot.world is None) != (self._plan.sampler is None):
+            here, there = ("without", "with") if self._plan.sampler is None else ("with", "without")
+            raise SnapshotError(
+                f"Expected a snapshot of an environment {here} a sampler, got one {there}; restore it in one that is "
+                "made alike."
+            )
+        before, interface = self.env, self.interface
         is_same = (snapshot.overrides, snapshot.world) == (self._overrides, self._world)
-        env = self.env if is_same else self._plan.build(snapshot.overrides, snapshot.world)
+        if is_same:
+            env = before
+        else:
+            try:
+                env, interface = self._built(snapshot.overrides, snapshot.world)
+            except ConfigError as error:
+                raise SnapshotError(f"Expected a snapshot of a world that can be here: {error}") from error
         env.restore_batch(snapshot.stack)
         if not is_same:
-            self._adopt(env)
+            self._adopt(env, interface)
             self._overrides, self._world = dict(snapshot.overrides), snapshot.world
+            before.close()
         self._seeds.bit_generator.state = snapshot.seeds
         self.interface.recall(snapshot.memory)
 

@@ -29,6 +29,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, number, table
 from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.layout import BUILT_IN_SLICES, LayoutRow
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
@@ -291,14 +292,22 @@ def _check_columns(built: list[ScenarioConfig], largest: ScenarioConfig) -> None
     for config in built:
         if columns_of(config) != expected:
             raise ConfigError(
-                f"Expected worlds with the same columns of observations, got {dict(expected)} in {largest.name} and "
-                f"{dict(columns_of(config))} in {config.name}; give all worlds the same sensors."
+                f"Expected worlds with the same columns of observations, got {_said_columns(expected)} in "
+                f"{largest.name} and {_said_columns(columns_of(config))} in {config.name}; give all worlds the same "
+                "neighbours_seen, neighbour_range_m, message_size and own_sensors."
             )
 
 
-def columns_of(config: ScenarioConfig) -> tuple[tuple[str, int], ...]:
-    """Return names and sizes of the slices of a scenario's observations: what worlds of one policy have in common."""
-    return tuple((part.name, part.size) for part in layout_for(config))
+def columns_of(config: ScenarioConfig) -> tuple[LayoutRow, ...]:
+    """Return the slices that a scenario adds to every observation: what worlds of one policy have in common.
+
+    The slices that all scenarios have differ in scale only, by the size of the arena and the number of objects.
+    """
+    return tuple(part.row for part in layout_for(config) if part.name not in BUILT_IN_SLICES)
+
+
+def _said_columns(rows: tuple[LayoutRow, ...]) -> str:
+    return "; ".join(f"{name} ({meaning})" for name, _, _, meaning in rows) or "those of every scenario"
 
 
 def _field_names() -> tuple[str, ...]:

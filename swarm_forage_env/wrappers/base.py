@@ -29,6 +29,10 @@ STACK_ORDER = (
     "ForageEnv",
 )
 """The documented stack, outermost first; `SwarmWrapper.stack_position` counts along it."""
+_STEPS = ("step", "step_batch", "begin_step", "end_step")
+"""Methods of a wrapper that are called on the outermost one only."""
+_HOOKS = ("before_step", "gain", "observe", "after_step")
+"""Methods that are called on every wrapper in each step."""
 
 
 class SwarmWrapper(BaseParallelWrapper):
@@ -37,7 +41,8 @@ class SwarmWrapper(BaseParallelWrapper):
     Hooks of one step, each called once per tick: `before_step` and `gain` from the outermost wrapper inwards, then
     the environment steps, then `observe` and `after_step` from the innermost wrapper outwards. A reset calls
     `on_reset` and `observe` from the innermost wrapper outwards. The wrapper that is stepped calls the hooks of all
-    wrappers inside of it; their own `step_batch` is not called. Wrappers never rewrite actions. They read the true
+    wrappers inside of it; their own `step_batch` is not called, so a wrapper that overrides it cannot be inside of
+    another one. Wrappers never rewrite actions. They read the true
     state from `self.unwrapped` (`swarm`, `events`, `tick` ...) and change the world only by `set_population` and
     `set_handling_ticks` of `self.unwrapped`.
 
@@ -57,7 +62,8 @@ class SwarmWrapper(BaseParallelWrapper):
 
         Raises:
             TypeError: `env` is neither a ForageEnv nor a SwarmWrapper. A wrapper from another library in between would
-                be skipped without notice; wrap it around the whole stack instead.
+                be skipped without notice; wrap it around the whole stack instead. Or `env` is a SwarmWrapper that
+                overrides `step_batch` or another method that would not be called.
             ConfigError: the stack would not be in the documented order.
         """
         if not isinstance(env, ForageEnv | SwarmWrapper):
@@ -65,6 +71,8 @@ class SwarmWrapper(BaseParallelWrapper):
                 f"Expected {type(self).__name__} to wrap a ForageEnv or a SwarmWrapper, got {type(env).__name__}; "
                 "put other wrappers outside of the swarm wrappers."
             )
+        if isinstance(env, SwarmWrapper):
+            self._check_hooks_only(type(env))
         if isinstance(env, SwarmWrapper) and self.stack_position >= env.stack_position:
             raise ConfigError(
                 f"Expected {type(env).__name__} not inside of {type(self).__name__}; the order, outermost first and "
@@ -75,6 +83,14 @@ class SwarmWrapper(BaseParallelWrapper):
         self._inner = env
         self._unwrapped: ForageEnv = env.unwrapped
         self._inside: tuple[SwarmWrapper, ...] = env.stack if isinstance(env, SwarmWrapper) else ()
+
+    def _check_hooks_only(self, inner: "type[SwarmWrapper]") -> None:
+        replaced = [name for name in _STEPS if getattr(inner, name) is not getattr(SwarmWrapper, name)]
+        if replaced:
+            raise TypeError(
+                f"Expected {inner.__name__} inside of {type(self).__name__} to override hooks only, got its own "
+                f"{' and '.join(replaced)}, which would never be called; override {', '.join(_HOOKS)} instead."
+            )
 
     @property
     def unwrapped(self) -> ForageEnv:

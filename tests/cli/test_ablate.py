@@ -68,7 +68,7 @@ def test_dry_run_makes_nothing(command):
         (("--robots", "8,many"), "Expected --robots as whole numbers separated by commas, such as 5,20, got '8,many'"),
         (("--quirks", "integer_estimate"), "Did you mean 'integer_estimates'?"),
         (("--policy", "crv"), "Did you mean 'crw'?"),
-        (("--seeds", "1"), "'--seeds'"),
+        (("--seeds", "1"), "Expected --seeds to be a number >= 2"),
     ],
 )
 def test_a_mistake_is_one_line_and_exit_code_2(command, words, complaint):

@@ -123,7 +123,7 @@ def test_a_report_is_written(ran):
     page = Path("pages/report.html").read_text()
     assert 'id="verdicts"' in page
     assert "S1a, budget tiny: 16 of 16 runs done" in page
-    assert "swarm-forage study run FILE --budget tiny --seeds 2 --reading described  # the file of study S1a" in page
+    assert "swarm-forage study run S1a.toml --budget tiny --seeds 2 --reading described" in page
     assert ran("study", "report", "done/S1a.parquet", "--out", "again.html")[0] == 0
     again = Path("again.html").read_text()
     last_cells = re.compile(r'<td class="number" data-value="[^"]*">[^<]*</td></tr>|<td>not kept</td></tr>')

@@ -127,3 +127,39 @@ def test_code_that_cannot_be_run_is_told_with_its_line(file):
     Path("broken.py").write_text("def (:\n")
     with pytest.raises(PythonFileError, match=r"Expected Python in broken\.py, got: invalid syntax"):
         load_policy("broken.py")
+
+
+@pytest.fixture
+def two_folders(tmp_path, monkeypatch):
+    """Two versions of a policy, each with its own module `nets_beside`, which one imports by way of another file."""
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    for name in ("nets_beside", "helpers_beside"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    for number in (1, 2):
+        folder = tmp_path / f"v{number}"
+        folder.mkdir()
+        (folder / "nets_beside.py").write_text(f"NUMBER = {number}\n")
+        first = "from nets_beside import NUMBER" if number == 1 else "import helpers_beside"
+        (folder / "pol.py").write_text(
+            f"{first}\n\n\nclass P:\n    def reset(self, spec, rng): ...\n    def act(self, obs, active): ...\n"
+        )
+    (tmp_path / "v2" / "helpers_beside.py").write_text(
+        "def number():\n    from nets_beside import NUMBER\n    return NUMBER\n"
+    )
+    return tmp_path
+
+
+def test_a_module_of_another_folder_is_never_taken_for_the_one_beside(two_folders):
+    load_policy(f"{two_folders}/v1/pol.py:P")
+    with pytest.raises(
+        PythonFileError, match=r"v2/pol\.py to import the module nets_beside that lies beside .* of .*/v1; rename"
+    ):
+        load_policy(f"{two_folders}/v2/pol.py:P")
+    load_policy(f"{two_folders}/v1/pol.py:P")
+
+
+def test_a_file_beside_a_policy_hides_nothing_that_is_installed(two_folders):
+    (two_folders / "v1" / "numpy.py").write_text("")
+    file = two_folders / "v1" / "pol.py"
+    file.write_text("import numpy as np\n" + file.read_text() + "    one = np.ones(1)\n")
+    assert load_policy(f"{file}:P").one == 1.0

@@ -295,9 +295,9 @@ def test_actions_that_are_not_three_numbers(action, after_a_death):
         kill(world, 4)
         world.step(idle(world))
     tick = world.tick
-    with pytest.raises(ActionError, match=r"three numbers, shape \(3,\)"):
+    with pytest.raises(ActionError, match=r"3 numbers, shape \(3,\)"):
         world.step(dict.fromkeys(world.agents, action))
-    with pytest.raises(ActionError, match=r"three numbers, shape \(3,\)"):
+    with pytest.raises(ActionError, match=r"3 numbers, shape \(3,\)"):
         world.step({**idle(world), "robot_2": action})
     assert world.tick == tick
 

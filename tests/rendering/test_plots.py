@@ -48,10 +48,10 @@ def test_the_legend_of_trainings_stands_beside_the_axes(drawn):
 def maps_drawn(drawn, **options):
     few, many = np.array([[0.0, 1.0]]), np.array([[0.0, 10.0]])
     rows = [
-        ("few", {"density": few}, False, (2.0, 1.0)),
-        ("many", {"density": many}, False, (2.0, 1.0)),
-        ("many minus few", {"density": many - few}, True, (2.0, 1.0)),
-        ("few minus many", {"density": 0.5 * (few - many)}, True, (2.0, 1.0)),
+        ("few", {"density": few}, False, (2.0, 1.0), ()),
+        ("many", {"density": many}, False, (2.0, 1.0), ()),
+        ("many minus few", {"density": many - few}, True, (2.0, 1.0), ()),
+        ("few minus many", {"density": 0.5 * (few - many)}, True, (2.0, 1.0), ()),
     ]
     draw_maps("unused.png", rows, {"density": ("robots", "per m²")}, **options)
     axes = [axes for axes in drawn[-1].axes if axes.get_images()]

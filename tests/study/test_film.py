@@ -108,8 +108,8 @@ def test_a_film_that_fails_leaves_nothing_behind(tmp_path):
 @pytest.mark.parametrize(
     ("name", "fps", "n_frames", "expected"),
     [
-        ("film.avi", 20, 10, r"ending in .gif or .mp4, got"),
-        ("film", 20, 10, r"ending in .gif or .mp4, got"),
+        ("film.avi", 20, 10, r"to end in .gif or .mp4, got"),
+        ("film", 20, 10, r"to end in .gif or .mp4, got"),
         ("file/film.gif", 20, 10, "to be a folder, but .*file' is a file"),
         ("film.gif", 51, 10, r"fps of a \.gif to be a number in \[1, 50\]"),
         ("film.mp4", 61, 10, r"fps of a \.mp4 to be a number in \[1, 60\]"),

@@ -11,6 +11,7 @@ pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-b
 from stable_baselines3 import DQN, PPO
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli.training_report import heading
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.scenarios.presets import warehouse_small
@@ -22,6 +23,7 @@ from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
 from swarm_forage_env.training.sb3.training import train
 from swarm_forage_env.training.status import Evaluation
+from swarm_forage_env.wrappers.registry import wrapper_configs
 from tests.support.sampled import TWO_WORLDS, sampler
 
 WORLDS = sampler()
@@ -172,3 +174,41 @@ def test_stages_share_the_caches_of_the_policy():
     cached = type(WORLDS).from_mapping({"worlds": [{"scenario": {"preset": "warehouse_small", "caches": "static"}}]})
     with pytest.raises(ConfigError, match="same caches"):
         tiny_plan(stages=(Stage(steps=5, sampler=cached),))
+
+
+FIXED = TrainingPlan(scenario=warehouse_small(**QUICK), interface=NUMBERED)
+
+
+@pytest.mark.parametrize("fields", [{"neighbours_seen": 2}, {"caches": "static"}])
+def test_worlds_to_be_judged_in_fit_the_policy(fields):
+    """The policy sees two neighbours within 4 m, which the worlds do not show so."""
+    seen = {"neighbours_seen": 2, "neighbour_range_m": 4.0} if "neighbours_seen" in fields else {}
+    odd = EvaluationWorld(scenario=warehouse_small(**QUICK, **fields), name="odd", baseline="crw")
+    with pytest.raises(ConfigError, match=r"evaluation world odd(: .* neighbour_range_m=4| with the caches)"):
+        dataclasses.replace(FIXED, scenario=warehouse_small(**QUICK, **seen), evaluation=EvaluationPlan(worlds=(odd,)))
+
+
+def test_wrappers_stand_where_they_take_effect():
+    noise = wrapper_configs(["sensor_noise:sigma=0.1"])
+    judged = EvaluationPlan(worlds=JUDGED)
+    stages = (Stage(steps=5, sampler=WORLDS),)
+    for changes in ({"evaluation": judged}, {"evaluation": judged, "stages": stages}):
+        with pytest.raises(ConfigError, match=r"without wrappers beside .* got sensor_noise;"):
+            dataclasses.replace(FIXED, wrappers=noise, **changes)
+
+
+def test_worlds_of_one_name_have_one_performance():
+    """Their progress is told under that name."""
+    worlds = [
+        {"scenario": {"preset": "warehouse_small", **QUICK, "performance": performance}}
+        for performance in ("collected", "first_picked")
+    ]
+    with pytest.raises(ConfigError, match=r"warehouse_small to have one performance, .* collected and first_picked"):
+        tiny_plan(stages=(Stage(steps=5, sampler=type(WORLDS).from_mapping({"worlds": worlds})),))
+
+
+def test_the_heading_tells_one_horizon_only_where_all_runs_have_it():
+    longer = EvaluationWorld(scenario=warehouse_small(**{**QUICK, "horizon_s": 400.0}), name="longer", baseline="crw")
+    for worlds, words in ((JUDGED, "in 1 run of 200 s in each of 2 worlds"), ((*JUDGED, longer), "in 1 whole run in")):
+        plan = dataclasses.replace(FIXED, evaluation=EvaluationPlan(worlds=worlds))
+        assert words in heading(plan)

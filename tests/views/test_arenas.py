@@ -6,6 +6,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.views import learner_arena
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
 from swarm_forage_env.views.learner_arena import ArenaPlan, plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -171,6 +172,20 @@ def test_a_refused_scenario_leaves_the_arena_as_it_was(options, reason):
         batch.step(np.zeros((3, 3), np.float32))
     batch.reset([0], [None])
     assert batch.step(np.zeros((3, 3), np.float32)).rewards.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_an_interface_that_is_refused_leaves_the_world_as_it_was(monkeypatch):
+    def refuse(config, spec):
+        raise ConfigError("no such interface")
+
+    batch = ArenaBatch(plan(), 1)
+    batch.reset([0], [None])
+    with monkeypatch.context() as patched:
+        patched.setattr(learner_arena, "LearnerInterface", refuse)
+        with pytest.raises(ConfigError, match="no such interface"):
+            batch.reset([0], [{"scenario": {"n_objects": 9}}])
+    batch.reset([0], [None])
+    assert batch.arenas[0].forage_env.scenario.objects.n_objects == 4
 
 
 def test_closed_arenas_take_no_reset_and_no_step():

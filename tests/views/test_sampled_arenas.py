@@ -6,7 +6,7 @@ import pettingzoo
 import pytest
 from pettingzoo.test import parallel_api_test
 
-from swarm_forage_env import parallel_env
+from swarm_forage_env import SnapshotError, parallel_env
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.policies.interface import InterfaceConfig
@@ -15,6 +15,7 @@ from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
 from swarm_forage_env.views.learner_arena import plan_arena
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.views.processes import ArenaProcesses
+from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
 from tests.support.sampled import sampler
 
 WORLDS = sampler()
@@ -34,6 +35,12 @@ def drawn(seeds=SEEDS):
 
 def sizes(seeds=SEEDS):
     return [config.robots.n_robots for config, _ in drawn(seeds)]
+
+
+def worlds_of(**fields):
+    """A sampler of one small world."""
+    world = {"preset": "warehouse_small", "n_robots": 2, "n_objects": 10, "physics": "compiled", **fields}
+    return ScenarioSampler(worlds=(SampledWorld(scenario=world),))
 
 
 def test_the_seeds_of_these_tests_leave_rows_to_spare():
@@ -100,6 +107,18 @@ def test_fields_of_a_reset_hold_in_every_world():
     assert {config.reward.delivery for config in batch.get_attribute("scenario", [0, 1])} == {7.0}
 
 
+@pytest.mark.parametrize("fields", [{"n_robots": 3}, {"n_objects": WORLDS.n_objects + 1}])
+def test_a_refused_reset_changes_no_world_and_no_seed(fields):
+    env, twin = (ParallelLearnerEnv(sampler=WORLDS) for _ in range(2))
+    for one in (env, twin):
+        one.reset(seed=3)
+    with pytest.raises(ConfigError, match=next(iter(fields))):
+        env.reset(options={"scenario": fields})
+    for one in (env, twin):
+        one.reset()
+    np.testing.assert_array_equal(env.state(), twin.state())
+
+
 def test_processes_give_the_same_rows():
     together, apart = ArenaBatch(PLAN, 2), ArenaProcesses(PLAN, 2, 1)
     try:
@@ -143,6 +162,32 @@ def test_a_snapshot_of_one_world_is_restored_from_another():
     restored = env.restore(kept)
     assert restored.keys() == first.keys()
     np.testing.assert_array_equal(np.stack(list(restored.values())), np.stack(list(first.values())))
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        ({"scenario": "warehouse_small", "n_robots": 2, "physics": "compiled"}, "with a sampler, got one without"),
+        ({"sampler": worlds_of(n_robots=9)}, "n_robots of at most 6, .* got 9"),
+        ({"sampler": worlds_of(n_objects=WORLDS.n_objects + 1)}, f"n_objects of at most {WORLDS.n_objects},"),
+    ],
+)
+def test_a_snapshot_for_which_there_is_no_room_changes_nothing(given, reason):
+    env, other = ParallelLearnerEnv(sampler=WORLDS), ParallelLearnerEnv(**given)
+    env.reset(seed=3)
+    other.reset(seed=3)
+    agents, state = list(env.agents), env.state()
+    with pytest.raises(SnapshotError, match=reason):
+        env.restore(other.snapshot())
+    assert env.agents == agents
+    np.testing.assert_array_equal(env.state(), state)
+
+
+def test_a_snapshot_of_a_drawn_world_needs_a_sampler():
+    env, other = ParallelLearnerEnv("warehouse_small", n_robots=2), ParallelLearnerEnv(sampler=worlds_of())
+    other.reset(seed=3)
+    with pytest.raises(SnapshotError, match="without a sampler, got one with;"):
+        env.restore(other.snapshot())
 
 
 def test_the_central_view_is_padded():

@@ -130,6 +130,15 @@ def test_worlds_with_other_columns_are_refused():
         ScenarioSampler(worlds=(SampledWorld(scenario="warehouse_small"), SampledWorld(scenario=sensing)))
 
 
+def test_worlds_that_show_neighbours_at_another_scale_are_refused():
+    seeing = [
+        SampledWorld(scenario={"preset": "warehouse_small", "neighbours_seen": 2, "neighbour_range_m": range_m})
+        for range_m in (2.0, 4.0)
+    ]
+    with pytest.raises(ConfigError, match=r"left / 2 m, .* left / 4 m, .* the same neighbours_seen, neighbour_range_m"):
+        ScenarioSampler(worlds=tuple(seeing))
+
+
 def test_what_only_a_draw_finds_impossible_says_what_was_drawn():
     between = {"preset": "search_and_rescue", "n_robots": 4, "side_m": {"uniform": [16.0, 32.0]}}
     worlds = ScenarioSampler(worlds=(SampledWorld(scenario=between),))

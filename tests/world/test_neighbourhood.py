@@ -261,6 +261,31 @@ def test_a_data_set_has_the_columns_of_messages(tmp_path):
             assert "messages" in plan.card.columns or size is None
 
 
+def test_a_data_set_of_a_trained_policy_has_the_columns_that_it_saw():
+    spec = plan_run(scenario("warehouse_small", **SMALL | BOTH), "ppo_warehouse_small")
+    policy = load_policy("ppo_warehouse_small")
+    policy.reset(SwarmSpec.of(spec.scenario), np.random.default_rng(0))
+    seen = plan_dataset(spec, [3]).card
+    assert seen.columns == tuple(part.name for part in policy.interface.layout for _ in range(part.size))
+    told = seen.interface
+    assert (told.neighbours_seen, told.message_size, told.own_sensors) == (0, 0, ())
+    assert "neighbours" in plan_dataset(spec, [3], observation="full").card.columns, "as was asked for"
+
+
+def test_a_learner_without_messages_passes_no_actions_on():
+    spec = SwarmSpec.of(scenario("warehouse_small", **SMALL | BOTH))
+    passes_on = {size: LearnerInterface(InterfaceConfig(message_size=size), spec).passes_on for size in (None, 0, 2)}
+    assert passes_on == {None: False, 0: False, 2: True}
+
+
+def test_a_random_policy_says_something():
+    policy = load_policy("random")
+    policy.reset(SwarmSpec.of(scenario("warehouse_small", **SMALL | BOTH)), np.random.default_rng(0))
+    actions = policy.act(np.zeros((N_ROBOTS, 5), np.float32), np.ones(N_ROBOTS, np.bool_))
+    assert actions.shape == (N_ROBOTS, 5)
+    assert (actions != 0.0).all()
+
+
 def test_numbered_actions_carry_no_message():
     with pytest.raises(ConfigError, match=r"'continuous' for messages of 2 numbers, got 'discrete'.*message_size=0"):
         parallel_env("warehouse_small", **BOTH, interface={"actions": "discrete"})
@@ -300,3 +325,9 @@ def test_a_reset_keeps_the_spaces():
     env.reset(options={"scenario": {"neighbour_range_m": 1.3, "message_range_m": 3.0}})
     with pytest.raises(ConfigError, match="message_size to stay 2, as spaces promise, got 3"):
         env.reset(options={"scenario": {"message_size": 3}})
+    with pytest.raises(ConfigError, match=r"neighbour_range_m to stay 1\.3, the scale of columns .* got 4;"):
+        env.reset(options={"scenario": {"neighbour_range_m": 4.0}})
+    env.reset()
+    assert env.forage_env.scenario.robots.neighbour_range_m == 1.3
+    alone = parallel_env("warehouse_small", **SMALL, interface={})
+    alone.reset(options={"scenario": {"neighbour_range_m": 4.0}})  # no column depends on it

@@ -76,6 +76,13 @@ def test_hooks_run_inwards_before_the_step_and_outwards_after_it(stack):
     ]
 
 
+@pytest.mark.parametrize("method", ["step", "step_batch", "begin_step", "end_step"])
+def test_a_wrapper_whose_step_would_be_skipped_is_refused_inside_of_another(method):
+    own = type("Own", (SwarmWrapper,), {"stack_position": 4, method: lambda *_: None})(FakeArena())
+    with pytest.raises(TypeError, match=rf"Expected Own inside of Throttle .* got its own {method}, .* before_step"):
+        wrapper_at(3)(own)
+
+
 @pytest.mark.parametrize("actions", [np.zeros((3, 3), np.float32), np.zeros((4, 2), np.float32), None])
 def test_actions_of_a_wrong_shape_are_refused_before_any_hook(stack, actions):
     stack.reset_batch(7)

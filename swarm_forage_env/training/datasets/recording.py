@@ -99,7 +99,9 @@ def plan_dataset(
     Args:
         spec: The run, see `study.spec.plan_run`.
         seeds: Seeds of the runs, each once.
-        observation: "full" or "compact": what is recorded instead of what a learned policy sees, or of "full".
+        observation: "full" or "compact": what is recorded instead of what a learned policy sees, or of "full". All
+            neighbours and own sensors of the scenario are then recorded for a learned policy, too, unless it says
+            which ones it sees.
         compress: See `DatasetPlan`.
 
     Raises:
@@ -112,8 +114,7 @@ def plan_dataset(
     if len(set(seeds)) < len(seeds) or len(seeds) > MOST_SEEDS:
         raise ConfigError(f"Expected different seeds, at most {MOST_SEEDS:,}, got {len(seeds)} of them.")
     world = SwarmSpec.of(spec.scenario)
-    config = _interface_of(spec, world)
-    config = (config if observation is None else replace(config, observation=observation)).for_scenario(spec.scenario)
+    config = _interface_of(spec, world, observation)
     interface = LearnerInterface(config, world)
     space = interface.action_space
     parts: dict[str, int] = {}
@@ -132,19 +133,33 @@ def plan_dataset(
     return DatasetPlan(spec=spec, card=card, compress=compress)
 
 
-def _interface_of(spec: RunSpec, world: SwarmSpec) -> InterfaceConfig:
-    """Return how a policy decides: the interface of a learned one; full observations and commands of all others."""
+def _interface_of(spec: RunSpec, world: SwarmSpec, observation: str | None) -> InterfaceConfig:
+    """Return what is recorded: what a learned policy sees and chooses; observations and commands of all others."""
+    config = _learned_interface(spec, world)
+    if config is None:
+        config = InterfaceConfig(observation="full" if observation is None else observation)
+        return config.for_scenario(spec.scenario)
+    # A learned policy that says nothing of messages sends none, so its actions have no columns for them.
+    config = replace(config, message_size=config.message_size or 0)
+    if observation is None:
+        # Of what else it says nothing, it sees nothing; `for_scenario` would write down what it never saw.
+        config = replace(config, neighbours_seen=config.neighbours_seen or 0, own_sensors=config.own_sensors or ())
+    else:
+        config = replace(config, observation=observation)
+    return config.for_scenario(spec.scenario)
+
+
+def _learned_interface(spec: RunSpec, world: SwarmSpec) -> InterfaceConfig | None:
+    """Return the interface of a learned policy, None for others."""
     if is_mixture(spec.policy):
-        return InterfaceConfig()
+        return None
     if is_policy_file(spec.policy) and trust.only_looks_at(file_of(spec.policy)):
-        return look_at_file(spec.policy, **spec.parameters).interface or InterfaceConfig()
+        return look_at_file(spec.policy, **spec.parameters).interface
     policy = load_policy(spec.policy, spec.parameters)
     if not isinstance(policy, LearnedPolicy):
-        return InterfaceConfig()
+        return None
     policy.reset(world, stream_rng(spec.seed, Stream.POLICY))
-    config = policy.interface.config
-    # A policy that was trained without messages says none, so its actions have no columns for them.
-    return replace(config, message_size=0) if world.message_size and config.message_size is None else config
+    return policy.interface.config
 
 
 def record_dataset(

@@ -65,10 +65,16 @@ def _found(name: str) -> Any:
 
 
 def _imported(module: str) -> Any:
-    """Import a module, also from the current folder, which Python does not search for an installed command."""
+    """Import a module, also from the current folder, which Python does not search for an installed command.
+
+    The folder is searched last, so that no file in it hides what is installed.
+    """
     here = str(Path.cwd())
-    sys.path.insert(0, here)
+    is_new = here not in sys.path
+    if is_new:
+        sys.path.append(here)
     try:
         return import_module(module)
     finally:
-        sys.path.remove(here)
+        if is_new:
+            sys.path.remove(here)

@@ -3,10 +3,11 @@
 import pytest
 
 from metrics.benchmark import BenchmarkError, load_protocol
-from swarm_forage_env import SCENARIO_NAMES
+from swarm_forage_env import SCENARIO_NAMES, plan_run
+from swarm_forage_env.env import ForageEnv
 from tests.support.entries import TINY
 
-IDENTITY_OF_VERSION_1 = "66e6cac38a596d86"
+IDENTITY_OF_VERSION_1 = "8c641b8515a43882"
 """A change of worlds, seeds or lengths is another version: entries of this one must stay comparable."""
 
 
@@ -29,6 +30,15 @@ def test_held_out_worlds_differ_from_those_to_train_in(protocol):
         if not world.is_disturbed and any(world.scenario == known.scenario for known in given)
     ]
     assert same == []
+
+
+@pytest.mark.parametrize("policy", ["stochm", "stochx"])
+def test_controllers_with_caches_fit_into_every_world(protocol, policy):
+    """Those are the worlds that can refuse a controller: caches need room."""
+    calm = {world.group: world.scenario for world in protocol.worlds if not world.wrappers}
+    assert len(calm) > 5
+    for config in calm.values():
+        ForageEnv(plan_run(config, policy).scenario)
 
 
 def test_the_protocol_has_what_it_promises(protocol):

@@ -86,7 +86,7 @@ def test_amounts_and_distances_are_drawn_relative_to_performance_too(tmp_path, m
 
 
 def test_bands_are_two_standard_deviations_wide_and_drawn_on_request_only(tmp_path, monkeypatch):
-    (given,) = tables("mine")
+    (given,) = tables("mine", runs=((1.0, 2.0), (2.0, 4.0), (1.5, 2.5), (3.0, 3.5)))
     for band in (True, False):
         monkeypatch.undo()
         figure = drawn(monkeypatch, tmp_path / "scores.png", [given], band=band)
