@@ -24,6 +24,7 @@ from swarm_forage_env import (
 from swarm_forage_env.contract import own
 from swarm_forage_env.contract.own import OwnFunctionError
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
+from swarm_forage_env.training.datasets.recording import plan_dataset
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 from tests.support.branches import pickled
@@ -274,3 +275,9 @@ def test_a_plan_of_a_training_says_them():
     plan = TrainingPlan(scenario=scenario("warehouse_small", own_sensors=("both",)))
     assert plan.interface.own_sensors == ("both",)
     assert TrainingPlan.from_mapping(json.loads(json.dumps(plan.to_mapping()))) == plan
+
+
+@pytest.mark.parametrize(("policy", "shown"), [("ppo_warehouse_small", False), ("crw", True)])
+def test_a_data_set_shows_own_sensors_unless_a_learned_policy_saw_none(policy, shown):
+    world = scenario("warehouse_small", n_robots=6, own_sensors=("both",))
+    assert ("both" in plan_dataset(plan_run(world, policy), [1]).card.columns) == shown
