@@ -285,6 +285,8 @@ class Watch:
             if known is not None:
                 shown = ", in thin frames" if hasattr(policy, "remembered_places") else ""
                 lines.append(f"remembers: {known[robot]}{shown}")
+        elif (places := self._remembered_places(robot)) is not None:
+            lines.append(f"remembers: {len(places.objects_m) + len(places.caches_m)}, in thin frames")
         return lines or [f"{self._name} does not tell what its robots are doing"]
 
     def summary(self) -> str:

@@ -177,6 +177,13 @@ def test_tasks_are_told_where_there_are_some():
     assert "random does not tell what its robots are doing" in silent.scene().lines
 
 
+def test_what_a_trained_policy_remembers_is_told():
+    watch = Watch(SMALL, "generalist", size_px=240)
+    press(watch, "tab")
+    watch.step()
+    assert "remembers: 0, in thin frames" in watch.scene().lines
+
+
 def test_the_close_up_gets_closer_and_wider(watch):
     press(watch, "tab")
     middle = watch.scene().close_up
