@@ -58,7 +58,7 @@ class EntryPolicy:
     """One policy of an entry: one training seed of a learner."""
 
     name: str
-    """For people, see `policies.registry.policy_label`: of a file without folder and ending."""
+    """For people, see `swarm_forage_env.policies.registry.policy_label`: of a file without folder and ending."""
     digest: str = ""
     """Hash of the content of its file; of a mixed swarm those of all its files, joined by +. Empty without any file."""
     training_seed: int | None = None
