@@ -31,7 +31,7 @@ def test_saliency_refuses_what_is_no_network(command):
     Path("broken.npz").write_text("nothing")
     for name, message in (
         ("crw", "Expected a network, that is the name of a shipped one (generalist, ppo_warehouse_small) or an .npz file"),
-        ("nosuch", "the name of a shipped one (ppo_warehouse_small)"),
+        ("nosuch", "the name of a shipped one (generalist, ppo_warehouse_small)"),
         ("ppo_warehous_small", "Did you mean 'ppo_warehouse_small'?"),
         ("broken.npz", "Expected broken.npz to hold a network"),
         ("model.zip", "Expected a network"),
