@@ -30,7 +30,10 @@ def test_saliency_is_told_and_drawn(command, monkeypatch):
 def test_saliency_refuses_what_is_no_network(command):
     Path("broken.npz").write_text("nothing")
     for name, message in (
-        ("crw", "Expected a network, that is the name of a shipped one (generalist, ppo_warehouse_small) or an .npz file"),
+        (
+            "crw",
+            "Expected a network, that is the name of a shipped one (generalist, ppo_warehouse_small) or an .npz file",
+        ),
         ("nosuch", "the name of a shipped one (generalist, ppo_warehouse_small)"),
         ("ppo_warehous_small", "Did you mean 'ppo_warehouse_small'?"),
         ("broken.npz", "Expected broken.npz to hold a network"),
