@@ -22,7 +22,9 @@ def train(  # long: one parameter per option
     out: Annotated[Path | None, typer.Option(help="Folder of the training; default results/training/NAME.")] = None,
     plan: Annotated[
         str | None,
-        typer.Option(help="TOML file with a training plan, or name of a shipped policy, instead of all below."),
+        typer.Option(
+            help="TOML file with a training plan, or name of a shipped policy, instead of all below but --seed."
+        ),
     ] = None,
     scenario: Annotated[str | None, typer.Option(help="Preset; default warehouse_small.")] = None,
     algorithm: Annotated[str | None, typer.Option("--algo", help="ppo, a2c, dqn or sac; default ppo.")] = None,
@@ -30,7 +32,7 @@ def train(  # long: one parameter per option
         int | None, typer.Option(min=1, help=f"Decisions of single robots; default {DEFAULT_STEPS:,}.")
     ] = None,
     arenas: Annotated[int | None, typer.Option(min=1, help=f"Arenas side by side; default {DEFAULT_ARENAS}.")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything; default 0.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything; default 0, or that of --plan.")] = None,
     observation: Annotated[str | None, typer.Option(help="compact or full; default compact.")] = None,
     actions: Annotated[
         str | None, typer.Option(help="discrete or continuous; default discrete, for sac continuous.")
@@ -132,15 +134,16 @@ def train(  # long: one parameter per option
         wrappers=tuple(wrappers or ()),
         config_file=config,
     )
-    says_more = (scenario, options, words) != (
-        None,
-        TrainOptions(steps=steps),
-        ScenarioOptions(scenario=words.scenario),
-    )
-    if plan is not None and (says_more or steps is not None):
-        raise typer.BadParameter("Expected --plan without options that the plan decides; write them into its file.")
-    chosen = build_plan(words, options) if plan is None else named_plan(plan)
-    name = Path(plan).stem if plan is not None else f"{chosen.scenario.name}_{chosen.algorithm}"
+    plain = (None, ScenarioOptions(scenario=words.scenario))
+    says_more = (scenario, words) != plain or options != TrainOptions(steps=steps)
+    if plan is not None and ((scenario, words) != plain or options != TrainOptions(seed=seed)):
+        raise typer.BadParameter(
+            "Expected --plan without options that the plan decides, other than --seed; write them into its file."
+        )
+    chosen = build_plan(words, options) if plan is None else named_plan(plan, seed)
+    name = f"{chosen.scenario.name}_{chosen.algorithm}"
+    if plan is not None:
+        name = Path(plan).stem if seed is None else f"{Path(plan).stem}_seed_{seed}"
     folder = out or Path("results/training") / name
     if resume and plan is None:
         chosen = resumed_plan(folder, chosen if says_more else None, steps)

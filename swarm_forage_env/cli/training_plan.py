@@ -67,14 +67,15 @@ def _given(values: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-def named_plan(name: str) -> TrainingPlan:
-    """Return the plan of a file, or of a shipped policy by its name.
+def named_plan(name: str, seed: int | None = None) -> TrainingPlan:
+    """Return the plan of a file, or of a shipped policy by its name, with another seed if one is given.
 
     Raises:
         ConfigError: there is none, or it cannot be used.
     """
     shipped = plan_file(name)
-    return read_plan(Path(name) if shipped is None else shipped)
+    plan = read_plan(Path(name) if shipped is None else shipped)
+    return plan if seed is None else replace(plan, seed=seed)
 
 
 def resumed_plan(folder: Path, described: TrainingPlan | None, steps: int | None) -> TrainingPlan:

@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -93,6 +94,13 @@ def test_a_training_is_resumed_by_its_folder_alone(command):
     code, _, err = command(*TRUSTING, *TINY, "--steps", "400", "--seed", "3", "--out", "a", "--resume")
     assert (code, len(err.splitlines())) == (2, 1)
     assert "got others: seed: 0 before, 3 now. Without options" in err
+
+
+@needs_training
+def test_a_plan_is_carried_out_with_another_seed(command):
+    assert command("train", *TINY, "--out", "a")[0] == 0
+    assert command("train", "--plan", "a/plan.json", "--seed", "7")[0] == 0
+    assert read_plan(Path("results/training/plan_seed_7/plan.json")) == replace(read_plan(Path("a/plan.json")), seed=7)
 
 
 def test_without_the_training_library_the_message_says_what_to_install(command, monkeypatch):
