@@ -23,7 +23,7 @@ def train(  # long: one parameter per option
     plan: Annotated[
         str | None,
         typer.Option(
-            help="TOML file with a training plan, or name of a shipped policy, instead of all below but --seed."
+            help="TOML file with a training plan, or name of a shipped policy, instead of all below; but --seed counts."
         ),
     ] = None,
     scenario: Annotated[str | None, typer.Option(help="Preset; default warehouse_small.")] = None,
