@@ -51,7 +51,7 @@ def main() -> None:
         end += stage.steps
         model.learn(end - model.num_timesteps, reset_num_timesteps=False)
         model.save(checkpoint)
-    export_network(model, plan.interface).save(arguments.out)
+    export_network(model, plan.interface, samples=plan.samples).save(arguments.out)
 
 
 if __name__ == "__main__":

@@ -44,6 +44,20 @@ def train(  # long: one parameter per option
     decision_ticks: Annotated[
         int | None, typer.Option(min=1, help=f"Ticks per decision; default {DECISION_TICKS}.")
     ] = None,
+    site_memory: Annotated[
+        bool | None,
+        typer.Option(
+            "--site-memory/--no-site-memory", help="Whether robots remember two places with objects; default yes."
+        ),
+    ] = None,
+    samples: Annotated[
+        bool | None,
+        typer.Option(
+            "--drawn-actions/--likeliest-actions",
+            help="Whether the trained policy draws its actions by their probabilities, or takes the likeliest; default "
+            "drawn where it has probabilities (ppo, a2c).",
+        ),
+    ] = None,
     evaluate_every: Annotated[
         int | None,
         typer.Option(
@@ -116,6 +130,8 @@ def train(  # long: one parameter per option
         actions=actions,
         automatic_gripper=automatic_gripper,
         decision_ticks=decision_ticks,
+        site_memory=site_memory,
+        samples=samples,
         evaluate_every=evaluate_every,
         evaluation_horizon=evaluation_horizon,
         small_start=small_start,

@@ -30,7 +30,7 @@ from swarm_forage_env.training.defaults import (
     EVALUATION_SHARE,
 )
 from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
-from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.training.plan import SAMPLING, EvaluationPlan, Stage, TrainingPlan
 from swarm_forage_env.views.learner_arena import DEFAULT_SCENARIO
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
@@ -51,6 +51,8 @@ DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
     "sac": {"buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 1024},
 }
 """Arguments that suit hundreds of robots at once; our choice, the rest is the library's."""
+TRAINING_PHYSICS = "compiled"
+"""What moves the bodies in training: the model of contact is the same as Chipmunk's, and it takes a part of the time."""
 SMALL_START = 0.4
 """Share of its size that an arena has in a small start; our choice."""
 
@@ -69,6 +71,7 @@ def recipe(
     small_start: bool | None = None,
     evaluation: EvaluationPlan | Mapping[str, Any] | None = None,
     seed: int = 0,
+    samples: bool | None = None,
     **overrides: Any,
 ) -> TrainingPlan:
     """Return the plan of a training in a scenario, or in many.
@@ -85,7 +88,7 @@ def recipe(
         n_arenas: Arenas side by side.
         interface: What a learner sees and does: an `InterfaceConfig`, or fields by name that differ from the
             recipe's (compact observations, discrete actions or for sac continuous ones, an automatic gripper,
-            `DECISION_TICKS`).
+            `DECISION_TICKS`, site memory).
         wrappers: What disturbs the swarm, in training and in evaluations: configurations, or words as on the command
             line ("population:death_per_tick=0.01").
         hidden: Sizes of the hidden layers.
@@ -94,8 +97,11 @@ def recipe(
         evaluation: How the policy is judged meanwhile: an `EvaluationPlan`, or fields by name that differ from the
             recipe's (whole runs, as often as `EVALUATE_EVERY` and `EVALUATION_SHARE` allow).
         seed: Seed of everything.
+        samples: Whether the trained policy draws its actions, see `TrainingPlan.samples`; default where it can: discrete
+            actions of ppo and a2c.
         overrides: Scenario fields by name; they go before the recipe's (`nest_progress=0.1`). `horizon_s` is the length
-            of the episodes; evaluations last as long as the scenario.
+            of the episodes; evaluations last as long as the scenario. Where nothing is said of `physics`, stages have
+            `TRAINING_PHYSICS` and evaluations those of the scenario.
 
     Raises:
         ConfigError: an unknown name or field, values that are refused by what they are for (see `TrainingPlan`), or
@@ -111,7 +117,11 @@ def recipe(
     measured = Measured() if isinstance(scenario, ScenarioConfig) else measured_recipe(scenario)
     fields = {name: value for name, value in overrides.items() if name != "horizon_s"}
     config = _training_scenario(scenario, fields, measured)
-    episodes = {} if isinstance(scenario, ScenarioConfig) else {"horizon_s": measured.episode_s}
+    episodes: dict[str, Any] = {}
+    if not isinstance(scenario, ScenarioConfig):
+        episodes = {"horizon_s": measured.episode_s}
+        if "physics" not in overrides:
+            episodes["physics"] = TRAINING_PHYSICS
     episodes |= {name: value for name, value in overrides.items() if name not in fields}
     with_overrides(config, **episodes)  # refuses an impossible length
     chosen = chosen_interface(interface, _default_interface(algorithm))
@@ -134,8 +144,14 @@ def recipe(
         ),
         evaluation=_evaluation(evaluation, config, chosen.decision_ticks, sampler),
         seed=seed,
+        samples=_can_draw(algorithm, chosen) if samples is None else samples,
         sampler=sampler,
     )
+
+
+def _can_draw(algorithm: str, interface: InterfaceConfig) -> bool:
+    """Return whether a policy has probabilities to draw its actions by."""
+    return algorithm in SAMPLING and interface.actions == "discrete"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -205,6 +221,7 @@ def _default_interface(algorithm: str) -> InterfaceConfig:
         actions="continuous" if algorithm == "sac" else "discrete",
         automatic_gripper=True,
         decision_ticks=DECISION_TICKS,
+        site_memory=True,
     )
 
 

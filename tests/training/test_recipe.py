@@ -19,8 +19,9 @@ from swarm_forage_env.training.recipe import recipe, small_arena
 def test_defaults_are_what_a_driver_needs():
     plan = recipe()
     assert plan.interface == InterfaceConfig(
-        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, own_sensors=()
-    )
+        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, own_sensors=(),
+        site_memory=True,
+    )  # fmt: skip
     assert (plan.algorithm, plan.n_arenas, plan.hidden, plan.seed) == ("ppo", 8, (64, 64), 0)
     assert plan.options == {
         "n_steps": 128,
@@ -40,8 +41,8 @@ def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first()
     plan = recipe("warehouse_small")
     assert plan.scenario == warehouse_small(nest_progress=0.05, first_pickup=1.0)
     assert plan.stages == (
-        Stage(steps=1_666_666, scenario={**small_arena(plan.scenario), "horizon_s": 1000.0}),
-        Stage(steps=3_333_334, scenario={"horizon_s": 1000.0}),
+        Stage(steps=1_666_666, scenario={**small_arena(plan.scenario), "horizon_s": 1000.0, "physics": "compiled"}),
+        Stage(steps=3_333_334, scenario={"horizon_s": 1000.0, "physics": "compiled"}),
     )
     assert plan == recipe("warehouse_small", small_start=True, nest_progress=0.05, first_pickup=1.0)
 
@@ -74,6 +75,34 @@ def test_a_horizon_is_that_of_the_episodes_and_not_of_the_evaluations():
         assert plan.scenario.horizon_s == 10_000.0
     with pytest.raises(ConfigError, match="horizon_s"):
         recipe(horizon_s=-1.0)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "actions", "draws"),
+    [
+        ("ppo", "discrete", True),
+        ("a2c", "discrete", True),
+        ("ppo", "continuous", False),
+        ("dqn", "discrete", False),
+        ("sac", "continuous", False),
+    ],
+)
+def test_policies_draw_their_actions_where_they_have_probabilities(algorithm, actions, draws):
+    assert recipe(algorithm=algorithm, interface={"actions": actions}).samples is draws
+    assert not recipe(algorithm=algorithm, interface={"actions": actions}, samples=False).samples
+    if not draws:
+        with pytest.raises(ConfigError, match="samples only with discrete actions of ppo or a2c"):
+            recipe(algorithm=algorithm, interface={"actions": actions}, samples=True)
+
+
+def test_trainings_have_compiled_bodies_and_evaluations_what_was_asked_for():
+    plan = recipe("search_and_rescue")
+    assert {stage.scenario["physics"] for stage in plan.stages} == {"compiled"}
+    assert {spec.scenario.physics for spec in plan.judging_runs("crw")} == {"chipmunk"}
+    for engine in ("chipmunk", "compiled"):
+        asked = recipe("search_and_rescue", physics=engine)
+        trained_in = {with_overrides(asked.scenario, **stage.scenario).physics for stage in asked.stages}
+        assert trained_in == {spec.scenario.physics for spec in asked.judging_runs("crw")} == {engine}
 
 
 @pytest.mark.parametrize("name", ["warehouse_medium", "search_and_rescue"])
@@ -114,8 +143,10 @@ def test_a_complete_configuration_is_taken_as_it_is():
 
 def test_an_interface_is_given_whole_or_by_what_differs():
     assert recipe(interface={"decision_ticks": 2}).interface == InterfaceConfig(
-        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=2, own_sensors=()
-    )
+        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=2, own_sensors=(),
+        site_memory=True,
+    )  # fmt: skip
+    assert not recipe(interface={"site_memory": False}).interface.site_memory
     numbered = InterfaceConfig(actions="discrete", own_sensors=())
     assert recipe(interface=numbered).interface is numbered
     with pytest.raises(ConfigError, match="Did you mean 'decision_ticks'"):
@@ -136,7 +167,7 @@ def test_the_other_arguments_reach_the_plan():
         seed=3,
     )
     assert (plan.algorithm, plan.n_arenas, plan.hidden, plan.seed) == ("dqn", 3, (8,), 3)
-    assert (plan.stages, plan.evaluation) == ((Stage(steps=300, scenario={"horizon_s": 1000.0}),), evaluation)
+    assert (plan.stages, plan.evaluation) == ((Stage(steps=300, scenario=plan.stages[0].scenario),), evaluation)
     assert [config.name for config in plan.wrappers] == ["sensor_noise"]
     assert (plan.options["gamma"], plan.options["train_freq"]) == (0.9, 4)
 
