@@ -1,7 +1,8 @@
 """The recipe by which `swarm-forage train` makes its plans: defaults that were seen to learn, for Python, too.
 
 Deliveries are too rare to learn from them alone. Where they count, the recipe also rewards first pick-ups and the way
-home, and begins in a smaller arena. `recipes.toml` holds what was measured to suit single scenarios better.
+home, and begins in a smaller arena. The last third of a training learns more slowly. `recipes.toml` holds what was
+measured to suit single scenarios better.
 """
 
 import dataclasses
@@ -51,8 +52,10 @@ DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
     "sac": {"buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 1024},
 }
 """Arguments that suit hundreds of robots at once; our choice, the rest is the library's."""
+LATE_OPTIONS: dict[str, dict[str, Any]] = {"ppo": {"learning_rate": 0.0003, "gamma": 0.995}}
+"""Arguments of an algorithm in the last third of a training: smaller steps, further ahead; our choice."""
 TRAINING_PHYSICS = "compiled"
-"""What moves the bodies in training: the model of contact is the same as Chipmunk's, and it takes a part of the time."""
+"""What moves the bodies in training: contact follows the same model as with Chipmunk, in a part of the time."""
 SMALL_START = 0.4
 """Share of its size that an arena has in a small start; our choice."""
 
@@ -92,13 +95,13 @@ def recipe(
         wrappers: What disturbs the swarm, in training and in evaluations: configurations, or words as on the command
             line ("population:death_per_tick=0.01").
         hidden: Sizes of the hidden layers.
-        options: Arguments of the algorithm that differ from `DEFAULT_OPTIONS`.
+        options: Arguments of the algorithm that differ from `DEFAULT_OPTIONS` and, to the end, from `LATE_OPTIONS`.
         small_start: Spend the first third of the steps in a smaller arena; default where deliveries count.
         evaluation: How the policy is judged meanwhile: an `EvaluationPlan`, or fields by name that differ from the
             recipe's (whole runs, as often as `EVALUATE_EVERY` and `EVALUATION_SHARE` allow).
         seed: Seed of everything.
-        samples: Whether the trained policy draws its actions, see `TrainingPlan.samples`; default where it can: discrete
-            actions of ppo and a2c.
+        samples: Whether the trained policy draws its actions, see `TrainingPlan.samples`; default where it can:
+            discrete actions of ppo and a2c.
         overrides: Scenario fields by name; they go before the recipe's (`nest_progress=0.1`). `horizon_s` is the length
             of the episodes; evaluations last as long as the scenario. Where nothing is said of `physics`, stages have
             `TRAINING_PHYSICS` and evaluations those of the scenario.
@@ -140,6 +143,9 @@ def recipe(
             config,
             steps,
             episodes,
+            late={
+                name: value for name, value in LATE_OPTIONS.get(algorithm, {}).items() if name not in (options or {})
+            },
             small_start=counts_deliveries and sampler is None if small_start is None else small_start,
         ),
         evaluation=_evaluation(evaluation, config, chosen.decision_ticks, sampler),
@@ -241,10 +247,24 @@ def _fitting_batch(n_samples: int, most: int) -> int:
 
 
 def _stages(
-    scenario: ScenarioConfig, steps: int, episodes: Mapping[str, Any], *, small_start: bool
+    scenario: ScenarioConfig,
+    steps: int,
+    episodes: Mapping[str, Any],
+    *,
+    late: Mapping[str, Any],
+    small_start: bool,
 ) -> tuple[Stage, ...]:
+    """Return a third of the steps in a smaller arena if asked for, and a third with the `late` options if any."""
+    third = max(1, steps // 3)
+    middle = Stage(steps=max(1, steps - third * (small_start + bool(late))), scenario=episodes)
+    stages = (middle, Stage(steps=third, scenario=episodes, options=late)) if late else (middle,)
     if not small_start:
-        return (Stage(steps=steps, scenario=episodes),)
+        return stages
+    return (Stage(steps=third, scenario={**_fitting_small_arena(scenario), **episodes}), *stages)
+
+
+def _fitting_small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
+    """Return `small_arena`; raises ConfigError where there cannot be one."""
     if scenario.objects.object_positions_m:
         raise ConfigError(
             "Expected no object_positions_m where a training begins in a smaller arena (small_start), which may not "
@@ -258,10 +278,7 @@ def _stages(
             f"Cannot begin in a smaller arena (small_start) of {small['width_m']} x {small['height_m']} m: {error} "
             "Or train in the whole arena from the beginning: small_start=False (--no-small-start)."
         ) from error
-    return (
-        Stage(steps=max(1, steps // 3), scenario={**small, **episodes}),
-        Stage(steps=steps - steps // 3, scenario=episodes),
-    )
+    return small
 
 
 def small_arena(scenario: ScenarioConfig) -> dict[str, Any]:

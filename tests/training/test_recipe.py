@@ -13,7 +13,7 @@ from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario, warehouse_small
 from swarm_forage_env.training.defaults import EVALUATE_EVERY
 from swarm_forage_env.training.plan import ALGORITHMS, EvaluationPlan, Stage
-from swarm_forage_env.training.recipe import recipe, small_arena
+from swarm_forage_env.training.recipe import LATE_OPTIONS, recipe, small_arena
 
 
 def test_defaults_are_what_a_driver_needs():
@@ -42,15 +42,16 @@ def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first()
     assert plan.scenario == warehouse_small(nest_progress=0.05, first_pickup=1.0)
     assert plan.stages == (
         Stage(steps=1_666_666, scenario={**small_arena(plan.scenario), "horizon_s": 1000.0, "physics": "compiled"}),
-        Stage(steps=3_333_334, scenario={"horizon_s": 1000.0, "physics": "compiled"}),
+        Stage(steps=1_666_668, scenario={"horizon_s": 1000.0, "physics": "compiled"}),
+        Stage(steps=1_666_666, scenario={"horizon_s": 1000.0, "physics": "compiled"}, options=LATE_OPTIONS["ppo"]),
     )
     assert plan == recipe("warehouse_small", small_start=True, nest_progress=0.05, first_pickup=1.0)
 
 
 def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
-    plan = recipe("search_and_rescue", interference=0.0)
+    plan = recipe("search_and_rescue", interference=0.0, delivery=0.0, nest_progress=0.0)
     assert plan.scenario == scenario("search_and_rescue")
-    assert [stage.steps for stage in plan.stages] == [5_000_000]
+    assert [stage.steps for stage in plan.stages] == [3_333_334, 1_666_666]
     counting = recipe("search_and_rescue", performance="collected", side_m=64.0)
     assert counting.scenario.reward.nest_progress == 0.05
 
@@ -71,10 +72,21 @@ def test_rewards_that_are_given_go_before_those_of_the_recipe(overrides, expecte
 def test_a_horizon_is_that_of_the_episodes_and_not_of_the_evaluations():
     for given in ("warehouse_small", warehouse_small()):
         plan = recipe(given, horizon_s=400.0)
-        assert [stage.scenario["horizon_s"] for stage in plan.stages] == [400.0, 400.0]
+        assert [stage.scenario["horizon_s"] for stage in plan.stages] == [400.0] * 3
         assert plan.scenario.horizon_s == 10_000.0
     with pytest.raises(ConfigError, match="horizon_s"):
         recipe(horizon_s=-1.0)
+
+
+def test_the_last_third_learns_more_slowly_unless_people_say_how_fast():
+    assert [dict(stage.options) for stage in recipe().stages] == [{}, {}, {"learning_rate": 0.0003, "gamma": 0.995}]
+    plan = recipe(options={"learning_rate": 0.01}, small_start=False)
+    assert [dict(stage.options) for stage in plan.stages] == [{}, {"gamma": 0.995}]
+    assert plan.options["learning_rate"] == 0.01
+    assert [dict(stage.options) for stage in recipe(options=LATE_OPTIONS["ppo"]).stages] == [{}, {}]
+    assert [dict(stage.options) for stage in recipe(algorithm="dqn").stages] == [{}, {}]
+    for steps in (1, 2, 3, 4, 100):
+        assert sum(stage.steps for stage in recipe(steps=steps).stages) == max(3, steps)
 
 
 @pytest.mark.parametrize(
@@ -137,7 +149,7 @@ def test_large_swarms_are_evaluated_less_often():
 def test_a_complete_configuration_is_taken_as_it_is():
     config = warehouse_small(n_robots=7, interference=-0.1)
     assert recipe(config).scenario == config
-    assert [stage.scenario.get("horizon_s") for stage in recipe(config).stages] == [None, None]
+    assert [stage.scenario.get("horizon_s") for stage in recipe(config).stages] == [None] * 3
     assert recipe(config, n_objects=30).scenario == with_overrides(config, n_objects=30)
 
 
@@ -209,7 +221,7 @@ def test_a_small_start_keeps_proportions(name, expected):
 def test_a_small_start_that_cannot_hold_the_objects_is_refused():
     with pytest.raises(ConfigError, match=r"objects for placement .* small_start=False"):
         recipe("warehouse_small", n_objects=800, small_start=True)
-    assert len(recipe("warehouse_small", n_objects=800, small_start=False).stages) == 1
+    assert len(recipe("warehouse_small", n_objects=800, small_start=False).stages) == 2
 
 
 def test_a_small_start_keeps_thin_walls_as_thick_as_walls_must_be():
@@ -224,4 +236,4 @@ def test_a_small_start_refuses_places_of_objects_that_it_may_not_hold():
     places = {"placement": "positions", "object_positions_m": ((8.0, 4.0), (8.0, 12.0)), "n_objects": 2}
     with pytest.raises(ConfigError, match=r"object_positions_m .*--no-small-start"):
         recipe("warehouse_small", **places)
-    assert len(recipe("warehouse_small", small_start=False, **places).stages) == 1
+    assert len(recipe("warehouse_small", small_start=False, **places).stages) == 2
