@@ -73,10 +73,9 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         f"recipe_{short}_{seed}": (
             (
                 f"swarm-forage train --scenario {name} --seed {seed} {COMPILED} --out trained",
-                f"python {ROOT}/scripts/likeliest.py trained/policy.npz likeliest.npz",
-                f"swarm-forage run --scenario {name} --policy trained/policy.npz,likeliest.npz --seeds 4 {COMPILED}",
+                f"swarm-forage run --scenario {name} --policy trained/policy.npz --seeds 4 {COMPILED}",
             ),
-            ("policy", "likeliest"),
+            ("policy",),
         )
         for short, name in SCENARIOS.items()
         for seed in (0, 1)

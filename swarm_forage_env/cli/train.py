@@ -31,7 +31,9 @@ def train(  # long: one parameter per option
     steps: Annotated[
         int | None, typer.Option(min=1, help=f"Decisions of single robots; default {DEFAULT_STEPS:,}.")
     ] = None,
-    arenas: Annotated[int | None, typer.Option(min=1, help=f"Arenas side by side; default {DEFAULT_ARENAS}.")] = None,
+    arenas: Annotated[
+        int | None, typer.Option(min=1, help=f"Arenas side by side; default {DEFAULT_ARENAS}, fewer of large swarms.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything; default 0, or that of --plan.")] = None,
     observation: Annotated[str | None, typer.Option(help="compact or full; default compact.")] = None,
     actions: Annotated[

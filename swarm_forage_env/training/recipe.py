@@ -25,6 +25,7 @@ from swarm_forage_env.training.defaults import (
     DEFAULT_ARENAS,
     DEFAULT_HIDDEN,
     DEFAULT_REWARDS,
+    DEFAULT_ROBOTS,
     DEFAULT_STEPS,
     EPISODE_S,
     EVALUATE_EVERY,
@@ -66,7 +67,7 @@ def recipe(
     sampler: ScenarioSampler | None = None,
     algorithm: str = "ppo",
     steps: int = DEFAULT_STEPS,
-    n_arenas: int = DEFAULT_ARENAS,
+    n_arenas: int | None = None,
     interface: GivenInterface = None,
     wrappers: Iterable[WrapperConfig | str] = (),
     hidden: tuple[int, ...] = DEFAULT_HIDDEN,
@@ -88,7 +89,8 @@ def recipe(
             of each name that it draws, unless `evaluation` has worlds.
         algorithm: One of `plan.ALGORITHMS`.
         steps: Decisions of single robots in all stages.
-        n_arenas: Arenas side by side.
+        n_arenas: Arenas side by side; default `DEFAULT_ARENAS`, fewer of swarms that make more than `DEFAULT_ROBOTS`
+            in all.
         interface: What a learner sees and does: an `InterfaceConfig`, or fields by name that differ from the
             recipe's (compact observations, discrete actions or for sac continuous ones, an automatic gripper,
             `DECISION_TICKS`, site memory).
@@ -96,7 +98,8 @@ def recipe(
             line ("population:death_per_tick=0.01").
         hidden: Sizes of the hidden layers.
         options: Arguments of the algorithm that differ from `DEFAULT_OPTIONS` and, to the end, from `LATE_OPTIONS`.
-        small_start: Spend the first third of the steps in a smaller arena; default where deliveries count.
+        small_start: Spend the first third of the steps in a smaller arena; default where deliveries count, unless
+            `recipes.toml` says otherwise.
         evaluation: How the policy is judged meanwhile: an `EvaluationPlan`, or fields by name that differ from the
             recipe's (whole runs, as often as `EVALUATE_EVERY` and `EVALUATION_SHARE` allow).
         seed: Seed of everything.
@@ -128,7 +131,9 @@ def recipe(
     episodes |= {name: value for name, value in overrides.items() if name not in fields}
     with_overrides(config, **episodes)  # refuses an impossible length
     chosen = chosen_interface(interface, _default_interface(algorithm))
-    counts_deliveries = config.performance == "collected"
+    n_arenas = _default_arenas(config, sampler) if n_arenas is None else n_arenas
+    if small_start is None:
+        small_start = config.performance == "collected" and sampler is None and measured.small_start
     return TrainingPlan(
         scenario=config,
         wrappers=wrapper_configs(wrappers),
@@ -146,13 +151,20 @@ def recipe(
             late={
                 name: value for name, value in LATE_OPTIONS.get(algorithm, {}).items() if name not in (options or {})
             },
-            small_start=counts_deliveries and sampler is None if small_start is None else small_start,
+            small_start=small_start,
         ),
         evaluation=_evaluation(evaluation, config, chosen.decision_ticks, sampler),
         seed=seed,
         samples=_can_draw(algorithm, chosen) if samples is None else samples,
         sampler=sampler,
     )
+
+
+def _default_arenas(scenario: ScenarioConfig, sampler: ScenarioSampler | None) -> int:
+    """Return how many arenas are side by side; a sampler needs many, so that every batch holds all kinds of worlds."""
+    if sampler is not None:
+        return DEFAULT_ARENAS
+    return min(DEFAULT_ARENAS, max(1, DEFAULT_ROBOTS // scenario.robots.n_robots))
 
 
 def _can_draw(algorithm: str, interface: InterfaceConfig) -> bool:
@@ -170,6 +182,8 @@ class Measured:
     """Fields of `RewardConfig` by name."""
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     """Arguments by algorithm."""
+    small_start: bool = True
+    """Whether a training begins in a smaller arena where deliveries count."""
 
 
 @cache

@@ -1,5 +1,6 @@
 """The recipe for a training: its defaults, what overrides them, and the smaller arena it begins in."""
 
+import dataclasses
 import tomllib
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario, warehouse_small
 from swarm_forage_env.training.defaults import EVALUATE_EVERY
 from swarm_forage_env.training.plan import ALGORITHMS, EvaluationPlan, Stage
-from swarm_forage_env.training.recipe import LATE_OPTIONS, recipe, small_arena
+from swarm_forage_env.training.recipe import LATE_OPTIONS, Measured, recipe, small_arena
 
 
 def test_defaults_are_what_a_driver_needs():
@@ -117,6 +118,12 @@ def test_trainings_have_compiled_bodies_and_evaluations_what_was_asked_for():
         assert trained_in == {spec.scenario.physics for spec in asked.judging_runs("crw")} == {engine}
 
 
+@pytest.mark.parametrize(("n_robots", "n_arenas"), [(4, 8), (50, 8), (51, 7), (115, 3), (200, 2), (1000, 1)])
+def test_large_swarms_have_fewer_arenas(n_robots, n_arenas):
+    assert recipe("warehouse_medium", n_robots=n_robots).n_arenas == n_arenas
+    assert recipe("warehouse_medium", n_robots=n_robots, n_arenas=5).n_arenas == 5
+
+
 @pytest.mark.parametrize("name", ["warehouse_medium", "search_and_rescue"])
 def test_what_was_measured_for_a_scenario_goes_before_the_general_recipe(name):
     plan = recipe(name)
@@ -130,11 +137,16 @@ def test_what_was_measured_for_a_scenario_goes_before_the_general_recipe(name):
     assert recipe(scenario(name)).scenario == scenario(name)
 
 
+def test_a_small_start_is_left_out_where_that_was_measured_to_be_better():
+    assert len(recipe("warehouse_medium").stages) == 2
+    assert len(recipe("warehouse_medium", small_start=True).stages) == 3
+
+
 def test_measured_recipes_are_of_presets_and_of_algorithms():
     tables = tomllib.loads((Path(training.__file__).parent / "recipes.toml").read_text())
     assert tables.keys() <= set(SCENARIO_NAMES)
     for table in tables.values():
-        assert table.keys() == {"episode_s", "rewards", "options"}
+        assert table.keys() <= {field.name for field in dataclasses.fields(Measured)}
         assert table["options"].keys() <= set(ALGORITHMS)
 
 
