@@ -148,9 +148,7 @@ def recipe(
             config,
             steps,
             episodes,
-            late={
-                name: value for name, value in LATE_OPTIONS.get(algorithm, {}).items() if name not in (options or {})
-            },
+            late=_late_options(algorithm, options or {}),
             small_start=small_start,
         ),
         evaluation=_evaluation(evaluation, config, chosen.decision_ticks, sampler),
@@ -165,6 +163,11 @@ def _default_arenas(scenario: ScenarioConfig, sampler: ScenarioSampler | None) -
     if sampler is not None:
         return DEFAULT_ARENAS
     return min(DEFAULT_ARENAS, max(1, DEFAULT_ROBOTS // scenario.robots.n_robots))
+
+
+def _late_options(algorithm: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `LATE_OPTIONS` but for those that are given, which hold to the end."""
+    return {name: value for name, value in LATE_OPTIONS.get(algorithm, {}).items() if name not in given}
 
 
 def _can_draw(algorithm: str, interface: InterfaceConfig) -> bool:
