@@ -152,15 +152,14 @@ def test_kinds_can_be_drawn():
     world = SampledWorld(scenario={"preset": "warehouse_small", "robot_kinds": kinds})
     worlds = ScenarioSampler(worlds=(world,))
     again = ScenarioSampler.from_mapping(json.loads(json.dumps(worlds.to_mapping())))
-    found = [worlds.world_of(seed).scenario.robots.robot_kinds for seed in range(20)]
-    assert found == [again.world_of(seed).scenario.robots.robot_kinds for seed in range(20)]
+    found = [worlds.world_of(seed)[0].robots.robot_kinds for seed in range(20)]
+    assert found == [again.world_of(seed)[0].robots.robot_kinds for seed in range(20)]
     assert {hauler for _, hauler in found} == {HAULER}
     shares, speeds = zip(*((slow.share, slow.speed) for slow, _ in found), strict=True)
     assert len(set(shares)) == len(set(speeds)) == 20
     assert 0.1 <= min(shares) < max(shares) <= 0.9
+    too_fast = [{"name": "slow", "speed": {"uniform": [0.5, 2.0]}}]
     with pytest.raises(ConfigError, match=r"robot_kinds\.0\.speed = 2"):
-        SampledWorld(
-            scenario={"preset": "warehouse_small", "robot_kinds": [{"name": "slow", "speed": {"uniform": [0.5, 2.0]}}]}
-        )
+        ScenarioSampler(worlds=(SampledWorld(scenario={"preset": "warehouse_small", "robot_kinds": too_fast}),))
     with pytest.raises(ConfigError, match="either all or none two or more robot_kinds"):
         ScenarioSampler(worlds=(world, SampledWorld(scenario="warehouse_small")))
