@@ -29,6 +29,7 @@ from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.kinds import blank
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
 from swarm_forage_env.world.kernels.world import World
+from swarm_forage_env.world.kinds import blank_boxes
 from swarm_forage_env.world.neighbourhood import Neighbourhood
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.placement import draw_source, place_all, place_objects, static_cache_centres
@@ -47,6 +48,7 @@ class ForagingArena:
         config: The scenario.
         layout: Layout of the observation rows.
         reads: Names of the observation slices that are used; sensors of others may stay zero.
+        blanks: (B, 4) what robots of some kinds cannot observe, see `kernels.kinds.blank`.
         tick: Ticks done since reset.
         swarm, objects, caches, events: The state; read freely, write through the methods.
         obs: (N, D) the observation, rewritten in every tick.
@@ -70,6 +72,7 @@ class ForagingArena:
         self.config = config
         self.layout = layout_for(config)
         self.reads = read_slices(reads, self.layout)
+        self.blanks = blank_boxes(config.robots, self.layout)
         self._own_names = tuple(name for name in config.robots.own_sensors if name in self.reads)
         further = {NEIGHBOURS, MESSAGES, *config.robots.own_sensors}
         self._needs_python = not further.isdisjoint(self.reads)
@@ -303,11 +306,6 @@ class ForagingArena:
     def needs_python(self) -> bool:
         """Whether Python is needed in every tick: for neighbours, messages or sensors of the user."""
         return self._needs_python
-
-    @property
-    def blanks(self) -> IntArray:
-        """What robots of some kinds cannot observe, (B, 4): see `kernels.kinds.blank`."""
-        return self._world.sensors.blanks
 
     # For `world.rack`
 
