@@ -123,7 +123,7 @@ class InterfaceConfig:
             unique_names("interface.own_sensors", self.own_sensors)
 
     def for_scenario(self, scenario: ScenarioConfig) -> "InterfaceConfig":
-        """Return these choices with what the scenario has of neighbours, messages, kinds, own sensors; not where told.
+        """Return these choices, with what the scenario has of neighbours, messages, kinds and own sensors unless told.
 
         What a scenario does not have stays None; own sensors are then empty.
 
