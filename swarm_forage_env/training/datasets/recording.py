@@ -89,7 +89,12 @@ class DatasetPlan:
 
 
 def plan_dataset(
-    spec: RunSpec, seeds: Sequence[int], *, observation: str | None = None, compress: bool = False
+    spec: RunSpec,
+    seeds: Sequence[int],
+    *,
+    observation: str | None = None,
+    site_memory: bool | None = None,
+    compress: bool = False,
 ) -> DatasetPlan:
     """Plan a data set. The policy is opened to see how it decides.
 
@@ -102,6 +107,8 @@ def plan_dataset(
         observation: "full" or "compact": what is recorded instead of what a learned policy sees, or of "full". All
             neighbours and own sensors of the scenario are then recorded for a learned policy, too, unless it says
             which ones it sees.
+        site_memory: Whether the columns of `InterfaceConfig.site_memory` are recorded; None = those that a learned
+            policy sees, none for others.
         compress: See `DatasetPlan`.
 
     Raises:
@@ -115,6 +122,8 @@ def plan_dataset(
         raise ConfigError(f"Expected different seeds, at most {MOST_SEEDS:,}, got {len(seeds)} of them.")
     world = SwarmSpec.of(spec.scenario)
     config = _interface_of(spec, world, observation)
+    if site_memory is not None:
+        config = replace(config, site_memory=site_memory)
     interface = LearnerInterface(config, world)
     space = interface.action_space
     parts: dict[str, int] = {}
