@@ -215,7 +215,13 @@ class _Walker:
         self.first_counters = env.events.counters.copy()
         self.driver.reset(env, stream_rng(world.seed, Stream.POLICY))
         self.is_over = False
-        self.deepest = look_at(env, self._obs)
+        self._objects = b""
+        self._look()
+
+    def _look(self) -> None:
+        """Check what holds after every tick."""
+        deepest, self._objects = look_at(self._env, self._obs, self._objects)
+        self.deepest = max(self.deepest, deepest)
 
     def _take(self, rows: dict[str, np.ndarray]) -> None:
         """Keep the rows of agents; those that have left have zeros."""
@@ -246,7 +252,7 @@ class _Walker:
             actions = self.driver.act(self._env, self._obs)
             shown = self._by_dict(actions) if self._by_dicts else self._by_array(actions)
             if self._is_looked_at:
-                self.deepest = max(self.deepest, look_at(self._env, self._obs))
+                self._look()
             self.digests.append(self._digest(shown))
         return self.digests[first:]
 
