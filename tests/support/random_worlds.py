@@ -103,6 +103,8 @@ def _drawn(random: Random, driver: str, most_ticks: int) -> RandomWorld:
     if driver not in SCRIPTED and random.random() < 0.15:
         sampler = random_sampler(random, config, most_ticks)
         config, wrappers = sampler.world_of(seed)
+        if any(corner.objects.placement == "power_law" for corner in sampler.corners):
+            _steps_of_batch(sampler, seed % 2**31)  # refuses clusters without room
     return RandomWorld(
         scenario=config,
         wrappers=wrappers,
