@@ -298,7 +298,8 @@ def _check_columns(built: list[ScenarioConfig], largest: ScenarioConfig) -> None
             raise ConfigError(
                 f"Expected worlds with the same columns of observations, got {_said_columns(expected)} in "
                 f"{largest.name} and {_said_columns(columns_of(config))} in {config.name}; give all worlds the same "
-                "neighbours_seen, neighbour_range_m, message_size and own_sensors."
+                "neighbours_seen, neighbour_range_m, message_size and own_sensors, and either all or none two or more "
+                "robot_kinds."
             )
 
 
@@ -339,6 +340,6 @@ def _said(fields: Mapping[str, Any], values: Mapping[str, Any]) -> str:
     for name in drawn_names(fields):
         value: Any = values
         for key in name.split("."):
-            value = value[key]
+            value = value[int(key)] if isinstance(value, tuple) else value[key]
         said.append(f"{name} = {value}")
     return ", ".join(said) or "these values"
