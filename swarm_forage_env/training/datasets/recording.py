@@ -152,7 +152,12 @@ def _interface_of(spec: RunSpec, world: SwarmSpec, observation: str | None) -> I
     config = replace(config, message_size=config.message_size or 0)
     if observation is None:
         # Of what else it says nothing, it sees nothing; `for_scenario` would write down what it never saw.
-        config = replace(config, neighbours_seen=config.neighbours_seen or 0, own_sensors=config.own_sensors or ())
+        config = replace(
+            config,
+            neighbours_seen=config.neighbours_seen or 0,
+            sees_kind=bool(config.sees_kind),
+            own_sensors=config.own_sensors or (),
+        )
     else:
         config = replace(config, observation=observation)
     return config.for_scenario(spec.scenario)
