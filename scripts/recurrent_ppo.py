@@ -55,7 +55,7 @@ class UsedRows(VecEnvWrapper):
         """Step every arena; refuses worlds in which robots come and go, because they would teach while away."""
         obs, rewards, dones, infos = self.venv.step_wait()
         if not np.array_equal(np.flatnonzero(self.venv.active), self._used):
-            raise SystemExit("Expected worlds with fixed numbers of robots without failures, got robots that come or go.")
+            raise SystemExit("Expected worlds with fixed numbers of robots, got robots that come or go.")
         return obs[self._used], rewards[self._used], dones[self._used], [infos[row] for row in self._used]
 
 

@@ -21,7 +21,7 @@ import torch
 import torchrl
 from gymnasium.spaces import flatdim
 from tensordict import TensorDict
-from tensordict.nn import TensorDictModule
+from tensordict.nn import InteractionType, TensorDictModule
 from torch import nn
 from torchrl.modules import MLP, ProbabilisticActor, ValueOperator
 from torchrl.objectives import ClipPPOLoss
@@ -47,12 +47,20 @@ class Learner:
             TensorDictModule(self.body, ["observation"], ["logits"]),
             in_keys=["logits"],
             distribution_class=torch.distributions.Categorical,
+            default_interaction_type=InteractionType.RANDOM,  # outside of TorchRL's collectors the default is the mode
             return_log_prob=True,
         )
         self.critic = ValueOperator(
             MLP(in_features=3 * n_columns, out_features=1, **form), in_keys=["observation", "swarm"]
         )
-        self.loss = ClipPPOLoss(self.actor, self.critic, normalize_advantage=True, loss_critic_type="l2")
+        self.loss = ClipPPOLoss(  # weights are those of the options
+            self.actor,
+            self.critic,
+            critic_coeff=1.0,
+            entropy_coeff=1.0,
+            normalize_advantage=True,
+            loss_critic_type="l2",
+        )
         self.optimizer = torch.optim.Adam(self.loss.parameters(), eps=1e-5)
 
     def value(self, obs: torch.Tensor, swarm: torch.Tensor) -> torch.Tensor:
@@ -67,7 +75,7 @@ class Learner:
             for chosen in torch.randperm(len(batch)).split(options["batch_size"]):
                 parts = self.loss(batch[chosen])
                 loss = parts["loss_objective"] + options["vf_coef"] * parts["loss_critic"]
-                loss = loss - options["ent_coef"] * parts["entropy"]
+                loss = loss + options["ent_coef"] * parts["loss_entropy"]
                 self.optimizer.zero_grad()
                 loss.backward()
                 nn.utils.clip_grad_norm_(self.loss.parameters(), options["max_grad_norm"])
@@ -143,7 +151,7 @@ def environment(plan: TrainingPlan, stage: Stage) -> SwarmVectorEnv:
 
 
 def options_of(plan: TrainingPlan, stage: Stage) -> dict:
-    """Return the numbers of PPO in a stage; refuses a plan for another algorithm, and options that have no place here."""
+    """Return the numbers of PPO in a stage; refuses a plan for another algorithm, and options that it does not know."""
     options = {**plan.options, **stage.options}
     if plan.algorithm != "ppo" or plan.interface.actions != "discrete" or not options.keys() <= OPTIONS.keys():
         raise SystemExit(
@@ -180,8 +188,8 @@ def main() -> None:
             done += options["n_steps"] * envs.num_envs
             print(f"{done:>11,} decisions, {done / (time.perf_counter() - started):,.0f} per s, reward {reward:.4f}")
         envs.close()
-    card = {"plan": plan.to_mapping(), "by": "scripts/torchrl_mappo.py",
-            "versions": {**software_versions(), "torchrl": torchrl.__version__, "tensordict": tensordict.__version__}}  # fmt: skip
+    versions = {**software_versions(), "torchrl": torchrl.__version__, "tensordict": tensordict.__version__}
+    card = {"plan": plan.to_mapping(), "by": "scripts/torchrl_mappo.py", "versions": versions}
     about = NetworkAbout(interface=plan.interface, samples=True, caches=plan.scenario.caches, card=card)
     Network.from_state_dict(learner.body.state_dict(), about).save(args.out)
 

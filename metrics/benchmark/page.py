@@ -161,10 +161,7 @@ def _origins(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str,
 def _commands(entries: Sequence[Entry]) -> str:
     """What to type for each entry, its training first, as a block of code that no text of an entry can end."""
     lines = [
-        line
-        for entry in entries
-        for line in (f"# {entry.name}", entry.training.command, entry.command)
-        if line.strip()
+        line for entry in entries for line in (f"# {entry.name}", entry.training.command, entry.command) if line.strip()
     ]
     return "\n".join(["```bash", *(" ".join(line.replace("```", "").split()) for line in lines), "```"])
 

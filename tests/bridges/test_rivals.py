@@ -18,9 +18,7 @@ def test_rivals_train_in_the_training_worlds_as_they_are(path):
     from metrics.benchmark import load_protocol
 
     wanted = {
-        world.scenario.name: world.scenario.robots.n_robots
-        for world in load_protocol().worlds
-        if not world.is_held_out
+        world.scenario.name: world.scenario.robots.n_robots for world in load_protocol().worlds if not world.is_held_out
     }
     plan = read_plan(path)
     assert plan.sampler is not None
@@ -108,6 +106,32 @@ def test_mappo_with_torchrl_values_what_would_have_followed_a_time_limit_and_not
     assert active.all()
 
 
+def test_mappo_with_torchrl_draws_its_actions_and_is_paid_for_doubt():
+    require("torchrl", "torchrl")
+    import torch
+    from tensordict import TensorDict
+
+    from scripts.torchrl_mappo import OPTIONS, Learner
+
+    torch.manual_seed(0)
+    learner = Learner(1, 4, (8,))
+    seen = TensorDict({"observation": torch.ones(200, 1), "swarm": torch.zeros(200, 2)}, [200])
+    step = learner.actor(seen)
+    assert len(step["action"].unique()) == 4
+    with torch.no_grad():
+        learner.body[-1].bias[0] += 2.0
+    batch = learner.actor(seen.clone())
+    batch["advantage"], batch["value_target"] = torch.zeros(200, 1), torch.zeros(200, 1)
+
+    def doubt():
+        logits = learner.body(torch.ones(1, 1))
+        return float(torch.distributions.Categorical(logits=logits).entropy().detach())
+
+    before = doubt()
+    learner.update(batch, {**OPTIONS, "ent_coef": 1.0, "vf_coef": 0.0})
+    assert doubt() > before
+
+
 def test_a_plan_for_another_algorithm_is_refused_by_mappo_with_torchrl():
     require("torchrl", "torchrl")
     from scripts.torchrl_mappo import options_of
@@ -150,6 +174,10 @@ def test_a_recurrent_rival_learns_from_rows_of_robots_only():
                                   wrappers=["population:death_per_tick=0.2"]), {})  # fmt: skip
     mortal.seed(1)
     mortal.reset()
-    with pytest.raises(SystemExit, match="robots that come or go"):
+
+    def live():
         for _ in range(40):
             mortal.step(np.zeros(3, int))
+
+    with pytest.raises(SystemExit, match="robots that come or go"):
+        live()

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -105,7 +106,7 @@ def test_a_file_with_its_whole_path_is_told_from_the_current_folder(tmp_path, mo
     given = ("runs/a.npz", f"{tmp_path}/runs/a.npz", f"{tmp_path}/m.zip:decision_ticks=5",
              f"mixed:{tmp_path}/a.npz=20%,crw=rest", "dpo")  # fmt: skip
     words = Wanted(policies=given, name="x").command.split()
-    told = [word for before, word in zip(words, words[1:], strict=False) if before == "--policy"]
+    told = [word for before, word in pairwise(words) if before == "--policy"]
     assert told == ["runs/a.npz", "runs/a.npz", "m.zip:decision_ticks=5", "mixed:a.npz=0.2,crw=rest", "dpo"]
 
 
