@@ -53,7 +53,7 @@ class Learner:
         self.critic = ValueOperator(
             MLP(in_features=3 * n_columns, out_features=1, **form), in_keys=["observation", "swarm"]
         )
-        self.loss = ClipPPOLoss(  # weights are those of the options
+        self.loss = ClipPPOLoss(  # the options have weights of their own
             self.actor,
             self.critic,
             critic_coeff=1.0,

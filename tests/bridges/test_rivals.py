@@ -120,7 +120,7 @@ def test_mappo_with_torchrl_draws_its_actions_and_is_paid_for_doubt():
     assert len(step["action"].unique()) == 4
     with torch.no_grad():
         learner.body[-1].bias[0] += 2.0
-    batch = learner.actor(seen.clone())
+        batch = learner.actor(seen.clone())
     batch["advantage"], batch["value_target"] = torch.zeros(200, 1), torch.zeros(200, 1)
 
     def doubt():
