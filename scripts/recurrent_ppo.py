@@ -13,6 +13,7 @@ import argparse
 import dataclasses
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -43,7 +44,7 @@ class UsedRows(VecEnvWrapper):
 
     def reset(self) -> np.ndarray:
         """Start a run in every arena; returns observations (num_envs, d)."""
-        return self.venv.reset()[self._used]
+        return np.asarray(self.venv.reset())[self._used]
 
     def step_async(self, actions: np.ndarray) -> None:
         """Keep actions (num_envs,)."""
@@ -56,13 +57,14 @@ class UsedRows(VecEnvWrapper):
         obs, rewards, dones, infos = self.venv.step_wait()
         if not np.array_equal(np.flatnonzero(self.venv.active), self._used):
             raise SystemExit("Expected worlds with fixed numbers of robots, got robots that come or go.")
-        return obs[self._used], rewards[self._used], dones[self._used], [infos[row] for row in self._used]
+        return np.asarray(obs)[self._used], rewards[self._used], dones[self._used], [infos[row] for row in self._used]
 
 
 def environment(plan: TrainingPlan, stage: Stage) -> UsedRows:
     """Return the arenas of a stage."""
     sampler = stage.sampler or plan.sampler
-    given = {"sampler": sampler} if sampler else {"scenario": plan.scenario, "wrappers": plan.wrappers}
+    fixed = {"scenario": plan.scenario, "wrappers": plan.wrappers}
+    given: dict[str, Any] = {"sampler": sampler} if sampler else fixed
     env = SwarmVecEnv(n_arenas=plan.n_arenas, interface=plan.interface, **given)
     return UsedRows(env, dict(stage.scenario))
 
@@ -76,6 +78,8 @@ def main() -> None:
     args = parser.parse_args()
     torch.set_num_threads(1)
     plan = dataclasses.replace(read_plan(args.plan), seed=args.seed)
+    if plan.algorithm != "ppo":
+        parser.error(f"Expected a plan of ppo in {args.plan}, got one of {plan.algorithm}.")
     started, done, end = time.perf_counter(), 0, 0
     for stage in plan.stages:
         end += stage.steps

@@ -14,6 +14,7 @@ import argparse
 import dataclasses
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tensordict
@@ -27,6 +28,8 @@ from torchrl.modules import MLP, ProbabilisticActor, ValueOperator
 from torchrl.objectives import ClipPPOLoss
 from torchrl.objectives.value.functional import generalized_advantage_estimate
 
+from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.study.record import software_versions
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
@@ -126,7 +129,7 @@ def rollout(envs: SwarmVectorEnv, learner: Learner, obs: np.ndarray, active: np.
     seen, at_work = torch.from_numpy(obs), torch.from_numpy(active)
     after = learner.value(seen, swarm_rows(seen, at_work, envs.n_arenas))
     steps[-1]["next_value"] += after * ~steps[-1]["done"]
-    batch: TensorDict = torch.stack(steps)
+    batch: Any = TensorDict.stack(steps)
     batch["advantage"], batch["value_target"] = generalized_advantage_estimate(
         options["gamma"],
         options["gae_lambda"],
@@ -146,7 +149,8 @@ def rollout(envs: SwarmVectorEnv, learner: Learner, obs: np.ndarray, active: np.
 def environment(plan: TrainingPlan, stage: Stage) -> SwarmVectorEnv:
     """Return the arenas of a stage."""
     sampler = stage.sampler or plan.sampler
-    given = {"sampler": sampler} if sampler else {"scenario": plan.scenario, "swarm_wrappers": plan.wrappers}
+    fixed = {"scenario": plan.scenario, "wrappers": plan.wrappers}
+    given: dict[str, Any] = {"sampler": sampler} if sampler else fixed
     return SwarmVectorEnv(n_arenas=plan.n_arenas, interface=plan.interface, **given)
 
 
@@ -171,13 +175,12 @@ def main() -> None:
     torch.manual_seed(args.seed)
     torch.set_num_threads(1)
     plan = dataclasses.replace(read_plan(args.plan), seed=args.seed, samples=True)
-    learner, started, done, end = None, time.perf_counter(), 0, 0
+    robot = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
+    learner = Learner(flatdim(robot.observation_space), flatdim(robot.action_space), plan.hidden)
+    started, done, end = time.perf_counter(), 0, 0
     for stage in plan.stages:
         options = options_of(plan, stage)
         envs = environment(plan, stage)
-        if learner is None:
-            sizes = flatdim(envs.single_observation_space), flatdim(envs.single_action_space)
-            learner = Learner(*sizes, plan.hidden)
         end += stage.steps
         first_seed = int(np.random.default_rng((plan.seed, done)).integers(2**31))  # another one in each stage
         obs, infos = envs.reset(seed=first_seed, options={"scenario": dict(stage.scenario)})
