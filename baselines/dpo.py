@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.policy import Memories, RememberedPlaces, SwarmSpec
+from swarm_forage_env.contract.policy import Memories, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 
 from .machines import (
@@ -132,10 +132,6 @@ class DPOPolicy(ScriptedPolicy):
     def n_remembered(self) -> IntArray:
         """(N,) the same: a robot remembers objects only."""
         return self.n_known
-
-    def remembered_places(self, row: int) -> RememberedPlaces:
-        """Return where one robot remembers objects, in m."""
-        return RememberedPlaces.of_cells((x, y) for x, y, _ in self.remembered(row).values())
 
     def describe_memories(self) -> Memories:
         """Return where all robots remember objects."""

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from swarm_forage_env.contract.policy import Memories, RememberedPlaces, SwarmSpec
+from swarm_forage_env.contract.policy import Memories, SwarmSpec
 from swarm_forage_env.contract.types import CodeArray, FloatArray, IntArray
 
 from .cache_memory import new_task_memory
@@ -136,13 +136,6 @@ class TaskPolicy(ScriptedPolicy):
     def n_remembered(self) -> IntArray:
         """(N,) number of objects and caches that each robot remembers."""
         return self._robots["n_known"] + self._robots["n_caches"]
-
-    def remembered_places(self, row: int) -> RememberedPlaces:
-        """Return where one robot remembers objects and caches, in m."""
-        return RememberedPlaces.of_cells(
-            objects=((x, y) for x, y, _ in self.remembered(row).values()),
-            caches=((x, y) for x, y, *_ in self.remembered_caches(row).values()),
-        )
 
     def describe_memories(self) -> Memories:
         """Return where all robots remember objects and caches."""

@@ -173,20 +173,12 @@ class RobotStates(NamedTuple):
 
 
 class RememberedPlaces(NamedTuple):
-    """Where one robot remembers things, for people; see `Policy`."""
+    """Where one robot remembers things, for people; see `Memories.of_robot`."""
 
     objects_m: FloatArray
     """(K, 2) m, middles of the cells of remembered objects."""
     caches_m: FloatArray
     """(C, 2) m, middles of remembered caches."""
-
-    @classmethod
-    def of_cells(cls, objects: Iterable[tuple[int, int]], caches: Iterable[tuple[int, int]] = ()) -> "RememberedPlaces":
-        """Return the places of cells x, y."""
-        objects_m, caches_m = (
-            (np.array([*cells], np.float64).reshape(-1, 2) + 0.5) / CELLS_PER_M for cells in (objects, caches)
-        )
-        return cls(objects_m, caches_m)
 
 
 class Memories(NamedTuple):
@@ -209,6 +201,11 @@ class Memories(NamedTuple):
         """Return all places of several memories."""
         nothing = cls(np.zeros(0, np.int32), np.zeros((0, 2)), np.zeros(0, np.bool_))
         return cls(*(np.concatenate(columns) for columns in zip(nothing, *parts, strict=True)))
+
+    def of_robot(self, row: int) -> RememberedPlaces:
+        """Return the places of one robot."""
+        own = self.robot == row
+        return RememberedPlaces(self.place_m[own & ~self.is_cache], self.place_m[own & self.is_cache])
 
 
 class CompiledPolicy(Protocol):
@@ -247,9 +244,9 @@ class Policy(Protocol):
 
     Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
     doing, for people (`study.stuck` shows it); `describe_robots() -> RobotStates`, the same of all robots as arrays
-    (`study.replay` keeps it); `remembered_places(row) -> RememberedPlaces`, where one robot remembers things (the
-    window shows it); `describe_memories() -> Memories`, the same of all robots (`study.replay` keeps it); `part_rows`,
-    slices of rows that the record tells apart, set by `reset` (of mixed swarms, whose runs are counted tick by tick);
+    (`study.replay` keeps it); `describe_memories() -> Memories`, where all robots remember things (`study.replay` keeps
+    it, and the window shows those of one); `part_rows`, slices of rows that the record tells apart, set by `reset` (of
+    mixed swarms, whose runs are counted tick by tick);
     `compiled() -> CompiledPolicy | None`, for runs without Python between ticks; the class attributes `caches` ("none",
     "static", "dynamic": those that the policy is made for) and `reads` (names of the slices it looks at; default all;
     "light if carrying" = light only of robots that carry).

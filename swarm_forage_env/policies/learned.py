@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env.contract.policy import Memories, RememberedPlaces, SwarmSpec
+from swarm_forage_env.contract.policy import Memories, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 
@@ -28,11 +28,10 @@ class LearnedPolicy:
         reads: Observation slices that are used, None = all.
         caches: Kind of caches that the controller was trained with; missing if that is unknown.
         interface: The interface for the swarm; set by `reset`.
-        remembered_places, describe_memories: See `Policy`; missing without site memory.
+        describe_memories: See `Policy`; missing without site memory.
     """
 
     interface: LearnerInterface
-    remembered_places: Callable[[int], RememberedPlaces]
     describe_memories: Callable[[], Memories]
 
     def __init__(
@@ -65,7 +64,7 @@ class LearnedPolicy:
             self.caches = caches
         self._config = interface
         if interface.site_memory:
-            self.remembered_places, self.describe_memories = self._sites_of, self._all_sites
+            self.describe_memories = self._all_sites
 
     def reset(self, spec: SwarmSpec, rng: np.random.Generator) -> None:
         """Start a run."""
@@ -91,12 +90,8 @@ class LearnedPolicy:
         self._ticks_left -= 1
         return self.interface.carry_out(self._checked, obs)
 
-    def _sites_of(self, row: int) -> RememberedPlaces:
-        """Return the sites of one robot, where it expects objects."""
-        told = self._all_sites()
-        return RememberedPlaces(told.place_m[told.robot == row], np.zeros((0, 2)))
-
     def _all_sites(self) -> Memories:
+        """Return the sites of all robots, where they expect objects."""
         sites = self.interface.memory()
         assert sites is not None, "only policies with site memory are asked"
         robot, site = np.nonzero(sites.is_known)

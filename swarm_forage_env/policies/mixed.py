@@ -8,7 +8,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, table
 from swarm_forage_env.contract.codes import Task
-from swarm_forage_env.contract.policy import Memories, Policy, RememberedPlaces, RobotStates, SwarmSpec
+from swarm_forage_env.contract.policy import Memories, Policy, RobotStates, SwarmSpec
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, IntArray, ObsArray
 from swarm_forage_env.policies.mixture import mixture_parts, part_sizes
 from swarm_forage_env.policies.registry import load_policy, part_labels
@@ -104,14 +104,6 @@ class MixedPolicy:
         if not hasattr(policy, "describe_robot"):
             return self.labels[place]
         return f"{self.labels[place]}: {policy.describe_robot(own_row)}"
-
-    def remembered_places(self, row: int) -> RememberedPlaces:
-        """Return where a robot remembers things; nowhere, if its part does not tell."""
-        place, own_row = self._place_of(row)
-        policy: Any = self._policies[place]
-        if not hasattr(policy, "remembered_places"):
-            return RememberedPlaces.of_cells(())
-        return policy.remembered_places(own_row)
 
     def describe_memories(self) -> Memories:
         """Return where all robots remember things; those of a part that does not tell have no places."""

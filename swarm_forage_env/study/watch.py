@@ -12,7 +12,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import number
 from swarm_forage_env.contract.codes import Counter, Task
-from swarm_forage_env.contract.policy import Policy, RememberedPlaces
+from swarm_forage_env.contract.policy import Memories, Policy, RememberedPlaces
 from swarm_forage_env.rendering.close_up import render_close_up
 from swarm_forage_env.rendering.frame import render_frame
 from swarm_forage_env.rendering.view import arena_view, refusing
@@ -214,8 +214,8 @@ class Watch:
         )
 
     def _remembered_places(self, robot: int) -> RememberedPlaces | None:
-        tell = getattr(self._policy, "remembered_places", None)
-        return None if tell is None else tell(robot)
+        tell: Callable[[], Memories] | None = getattr(self._policy, "describe_memories", None)
+        return None if tell is None else tell().of_robot(robot)
 
     def _marks(self, remembered: RememberedPlaces | None) -> tuple[tuple[float, float, float], ...]:
         """Return squares of the frame, around the places of objects and of caches."""
@@ -283,7 +283,7 @@ class Watch:
         if hasattr(policy, "describe_robots"):
             known = policy.describe_robots().n_remembered  # type: ignore[attr-defined] - optional, see Policy
             if known is not None:
-                shown = ", in thin frames" if hasattr(policy, "remembered_places") else ""
+                shown = ", in thin frames" if hasattr(policy, "describe_memories") else ""
                 lines.append(f"remembers: {known[robot]}{shown}")
         elif (places := self._remembered_places(robot)) is not None:
             lines.append(f"remembers: {len(places.objects_m) + len(places.caches_m)}, in thin frames")

@@ -15,7 +15,8 @@ from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.kernels.gaussian import to_normal
 from swarm_forage_env.wrappers.kernels.noise import garble
-from swarm_forage_env.wrappers.waveform import Waveform, gather_waveform
+from swarm_forage_env.wrappers.sigma import Sigma, check_sigma, sigma_in_words, sigma_signal
+from swarm_forage_env.wrappers.waveform import gather_waveform
 
 
 class MessageNoise(SwarmWrapper):
@@ -48,9 +49,7 @@ class MessageNoise(SwarmWrapper):
     def reconfigure(self, config: "MessageNoiseConfig") -> None:
         """Go on under another configuration from the next tick on."""
         self.made_from = config
-        sigma = config.sigma
-        wave = sigma if isinstance(sigma, Waveform) else Waveform(kind="constant", amplitude=sigma)
-        self._signal = wave.signal(self.unwrapped.scenario.dt_s)
+        self._signal = sigma_signal(config.sigma, self.unwrapped.scenario.dt_s)
         self._loss = config.loss
 
     def on_reset(self, seed: int) -> None:
@@ -79,16 +78,14 @@ class MessageNoiseConfig(WrapperConfig):
     name: ClassVar[str] = "message_noise"
     stack_position: ClassVar[int] = MessageNoise.stack_position
 
-    sigma: float | Waveform = 0.0
-    """Standard deviation of what is added to each number heard: constant, or by a waveform of time (no noise where it
-    is below 0)."""
+    sigma: Sigma = 0.0
+    """Standard deviation of what is added to each number heard."""
     loss: float = 0.0
     """Probability, per robot and tick, that it hears nothing at all."""
     example: ClassVar[str] = "sigma=0.1"
 
     def __post_init__(self) -> None:
-        if not isinstance(self.sigma, Waveform):
-            number("message_noise.sigma", self.sigma, at_least=0.0)
+        check_sigma("message_noise.sigma", self.sigma)
         number("message_noise.loss", self.loss, at_least=0.0, at_most=1.0)
 
     def wrap(self, env: ForageEnv | SwarmWrapper) -> MessageNoise:
@@ -97,8 +94,7 @@ class MessageNoiseConfig(WrapperConfig):
 
     def in_words(self, dt_s: float) -> str:
         """Return how noisy messages are, and how many are lost; see `WrapperConfig.in_words`."""
-        sigma = self.sigma.in_words("", floor=0.0) if isinstance(self.sigma, Waveform) else f"{self.sigma:g}"
-        return f"message noise: sigma {sigma}, {100 * self.loss:g} % lost"
+        return f"message noise: sigma {sigma_in_words(self.sigma)}, {100 * self.loss:g} % lost"
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "MessageNoiseConfig":

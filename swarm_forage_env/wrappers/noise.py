@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import sqrt
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, known_name, number, one_of, several, table
+from swarm_forage_env._internal.fields import ConfigError, known_name, one_of, several, table
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.layout import NEIGHBOUR_FIELDS, NEIGHBOURS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
@@ -15,6 +15,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.kernels.noise import NOT_NOISY, disturb, noisy_gain, shift_neighbours
+from swarm_forage_env.wrappers.sigma import Sigma, check_sigma, is_noisy, sigma_in_words, sigma_signal
 from swarm_forage_env.wrappers.waveform import Signal, Waveform, gather_waveform
 
 NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
@@ -25,9 +26,6 @@ ALL_GROUPS = (*NOISE_GROUPS, *NAMED_GROUPS)
 POSE_GROUPS = NOISE_GROUPS[4:]
 """Groups that the authors' program leaves exact (quirk `pose_sensors_exact`); the paper speaks of all sensors."""
 DISTRIBUTIONS = ("gaussian", "uniform")
-
-Sigma: TypeAlias = float | Waveform
-"""Standard deviation: constant, or by a waveform of time (no noise where it is below 0)."""
 
 _READINGS = ("proximity", "light", "ground")
 """Groups with values in [0, 1]; those of the others lie in [-1, 1]."""
@@ -49,10 +47,6 @@ def _append_span(spans: list[tuple[int, int, int]], lows: list[float], span: tup
             return
     spans.append(span)
     lows.append(low)
-
-
-def _is_noisy(sigma: Sigma) -> bool:
-    return isinstance(sigma, Waveform) or sigma > 0.0
 
 
 class SensorNoise(SwarmWrapper):
@@ -94,7 +88,7 @@ class SensorNoise(SwarmWrapper):
         self._is_uniform = config.distribution == "uniform"
         exact = POSE_GROUPS if self.unwrapped.scenario.quirks.pose_sensors_exact else ()
         sigmas = config.group_sigmas().items()
-        self._place_groups({name: sigma for name, sigma in sigmas if _is_noisy(sigma) and name not in exact})
+        self._place_groups({name: sigma for name, sigma in sigmas if is_noisy(sigma) and name not in exact})
         self._draws: ObsArray = np.zeros((self.unwrapped.scenario.robots.n_robots, len(self._factors)), np.float32)
 
     def _place_groups(self, sigmas: dict[str, Sigma]) -> None:
@@ -194,9 +188,8 @@ class ActuatorNoise(SwarmWrapper):
         self.made_from = config
         sigma = config.sigma
         self._is_uniform = config.distribution == "uniform"
-        self._is_noisy = _is_noisy(sigma)
-        constant = Waveform(kind="constant", amplitude=sigma) if not isinstance(sigma, Waveform) else sigma
-        self._signal = constant.signal(self.unwrapped.scenario.dt_s)
+        self._is_noisy = is_noisy(sigma)
+        self._signal = sigma_signal(sigma, self.unwrapped.scenario.dt_s)
 
     def on_reset(self, seed: int) -> None:
         """Start the random stream."""
@@ -238,9 +231,9 @@ class SensorNoiseConfig(WrapperConfig):
         several("sensor_noise.groups", self.groups, "names of sensors")
         for name in (*self.groups, *table("sensor_noise.sigmas", self.sigmas)):
             known_name("group of sensors", name, ALL_GROUPS)
-        _check_sigma("sensor_noise.sigma", self.sigma)
+        check_sigma("sensor_noise.sigma", self.sigma)
         for name, sigma in self.sigmas.items():
-            _check_sigma(f"sensor_noise.sigmas.{name}", sigma)
+            check_sigma(f"sensor_noise.sigmas.{name}", sigma)
         one_of("sensor_noise.distribution", self.distribution, DISTRIBUTIONS)
         object.__setattr__(self, "groups", tuple(name for name in ALL_GROUPS if name in self.groups))
         object.__setattr__(self, "sigmas", dict(self.sigmas))
@@ -257,7 +250,7 @@ class SensorNoiseConfig(WrapperConfig):
         """Return which sensors are how noisy; see `WrapperConfig.in_words`."""
         by_sigma: dict[str, list[str]] = {}
         for group, sigma in self.group_sigmas().items():
-            by_sigma.setdefault(_sigma_in_words(sigma), []).append(group.replace("_", " "))
+            by_sigma.setdefault(sigma_in_words(sigma), []).append(group.replace("_", " "))
         parts = [
             f"sigma {sigma} ({'all sensors' if len(groups) == len(NOISE_GROUPS) else ', '.join(groups)})"
             for sigma, groups in by_sigma.items()
@@ -300,7 +293,7 @@ class ActuatorNoiseConfig(WrapperConfig):
     example: ClassVar[str] = "sigma=0.1"
 
     def __post_init__(self) -> None:
-        _check_sigma("actuator_noise.sigma", self.sigma)
+        check_sigma("actuator_noise.sigma", self.sigma)
         one_of("actuator_noise.distribution", self.distribution, DISTRIBUTIONS)
 
     def wrap(self, env: ForageEnv | SwarmWrapper) -> ActuatorNoise:
@@ -309,7 +302,7 @@ class ActuatorNoiseConfig(WrapperConfig):
 
     def in_words(self, dt_s: float) -> str:
         """Return how noisy wheels are; see `WrapperConfig.in_words`."""
-        return f"{_distribution_in_words(self.distribution)}wheel noise: sigma {_sigma_in_words(self.sigma)}"
+        return f"{_distribution_in_words(self.distribution)}wheel noise: sigma {sigma_in_words(self.sigma)}"
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "ActuatorNoiseConfig":
@@ -334,14 +327,5 @@ def noise_levels(
     )
 
 
-def _sigma_in_words(sigma: Sigma) -> str:
-    return sigma.in_words("", floor=0.0) if isinstance(sigma, Waveform) else f"{sigma:g}"
-
-
 def _distribution_in_words(distribution: str) -> str:
     return "" if distribution == "gaussian" else f"{distribution} "
-
-
-def _check_sigma(where: str, sigma: Any) -> None:
-    if not isinstance(sigma, Waveform):
-        number(where, sigma, at_least=0.0)

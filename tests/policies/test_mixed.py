@@ -168,11 +168,11 @@ def test_each_robot_remembers_the_places_of_its_part():
     anywhere = scenario("warehouse_medium", n_robots=6, physics="compiled")  # objects are never far
     run = LiveRun(build_stack(anywhere), mixed, 1)
     run.advance(to_tick=400)
-    (dpo,) = (policy for policy in mixed._policies if hasattr(policy, "remembered_places"))
-    places = [mixed.remembered_places(row) for row in range(6)]
+    (dpo,) = (policy for policy in mixed._policies if hasattr(policy, "describe_memories"))
+    places = [mixed.describe_memories().of_robot(row) for row in range(6)]
     assert [len(place.objects_m) for place in places[:2]] == [0, 0]
     for row in range(4):
-        np.testing.assert_array_equal(places[2 + row].objects_m, dpo.remembered_places(row).objects_m)
+        np.testing.assert_array_equal(places[2 + row].objects_m, dpo.describe_memories().of_robot(row).objects_m)
     assert sum(len(place.objects_m) for place in places) == dpo.n_known.sum() > 0
 
 

@@ -148,8 +148,6 @@ def test_a_policy_with_site_memory_tells_its_places_from_the_corner_of_the_arena
     load(env, 1, 0)
     policy.act(env.arena.observe(), env.active)
     for asked in (policy, pickle.loads(pickle.dumps(policy))):  # noqa: S301 - what was pickled here
-        np.testing.assert_allclose(asked.remembered_places(1).objects_m, [PLACE], atol=1e-4)
-        assert len(asked.remembered_places(0).objects_m) == 0
         told = asked.describe_memories()
         assert (told.robot.tolist(), told.is_cache.tolist()) == ([1], [False])
         np.testing.assert_allclose(told.place_m, [PLACE], atol=1e-4)
@@ -157,5 +155,4 @@ def test_a_policy_with_site_memory_tells_its_places_from_the_corner_of_the_arena
 
 def test_a_policy_without_site_memory_tells_no_places():
     policy = LearnedPolicy(InterfaceConfig(), still)
-    assert not hasattr(policy, "remembered_places")
     assert not hasattr(policy, "describe_memories")

@@ -10,6 +10,7 @@ from swarm_forage_env.rendering.close_up import render_close_up
 from swarm_forage_env.rendering.view import PALETTE, THEMES
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.state import CacheState, ObjectState, SwarmState
 
 CONFIG = scenario("warehouse_small", n_robots=2, n_objects=3)
@@ -78,8 +79,13 @@ def test_objects_that_the_robot_sees_are_bright(place):
     assert place.pixel(place.draw(), 0.4, 0.0) == PALETTE.object
 
 
+def remembered(objects=(), caches=()):
+    """What a robot remembers in these cells."""
+    return RememberedPlaces(*((np.reshape(cells, (-1, 2)) + 0.5) * CELL_M for cells in (objects, caches)))
+
+
 def test_a_frame_is_around_a_remembered_object(place):
-    memory = RememberedPlaces.of_cells([(82, 40), (150, 40)])  # two cells to the right of the robot's own; far away
+    memory = remembered(objects=[(82, 40), (150, 40)])  # two cells to the right of the robot's own; far away
     without, picture = place.draw(), place.draw(remembered=memory)
     for right, up in ((0.305, 0.0), (0.4, 0.095), (0.4, -0.095)):
         assert place.pixel(picture, right, up) == PALETTE.text
@@ -88,7 +94,7 @@ def test_a_frame_is_around_a_remembered_object(place):
 
 
 def test_a_frame_is_around_a_remembered_cache(place):
-    picture = place.draw(side_m=8.0, remembered=RememberedPlaces.of_cells((), [(80, 40)]))
+    picture = place.draw(side_m=8.0, remembered=remembered(caches=[(80, 40)]))
     columns = np.flatnonzero((picture == PALETTE.text).all(axis=2).any(axis=0))
     assert np.ptp(columns) * 8.0 / 300 == pytest.approx((CONFIG.cache_side_cells + 1) * 0.2, abs=0.06)
 

@@ -189,8 +189,9 @@ def test_places_are_those_that_robots_remember(name, tmp_path):
     n_places = 0
     for frame, tick in enumerate(kept.ticks.tolist()):
         run.advance(to_tick=tick)
+        memories = policy.describe_memories()
         for robot in range(spec.scenario.robots.n_robots):
-            told = policy.remembered_places(robot)
+            told = memories.of_robot(robot)
             expected = {
                 (kind, *(round(kept.position_step_m * step, 3) for step in steps))
                 for kind, places_m in ((1, told.objects_m), (2, told.caches_m))
