@@ -40,12 +40,21 @@ OPTIONS = {"n_steps": 128, "batch_size": 4096, "n_epochs": 4, "learning_rate": 1
 """Options that the script understands, and what they are where a plan leaves them away."""
 
 
+def network(n_inputs: int, n_outputs: int, hidden: tuple[int, ...], last_gain: float) -> MLP:
+    """Return a perceptron with orthogonal first weights; the last layer's are as large as `last_gain` says."""
+    body = MLP(in_features=n_inputs, out_features=n_outputs, num_cells=list(hidden), activation_class=nn.Tanh)
+    layers = [layer for layer in body if isinstance(layer, nn.Linear)]
+    for layer in layers:
+        nn.init.orthogonal_(layer.weight, last_gain if layer is layers[-1] else 2**0.5)
+        nn.init.zeros_(layer.bias)
+    return body
+
+
 class Learner:
     """Actor, critic and the loss of both."""
 
     def __init__(self, n_columns: int, n_actions: int, hidden: tuple[int, ...]) -> None:
-        form = {"num_cells": list(hidden), "activation_class": nn.Tanh}
-        self.body = MLP(in_features=n_columns, out_features=n_actions, **form)
+        self.body = network(n_columns, n_actions, hidden, last_gain=0.01)  # begins with all actions alike
         self.actor = ProbabilisticActor(
             TensorDictModule(self.body, ["observation"], ["logits"]),
             in_keys=["logits"],
@@ -53,9 +62,8 @@ class Learner:
             default_interaction_type=InteractionType.RANDOM,  # outside of TorchRL's collectors the default is the mode
             return_log_prob=True,
         )
-        self.critic = ValueOperator(
-            MLP(in_features=3 * n_columns, out_features=1, **form), in_keys=["observation", "swarm"]
-        )
+        central = network(3 * n_columns, 1, hidden, last_gain=1.0)
+        self.critic = ValueOperator(central, in_keys=["observation", "swarm"])
         self.loss = ClipPPOLoss(  # the options have weights of their own
             self.actor,
             self.critic,
