@@ -20,6 +20,7 @@ FOLDERS = ("swarm_forage_env/rendering/kernels", "swarm_forage_env/world/kernels
 TESTS = (
     "tests/promises/test_conservation.py",
     "tests/rendering/test_paint.py",
+    "tests/world/test_kinds.py",
     "tests/world/test_neighbourhood.py",
     "tests/world/test_rack.py",
     "tests/wrappers/test_messages.py",
@@ -30,7 +31,7 @@ CHOICE = (
     "or they_are_those_of_the_twins or as_by_the_twin"
 )
 """Every kind of caches with Chipmunk; shapes beyond the edge; arenas together, wrapped and not, with the compiled
-engine; noise on wheels; neighbours and messages."""
+engine; noise on wheels; neighbours, messages and kinds of robots."""
 ELSEWHERE = {
     "tick.run": "whole runs by one kernel need a compiled policy, which would be compiled, too",
     "task_shares.add_task_shares": "a part of tick.run",

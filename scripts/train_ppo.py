@@ -47,11 +47,12 @@ def main() -> None:
     for stage in plan.stages:
         env.set_options({"scenario": stage.scenario})
         if end:  # a new seed, and arenas that start anew
-            model = PPO.load(checkpoint, env=env, device="cpu", seed=training_seed(plan.seed, model.num_timesteps))
+            seed = training_seed(plan.seed, model.num_timesteps)
+            model = PPO.load(checkpoint, env=env, device="cpu", seed=seed, **stage.options)
         end += stage.steps
         model.learn(end - model.num_timesteps, reset_num_timesteps=False)
         model.save(checkpoint)
-    export_network(model, plan.interface).save(arguments.out)
+    export_network(model, plan.interface, samples=plan.samples).save(arguments.out)
 
 
 if __name__ == "__main__":

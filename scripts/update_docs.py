@@ -36,6 +36,9 @@ BLOCK = re.compile(
 PACKAGES = ("numpy", "scipy", "numba", "pymunk")
 FIVE = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")
 WITH_ALL = ("crw", "dpo", "stochm", "stochx", "generalist")
+SCENARIOS = {"small": "warehouse_small", "medium": "warehouse_medium", "rescue": "search_and_rescue"}
+"""Short name in blocks -> scenario."""
+COMPILED = "--set physics=compiled"
 SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": ((f"swarm-forage run --scenario warehouse_small --policy {','.join(FIVE)} --robots 50 --seeds 4",), FIVE),
     "medium": (
@@ -58,18 +61,34 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     **{
         f"generalist_{short}": (
-            (f"swarm-forage run --scenario {name} --policy {','.join(WITH_ALL)} --seeds 4 --set physics=compiled",),
+            (f"swarm-forage run --scenario {name} --policy {','.join(WITH_ALL)} --seeds 4 {COMPILED}",),
             WITH_ALL,
         )
-        for short, name in (
-            ("small", "warehouse_small"),
-            ("medium", "warehouse_medium"),
-            ("rescue", "search_and_rescue"),
-        )
+        for short, name in SCENARIOS.items()
     },
     "sets": (("swarm-forage study list",), ()),
     "smoke": (("swarm-forage study list --budget smoke",), ()),
     "reduced": (("swarm-forage study list --budget reduced",), ()),
+    **{
+        f"recipe_{short}_{seed}": (
+            (
+                f"swarm-forage train --scenario {name} --seed {seed} {COMPILED} --out trained",
+                f"swarm-forage run --scenario {name} --policy trained/policy.npz --seeds 4 {COMPILED}",
+            ),
+            ("policy",),
+        )
+        for short, name in SCENARIOS.items()
+        for seed in (0, 1)
+        if short != "small"  # that is "trained"
+    },
+    "drawn": (
+        (
+            f"python {ROOT}/scripts/likeliest.py generalist likeliest.npz",
+            "swarm-forage run --scenario search_and_rescue --robots 64 --policy generalist,likeliest.npz --seeds 4 "
+            f"{COMPILED}",
+        ),
+        ("generalist", "likeliest"),
+    ),
 }
 """Name -> commands, of which the last prints the table, and what its rows are called in blocks."""
 
@@ -168,6 +187,7 @@ def main(words: Sequence[str] | None = None) -> int:
     if arguments.remake is not None:
         for name in arguments.remake or SOURCES:
             store[name] = make(name)
+            store = {source: store[source] for source in SOURCES if source in store}  # in the order of the list
             STORE.write_text(json.dumps(store, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
     differing_pages = [
         page for page in PAGES if written(page.read_text(encoding="utf-8"), store) != page.read_text(encoding="utf-8")

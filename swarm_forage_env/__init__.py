@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.env import ForageEnv
     from swarm_forage_env.policies.registry import RandomPolicy, from_callable, load_policy, policy_names
     from swarm_forage_env.scenarios.config import ScenarioConfig
+    from swarm_forage_env.scenarios.kinds import RobotKind
     from swarm_forage_env.scenarios.overrides import with_overrides
     from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
     from swarm_forage_env.study.film import record_run
@@ -70,6 +71,7 @@ __all__ = [
     "PopulationDynamics",
     "Quirks",
     "RandomPolicy",
+    "RobotKind",
     "RunRecord",
     "RunRecorder",
     "RunSpec",
@@ -134,6 +136,7 @@ _HOMES = {
     "PopulationDynamics": "wrappers.population",
     "Quirks": "scenarios.quirks",
     "RandomPolicy": "policies.registry",
+    "RobotKind": "scenarios.kinds",
     "RunRecord": "study.record",
     "RunRecorder": "wrappers.recorder",
     "RunSpec": "study.spec",

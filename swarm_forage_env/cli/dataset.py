@@ -26,6 +26,13 @@ def dataset(  # long: one parameter per option
         str | None,
         typer.Option(help="full or compact; default what a learned policy sees, else full."),
     ] = None,
+    site_memory: Annotated[
+        bool | None,
+        typer.Option(
+            "--site-memory/--no-site-memory",
+            help="Whether to record two places that robots remember; default as a learned policy sees, else not.",
+        ),
+    ] = None,
     compress: Annotated[bool, typer.Option("--compress", help="Smaller files, which take longer to write.")] = False,
     minari: Annotated[
         str | None, typer.Option(metavar="ID", help="Also make a Minari data set of the whole swarm as one agent.")
@@ -46,7 +53,13 @@ def dataset(  # long: one parameter per option
 
     options = replace(described, horizon=horizon)
     spec = plan_runs(options, (policy,), n_seeds=1, first_seed=first_seed)[0]
-    plan = plan_dataset(spec, range(first_seed, first_seed + seeds), observation=observation, compress=compress)
+    plan = plan_dataset(
+        spec,
+        range(first_seed, first_seed + seeds),
+        observation=observation,
+        site_memory=site_memory,
+        compress=compress,
+    )
     folder = out or Path("results", "datasets", as_file_name(f"{spec.scenario.name}_{policy_label(spec.policy)}"))
     typer.echo(_described(plan, folder))
     if dry_run:

@@ -16,6 +16,7 @@ from metrics.statistics import aggregate
 from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts, part_sizes
 from swarm_forage_env.policies.registry import part_labels
 from swarm_forage_env.rendering.plots import Curve, draw_curves
+from swarm_forage_env.scenarios.kinds import kind_sizes
 from swarm_forage_env.scenarios.performance import Quantity, part_column, performance_curve, quantity
 from swarm_forage_env.study.progress import duration
 from swarm_forage_env.study.record import RunRecord
@@ -73,7 +74,7 @@ class ControllerSummary:
     simulated_s_per_wall_s: float
     """Simulated seconds per second and process, policy and recording included."""
     parts: tuple[PartSummary, ...] = ()
-    """Of a mixed swarm, in order."""
+    """Of a mixed swarm, or of several kinds of robots, in order."""
 
 
 def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[ControllerSummary, ...]:
@@ -111,12 +112,18 @@ def _per_robot(records: Sequence[RunRecord]) -> Estimate:
 
 
 def _parts(spec: RunSpec, records: Sequence[RunRecord]) -> tuple[PartSummary, ...]:
-    """Return what each part of a mixed swarm has done, nothing of another swarm."""
-    if not is_mixture(spec.policy):
+    """Return what each part of a mixed swarm, or each of several kinds of robots, has done; nothing of others."""
+    robots = spec.scenario.robots
+    if is_mixture(spec.policy):
+        labels = part_labels(spec.policy)
+        sizes = part_sizes(spec.policy, robots.n_robots, spec.parameters.get("share"))
+    elif robots.tells_kinds:
+        labels = tuple(kind.name for kind in robots.robot_kinds)
+        sizes = kind_sizes(robots.robot_kinds, robots.n_robots)
+    else:
         return ()
-    sizes = part_sizes(spec.policy, spec.scenario.robots.n_robots, spec.parameters.get("share"))
     summaries: list[PartSummary] = []
-    for number, (label, size) in enumerate(zip(part_labels(spec.policy), sizes, strict=True), start=1):
+    for number, (label, size) in enumerate(zip(labels, sizes, strict=True), start=1):
 
         def rate(name: str, part: int = number) -> Estimate:
             totals = [float(performance_curve(part_column(part, name), one.columns()).sum()) for one in records]

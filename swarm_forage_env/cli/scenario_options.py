@@ -24,6 +24,7 @@ _Number = TypeVar("_Number", int, float)
 
 _EXAMPLES = {
     "obstacles": "boxes such as 10,4,11,12 or 10,4,11,12+20,4,21,12 (x low, y low, x high, y high in m)",
+    "robot_kinds": "kinds such as scout:share=0.2,window_cells=3+hauler:speed=0.5,lacks=light/los_cache",
     "object_positions_m": "places such as 10,4 or 10,4+20,4 (x, y in m)",
 }
 _TRUTH = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
@@ -169,6 +170,8 @@ def _parse_value(name: str, text: str, kind: Any) -> Any:
         if kind is bool:
             return _TRUTH[text.lower()]
         return kind(text)
+    except ConfigError:
+        raise
     except (KeyError, ValueError) as error:
         words = {bool: "true or false", int: "a whole number", float: "a number"}
         wanted = words.get(kind, _EXAMPLES.get(name, "numbers separated by commas, like its default"))

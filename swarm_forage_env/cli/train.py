@@ -31,7 +31,9 @@ def train(  # long: one parameter per option
     steps: Annotated[
         int | None, typer.Option(min=1, help=f"Decisions of single robots; default {DEFAULT_STEPS:,}.")
     ] = None,
-    arenas: Annotated[int | None, typer.Option(min=1, help=f"Arenas side by side; default {DEFAULT_ARENAS}.")] = None,
+    arenas: Annotated[
+        int | None, typer.Option(min=1, help=f"Arenas side by side; default {DEFAULT_ARENAS}, fewer of large swarms.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything; default 0, or that of --plan.")] = None,
     observation: Annotated[str | None, typer.Option(help="compact or full; default compact.")] = None,
     actions: Annotated[
@@ -43,6 +45,20 @@ def train(  # long: one parameter per option
     ] = None,
     decision_ticks: Annotated[
         int | None, typer.Option(min=1, help=f"Ticks per decision; default {DECISION_TICKS}.")
+    ] = None,
+    site_memory: Annotated[
+        bool | None,
+        typer.Option(
+            "--site-memory/--no-site-memory", help="Whether robots remember two places with objects; default yes."
+        ),
+    ] = None,
+    samples: Annotated[
+        bool | None,
+        typer.Option(
+            "--drawn-actions/--likeliest-actions",
+            help="Whether the trained policy draws its actions by their probabilities, or takes the likeliest; default "
+            "drawn where it has probabilities (ppo, a2c).",
+        ),
     ] = None,
     evaluate_every: Annotated[
         int | None,
@@ -116,6 +132,8 @@ def train(  # long: one parameter per option
         actions=actions,
         automatic_gripper=automatic_gripper,
         decision_ticks=decision_ticks,
+        site_memory=site_memory,
+        samples=samples,
         evaluate_every=evaluate_every,
         evaluation_horizon=evaluation_horizon,
         small_start=small_start,

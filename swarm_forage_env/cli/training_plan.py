@@ -11,7 +11,7 @@ from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 
-_INTERFACE_FIELDS = ("observation", "actions", "automatic_gripper", "decision_ticks")
+_INTERFACE_FIELDS = ("observation", "actions", "automatic_gripper", "decision_ticks", "site_memory")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -26,6 +26,8 @@ class TrainOptions:
     actions: str | None = None
     automatic_gripper: bool | None = None
     decision_ticks: int | None = None
+    site_memory: bool | None = None
+    samples: bool | None = None
     evaluate_every: int | None = None
     evaluation_horizon: float | None = None
     small_start: bool | None = None
@@ -47,7 +49,8 @@ def build_plan(words: ScenarioOptions, options: TrainOptions) -> TrainingPlan:
     build_scenario(words, fields)  # refuses unknown fields, which the recipe could take for its own arguments
     overrides = scenario_overrides(words, fields)
     interface = {name: getattr(options, name) for name in _INTERFACE_FIELDS}
-    chosen = {name: getattr(options, name) for name in ("algorithm", "steps", "n_arenas", "small_start", "seed")}
+    names = ("algorithm", "steps", "n_arenas", "small_start", "seed", "samples")
+    chosen = {name: getattr(options, name) for name in names}
     if options.hidden is not None:
         chosen["hidden"] = _layers(options.hidden)
     evaluation = {"every_steps": options.evaluate_every, "horizon_s": options.evaluation_horizon}

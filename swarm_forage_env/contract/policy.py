@@ -14,6 +14,7 @@ from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.layout import (
     LayoutRow,
     ObservationLayout,
+    kind_row,
     messages_row,
     neighbours_row,
     observation_layout,
@@ -58,7 +59,7 @@ class SwarmSpec:
     horizon_s: float
     layout: ObservationLayout
     max_speed_mps: float
-    """Limit of the centre speed."""
+    """Limit of the centre speed; a robot of a slower kind has its share of this and of the wheels' speeds."""
     max_wheel_difference_mps: float
     """Limit of right minus left wheel speed."""
     wheel_scale_mps: float
@@ -146,7 +147,7 @@ def state_size(n_robots: int, n_objects: int) -> int:
 
 
 def layout_for(scenario: ScenarioConfig) -> ObservationLayout:
-    """Return the layout of a scenario's observations, with neighbours, messages and its own sensors where it has them.
+    """Return the layout of a scenario's observations, with all slices that only some scenarios have.
 
     Raises:
         ConfigError: a sensor that is not known here.
@@ -156,6 +157,8 @@ def layout_for(scenario: ScenarioConfig) -> ObservationLayout:
         further.append(neighbours_row(robots.neighbours_seen, robots.neighbour_range_m))
     if robots.message_size:
         further.append(messages_row(robots.message_size))
+    if robots.tells_kinds:
+        further.append(kind_row())
     further += [own_sensor(name).row for name in robots.own_sensors]
     arena = scenario.arena
     return observation_layout(arena.width_m, arena.height_m, scenario.objects.n_objects, tuple(further))

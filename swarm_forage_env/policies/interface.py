@@ -18,6 +18,7 @@ from gymnasium import spaces
 from swarm_forage_env._internal.fields import ConfigError, known_keys, number, one_of, switch, unique_names, whole
 from swarm_forage_env.contract.layout import (
     BUILT_IN_SLICES,
+    KIND,
     MESSAGES,
     NEIGHBOURS,
     LayoutRow,
@@ -92,6 +93,9 @@ class InterfaceConfig:
     message_size: int | None = None
     """Numbers of the messages that the learner sends and hears, as many as in its scenario, or 0: it says zeros and
     hears nothing. None: as for `neighbours_seen`. Messages need continuous actions."""
+    sees_kind: bool | None = None
+    """Whether the learner sees what a robot's kind can do, where its scenario has two or more. None: as for
+    `neighbours_seen`."""
     site_memory: bool = False
     """Two places that a robot remembers, see `policies.kernels.sites`: eight more columns."""
     own_sensors: tuple[str, ...] | None = None
@@ -112,14 +116,16 @@ class InterfaceConfig:
                 f"Expected interface.actions 'continuous' for messages of {self.message_size} numbers, got "
                 f"{self.actions!r}; choose continuous actions, or message_size=0 for a learner without messages."
             )
+        if self.sees_kind is not None:
+            switch("interface.sees_kind", self.sees_kind)
         switch("interface.site_memory", self.site_memory)
         if self.own_sensors is not None:
             unique_names("interface.own_sensors", self.own_sensors)
 
     def for_scenario(self, scenario: ScenarioConfig) -> "InterfaceConfig":
-        """Return these choices with neighbours, messages and own sensors of the scenario, where nothing was said.
+        """Return these choices, with what the scenario has of neighbours, messages, kinds and own sensors unless told.
 
-        Neighbours and messages that a scenario does not have stay None.
+        What a scenario does not have stays None; own sensors are then empty.
 
         Raises:
             ConfigError: discrete actions in a scenario with messages, of which nothing was said.
@@ -133,13 +139,15 @@ class InterfaceConfig:
             found["neighbour_range_m"] = robots.neighbour_range_m
         if self.message_size is None and robots.message_size:
             found["message_size"] = robots.message_size
+        if self.sees_kind is None and robots.tells_kinds:
+            found["sees_kind"] = True
         return replace(self, **found) if found else self
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """The slices that are seen beside those of every observation: neighbours, messages, own sensors."""
-        company = {NEIGHBOURS: self.neighbours_seen, MESSAGES: self.message_size}
-        return (*(name for name, size in company.items() if size), *(self.own_sensors or ()))
+        """The slices that are seen beside those of every observation: neighbours, messages, kind, own sensors."""
+        optional = {NEIGHBOURS: self.neighbours_seen, MESSAGES: self.message_size, KIND: self.sees_kind}
+        return (*(name for name, wanted in optional.items() if wanted), *(self.own_sensors or ()))
 
     @property
     def reads(self) -> tuple[str, ...] | None:
@@ -363,7 +371,7 @@ def learner_layout(source: ObservationLayout, config: InterfaceConfig) -> Observ
 
 
 def _check_company(source: ObservationLayout, config: InterfaceConfig) -> None:
-    """Refuse a scenario that shows other neighbours, or has other messages, than the learner knows."""
+    """Refuse a scenario with other neighbours or messages than the learner knows, or without kinds that it sees."""
     rows = {part.name: part.row for part in source}
     n_seen, size = config.neighbours_seen or 0, config.message_size or 0
     _, scale, _, shown = rows.get(NEIGHBOURS, (NEIGHBOURS, (1.0,), "", "none"))
@@ -378,6 +386,11 @@ def _check_company(source: ObservationLayout, config: InterfaceConfig) -> None:
         raise ConfigError(
             f"Expected a scenario with messages of {size} numbers, which the policy sends, got {there}; give the "
             f"scenario message_size={size}."
+        )
+    if config.sees_kind and KIND not in rows:
+        raise ConfigError(
+            "Expected a scenario whose robots are of several kinds, which the policy sees, got one in which all are "
+            "alike; give the scenario two or more robot_kinds."
         )
 
 

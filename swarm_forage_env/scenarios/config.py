@@ -25,6 +25,7 @@ from swarm_forage_env.scenarios.regions import (
     overlap_cells,
     source_boxes,
 )
+from swarm_forage_env.scenarios.robots import RobotConfig
 from swarm_forage_env.scenarios.units import CELL_M, CELLS_PER_M, EAST_WALL_M, WALL_M, WHEEL_SCALE_MPS
 
 CACHE_KINDS = ("none", "static", "dynamic")
@@ -33,10 +34,6 @@ MAX_DISC_SHARE = 0.4
 """Robot discs may cover at most this share of the start area; with more, random start poses cannot be drawn."""
 MAX_HANDLING_TICKS = 1_000_000
 """Longest pick-up or drop (our choice: twenty runs of the paper, far below what a 32-bit tick holds)."""
-MAX_NEIGHBOURS_SEEN = 64
-"""Most neighbours in an observation (our choice: 256 columns, twice those of all other sensors)."""
-MAX_MESSAGE_SIZE = 64
-"""Most numbers in a message (our choice, as for neighbours)."""
 MAX_CELLS = 200_000_000
 """Largest floor, 2.8 km square (our choice: its codes take 800 MB; the largest of the paper has 409,600 cells)."""
 
@@ -141,46 +138,6 @@ class ArenaConfig:
     def light_intensity(self) -> float:
         """Distance scale of the nest lights, (X Y)^(1/2)."""
         return math.sqrt(self.width_m * self.height_m)
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class RobotConfig:
-    """Differential-drive robots; defaults are those of the foot-bot used by the paper."""
-
-    n_robots: int
-    radius_m: float = 0.085036758
-    wheel_base_m: float = 0.14
-    max_speed_mps: float = 0.10
-    """Limit of the centre speed."""
-    max_wheel_difference_mps: float = 0.20
-    """Limit of right minus left wheel speed."""
-    start_margin_m: float = 2.8
-    """Robots start at uniform positions at least this far from the arena border."""
-    own_sensors: tuple[str, ...] = ()
-    """Names of further slices of an observation, registered by `contract.own.register_sensor`."""
-    neighbours_seen: int = 0
-    """How many of the nearest robots a robot observes; 0 = none, as in the paper."""
-    neighbour_range_m: float = 2.0
-    """How far it sees them, between centres (our choice: twice the side of its window on the floor)."""
-    message_size: int = 0
-    """Numbers that a robot may broadcast in every tick; 0 = robots say nothing, as in the paper."""
-    message_range_m: float = 2.0
-    """How far a message is heard, between centres (our choice, as for neighbours)."""
-
-    def __post_init__(self) -> None:
-        fields.whole("robots.n_robots", self.n_robots, at_least=1)
-        for name in ("radius_m", "wheel_base_m", "max_speed_mps", "max_wheel_difference_mps", "start_margin_m"):
-            fields.number(f"robots.{name}", getattr(self, name), above=0.0)
-        least = EAST_WALL_M + self.radius_m
-        _require(
-            self.start_margin_m >= least,
-            f"Expected robots.start_margin_m >= {least:.3f} (wall plus radius), got {self.start_margin_m}.",
-        )
-        fields.unique_names("robots.own_sensors", self.own_sensors)
-        fields.whole("robots.neighbours_seen", self.neighbours_seen, at_least=0, at_most=MAX_NEIGHBOURS_SEEN)
-        fields.whole("robots.message_size", self.message_size, at_least=0, at_most=MAX_MESSAGE_SIZE)
-        for name in ("neighbour_range_m", "message_range_m"):
-            fields.number(f"robots.{name}", getattr(self, name), above=0.0)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -6,7 +6,7 @@ by `read_fields`; `draw_fields` then makes values of it, and `corners` all combi
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Any, cast
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_keys, number, text
 from swarm_forage_env._internal.printable import shown
+from swarm_forage_env.scenarios.kinds import RobotKind
 
 KINDS = ("uniform", "log_uniform", "choice", "same_as")
 """Ways to draw a value: all numbers of a range alike, all orders of magnitude alike, one of a list, and the value of
@@ -94,7 +95,7 @@ class Drawn:
 
 
 def read_value(value: Any) -> Any:
-    """Return a value in which tables such as `{"uniform": [1, 2]}` are `Drawn` and lists are tuples.
+    """Return a value in which tables such as `{"uniform": [1, 2]}` are `Drawn`, lists are tuples and kinds are tables.
 
     Raises:
         ConfigError: a table that begins like a distribution and is none.
@@ -111,6 +112,8 @@ def read_value(value: Any) -> Any:
         return read_fields(given)
     if isinstance(value, list | tuple):
         return tuple(read_value(item) for item in cast("list[Any]", value))
+    if isinstance(value, RobotKind):
+        return {name: item for name, item in asdict(value).items() if item is not None}
     return value
 
 
@@ -139,7 +142,7 @@ def _plain(value: Any) -> Any:
         return value.to_mapping()
     if isinstance(value, Mapping):
         return plain_fields(cast("Mapping[str, Any]", value))
-    return list(cast("tuple[Any, ...]", value)) if isinstance(value, tuple) else value
+    return [_plain(item) for item in cast("tuple[Any, ...]", value)] if isinstance(value, tuple) else value
 
 
 def draw_fields(fields: Mapping[str, Any], grains: Mapping[str, float], rng: np.random.Generator) -> dict[str, Any]:
@@ -195,13 +198,20 @@ _Place = tuple[str, ...]
 
 
 def _places(fields: Mapping[str, Any], above: _Place = ()) -> Iterator[tuple[_Place, Drawn]]:
-    """Yield where the distributions of a table are, those of tables in it included."""
+    """Yield where the distributions of a table are, those of tables in it included, and of tables in lists."""
     for name, value in fields.items():
         if isinstance(value, Drawn):
             if value.kind != "same_as":
                 yield (*above, name), value
         elif isinstance(value, Mapping):
             yield from _places(cast("Mapping[str, Any]", value), (*above, name))
+        elif isinstance(value, tuple):
+            yield from _places(_tables_in(cast("tuple[Any, ...]", value)), (*above, name))
+
+
+def _tables_in(entries: tuple[Any, ...]) -> dict[str, Any]:
+    """Return the tables of a list by their places in it, "0" for the first."""
+    return {str(place): entry for place, entry in enumerate(entries) if isinstance(entry, Mapping)}
 
 
 def _filled(fields: Mapping[str, Any], values: Mapping[_Place, Any], above: _Place = ()) -> dict[str, Any]:
@@ -209,6 +219,10 @@ def _filled(fields: Mapping[str, Any], values: Mapping[_Place, Any], above: _Pla
     for name, value in fields.items():
         if isinstance(value, Mapping):
             filled[name] = _filled(cast("Mapping[str, Any]", value), values, (*above, name))
+        elif isinstance(value, tuple):
+            entries = cast("tuple[Any, ...]", value)
+            tables = _filled(_tables_in(entries), values, (*above, name))
+            filled[name] = tuple(tables.get(str(place), entry) for place, entry in enumerate(entries))
         else:
             filled[name] = values.get((*above, name), value)
     for name, value in filled.items():

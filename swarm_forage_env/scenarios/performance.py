@@ -148,7 +148,8 @@ DERIVED_PERFORMANCES = tuple(_FORMULAS)
 
 _COUNTED_OF_PARTS = ("collected", "first_picked")
 PART_COLUMNS = (*_COUNTED_OF_PARTS, "interference_fraction", "n_active", "n_present")
-"""Columns that the record of a mixed swarm also has of each part, under the name of `part_column`."""
+"""Columns that the record of a mixed swarm also has of each part, under the name of `part_column`; that of another
+swarm has them of each kind of robots where there are several."""
 _PER_ROBOT = "_per_robot"
 _PART_NAME = re.compile(
     rf"part_(?P<part>[1-9]\d{{0,3}})_(?P<column>{'|'.join(PART_COLUMNS)}|(?:{'|'.join(_COUNTED_OF_PARTS)}){_PER_ROBOT})"
@@ -172,7 +173,7 @@ def _quantity_of_part(name: str) -> Quantity | None:
 
 
 def _of_part(name: str, columns: Columns) -> Curve:
-    """Compute a quantity of one part. A swarm that is not mixed is its only part."""
+    """Compute a quantity of one part. A swarm that is not mixed, of robots of one kind, is its only part."""
     found = _PART_NAME.fullmatch(name)
     assert found is not None, "quantity knows the name"
     part, column = int(found["part"]), found["column"]

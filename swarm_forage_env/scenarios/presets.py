@@ -10,9 +10,10 @@ from typing import Any
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError, known_name
-from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, RewardConfig, RobotConfig, ScenarioConfig
+from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, RewardConfig, ScenarioConfig
 from swarm_forage_env.scenarios.obstacles import stretched
 from swarm_forage_env.scenarios.overrides import with_overrides
+from swarm_forage_env.scenarios.robots import RobotConfig
 from swarm_forage_env.scenarios.sizing import (
     ARENA_FIELDS,
     arena_at_density,

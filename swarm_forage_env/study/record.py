@@ -284,7 +284,10 @@ KNOWN_CONTRIBUTIONS: dict[str, tuple[str, str]] = {
     "time_in_repair_s": ("s", "mean length of the absences that ended with a repair in the interval; 0 = none ended"),
 }
 KNOWN_CONTRIBUTIONS |= {
-    part_column("K", name): (PERFORMANCE_COLUMNS[name].unit, f"{name} of part K of a mixed swarm, from 1")
+    part_column("K", name): (
+        PERFORMANCE_COLUMNS[name].unit,
+        f"{name} of part K of a mixed swarm, or of kind K of robots, from 1",
+    )
     for name in PART_COLUMNS
 }
 """Columns of `RunRecord.contributed` that this package may write: unit and meaning. Present only where they apply."""

@@ -4,7 +4,7 @@
 """
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
@@ -50,8 +50,8 @@ class LiveRun:
         self._by_ticks = by_ticks
         policy.reset(self.forage_env.swarm_spec, stream_rng(seed, Stream.POLICY))
         self._obs = stack.reset_batch(seed)
-        if isinstance(stack, RunRecorder) and hasattr(policy, "part_rows"):
-            stack.divide(policy.part_rows)  # type: ignore[attr-defined] - optional, see Policy
+        if isinstance(stack, RunRecorder):
+            stack.divide(_told_apart(policy, self.forage_env.scenario))
         self._has_tasks = hasattr(policy, "task")
 
     @property
@@ -83,10 +83,10 @@ def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> Compi
     """Return a policy, which was reset, for a run without Python between ticks; None where anybody might have a say.
 
     That is a wrapper other than the recorder, a subclass, a method that was replaced, neighbours, messages
-    or an own sensor that the policy reads, a mixed swarm, or Chipmunk.
+    or an own sensor that the policy reads, a mixed swarm, robots of several kinds, or Chipmunk.
     """
     env = stack.unwrapped
-    if hasattr(policy, "part_rows"):  # parts are counted tick by tick
+    if _told_apart(policy, env.scenario):  # parts are counted tick by tick
         return None
     is_bare = type(stack) is RunRecorder and stack.env is env and type(env) is ForageEnv
     if not is_bare or env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
@@ -96,6 +96,13 @@ def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> Compi
     if env.arena.needs_python:
         return None
     return policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
+
+
+def _told_apart(policy: Policy, scenario: ScenarioConfig) -> Sequence[slice]:
+    """Return the rows of what a record tells apart: parts of a mixed swarm, else kinds of robots, else nothing."""
+    if hasattr(policy, "part_rows"):
+        return policy.part_rows  # type: ignore[attr-defined] - optional, see Policy
+    return scenario.robots.kind_rows if scenario.robots.tells_kinds else ()
 
 
 def build_env(

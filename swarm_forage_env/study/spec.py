@@ -33,6 +33,7 @@ RUN_ID_DIGITS = 16
 _MAX_SEED = 2**63 - 1
 _LATER_FIELDS = (
     ("robots", "own_sensors"),
+    ("robots", "robot_kinds"),
     ("reward", "own_reward"),
     ("arena", "obstacles"),
     ("objects", "object_positions_m"),
@@ -94,8 +95,8 @@ class RunSpec:
 
         `performance` of the scenario is left out: it says how the run is read. So another one finds the stored run.
         `physics` is left out where it is the default, so that runs in Chipmunk have the same ids with and without it;
-        so are own sensors, an own reward, neighbours, messages, obstacles and positions of objects where there are
-        none.
+        so are own sensors, an own reward, neighbours, messages, kinds of robots, obstacles and positions of objects
+        where there are none.
         """
         return identity_of({**self._others(), "scenario": _identifying_fields(self.scenario)})
 

@@ -25,6 +25,7 @@ from swarm_forage_env._internal.fields import (
 )
 from swarm_forage_env.policies.mixture import SHARE, has_open_share
 from swarm_forage_env.policies.registry import policy_label
+from swarm_forage_env.scenarios.kinds import words_of_kind
 from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import READINGS
@@ -110,8 +111,11 @@ def _kind(value: Any) -> str:
 def list_word(entries: Sequence[Any]) -> str:
     """Return a list as a place on an axis: ["nest_distance", "x"] is "nest_distance,x", [] is "none".
 
-    Lists in it are joined by plus signs: [[1, 2], [3, 4]] is "1,2+3,4".
+    Lists in it are joined by plus signs: [[1, 2], [3, 4]] is "1,2+3,4". So are tables, which are kinds of robots:
+    [{name = "scout", share = 0.2}, {name = "hauler"}] is "scout:share=0.2+hauler".
     """
+    if entries and all(isinstance(entry, Mapping) for entry in entries):
+        return "+".join(map(words_of_kind, entries))
     if any(isinstance(entry, list | tuple) for entry in entries):
         return "+".join(map(list_word, entries))
     return ",".join(map(str, entries)) or NOTHING
@@ -130,6 +134,8 @@ def _field_value(name: str, value: Value) -> Any:
         return value
     try:
         return parse_tuple("" if value == NOTHING else str(value), kind)
+    except ConfigError:
+        raise
     except ValueError as error:
         raise ConfigError(f"Expected lists of numbers on axis {name}, got {value!r}.") from error
 

@@ -270,6 +270,8 @@ class Watch:
         ]
         lines = [f"robot {robot} at ({x:.2f}, {y:.2f}) m", ", ".join(signs) or "carries nothing"]
         left, right = swarm.wheel_speed[robot]
+        if kind := world.scenario.robots.kind_of(robot):
+            lines.append(f"kind: {kind}")
         lines.append(f"wheels {100 * left:.1f}, {100 * right:.1f} cm/s")
         return [*lines, *self._policy_lines(robot)]
 

@@ -8,7 +8,10 @@ DEFAULT_STEPS = 5_000_000
 DEFAULT_HIDDEN = (64, 64)
 """Sizes of the hidden layers."""
 DEFAULT_ARENAS = 8
-"""Arenas side by side."""
+"""Arenas side by side, at most."""
+DEFAULT_ROBOTS = 400
+"""Robots in all arenas, at most, but for one whole swarm: where more of them share the decisions, there are fewer
+rollouts, and so few seconds of each arena that no jam is ever seen."""
 DEFAULT_REWARDS = {"first_pickup": 1.0, "nest_progress": 0.05}
 """Rewards where deliveries count: deliveries alone are too rare to learn from. The whole way home is worth about one
 delivery."""

@@ -1,7 +1,8 @@
 """The recipe by which `swarm-forage train` makes its plans: defaults that were seen to learn, for Python, too.
 
 Deliveries are too rare to learn from them alone. Where they count, the recipe also rewards first pick-ups and the way
-home, and begins in a smaller arena. `recipes.toml` holds what was measured to suit single scenarios better.
+home, and begins in a smaller arena. The last third of a training learns more slowly. `recipes.toml` holds what was
+measured to suit single scenarios better.
 """
 
 import dataclasses
@@ -24,13 +25,14 @@ from swarm_forage_env.training.defaults import (
     DEFAULT_ARENAS,
     DEFAULT_HIDDEN,
     DEFAULT_REWARDS,
+    DEFAULT_ROBOTS,
     DEFAULT_STEPS,
     EPISODE_S,
     EVALUATE_EVERY,
     EVALUATION_SHARE,
 )
 from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
-from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.training.plan import SAMPLING, EvaluationPlan, Stage, TrainingPlan
 from swarm_forage_env.views.learner_arena import DEFAULT_SCENARIO
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
@@ -51,6 +53,10 @@ DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
     "sac": {"buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 1024},
 }
 """Arguments that suit hundreds of robots at once; our choice, the rest is the library's."""
+LATE_OPTIONS: dict[str, dict[str, Any]] = {"ppo": {"learning_rate": 0.0003, "gamma": 0.995}}
+"""Arguments of an algorithm in the last third of a training: smaller steps, further ahead; our choice."""
+TRAINING_PHYSICS = "compiled"
+"""What moves the bodies in training: contact follows the same model as with Chipmunk, in a part of the time."""
 SMALL_START = 0.4
 """Share of its size that an arena has in a small start; our choice."""
 
@@ -61,7 +67,7 @@ def recipe(
     sampler: ScenarioSampler | None = None,
     algorithm: str = "ppo",
     steps: int = DEFAULT_STEPS,
-    n_arenas: int = DEFAULT_ARENAS,
+    n_arenas: int | None = None,
     interface: GivenInterface = None,
     wrappers: Iterable[WrapperConfig | str] = (),
     hidden: tuple[int, ...] = DEFAULT_HIDDEN,
@@ -69,6 +75,7 @@ def recipe(
     small_start: bool | None = None,
     evaluation: EvaluationPlan | Mapping[str, Any] | None = None,
     seed: int = 0,
+    samples: bool | None = None,
     **overrides: Any,
 ) -> TrainingPlan:
     """Return the plan of a training in a scenario, or in many.
@@ -82,20 +89,25 @@ def recipe(
             of each name that it draws, unless `evaluation` has worlds.
         algorithm: One of `plan.ALGORITHMS`.
         steps: Decisions of single robots in all stages.
-        n_arenas: Arenas side by side.
+        n_arenas: Arenas side by side; default `DEFAULT_ARENAS`, fewer of swarms that make more than `DEFAULT_ROBOTS`
+            in all.
         interface: What a learner sees and does: an `InterfaceConfig`, or fields by name that differ from the
             recipe's (compact observations, discrete actions or for sac continuous ones, an automatic gripper,
-            `DECISION_TICKS`).
+            `DECISION_TICKS`, site memory).
         wrappers: What disturbs the swarm, in training and in evaluations: configurations, or words as on the command
             line ("population:death_per_tick=0.01").
         hidden: Sizes of the hidden layers.
-        options: Arguments of the algorithm that differ from `DEFAULT_OPTIONS`.
-        small_start: Spend the first third of the steps in a smaller arena; default where deliveries count.
+        options: Arguments of the algorithm that differ from `DEFAULT_OPTIONS` and, to the end, from `LATE_OPTIONS`.
+        small_start: Spend the first third of the steps in a smaller arena; default where deliveries count, unless
+            `recipes.toml` says otherwise.
         evaluation: How the policy is judged meanwhile: an `EvaluationPlan`, or fields by name that differ from the
             recipe's (whole runs, as often as `EVALUATE_EVERY` and `EVALUATION_SHARE` allow).
         seed: Seed of everything.
+        samples: Whether the trained policy draws its actions, see `TrainingPlan.samples`; default where it can:
+            discrete actions of ppo and a2c.
         overrides: Scenario fields by name; they go before the recipe's (`nest_progress=0.1`). `horizon_s` is the length
-            of the episodes; evaluations last as long as the scenario.
+            of the episodes; evaluations last as long as the scenario. Where nothing is said of `physics`, stages have
+            `TRAINING_PHYSICS` and evaluations those of the scenario.
 
     Raises:
         ConfigError: an unknown name or field, values that are refused by what they are for (see `TrainingPlan`), or
@@ -111,11 +123,17 @@ def recipe(
     measured = Measured() if isinstance(scenario, ScenarioConfig) else measured_recipe(scenario)
     fields = {name: value for name, value in overrides.items() if name != "horizon_s"}
     config = _training_scenario(scenario, fields, measured)
-    episodes = {} if isinstance(scenario, ScenarioConfig) else {"horizon_s": measured.episode_s}
+    episodes: dict[str, Any] = {}
+    if not isinstance(scenario, ScenarioConfig):
+        episodes = {"horizon_s": measured.episode_s}
+        if "physics" not in overrides:
+            episodes["physics"] = TRAINING_PHYSICS
     episodes |= {name: value for name, value in overrides.items() if name not in fields}
     with_overrides(config, **episodes)  # refuses an impossible length
     chosen = chosen_interface(interface, _default_interface(algorithm))
-    counts_deliveries = config.performance == "collected"
+    n_arenas = _default_arenas(config, sampler) if n_arenas is None else n_arenas
+    if small_start is None:
+        small_start = config.performance == "collected" and sampler is None and measured.small_start
     return TrainingPlan(
         scenario=config,
         wrappers=wrapper_configs(wrappers),
@@ -130,12 +148,31 @@ def recipe(
             config,
             steps,
             episodes,
-            small_start=counts_deliveries and sampler is None if small_start is None else small_start,
+            late=_late_options(algorithm, options or {}),
+            small_start=small_start,
         ),
         evaluation=_evaluation(evaluation, config, chosen.decision_ticks, sampler),
         seed=seed,
+        samples=_can_draw(algorithm, chosen) if samples is None else samples,
         sampler=sampler,
     )
+
+
+def _default_arenas(scenario: ScenarioConfig, sampler: ScenarioSampler | None) -> int:
+    """Return how many arenas are side by side; a sampler needs many, so that every batch holds all kinds of worlds."""
+    if sampler is not None:
+        return DEFAULT_ARENAS
+    return min(DEFAULT_ARENAS, max(1, DEFAULT_ROBOTS // scenario.robots.n_robots))
+
+
+def _late_options(algorithm: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `LATE_OPTIONS` but for those that are given, which hold to the end."""
+    return {name: value for name, value in LATE_OPTIONS.get(algorithm, {}).items() if name not in given}
+
+
+def _can_draw(algorithm: str, interface: InterfaceConfig) -> bool:
+    """Return whether a policy has probabilities to draw its actions by."""
+    return algorithm in SAMPLING and interface.actions == "discrete"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -148,6 +185,8 @@ class Measured:
     """Fields of `RewardConfig` by name."""
     options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     """Arguments by algorithm."""
+    small_start: bool = True
+    """Whether a training begins in a smaller arena where deliveries count."""
 
 
 @cache
@@ -205,6 +244,7 @@ def _default_interface(algorithm: str) -> InterfaceConfig:
         actions="continuous" if algorithm == "sac" else "discrete",
         automatic_gripper=True,
         decision_ticks=DECISION_TICKS,
+        site_memory=True,
     )
 
 
@@ -224,10 +264,24 @@ def _fitting_batch(n_samples: int, most: int) -> int:
 
 
 def _stages(
-    scenario: ScenarioConfig, steps: int, episodes: Mapping[str, Any], *, small_start: bool
+    scenario: ScenarioConfig,
+    steps: int,
+    episodes: Mapping[str, Any],
+    *,
+    late: Mapping[str, Any],
+    small_start: bool,
 ) -> tuple[Stage, ...]:
+    """Return a third of the steps in a smaller arena if asked for, and a third with the `late` options if any."""
+    third = max(1, steps // 3)
+    middle = Stage(steps=max(1, steps - third * (small_start + bool(late))), scenario=episodes)
+    stages = (middle, Stage(steps=third, scenario=episodes, options=late)) if late else (middle,)
     if not small_start:
-        return (Stage(steps=steps, scenario=episodes),)
+        return stages
+    return (Stage(steps=third, scenario={**_fitting_small_arena(scenario), **episodes}), *stages)
+
+
+def _fitting_small_arena(scenario: ScenarioConfig) -> dict[str, Any]:
+    """Return `small_arena`; raises ConfigError where there cannot be one."""
     if scenario.objects.object_positions_m:
         raise ConfigError(
             "Expected no object_positions_m where a training begins in a smaller arena (small_start), which may not "
@@ -241,10 +295,7 @@ def _stages(
             f"Cannot begin in a smaller arena (small_start) of {small['width_m']} x {small['height_m']} m: {error} "
             "Or train in the whole arena from the beginning: small_start=False (--no-small-start)."
         ) from error
-    return (
-        Stage(steps=max(1, steps // 3), scenario={**small, **episodes}),
-        Stage(steps=steps - steps // 3, scenario=episodes),
-    )
+    return small
 
 
 def small_arena(scenario: ScenarioConfig) -> dict[str, Any]:

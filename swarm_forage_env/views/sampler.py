@@ -37,6 +37,7 @@ from swarm_forage_env.scenarios.draws import KINDS, corners, draw_fields, drawn_
 from swarm_forage_env.scenarios.overrides import field_types
 from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.scenarios.units import CELL_M
+from swarm_forage_env.world.placement import static_cache_centres
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_config_class, wrappers_from_mapping
 
@@ -238,7 +239,10 @@ class ScenarioSampler:
     def _built(self, number: int, values: Mapping[str, Any]) -> ScenarioConfig:
         table = self.worlds[number].scenario
         assert isinstance(table, Mapping), "the constructor made it one"
-        return chosen_scenario(table[_PRESET], values)
+        config = chosen_scenario(table[_PRESET], values)
+        if config.caches == "static":
+            static_cache_centres(config)  # an environment would refuse caches without room, but only once it is drawn
+        return config
 
     def _title(self, number: int) -> str:
         table = self.worlds[number].scenario
@@ -294,7 +298,8 @@ def _check_columns(built: list[ScenarioConfig], largest: ScenarioConfig) -> None
             raise ConfigError(
                 f"Expected worlds with the same columns of observations, got {_said_columns(expected)} in "
                 f"{largest.name} and {_said_columns(columns_of(config))} in {config.name}; give all worlds the same "
-                "neighbours_seen, neighbour_range_m, message_size and own_sensors."
+                "neighbours_seen, neighbour_range_m, message_size and own_sensors, and either all or none two or more "
+                "robot_kinds."
             )
 
 
@@ -335,6 +340,6 @@ def _said(fields: Mapping[str, Any], values: Mapping[str, Any]) -> str:
     for name in drawn_names(fields):
         value: Any = values
         for key in name.split("."):
-            value = value[key]
+            value = value[int(key)] if isinstance(value, tuple) else value[key]
         said.append(f"{name} = {value}")
     return ", ".join(said) or "these values"

@@ -10,7 +10,7 @@ from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.rng import Stream, TickDraws, stream_rng
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.contract.layout import OPTIONAL_SLICES
+from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOURS
 from swarm_forage_env.contract.own import OwnSensor, own_sensor
 from swarm_forage_env.contract.policy import CompiledPolicy, layout_for, refused_action, refused_tasks
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
@@ -26,8 +26,10 @@ from swarm_forage_env.world.caches import (
 from swarm_forage_env.world.compiled import CompiledTick, new_world, tasks_of
 from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels.bodies import BodyState
+from swarm_forage_env.world.kernels.kinds import blank
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
 from swarm_forage_env.world.kernels.world import World
+from swarm_forage_env.world.kinds import blank_boxes
 from swarm_forage_env.world.neighbourhood import Neighbourhood
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.placement import draw_source, place_all, place_objects, static_cache_centres
@@ -46,6 +48,7 @@ class ForagingArena:
         config: The scenario.
         layout: Layout of the observation rows.
         reads: Names of the observation slices that are used; sensors of others may stay zero.
+        blanks: (B, 4) what robots of some kinds cannot observe, see `kernels.kinds.blank`.
         tick: Ticks done since reset.
         swarm, objects, caches, events: The state; read freely, write through the methods.
         obs: (N, D) the observation, rewritten in every tick.
@@ -69,8 +72,9 @@ class ForagingArena:
         self.config = config
         self.layout = layout_for(config)
         self.reads = read_slices(reads, self.layout)
+        self.blanks = blank_boxes(config.robots, self.layout)
         self._own_names = tuple(name for name in config.robots.own_sensors if name in self.reads)
-        further = {*OPTIONAL_SLICES, *config.robots.own_sensors}
+        further = {NEIGHBOURS, MESSAGES, *config.robots.own_sensors}
         self._needs_python = not further.isdisjoint(self.reads)
         self._given_reads = reads
         self._snapshots = snapshots
@@ -152,12 +156,17 @@ class ForagingArena:
         return found
 
     def _sense_further(self) -> None:
-        """Fill in neighbours, messages and the user's own sensors; robots that are not in the world sense nothing."""
+        """Fill in neighbours, messages and the user's own sensors; robots that are not in the world sense nothing.
+
+        Nor do robots whose kind lacks the sensor.
+        """
         if self._neighbourhood.is_used:
             self._neighbourhood.sense(self.swarm, self.obs)
         for sensor in self._own_sensors:
             values = sensor.read(self)
             self.obs[:, self.layout[sensor.name]] = np.where(self.swarm.present[:, None], values, 0.0)
+        if self._needs_python:
+            blank(self.obs, self.blanks)
 
     def _furnish(self) -> None:
         """Place all objects and create static caches: before the clusters if placement is "power_law", else after."""

@@ -16,6 +16,7 @@ from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels import tick
 from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.world import Sensors, Wandering, World
+from swarm_forage_env.world.kinds import speeds
 from swarm_forage_env.world.state import StepEvents, SwarmState
 
 Call = tuple[Callable[..., Any], *tuple[Any, ...]]
@@ -139,6 +140,7 @@ def new_world(
         twist=twist,
         command=np.zeros((n_robots, 2)),
         drive_limits=drive_limits(config),
+        speeds=speeds(config.robots),
         dt_s=config.dt_s,
         touch_m=2 * config.robots.radius_m + TOUCH_SLACK_M,
         pressing=(new_memory(n_robots), new_memory(n_robots)),

@@ -155,7 +155,8 @@ def static_cache_centres(config: ScenarioConfig) -> tuple[tuple[int, int], ...]:
     its squares would reach into the nest (our choice: a floor cell is either nest or cache).
 
     Raises:
-        ConfigError: a cache square leaves the arena, reaches into nest or obstacles or overlaps another.
+        ConfigError: a cache square leaves the arena, reaches into nest or obstacles or overlaps another, or its centre,
+            on which the last object of a cache stays, is where no object may lie.
     """
     nx, ny = config.arena.n_cells
     nest = config.arena.nest_cells
@@ -193,5 +194,10 @@ def _check_cache_squares(config: ScenarioConfig, centres: tuple[tuple[int, int],
                 f"Expected static caches inside the arena, clear of nest, obstacles and each other, got a square of "
                 f"{side_m:.1f} m centred at ({(x + 0.5) * CELL_M:.1f}, {(y + 0.5) * CELL_M:.1f}) m; lower "
                 "cache.side_share or move nest or obstacles."
+            )
+        if not overlap_cells((x, y, x + 1, y + 1), config.arena.distributable_cells):
+            raise ConfigError(
+                f"Expected static caches with centres between 15 % and 85 % of each axis, where objects may lie, got "
+                f"one at ({(x + 0.5) * CELL_M:.1f}, {(y + 0.5) * CELL_M:.1f}) m; choose a smaller nest or move it."
             )
         taken.append(square)

@@ -9,15 +9,16 @@ from collections.abc import Collection
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_name
-from swarm_forage_env.contract.layout import LIGHT_IF_CARRYING, MESSAGES, NEIGHBOURS, ObservationLayout
+from swarm_forage_env.contract.layout import KIND, LIGHT_IF_CARRYING, MESSAGES, NEIGHBOURS, ObservationLayout
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 from swarm_forage_env.world.kernels.world import Columns, Sensors
+from swarm_forage_env.world.kinds import blank_boxes, half_windows, kind_columns
 from swarm_forage_env.world.physics import obstacle_rows
 
 PROXIMITY_RANGE_M = 0.1
 """Reach of a proximity beam beyond the body."""
-_SWITCHES = {NEIGHBOURS: "neighbours_seen", MESSAGES: "message_size"}
+_SWITCHES = {NEIGHBOURS: "neighbours_seen", MESSAGES: "message_size", KIND: "two or more robot_kinds"}
 """Slices that only some scenarios have, and the field that gives them."""
 
 
@@ -68,4 +69,8 @@ def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collec
         reads_ground="ground" in read,
         reads_line_of_sight=not {"los_cell", "los_object", "los_cache"}.isdisjoint(read),
         behind_counts=config.quirks.obstacle_behind_counts,
+        half_windows=half_windows(config.robots),
+        kinds=kind_columns(config.robots),
+        kind_start=starts.get(KIND, 0),
+        blanks=blank_boxes(config.robots, layout),
     )

@@ -148,6 +148,7 @@ class SensorNoise(SwarmWrapper):
             self._spans,
             self._lows,
             self._heading,
+            env.arena.blanks,
             self._proximity,
             self._behind_counts,
         )

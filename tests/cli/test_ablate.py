@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ABLATE = ("ablate", "--scenario", "warehouse_small", "--robots", "8,16", "--policy", "crw,stochm", "--seeds", "2",
-          "--horizon", "400", "--jobs", "1", "--set", "interval_s=200")  # fmt: skip
+          "--horizon", "200", "--jobs", "1", "--set", "interval_s=200")  # fmt: skip
 QUIRKS = ("--quirks", "explore_double_start,integer_estimates,dynamic_cache_merges_all")
 
 
@@ -58,7 +58,7 @@ def test_worlds_may_be_disturbed_and_performance_another(command):
 def test_dry_run_makes_nothing(command):
     code, out, _ = command(*ABLATE, *QUIRKS, "--dry-run")
     assert code == 0
-    assert "At most 64 runs to do, 25,600 simulated seconds" in out
+    assert "At most 64 runs to do, 12,800 simulated seconds" in out
     assert not Path("results").exists()
 
 

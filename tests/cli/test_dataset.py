@@ -21,6 +21,12 @@ def test_a_data_set_is_told_written_and_kept(command, tmp_path):
     assert "2, of which 0 to do" in command(*words, "--dry-run")[1]
 
 
+def test_site_memory_is_eight_columns_more(command):
+    words = ("dataset", "--policy", "random", "--observation", "compact", "--dry-run", *TINY)
+    for option, columns in (("--site-memory", 31), ("--no-site-memory", 23)):
+        assert f"compact, {columns} columns" in command(*words, option)[1]
+
+
 def test_what_is_wrong_is_told_in_one_line(command, tmp_path):
     for words in (("--observation", "half"), ("--policy", "crv"), ("--policy", "mixed:crw=1,dpo=1")):
         code, _, err = command("dataset", *TINY, *words)

@@ -1,4 +1,4 @@
-"""Mixed swarms on the command line: the rows of their parts, and one line for what is wrong."""
+"""Mixed swarms and kinds of robots on the command line: the rows of their parts, and one line for what is wrong."""
 
 import json
 
@@ -22,6 +22,20 @@ def test_the_table_of_a_run_has_a_row_for_each_part(command):
     code, out, _ = command("run", "--policy", MIXED, *TINY, "--performance", "part_2_first_picked", "--json")
     (read,) = json.loads(out)["controllers"]
     assert read["performance"] == mixed["parts"][1]["first_pickups_per_1000_s"]
+
+
+def test_the_table_of_a_run_has_a_row_for_each_kind_of_robots(command):
+    words = ("run", "--policy", "random", *TINY, "--set", "robot_kinds=fast:share=0.25+slow:speed=0.5,lacks=light")
+    code, out, err = command(*words)
+    assert code == 0, err
+    rows = [line for line in out.splitlines() if "of which" in line]
+    assert ["of which fast (1 robot)" in row for row in rows] == [True, False]
+    assert "of which slow (3 robots)" in rows[1]
+    (found,) = json.loads(command(*words, "--json")[1])["controllers"]
+    assert (
+        sum(part["first_pickups_per_1000_s"]["mean"] for part in found["parts"])
+        == (found["first_pickups_per_1000_s"]["mean"])
+    )
 
 
 def test_films_and_information_take_mixed_swarms(command, tmp_path):

@@ -35,14 +35,18 @@ def page(*specs):
     return page_of(tables, scored, Verdicts(*judge_claims(tables, scored), *expected), "ci")
 
 
+def page_of_two() -> str:
+    """A page about two sets, one with two axes."""
+    walking = Axis(name="walk_probability", values=(0.0, 0.051))
+    return page(made_study(), made_study("S2a", walking, Axis(name="population_size", values=(2, 4))))
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """A page about two sets, one with two axes."""
+    """The page of two in a file."""
     chromium()  # skips before the page is made
-    walking = Axis(name="walk_probability", values=(0.0, 0.001))
     folder = tmp_path_factory.mktemp("report")
-    text = page(made_study(), made_study("S2a", walking, Axis(name="population_size", values=(2, 4))))
-    (folder / "report.html").write_text(text)
+    (folder / "report.html").write_text(page_of_two())
     return folder / "report.html"
 
 
@@ -109,9 +113,7 @@ def test_a_claim_that_needs_another_set_says_which():
 
 
 def test_what_the_paper_expected_stands_below_its_claims():
-    walking = Axis(name="walk_probability", values=(0.0, 0.051))
-    text = page(made_study("S2a", walking, Axis(name="population_size", values=(2, 4))))
-    table = text.split('id="intuitions"')[1].split("</table>")[0]
+    table = page_of_two().split('id="intuitions"')[1].split("</table>")[0]
     assert "CRW: Moving objects do not affect it" in table, "H14 needs no other set"
     assert '<span class="answer supported">' in table
     assert re.findall(r'class="name">(\w+)<', table) == [*INTUITIONS], "those that wait, too"

@@ -128,6 +128,7 @@ def test_a_policy_that_sees_them_says_what_it_needs():
         LearnerInterface(config, SwarmSpec.of(scenario("warehouse_small")))
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
 def test_runs_of_scripted_policies_stay_what_they_are(physics):
     small = scenario("warehouse_small", n_robots=6, horizon_s=200.0, physics=physics)

@@ -74,6 +74,7 @@ def call(folder: Path, program: str) -> str:
     return run.stdout.strip()
 
 
+@pytest.mark.compiled
 def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(package):
     program = "from controllers.outer import outer; print(outer(1.0), sum(outer.stats.cache_hits.values()))"
     (package / "outer.py").write_text(OUTER)
@@ -84,6 +85,7 @@ def test_an_edit_of_one_module_reaches_what_another_has_compiled_in(package):
     assert call(package, program) == "3.0 0"
 
 
+@pytest.mark.compiled
 def test_a_kernel_that_another_has_called_still_answers_python(package):
     """Both versions of it are kept, apart from each other."""
     (package / "outer.py").write_text(OUTER)
@@ -94,6 +96,7 @@ def test_a_kernel_that_another_has_called_still_answers_python(package):
     assert call(package, both.format("inner(1.0), outer(3.0)")) == "2.0 4.0 1"
 
 
+@pytest.mark.compiled
 def test_a_type_that_the_sources_no_longer_have_does_no_harm(package):
     program = "from controllers import pairs; print(pairs.total(pairs.{name}(1.0, 2.0)))"
     for name in ("Pair", "Couple"):

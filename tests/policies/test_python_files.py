@@ -2,6 +2,8 @@
 
 import sys
 import textwrap
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import pytest
@@ -94,10 +96,11 @@ def test_path_and_content_are_the_identity_of_its_runs(file):
 
 
 @pytest.mark.compiled
-def test_worker_processes_find_it(file):
+def test_another_process_finds_it(file):
     world = scenario("warehouse_small", n_robots=2, n_objects=10, horizon_s=2.0, interval_s=1.0)
     specs = [plan_run(world, "mine.py:Ahead", seed=seed) for seed in (1, 2)]
-    result = run_all(specs, jobs=2)
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
+        result = run_all(specs, executor=executor)
     assert [failure.error for failure in result.failures] == []
     assert [record.controller for record in result.records] == [f"{file}:Ahead"] * 2
 

@@ -132,6 +132,19 @@ def test_every_source_is_stored_with_what_made_it():
     assert [set(values["made_with"]) for values in store.values()] == [set(update_docs.made_with())] * len(store)
 
 
+def test_what_is_made_anew_takes_its_place_in_the_store(tmp_path, monkeypatch):
+    first, second, *_ = update_docs.SOURCES
+    monkeypatch.setattr(update_docs, "STORE", tmp_path / "results.json")
+    monkeypatch.setattr(update_docs, "PAGES", [])
+    monkeypatch.setattr(update_docs, "make", lambda name: {"table": f"of {name}"})
+    update_docs.STORE.write_text(json.dumps({second: {"table": "old"}}))
+    assert update_docs.main(["--remake", first]) == 0
+    assert list(json.loads(update_docs.STORE.read_text()).items()) == [
+        (first, {"table": f"of {first}"}),
+        (second, {"table": "old"}),
+    ]
+
+
 def test_commands_of_the_store_are_those_that_the_pages_show():
     readme = (ROOT / "README.md").read_text()
     assert [

@@ -4,20 +4,27 @@
 """
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 import pytest
 
+from metrics.benchmark import BenchmarkError, load_protocol, read_entry
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.network import Network, NetworkError
 from swarm_forage_env.study.record import SCHEMA_VERSION, RecordError, RunRecord
 from swarm_forage_env.study.replay.files import read_replays
+from swarm_forage_env.study.replay.frames import ReplayError
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import read_failure
+from swarm_forage_env.training.datasets.layout import DatasetError
+from swarm_forage_env.training.datasets.reading import TrajectoryDataset
 from swarm_forage_env.training.evaluations import read_evaluations, read_training
 from swarm_forage_env.training.plan import read_plan
+from tests.support.entries import TINY
+from tests.support.sampled import sampler
 
 FILES = Path(__file__).parent.parent / "files"
 
@@ -54,6 +61,55 @@ def test_a_replay_of_an_earlier_day_is_read():
     assert (replay.label, replay.n_frames, replay.scenario.robots.n_robots) == ("dpo", 31, 2)
     assert replay.memory_events is None, "it is of version 2"
     assert "death_per_tick" in replay.spec.to_json()
+
+
+def test_a_replay_of_version_3_has_what_robots_remember():
+    (replay,) = read_replays(FILES / "replay_3.html")
+    assert (replay.label, replay.scenario.robots.n_robots) == ("dpo", 2)
+    assert replay.memory_events is not None
+    assert len(replay.memory_events) > 0
+
+
+def test_a_replay_of_another_version_is_refused(tmp_path):
+    page = (FILES / "replay_3.html").read_text(encoding="utf-8")
+    assert page.count('"version": 3,') == 1
+    (tmp_path / "a.html").write_text(page.replace('"version": 3,', '"version": 4,'), encoding="utf-8")
+    with pytest.raises(ReplayError, match="version 4"):
+        read_replays(tmp_path / "a.html")
+
+
+def test_a_data_set_of_an_earlier_day_is_read():
+    data = TrajectoryDataset(FILES / "dataset")
+    steps = data.steps(1)
+    assert data.card.schema_version == 1
+    assert (steps.observations.shape, steps.actions.shape) == ((11, 2, len(data.card.columns)), (10, 2, 3))
+    assert steps.truncated[-1].all()
+
+
+@pytest.mark.parametrize(("change", "reason"), [({"schema_version": 2}, "version"), ({"colour": 1}, "'colour'")])
+def test_a_data_set_of_a_later_day_is_refused(tmp_path, change, reason):
+    shutil.copytree(FILES / "dataset", tmp_path / "later")
+    card = tmp_path / "later/dataset.json"
+    card.write_text(json.dumps(json.loads(card.read_text(encoding="utf-8")) | change), encoding="utf-8")
+    with pytest.raises(DatasetError, match=reason):
+        TrajectoryDataset(tmp_path / "later")
+
+
+def test_an_entry_of_an_earlier_day_is_read_and_one_of_a_later_day_refused(tmp_path):
+    """It is an entry of `tests/support/tiny_benchmark.toml`; another protocol there needs a new file."""
+    entry = read_entry(FILES / "entry.json", load_protocol(TINY))
+    assert entry.name == "mine"
+    assert entry.performance("room, 1 robot").shape == (1, 2)
+    content = json.loads((FILES / "entry.json").read_text(encoding="utf-8"))
+    (tmp_path / "a.json").write_text(json.dumps(content | {"colour": 1}), encoding="utf-8")
+    with pytest.raises(BenchmarkError, match="with the keys"):
+        read_entry(tmp_path / "a.json", load_protocol(TINY))
+
+
+def test_a_plan_with_a_sampler_of_an_earlier_day_is_read():
+    plan = read_plan(FILES / "sampled_plan.json")
+    assert plan.sampler == sampler()
+    assert [world.baseline for world in plan.evaluation.worlds] == ["random", "crw"]
 
 
 def test_a_network_of_an_earlier_day_is_read():

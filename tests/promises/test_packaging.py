@@ -6,7 +6,7 @@ import re
 import subprocess
 import sys
 import tomllib
-from importlib.metadata import entry_points, version
+from importlib.metadata import entry_points, metadata, version
 from pathlib import Path
 
 import gymnasium
@@ -64,6 +64,11 @@ def test_unknown_names_are_refused():
 
 def test_version_comes_from_the_installed_package():
     assert swarm_forage_env.__version__ == version("swarm-forage-env") == PROJECT["version"]
+
+
+def test_the_installed_package_names_the_paper():
+    told = metadata("swarm-forage-env").get_all("Project-URL")
+    assert told == ["Paper, https://arxiv.org/abs/2012.04144"], "install the checkout again: pip install -e ."
 
 
 def test_changelog_and_citation_have_this_version_and_its_date():

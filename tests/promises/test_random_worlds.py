@@ -3,10 +3,13 @@
 A short look in every test run; `scripts/fuzz worlds` visits as many as fit into a time.
 """
 
+from collections import Counter
 from random import Random
 
 import pytest
 
+from swarm_forage_env._internal.fields import ConfigError
+from tests.support.random_scenarios import random_scenario, random_wrappers
 from tests.support.random_worlds import random_world, visit
 
 pytestmark = pytest.mark.compiled
@@ -23,3 +26,29 @@ def test_everything_holds_in_random_worlds(first):
 def test_the_same_number_gives_the_same_world():
     assert random_world(Random(5)) == random_world(Random(5))
     assert random_world(Random(5)) != random_world(Random(6))
+
+
+def test_every_kind_of_world_is_drawn():
+    found: Counter[str] = Counter()
+    for number in range(300):
+        random = Random(number)
+        try:
+            config = random_scenario(random, None, 40)
+        except ConfigError:
+            continue
+        found["valid"] += 1
+        found["obstacles"] += bool(config.arena.obstacles)
+        found["neighbours"] += config.robots.neighbours_seen > 0
+        found["messages"] += config.robots.message_size > 0
+        found["message noise"] += any(one.name == "message_noise" for one in random_wrappers(random, config))
+        found[config.objects.placement] += 1
+        found[config.caches] += 1
+    assert found["valid"] > 60
+    assert min(found[name] for name in ("obstacles", "neighbours", "messages", "message noise", "positions")) > 3
+    assert min(found[name] for name in ("power_law", "quad_source", "none", "static", "dynamic")) > 3
+
+
+def test_a_world_may_come_from_a_sampler():
+    world = next(world for world in map(random_world, map(Random, range(400))) if world.sampler)
+    assert world.sampler is not None
+    assert world.sampler.world_of(world.seed) == (world.scenario, world.wrappers)

@@ -58,4 +58,8 @@ def test_what_a_work_is_used_for_exists():
 def test_the_paper_has_the_same_number_wherever_it_is_cited():
     (paper,) = (text for name, text in ENTRIES if name == "the paper")
     assert "https://arxiv.org/abs/2012.04144" in paper
-    assert "url: https://arxiv.org/abs/2012.04144" in (ROOT / "CITATION.cff").read_text()
+    doi = "10.48550/arXiv.2012.04144"  # arXiv gives one to every paper, by its number
+    citation, bibliography = ((ROOT / name).read_text() for name in ("CITATION.cff", "paper/paper.bib"))
+    assert f"\n    doi: {doi}\n    url: https://arxiv.org/abs/2012.04144\n" in citation
+    assert f"doi = {{{doi}}}" in bibliography
+    assert f"https://doi.org/{doi}" in paper

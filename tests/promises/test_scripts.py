@@ -3,12 +3,16 @@
 import re
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from metrics.claims import CLAIMS, INTUITIONS
 from metrics.laws import ALL_LAWS
+from swarm_forage_env.policies.network import Network
+from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.run import run_one
 from swarm_forage_env.study.spec import plan_run
@@ -214,3 +218,12 @@ def test_a_package_that_cannot_be_timed_gives_its_reason(monkeypatch):
             worker.rate("nobody", 50, 1, 0.1)
     finally:
         worker.close()
+
+
+def test_the_likeliest_action_of_a_network_that_draws_is_told_by_the_same_weights(run, tmp_path):
+    assert run("likeliest", "generalist", "likeliest.npz")[0] == 0
+    shipped, likeliest = Network.load(network_file("generalist")), Network.load(tmp_path / "likeliest.npz")
+    assert (shipped.about.samples, likeliest.about.samples) == (True, False)
+    assert replace(likeliest.about, samples=True) == shipped.about
+    layers = zip(likeliest.weights + likeliest.biases, shipped.weights + shipped.biases, strict=True)
+    assert all(np.array_equal(*pair) for pair in layers)

@@ -138,13 +138,13 @@ def objects_in_sight(env: ForageEnv, robot: int) -> list[float]:
     return window
 
 
-def caches_in_sight(env: ForageEnv, robot: int) -> list[float]:
-    """The nearest four caches that have a cell in the window."""
+def caches_in_sight(env: ForageEnv, robot: int, half: int = 2) -> list[float]:
+    """The nearest four caches that have a cell in the window, which ends `half` cells from its middle."""
     column, row = cell_of(env, robot)
     seen = set()
     ny, nx = env.objects.floor.shape
-    for y in range(max(0, row - 2), min(ny, row + 3)):
-        for x in range(max(0, column - 2), min(nx, column + 3)):
+    for y in range(max(0, row - half), min(ny, row + half + 1)):
+        for x in range(max(0, column - half), min(nx, column + half + 1)):
             if env.objects.floor[y, x] <= CELL_CACHE:
                 seen.add(CELL_CACHE - int(env.objects.floor[y, x]))
     caches = env.caches

@@ -42,6 +42,7 @@ NEIGHBOURS = Twin(
     "neighbourhood.neighbours", "world/test_neighbourhood.py", "swarm_forage_env.env.ForageEnv.step_batch"
 )
 MESSAGES = Twin("neighbourhood.heard", "world/test_neighbourhood.py", "swarm_forage_env.env.ForageEnv.step_batch")
+KINDS = Twin("kinds.observe", "world/test_kinds.py", "swarm_forage_env.env.ForageEnv.step_batch")
 NOISE = Twin("adversity.noisy_row", "wrappers/test_noise.py", "swarm_forage_env.wrappers.noise.SensorNoise.observe")
 
 TWINS = {
@@ -105,6 +106,8 @@ TWINS = {
     "swarm_forage_env.world.kernels.floor.line_of_sight": OBSERVED,
     "swarm_forage_env.world.kernels.interact.serve": INTERACTIONS,
     "swarm_forage_env.world.kernels.interfere.mark": INTERFERENCE,
+    "swarm_forage_env.world.kernels.kinds.blank": KINDS,
+    "swarm_forage_env.world.kernels.kinds.tell_kinds": KINDS,
     "swarm_forage_env.world.kernels.neighbourhood.hear": MESSAGES,
     "swarm_forage_env.world.kernels.neighbourhood.say": MESSAGES,
     "swarm_forage_env.world.kernels.neighbourhood.see_neighbours": NEIGHBOURS,

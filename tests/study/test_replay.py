@@ -15,6 +15,7 @@ from swarm_forage_env.contract.codes import Counter, ObjectStatus, Task
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.rendering.view import RenderError
+from swarm_forage_env.scenarios.kinds import RobotKind, kind_sizes
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.study.replay import capture
 from swarm_forage_env.study.replay import files as files_module
@@ -404,6 +405,17 @@ def test_the_page_is_told_where_obstacles_are(replay):
     for one, expected in ((replay, []), (dataclasses.replace(replay, spec=spec), [list(box) for box in boxes])):
         header, _ = files_module.take_page_apart(files_module.page_of([one]))
         assert header["runs"][0]["world"]["obstacles_m"] == expected
+
+
+def test_the_page_is_told_who_is_of_which_kind(replay):
+    kinds = (RobotKind(name="scout", share=0.25), RobotKind(name="hauler"))
+    robots = dataclasses.replace(CROWDED.robots, robot_kinds=kinds)
+    spec = dataclasses.replace(replay.spec, scenario=dataclasses.replace(CROWDED, robots=robots))
+    n_scouts = kind_sizes(kinds, robots.n_robots)[0]
+    named = [["scout", n_scouts], ["hauler", robots.n_robots - n_scouts]]
+    for one, expected in ((replay, []), (dataclasses.replace(replay, spec=spec), named)):
+        header, _ = files_module.take_page_apart(files_module.page_of([one]))
+        assert header["runs"][0]["kinds"] == expected
 
 
 # Coding

@@ -8,6 +8,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
+from swarm_forage_env.scenarios.kinds import RobotKind
 from swarm_forage_env.study import study_file
 from swarm_forage_env.study.experiments import BUDGETS
 from swarm_forage_env.study.studies import Axis, Cell, StudySpec
@@ -248,6 +249,19 @@ def test_an_axis_of_lists(tmp_path):
     assert spec.axes[0].values == ("none", "nest_distance")
     assert spec.reference == "none"
     assert [spec.experiment(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance",)]
+
+
+def test_an_axis_of_kinds(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        'name = "mine"\nscenario = "warehouse_small"\npolicies = ["random"]\nreadings = ["described"]\n'
+        '[[axis]]\nfield = "robot_kinds"\nvalues = [[], [{name = "slow", share = 0.2, speed = 0.5}, {name = "rest"}]]\n'
+        "reference = []\n[budget.few]\nseeds = 1\n"
+    )
+    spec = load_study(file)
+    assert spec.axes[0].values == ("none", "slow:share=0.2,speed=0.5+rest")
+    kinds = [spec.experiment(cell).scenario.robots.robot_kinds for cell in spec.cells]
+    assert kinds == [(), (RobotKind(name="slow", share=0.2, speed=0.5), RobotKind(name="rest"))]
 
 
 def test_what_a_budget_leaves_out_of_the_paper_is_told():

@@ -1,4 +1,7 @@
-"""Who drives the swarms of worlds made at random: ways that no sensible policy would take, and policies."""
+"""Who drives the swarms of worlds made at random: ways that no sensible policy would take, and policies.
+
+Where robots can send messages, the first three drivers send what they drive by: (N, 3 + message_size).
+"""
 
 from typing import Protocol
 
@@ -41,7 +44,7 @@ class Driver(Protocol):
         """Start a run."""
 
     def act(self, env: ForageEnv, obs: ObsArray) -> ActionArray:
-        """Return (N, 3) actions for observations (N, D)."""
+        """Return (N, 3) or (N, A) actions for observations (N, D)."""
         ...
 
 
@@ -54,7 +57,7 @@ class Uniform:
 
     def act(self, env: ForageEnv, obs: ObsArray) -> ActionArray:
         """Draw."""
-        return self._rng.uniform(-1.0, 1.0, (len(obs), 3)).astype(np.float32)
+        return self._rng.uniform(-1.0, 1.0, env.swarm_spec.action_shapes[-1]).astype(np.float32)
 
 
 class Corners:
@@ -63,15 +66,16 @@ class Corners:
     def reset(self, env: ForageEnv, rng: np.random.Generator) -> None:
         """Keep the generator."""
         self._rng = rng
-        self._actions = self._draw(env.scenario.robots.n_robots)
+        self._actions = self._draw(env)
 
-    def _draw(self, n_robots: int) -> ActionArray:
-        return self._rng.choice(np.array([-1.0, 0.0, 1.0], np.float32), (n_robots, 3))
+    def _draw(self, env: ForageEnv) -> ActionArray:
+        shape = env.swarm_spec.action_shapes[-1]
+        return self._rng.choice(np.array([-1.0, 0.0, 1.0], np.float32), shape)
 
     def act(self, env: ForageEnv, obs: ObsArray) -> ActionArray:
         """Change some."""
         changed = self._rng.random(len(obs)) < 0.1
-        self._actions[changed] = self._draw(len(obs))[changed]
+        self._actions[changed] = self._draw(env)[changed]
         return self._actions.copy()
 
 
@@ -86,7 +90,7 @@ class Beyond:
 
     def act(self, env: ForageEnv, obs: ObsArray) -> ActionArray:
         """Draw."""
-        return self._rng.choice(self.NUMBERS, (len(obs), 3))
+        return self._rng.choice(self.NUMBERS, env.swarm_spec.action_shapes[-1])
 
 
 class Wall:

@@ -1,5 +1,7 @@
 """What holds after every tick of any run, whoever drives and whatever disturbs the swarm."""
 
+import hashlib
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -15,8 +17,17 @@ IN_A_CROWD = 0.12
 `tests/science/test_physics_convergence.py` finds. Robots that pile up overlap by 90 %."""
 
 
-def look_at(env: ForageEnv, obs: np.ndarray) -> float:
-    """Check the world and what is seen of it, (N, D); returns the deepest overlap as a share of a diameter."""
+def look_at(env: ForageEnv, obs: np.ndarray, before: bytes = b"") -> tuple[float, bytes]:
+    """Check the world and what is seen of it.
+
+    Args:
+        env: The environment.
+        obs: What is seen, (N, D).
+        before: What the last look returned; objects that are where they were then are not looked at again.
+
+    Returns:
+        The deepest overlap as a share of a diameter, and a digest of where objects are.
+    """
     swarm, arena, radius = env.swarm, env.scenario.arena, env.scenario.robots.radius_m
     assert obs.dtype == np.float32
     assert np.isfinite(obs).all(), "observations are numbers"
@@ -33,8 +44,21 @@ def look_at(env: ForageEnv, obs: np.ndarray) -> float:
     assert inside.min(initial=np.inf) >= radius - 1e-9, f"a robot left the arena by {radius - inside.min():.3g} m"
     deep = radius - distances_m(arena.obstacles, position).min(initial=np.inf)
     assert deep <= 1e-9, f"a robot is {deep:.3g} m deep in an obstacle"
-    assert_conserved(env)
-    return _deepest_overlap(env, position)
+    objects = _digest_of_objects(env)
+    if objects != before:
+        assert_conserved(env)
+    return _deepest_overlap(env, position), objects
+
+
+def _digest_of_objects(env: ForageEnv) -> bytes:
+    """Digest of all that `assert_conserved` looks at."""
+    objects, caches, swarm = env.objects, env.caches, env.swarm
+    happened = hashlib.sha256(repr(sorted(objects.waiting)).encode() + bytes([caches.last_serial % 256]))
+    lie = objects.floor, objects.status, objects.cell, objects.cache_slot, objects.carriers
+    stand = caches.alive, caches.cell, caches.count, caches.serial
+    for array in (*lie, *stand, swarm.carried_object, swarm.present):
+        happened.update(np.ascontiguousarray(array))
+    return happened.digest()
 
 
 def _deepest_overlap(env: ForageEnv, position: np.ndarray) -> float:

@@ -113,8 +113,9 @@ COMMANDS = {
 }  # fmt: skip
 NOT_COMPARED = re.compile(r"tensorboard/|model\.zip$|\.png$|(^|/)\.[^/]*\.tmp$")
 """Files that hold clock times inside, or are drawn from files that are compared; and drafts, which nothing reads."""
-CLOCK_KEYS = re.compile(r"created|wall|seconds|elapsed|^(date|out|folder|picture|file)$")
-"""Keys of JSON and columns of tables that hold clock times, or names of folders."""
+CLOCK_KEYS = re.compile(r"created|wall|seconds|elapsed|^(date|out|folder|picture|file|commit)$")
+"""Keys of JSON and columns of tables that hold clock times, or names of folders; and the commit, which somebody may
+make while a campaign runs."""
 
 
 @dataclass
@@ -245,6 +246,8 @@ def _killed(command: Command, place: Path, sent: int, n_files: int, after_s: flo
     code = started.returncode
     if code == 0:
         return "over"
+    if sent == signal.SIGINT and code == 1 and err.startswith("Fatal Python error: init_import_site"):
+        return "killed while Python itself started"  # it ends so before a line of ours is run
     assert code in ENDS[sent], f"signal {sent} leads to exit code {code}: {err[-2000:]}"
     assert "Traceback" not in err or code < 0, f"a traceback on stderr: {err[-2000:]}"
     return f"exit code {code}"

@@ -63,14 +63,14 @@ def misuse(stack: RunRecorder, random: Random) -> int:
     """Make some wrong calls in the middle of a run; returns how many."""
     env = stack.unwrapped
     n_robots = env.scenario.robots.n_robots
-    good = np.zeros((n_robots, 3), np.float32)
+    good = np.zeros(env.swarm_spec.action_shapes[-1], np.float32)
     agents = list(env.agents)
     some = good.copy()
     workers = np.flatnonzero(env.active)
     by_agent = dict.fromkeys(agents, good[0])
     calls: dict[str, Callable[[], Any]] = {
         "actions without a row": lambda: stack.step_batch(good[1:]),
-        "actions with a column more": lambda: stack.step_batch(np.zeros((n_robots, 4), np.float32)),
+        "actions with a column more": lambda: stack.step_batch(np.zeros((n_robots, good.shape[1] + 1), np.float32)),
         "one number for actions": lambda: stack.step_batch(np.float32(0.0)),
         "text for actions": lambda: stack.step_batch([["a"] * 3] * n_robots),
         "no actions": lambda: stack.step_batch(None),
@@ -92,7 +92,9 @@ def misuse(stack: RunRecorder, random: Random) -> int:
             "a list for actions": lambda: stack.step([good[0]] * len(agents)),
         }
     if len(workers):
-        some[random.choice(workers.tolist()), random.randrange(3)] = random.choice((np.nan, np.inf, -np.inf))
+        some[random.choice(workers.tolist()), random.randrange(good.shape[1])] = random.choice(
+            (np.nan, np.inf, -np.inf)
+        )
         rows = dict(zip(env.possible_agents, some, strict=True))
         calls |= {
             "an action that is no number": lambda: stack.step_batch(some),

@@ -7,6 +7,7 @@ snapshot, and walks through it once more without any of that: both walks must sh
 
 import copy
 import hashlib
+import json
 import traceback
 from collections import Counter
 from dataclasses import dataclass, field
@@ -18,29 +19,26 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.scenarios.config import CACHE_KINDS, PHYSICS_ENGINES, RewardConfig, ScenarioConfig
-from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, QUIRK_NAMES, Quirks
-from swarm_forage_env.scenarios.regions import PLACEMENTS
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.study.run import build_stack
 from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.views.gymnasium import SwarmVectorEnv
+from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
-from swarm_forage_env.wrappers.handling import HandlingCostConfig
-from swarm_forage_env.wrappers.noise import DISTRIBUTIONS, NOISE_GROUPS, ActuatorNoiseConfig, SensorNoiseConfig
-from swarm_forage_env.wrappers.population import DEATHS, PopulationConfig
 from swarm_forage_env.wrappers.recorder import RunRecorder
-from swarm_forage_env.wrappers.throttle import ThrottleConfig
-from swarm_forage_env.wrappers.waveform import Waveform
 from tests.support.busy import BusyPolicy
 from tests.support.drivers import Beyond, Corners, Driven, Driver, Uniform, Wall
 from tests.support.invariants import look_at, look_at_record
 from tests.support.misuse import misuse, misuse_before_reset
+from tests.support.random_scenarios import random_sampler, random_scenario, random_wrappers
 
 SCRIPTED = {"crw": "none", "dpo": "none", "stochm": "static", "stochx": "dynamic", "ppo_warehouse_small": "none"}
 """Policy -> the caches that it is made for."""
 DRIVERS = ("uniform", "corners", "beyond", "wall", "busy", *SCRIPTED)
 MOST_TRIALS = 200
 """Drawn scenarios, of which many are refused; one in a few is valid."""
+BATCH_STEPS = 12
+"""Steps of a batch of drawn worlds, beside the two walks through one of them."""
 
 
 @dataclass(frozen=True)
@@ -55,15 +53,20 @@ class RandomWorld:
     """Whether the first walk uses dictionaries and the second arrays, or the other way round."""
     detour_at: int
     """Tick of a snapshot, from which the walk goes on twice."""
+    sampler: ScenarioSampler | None = None
+    """What the scenario and its wrappers were drawn from; None = they were drawn alone."""
 
     def describe(self) -> str:
         """One line for people."""
         config = self.scenario
         kinds = ", ".join(wrapper.name for wrapper in self.wrappers) or "no wrappers"
+        company = f"{config.robots.neighbours_seen} neighbours seen, messages of {config.robots.message_size}"
+        drawn = ", from a sampler" if self.sampler else ""
         return (
             f"{config.name}, {config.arena.width_m:g} x {config.arena.height_m:g} m, {config.robots.n_robots} robots, "
-            f"{config.objects.n_objects} objects, caches {config.caches}, {config.physics}, {config.horizon_ticks} "
-            f"ticks, {kinds}, driven by {self.driver}, seed {self.seed}"
+            f"{config.objects.n_objects} objects, {config.objects.placement}, {len(config.arena.obstacles)} obstacles, "
+            f"{company}, caches {config.caches}, {config.physics}, {config.horizon_ticks} ticks, {kinds}, driven by "
+            f"{self.driver}, seed {self.seed}{drawn}"
         )
 
 
@@ -84,15 +87,7 @@ def random_world(random: Random, *, most_ticks: int = 400) -> RandomWorld:
     for _ in range(MOST_TRIALS):
         driver = random.choice(DRIVERS)
         try:
-            config = _scenario(random, driver, most_ticks)
-            world = RandomWorld(
-                scenario=config,
-                wrappers=_wrappers(random, config),
-                driver=driver,
-                seed=random.choice((0, 1, 2**63 - 1, random.randrange(2**31))),
-                by_dicts=random.random() < 0.5,
-                detour_at=random.randrange(config.horizon_ticks),
-            )
+            world = _drawn(random, driver, most_ticks)
             build_stack(world.scenario, world.wrappers).reset_batch(world.seed)  # refuses clusters without room
         except ConfigError:
             continue
@@ -100,115 +95,25 @@ def random_world(random: Random, *, most_ticks: int = 400) -> RandomWorld:
     raise AssertionError(f"{MOST_TRIALS} drawn worlds were refused")
 
 
-def _scenario(random: Random, driver: str, most_ticks: int) -> ScenarioConfig:
-    name = random.choice(SCENARIO_NAMES)
-    given: dict[str, Any] = {
-        "n_robots": random.choice((1, 2, *random.choices(range(3, 30), k=3), random.randint(30, 80), 150)),
-        "n_objects": round(10 ** random.uniform(0.0, 2.7)),
-        "caches": SCRIPTED.get(driver, random.choice(CACHE_KINDS)),
-        "physics": random.choice(PHYSICS_ENGINES),
-        "side_share": random.choice((0.03, 0.05, 0.2, random.uniform(0.01, 0.5))),
-    }
-    dt_s = random.choice((0.2, 0.2, 0.2, 0.05, 0.5))
-    n_ticks = random.choice((random.randint(20, most_ticks), most_ticks))
-    n_intervals = random.randint(1, 4)
-    interval_ticks = max(1, n_ticks // n_intervals)
-    given |= {"dt_s": dt_s, "interval_s": interval_ticks * dt_s, "horizon_s": n_intervals * interval_ticks * dt_s}
-    if random.random() < 0.8:
-        given |= _arena(random)
-    for field_name, value in _others(random).items():
-        if random.random() < 0.3:
-            given[field_name] = value
-    return scenario(name, **given)
-
-
-def _arena(random: Random) -> dict[str, Any]:
-    """A floor of 6 to 24 m, now and then a long and narrow one, with a nest anywhere in it."""
-    cells = [random.randint(30, 120), random.choice((random.randint(30, 120), 30))]
-    random.shuffle(cells)
-    size = [random.randint(1, max(1, n // 2)) for n in cells]
-    low = [random.randint(0, n - extent) for n, extent in zip(cells, size, strict=True)]
-    return {
-        "width_m": cells[0] / 5,
-        "height_m": cells[1] / 5,
-        "nest_size_m": (size[0] / 5, size[1] / 5),
-        "nest_centre_m": ((2 * low[0] + size[0]) / 10, (2 * low[1] + size[1]) / 10),
-    }
-
-
-def _others(random: Random) -> dict[str, Any]:
-    """Fields that are changed now and then."""
-    chosen = {name: random.random() < 0.5 for name in QUIRK_NAMES}
-    n_substeps = random.randint(4, 10)
-    return {
-        "placement": random.choice(PLACEMENTS),
-        "quirks": random.choice((AUTHORS_PROGRAM, Quirks(**chosen))),
-        "physics_substeps": (1.0 / n_substeps,) * n_substeps,
-        "pickup_ticks": random.randint(1, 30),
-        "drop_ticks": random.randint(1, 30),
-        "walk_probability": random.choice((0.001, 0.05, 1.0)),
-        "start_margin_m": random.uniform(0.4, 2.8),
-        "distance_share": random.uniform(0.01, 0.6),
-        "static_size": random.randint(2, 6),
-        "respawn_scale": random.choice((0.0, 0.05, 10.0)),
-        "radius_m": random.uniform(0.06, 0.15),
-        "wheel_base_m": random.uniform(0.05, 0.3),
-        "max_speed_mps": random.uniform(0.01, 0.4),
-        "max_wheel_difference_mps": random.uniform(0.01, 0.8),
-        "performance": random.choice(("first_picked", "n_carrying", "1/interference_fraction", "cache_load")),
-        "reward": RewardConfig(
-            delivery=random.uniform(-1.0, 1.0),
-            nest_progress=random.choice((0.0, 1.0)),
-            interference=random.choice((0.0, -0.1)),
-            tick=random.choice((0.0, -0.01)),
-            team=random.random() < 0.5,
-        ),
-    }
-
-
-def _wrappers(random: Random, config: ScenarioConfig) -> tuple[WrapperConfig, ...]:
-    """Draw a stack, in any order."""
-    n_robots = config.robots.n_robots
-    are_born = n_robots > 1 and random.random() < 0.5
-    rate = 10 ** random.uniform(-3.0, -0.5)
-    made: list[WrapperConfig] = [
-        SensorNoiseConfig(
-            sigma=_sigma(random),
-            groups=tuple(random.sample(NOISE_GROUPS, random.randint(1, len(NOISE_GROUPS)))),
-            distribution=random.choice(DISTRIBUTIONS),
-        ),
-        PopulationConfig(
-            death_per_tick=random.choice((0.0, rate)),
-            birth_per_tick=rate if are_born else 0.0,
-            malfunction_per_tick=random.choice((0.0, rate, 3 * rate)),
-            repair_per_tick=random.choice((0.0, rate)),
-            initial_robots=random.randint(1, n_robots - 1) if are_born else None,
-            max_robots=random.choice((None, random.randint(1, n_robots))),
-            deaths=random.choice(DEATHS),
-        ),
-        ThrottleConfig(waveform=_waveform(random, 1.0), carriers=random.random() < 0.5),
-        ActuatorNoiseConfig(sigma=_sigma(random), distribution=random.choice(DISTRIBUTIONS)),
-        HandlingCostConfig(waveform=_waveform(random, 40.0)),
-    ]
-    return tuple(random.sample(made, random.choice((0, 0, 1, 2, 3, 5))))
-
-
-def _waveform(random: Random, peak: float) -> Waveform:
-    """A waveform of at most `peak`, of any kind."""
-    half, period_s = random.uniform(0.0, 0.5 * peak), random.uniform(0.1, 60.0)
-    periodic = random.choice(("sine", "square", "sawtooth"))
-    return random.choice(
-        (
-            Waveform(kind="constant", amplitude=2 * half),
-            Waveform(kind=periodic, amplitude=half, offset=half, period_s=period_s),
-            Waveform(kind="step", amplitude=half, offset=half, start_s=period_s),
-            Waveform(kind="table", times_s=(0.0, period_s), values=(half, 2 * half)),
-        )
+def _drawn(random: Random, driver: str, most_ticks: int) -> RandomWorld:
+    """Draw a world; raises ConfigError where what was drawn does not fit together."""
+    config = random_scenario(random, SCRIPTED.get(driver), most_ticks)
+    wrappers, sampler = random_wrappers(random, config), None
+    seed = random.choice((0, 1, 2**63 - 1, random.randrange(2**31)))
+    if driver not in SCRIPTED and random.random() < 0.15:
+        sampler = random_sampler(random, config, most_ticks)
+        config, wrappers = sampler.world_of(seed)
+        if any(corner.objects.placement == "power_law" for corner in sampler.corners):
+            _steps_of_batch(sampler, seed % 2**31)  # refuses clusters without room
+    return RandomWorld(
+        scenario=config,
+        wrappers=wrappers,
+        driver=driver,
+        seed=seed,
+        by_dicts=random.random() < 0.5,
+        detour_at=random.randrange(config.horizon_ticks),
+        sampler=sampler,
     )
-
-
-def _sigma(random: Random) -> float | Waveform:
-    return random.choice((0.0, 10 ** random.uniform(-3.0, 2.0), _waveform(random, 0.2)))
 
 
 def visit(world: RandomWorld) -> Visit:
@@ -219,9 +124,38 @@ def visit(world: RandomWorld) -> Visit:
         second = _walk(world, seen, by_dicts=not world.by_dicts, is_disturbed=False)
         for tick, (one, other) in enumerate(zip(first, second, strict=True)):
             assert one == other, f"the same run, without wrong calls and snapshots, differs from tick {tick} on"
+        if world.sampler is not None:
+            _look_at_sampler(world.sampler, world, seen)
     except Exception:  # noqa: BLE001 - whatever it is, it is a fault
         seen.fault = f"{world.describe()}\n{traceback.format_exc()}"
     return seen
+
+
+def _look_at_sampler(sampler: ScenarioSampler, world: RandomWorld, seen: Visit) -> None:
+    """Check that a sampler comes back from its text with the same worlds, and step a batch of them twice."""
+    again = ScenarioSampler.from_mapping(json.loads(json.dumps(sampler.to_mapping())))
+    assert again == sampler, "a sampler comes back from its text"
+    assert again.world_of(world.seed) == (world.scenario, world.wrappers), "a seed is a world"
+    first, second = (_steps_of_batch(each, world.seed % 2**31) for each in (sampler, again))
+    assert first == second, "the same batch of drawn worlds goes another way"
+    seen.figures["steps of drawn batches"] += len(first) + len(second)
+
+
+def _steps_of_batch(sampler: ScenarioSampler, seed: int) -> list[bytes]:
+    """Step a batch of two arenas by chance; returns digests of what is told."""
+    envs, chance, digests = SwarmVectorEnv(sampler=sampler, n_arenas=2), np.random.default_rng(seed), list[bytes]()
+    try:
+        obs, _ = envs.reset(seed=seed)
+        for _ in range(BATCH_STEPS):
+            assert envs.observation_space.contains(obs), "a batch sees what its space does not hold"
+            actions = chance.uniform(-1.0, 1.0, envs.action_space.shape).astype(np.float32)
+            obs, rewards, terminated, truncated, _ = envs.step(actions)
+            assert np.isfinite(rewards).all(), "rewards are numbers"
+            told = b"".join(part.tobytes() for part in (obs, rewards, terminated, truncated))
+            digests.append(hashlib.sha256(told).digest())
+    finally:
+        envs.close()
+    return digests
 
 
 def _walk(world: RandomWorld, seen: Visit, *, by_dicts: bool, is_disturbed: bool) -> list[bytes]:
@@ -231,7 +165,7 @@ def _walk(world: RandomWorld, seen: Visit, *, by_dicts: bool, is_disturbed: bool
     chance = Random(world.seed)
     if is_disturbed:
         seen.figures["wrong calls"] += misuse_before_reset(stack)
-    walker = _Walker(world, stack, by_dicts=by_dicts)
+    walker = _Walker(world, stack, by_dicts=by_dicts, is_looked_at=is_disturbed)
     while not walker.is_over:
         if is_disturbed and chance.random() < 0.05:
             seen.figures["wrong calls"] += misuse(stack, chance)
@@ -261,15 +195,19 @@ def _driver(name: str) -> Driver:
 
 
 class _Walker:
-    """One walk: the stack, who drives it, and digests of what was seen."""
+    """One walk: the stack, who drives it, and digests of what was seen.
 
-    def __init__(self, world: RandomWorld, stack: RunRecorder, *, by_dicts: bool) -> None:
-        self.driver = _driver(world.driver)
+    Only one of two walks is looked at: the other must have the same digests, of the same world.
+    """
+
+    def __init__(self, world: RandomWorld, stack: RunRecorder, *, by_dicts: bool, is_looked_at: bool) -> None:
+        self.driver, self._is_looked_at = _driver(world.driver), is_looked_at
         self.digests: list[bytes] = []
         self.deepest = 0.0
         self._stack, self._env, self._by_dicts = stack, stack.unwrapped, by_dicts
         env = self._env
         n_columns = env.layout.size
+        self._row = {agent: row for row, agent in enumerate(env.possible_agents)}
         self._obs = np.zeros((world.scenario.robots.n_robots, n_columns), np.float32)
         if by_dicts:
             self._take(stack.reset(seed=world.seed)[0])
@@ -279,14 +217,23 @@ class _Walker:
         self.first_counters = env.events.counters.copy()
         self.driver.reset(env, stream_rng(world.seed, Stream.POLICY))
         self.is_over = False
-        self.deepest = look_at(env, self._obs)
+        self._objects = b""
+        self._look()
+
+    def _look(self) -> None:
+        """Check what holds after every tick."""
+        deepest, self._objects = look_at(self._env, self._obs, self._objects)
+        self.deepest = max(self.deepest, deepest)
 
     def _take(self, rows: dict[str, np.ndarray]) -> None:
         """Keep the rows of agents; those that have left have zeros."""
         self._obs[:] = 0.0
         for agent, row in rows.items():
-            assert self._env.observation_space(agent).contains(row), f"{agent} sees what its space does not hold"
-            self._obs[int(agent.removeprefix("robot_"))] = row
+            # As `contains` of its space does, but for the bounds, which are looked at in all rows at once.
+            assert (row.dtype, row.shape) == (np.float32, self._obs.shape[1:]), f"{agent} sees {row.dtype} {row.shape}"
+            self._obs[self._row[agent]] = row
+        some = next(iter(rows), None)
+        assert some is None or self._env.observation_space(some).contains(rows[some]), f"{some} sees beyond its space"
 
     def return_to(self, snapshot: Any, driver: Driver) -> None:
         """Take the stack back."""
@@ -306,7 +253,8 @@ class _Walker:
                 break
             actions = self.driver.act(self._env, self._obs)
             shown = self._by_dict(actions) if self._by_dicts else self._by_array(actions)
-            self.deepest = max(self.deepest, look_at(self._env, self._obs))
+            if self._is_looked_at:
+                self._look()
             self.digests.append(self._digest(shown))
         return self.digests[first:]
 
@@ -314,14 +262,17 @@ class _Walker:
         obs, rewards, terminated, truncated = self._stack.step_batch(actions)
         self._obs[:] = obs
         self.is_over = truncated or bool(terminated.all())
-        rows = [int(agent.removeprefix("robot_")) for agent in self._agents]
+        rows = [self._row[agent] for agent in self._agents]
         shown = [rewards[rows].tolist(), terminated[rows].tolist(), [truncated] * len(rows)]
         assert np.isfinite(rewards).all(), "rewards are numbers"
         self._agents = _left(self._env)
         return shown
 
     def _by_dict(self, actions: np.ndarray) -> list[Any]:
-        agents, rows = self._agents, {agent: k for k, agent in enumerate(self._env.possible_agents)}
+        agents, rows = self._agents, self._row
+        # Arrays of three columns say zeros; a single agent's action must be in its space.
+        silent = self._env.swarm_spec.action_size - actions.shape[1]
+        actions = np.pad(actions, ((0, 0), (0, silent))) if silent else actions
         told = self._stack.step({agent: actions[rows[agent]] for agent in agents})
         for part in told:
             assert list(part) == agents, "every agent is told of, and nobody else"
@@ -338,7 +289,10 @@ class _Walker:
     def _digest(self, shown: list[Any]) -> bytes:
         env, obs = self._env, self._obs
         happened = hashlib.sha256(repr(shown).encode())
-        for array in (obs, env.state(), env.swarm.position, env.swarm.heading, env.objects.cell, env.caches.count):
+        swarm, objects, caches = env.swarm, env.objects, env.caches
+        of_robots = swarm.position, swarm.heading, swarm.carried_object, swarm.active, swarm.present
+        of_objects = objects.cell, objects.status, objects.cache_slot, caches.cell, caches.count, caches.alive
+        for array in (obs, *of_robots, *of_objects):
             happened.update(array.tobytes())
         happened.update(env.events.counters.tobytes() + env.events.interference_sum.tobytes())
         return happened.digest()

@@ -178,14 +178,13 @@ def assert_conserved(env: ForageEnv) -> None:
     """Every object is in exactly one place, and floor, caches and robots agree about it."""
     objects, caches, swarm = env.objects, env.caches, env.swarm
     status = objects.status
-    counts = [int(np.count_nonzero(status == kind)) for kind in ObjectStatus]
-    assert sum(counts) == len(status)
+    assert set(status.tolist()) <= set(ObjectStatus)
     floor = objects.floor
     # Floor: exactly the free objects, each on its own cell.
-    lying = np.argwhere(floor >= 0)
-    rows = floor[lying[:, 0], lying[:, 1]]
+    y, x = np.nonzero(floor >= 0)
+    rows = floor[y, x]
     assert sorted(rows.tolist()) == np.flatnonzero(status == ObjectStatus.FREE).tolist()
-    np.testing.assert_array_equal(objects.cell[rows], lying[:, ::-1])
+    assert np.array_equal(objects.cell[rows], np.array((x, y)).T), "an object lies where it says that it does"
     x_low, y_low, x_high, y_high = env.scenario.arena.distributable_cells
     low, high = np.array([x_low, y_low]), np.array([x_high, y_high])
     assert np.all((objects.cell[rows] >= low) & (objects.cell[rows] < high))
@@ -202,15 +201,15 @@ def assert_conserved(env: ForageEnv) -> None:
         square = expected[y - half : y + half + 1, x - half : x + half + 1]
         assert np.all(square == CELL_EMPTY), "cache square overlaps nest, obstacle or another cache"
         square[:] = CELL_CACHE - slot
-    np.testing.assert_array_equal(painted, expected)
+    assert np.array_equal(painted, expected), f"cells (y, x) {np.argwhere(painted != expected)[:5].tolist()}"
     # Caches: contents and counts.
     cached = status == ObjectStatus.CACHED
-    np.testing.assert_array_equal(cached, objects.cache_slot >= 0)
+    assert np.array_equal(cached, objects.cache_slot >= 0), "an object is in a cache where it says that it is"
     contents = np.bincount(objects.cache_slot[cached], minlength=len(caches.alive))
-    np.testing.assert_array_equal(contents[: len(caches.alive)], caches.count)
+    assert np.array_equal(contents, caches.count), f"caches hold {contents}, and count {caches.count}"
     assert np.all(caches.count[caches.alive] >= 2)
     assert np.all(caches.count[~caches.alive] == 0)
-    np.testing.assert_array_equal(objects.cell[cached], caches.cell[objects.cache_slot[cached]])
+    assert np.array_equal(objects.cell[cached], caches.cell[objects.cache_slot[cached]]), "objects lie at their cache"
     serials = caches.serial[caches.alive]
     assert len(np.unique(serials)) == len(serials)
     assert caches.serial.max(initial=0) <= caches.last_serial

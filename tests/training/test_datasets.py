@@ -98,6 +98,24 @@ def test_observations_can_be_compact_for_any_policy(tmp_path):
         plan("crw", observation="compakt")
 
 
+@pytest.mark.parametrize("policy", ["crw", "generalist"])
+def test_what_robots_remember_is_recorded_where_it_is_asked_for_or_seen(policy, tmp_path):
+    """It is what an interface of the same choices says of the recorded rows, from the first on."""
+    is_seen = policy == "generalist"
+    columns = len(plan(policy).card.columns)
+    assert len(plan(policy, site_memory=not is_seen).card.columns) == columns + (-8 if is_seen else 8)
+    remembering, plain = plan(policy, observation="full", site_memory=True), plan(policy, observation="full")
+    if is_seen:
+        plain = plan(policy, observation="full", site_memory=False)
+    record_dataset(remembering, tmp_path / "remembering")
+    record_dataset(plain, tmp_path / "plain")
+    rows, seen = (TrajectoryDataset(tmp_path / name).steps(3).observations for name in ("remembering", "plain"))
+    interface = LearnerInterface(remembering.card.interface, env_spec())
+    for row, obs in zip(rows, seen, strict=True):
+        np.testing.assert_array_equal(row, interface.observe(obs))
+    assert rows[:, :, seen.shape[2] :].any(), "nobody remembers anything"
+
+
 def env_spec():
     return build_env(WORLD).unwrapped.swarm_spec
 

@@ -1,5 +1,6 @@
 """The recipe for a training: its defaults, what overrides them, and the smaller arena it begins in."""
 
+import dataclasses
 import tomllib
 from pathlib import Path
 
@@ -13,14 +14,15 @@ from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario, warehouse_small
 from swarm_forage_env.training.defaults import EVALUATE_EVERY
 from swarm_forage_env.training.plan import ALGORITHMS, EvaluationPlan, Stage
-from swarm_forage_env.training.recipe import recipe, small_arena
+from swarm_forage_env.training.recipe import LATE_OPTIONS, Measured, recipe, small_arena
 
 
 def test_defaults_are_what_a_driver_needs():
     plan = recipe()
     assert plan.interface == InterfaceConfig(
-        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, own_sensors=()
-    )
+        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5, own_sensors=(),
+        site_memory=True,
+    )  # fmt: skip
     assert (plan.algorithm, plan.n_arenas, plan.hidden, plan.seed) == ("ppo", 8, (64, 64), 0)
     assert plan.options == {
         "n_steps": 128,
@@ -40,16 +42,17 @@ def test_where_deliveries_count_the_way_to_them_is_rewarded_and_short_at_first()
     plan = recipe("warehouse_small")
     assert plan.scenario == warehouse_small(nest_progress=0.05, first_pickup=1.0)
     assert plan.stages == (
-        Stage(steps=1_666_666, scenario={**small_arena(plan.scenario), "horizon_s": 1000.0}),
-        Stage(steps=3_333_334, scenario={"horizon_s": 1000.0}),
+        Stage(steps=1_666_666, scenario={**small_arena(plan.scenario), "horizon_s": 1000.0, "physics": "compiled"}),
+        Stage(steps=1_666_668, scenario={"horizon_s": 1000.0, "physics": "compiled"}),
+        Stage(steps=1_666_666, scenario={"horizon_s": 1000.0, "physics": "compiled"}, options=LATE_OPTIONS["ppo"]),
     )
     assert plan == recipe("warehouse_small", small_start=True, nest_progress=0.05, first_pickup=1.0)
 
 
 def test_where_deliveries_do_not_count_the_scenario_says_the_rewards():
-    plan = recipe("search_and_rescue", interference=0.0)
+    plan = recipe("search_and_rescue", interference=0.0, delivery=0.0, nest_progress=0.0)
     assert plan.scenario == scenario("search_and_rescue")
-    assert [stage.steps for stage in plan.stages] == [5_000_000]
+    assert [stage.steps for stage in plan.stages] == [3_333_334, 1_666_666]
     counting = recipe("search_and_rescue", performance="collected", side_m=64.0)
     assert counting.scenario.reward.nest_progress == 0.05
 
@@ -70,10 +73,55 @@ def test_rewards_that_are_given_go_before_those_of_the_recipe(overrides, expecte
 def test_a_horizon_is_that_of_the_episodes_and_not_of_the_evaluations():
     for given in ("warehouse_small", warehouse_small()):
         plan = recipe(given, horizon_s=400.0)
-        assert [stage.scenario["horizon_s"] for stage in plan.stages] == [400.0, 400.0]
+        assert [stage.scenario["horizon_s"] for stage in plan.stages] == [400.0] * 3
         assert plan.scenario.horizon_s == 10_000.0
     with pytest.raises(ConfigError, match="horizon_s"):
         recipe(horizon_s=-1.0)
+
+
+def test_the_last_third_learns_more_slowly_unless_people_say_how_fast():
+    assert [dict(stage.options) for stage in recipe().stages] == [{}, {}, {"learning_rate": 0.0003, "gamma": 0.995}]
+    plan = recipe(options={"learning_rate": 0.01}, small_start=False)
+    assert [dict(stage.options) for stage in plan.stages] == [{}, {"gamma": 0.995}]
+    assert plan.options["learning_rate"] == 0.01
+    assert [dict(stage.options) for stage in recipe(options=LATE_OPTIONS["ppo"]).stages] == [{}, {}]
+    assert [dict(stage.options) for stage in recipe(algorithm="dqn").stages] == [{}, {}]
+    for steps in (1, 2, 3, 4, 100):
+        assert sum(stage.steps for stage in recipe(steps=steps).stages) == max(3, steps)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "actions", "draws"),
+    [
+        ("ppo", "discrete", True),
+        ("a2c", "discrete", True),
+        ("ppo", "continuous", False),
+        ("dqn", "discrete", False),
+        ("sac", "continuous", False),
+    ],
+)
+def test_policies_draw_their_actions_where_they_have_probabilities(algorithm, actions, draws):
+    assert recipe(algorithm=algorithm, interface={"actions": actions}).samples is draws
+    assert not recipe(algorithm=algorithm, interface={"actions": actions}, samples=False).samples
+    if not draws:
+        with pytest.raises(ConfigError, match="samples only with discrete actions of ppo or a2c"):
+            recipe(algorithm=algorithm, interface={"actions": actions}, samples=True)
+
+
+def test_trainings_have_compiled_bodies_and_evaluations_what_was_asked_for():
+    plan = recipe("search_and_rescue")
+    assert {stage.scenario["physics"] for stage in plan.stages} == {"compiled"}
+    assert {spec.scenario.physics for spec in plan.judging_runs("crw")} == {"chipmunk"}
+    for engine in ("chipmunk", "compiled"):
+        asked = recipe("search_and_rescue", physics=engine)
+        trained_in = {with_overrides(asked.scenario, **stage.scenario).physics for stage in asked.stages}
+        assert trained_in == {spec.scenario.physics for spec in asked.judging_runs("crw")} == {engine}
+
+
+@pytest.mark.parametrize(("n_robots", "n_arenas"), [(4, 8), (50, 8), (51, 7), (115, 3), (200, 2), (1000, 1)])
+def test_large_swarms_have_fewer_arenas(n_robots, n_arenas):
+    assert recipe("warehouse_medium", n_robots=n_robots).n_arenas == n_arenas
+    assert recipe("warehouse_medium", n_robots=n_robots, n_arenas=5).n_arenas == 5
 
 
 @pytest.mark.parametrize("name", ["warehouse_medium", "search_and_rescue"])
@@ -89,11 +137,16 @@ def test_what_was_measured_for_a_scenario_goes_before_the_general_recipe(name):
     assert recipe(scenario(name)).scenario == scenario(name)
 
 
+def test_a_small_start_is_left_out_where_that_was_measured_to_be_better():
+    assert len(recipe("warehouse_medium").stages) == 2
+    assert len(recipe("warehouse_medium", small_start=True).stages) == 3
+
+
 def test_measured_recipes_are_of_presets_and_of_algorithms():
     tables = tomllib.loads((Path(training.__file__).parent / "recipes.toml").read_text())
     assert tables.keys() <= set(SCENARIO_NAMES)
     for table in tables.values():
-        assert table.keys() == {"episode_s", "rewards", "options"}
+        assert table.keys() <= {field.name for field in dataclasses.fields(Measured)}
         assert table["options"].keys() <= set(ALGORITHMS)
 
 
@@ -108,14 +161,16 @@ def test_large_swarms_are_evaluated_less_often():
 def test_a_complete_configuration_is_taken_as_it_is():
     config = warehouse_small(n_robots=7, interference=-0.1)
     assert recipe(config).scenario == config
-    assert [stage.scenario.get("horizon_s") for stage in recipe(config).stages] == [None, None]
+    assert [stage.scenario.get("horizon_s") for stage in recipe(config).stages] == [None] * 3
     assert recipe(config, n_objects=30).scenario == with_overrides(config, n_objects=30)
 
 
 def test_an_interface_is_given_whole_or_by_what_differs():
     assert recipe(interface={"decision_ticks": 2}).interface == InterfaceConfig(
-        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=2, own_sensors=()
-    )
+        observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=2, own_sensors=(),
+        site_memory=True,
+    )  # fmt: skip
+    assert not recipe(interface={"site_memory": False}).interface.site_memory
     numbered = InterfaceConfig(actions="discrete", own_sensors=())
     assert recipe(interface=numbered).interface is numbered
     with pytest.raises(ConfigError, match="Did you mean 'decision_ticks'"):
@@ -136,7 +191,7 @@ def test_the_other_arguments_reach_the_plan():
         seed=3,
     )
     assert (plan.algorithm, plan.n_arenas, plan.hidden, plan.seed) == ("dqn", 3, (8,), 3)
-    assert (plan.stages, plan.evaluation) == ((Stage(steps=300, scenario={"horizon_s": 1000.0}),), evaluation)
+    assert (plan.stages, plan.evaluation) == ((Stage(steps=300, scenario=plan.stages[0].scenario),), evaluation)
     assert [config.name for config in plan.wrappers] == ["sensor_noise"]
     assert (plan.options["gamma"], plan.options["train_freq"]) == (0.9, 4)
 
@@ -178,7 +233,7 @@ def test_a_small_start_keeps_proportions(name, expected):
 def test_a_small_start_that_cannot_hold_the_objects_is_refused():
     with pytest.raises(ConfigError, match=r"objects for placement .* small_start=False"):
         recipe("warehouse_small", n_objects=800, small_start=True)
-    assert len(recipe("warehouse_small", n_objects=800, small_start=False).stages) == 1
+    assert len(recipe("warehouse_small", n_objects=800, small_start=False).stages) == 2
 
 
 def test_a_small_start_keeps_thin_walls_as_thick_as_walls_must_be():
@@ -193,4 +248,4 @@ def test_a_small_start_refuses_places_of_objects_that_it_may_not_hold():
     places = {"placement": "positions", "object_positions_m": ((8.0, 4.0), (8.0, 12.0)), "n_objects": 2}
     with pytest.raises(ConfigError, match=r"object_positions_m .*--no-small-start"):
         recipe("warehouse_small", **places)
-    assert len(recipe("warehouse_small", small_start=False, **places).stages) == 1
+    assert len(recipe("warehouse_small", small_start=False, **places).stages) == 2

@@ -110,6 +110,22 @@ def test_a_plan_with_a_sampler_is_carried_out_and_tells_world_by_world(tmp_path)
     assert train(plan, tmp_path, resume=True).steps == 0
 
 
+def test_the_same_plan_with_a_sampler_gives_the_same_weights_in_one_process_and_in_two(tmp_path):
+    changes = {"stages": (Stage(steps=96),)}
+    first, again, divided, other = (
+        [value.numpy() for value in train(plan, tmp_path / name, n_processes=n).model.policy.state_dict().values()]
+        for name, plan, n in (
+            ("first", tiny_plan(**changes), 0),
+            ("again", tiny_plan(**changes), 0),
+            ("divided", tiny_plan(**changes), 2),
+            ("other", tiny_plan(**changes, seed=1), 0),
+        )
+    )
+    for same in (again, divided):
+        assert all(map(np.array_equal, first, same))
+    assert not all(map(np.array_equal, first, other))
+
+
 def test_plans_without_worlds_write_what_they_always_wrote():
     plan = dataclasses.replace(
         tiny_plan(), sampler=None, scenario=warehouse_small(**QUICK), evaluation=EvaluationPlan(every_steps=5)
@@ -140,7 +156,7 @@ def test_the_best_of_the_scripted_controllers_runs_with_its_own_caches(monkeypat
 def test_the_recipe_judges_in_the_largest_world_of_each_name():
     plan = recipe(sampler=WORLDS)
     assert [world.name for world in plan.evaluation.worlds] == ["warehouse_small_6", "search_and_rescue_4"]
-    assert plan.stages == (Stage(steps=plan.total_steps),)
+    assert [dict(stage.scenario) for stage in plan.stages] == [{}, {}]
     with pytest.raises(ConfigError, match="either a sampler or n_robots"):
         recipe(sampler=WORLDS, n_robots=3)
 

@@ -31,10 +31,11 @@ def test_the_script_gives_the_weights_of_the_command(tmp_path, monkeypatch):
     script.main()
 
     plan = tiny("warehouse_small", steps=384, evaluation={"horizon_s": 200.0, "baseline": "random"})
-    assert len(plan.stages) == 2
+    assert len(plan.stages) == 3
     result = train(plan, tmp_path / "command")
     scripted = PPO.load(tmp_path / "example.zip")
     assert scripted.num_timesteps == result.model.num_timesteps == 384
     ours, theirs = (model.policy.state_dict() for model in (scripted, result.model))
     assert all(np.array_equal(ours[name].numpy(), theirs[name].numpy()) for name in theirs)
-    assert Network.load(tmp_path / "example.npz").about.interface == plan.interface
+    about = Network.load(tmp_path / "example.npz").about
+    assert (about.interface, about.samples) == (plan.interface, plan.samples)

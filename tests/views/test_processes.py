@@ -23,21 +23,28 @@ PLAN = ArenaPlan(scenario=scenario("warehouse_small", n_robots=3, n_objects=4), 
 IDLE = np.zeros((6, 3), np.float32)
 
 
-@pytest.fixture
-def arenas() -> Iterator[ArenaProcesses]:
-    """Two arenas in two processes, reset."""
+@pytest.fixture(scope="module")
+def lasting() -> Iterator[ArenaProcesses]:
+    """Two arenas in two processes, for tests that leave them alive."""
     opened = ArenaProcesses(PLAN, 2, 2)
-    opened.reset([0, 1], [None, None])
     yield opened
     opened.close()
 
 
-def test_closed_arenas_may_be_closed_again_and_say_so(arenas):
-    arenas.close()
-    arenas.close()
-    assert not any(process.is_alive() for process in arenas._processes)
-    with pytest.raises(RuntimeError, match="were closed"):
-        arenas.step(IDLE)
+@pytest.fixture
+def running(lasting) -> ArenaProcesses:
+    """The same, reset."""
+    lasting.reset([0, 1], [None, None])
+    return lasting
+
+
+@pytest.fixture
+def arenas() -> Iterator[ArenaProcesses]:
+    """Two arenas in two processes of their own, reset."""
+    opened = ArenaProcesses(PLAN, 2, 2)
+    opened.reset([0, 1], [None, None])
+    yield opened
+    opened.close()
 
 
 def test_a_process_that_died_is_reported_with_its_exit_code(arenas):
@@ -86,26 +93,29 @@ def test_the_interface_is_known_without_an_environment_in_this_process(monkeypat
     assert arenas.interface.observation_space.shape == (SwarmSpec.of(PLAN.scenario).layout.size,)
 
 
-def test_ctrl_c_is_left_to_the_parent(arenas):
-    for process in arenas._processes:
+def test_ctrl_c_is_left_to_the_parent(running):
+    for process in running._processes:
         os.kill(process.pid, signal.SIGINT)
     time.sleep(0.2)
-    assert arenas.step(IDLE).rewards.shape == (6,)
+    assert running.step(IDLE).rewards.shape == (6,)
 
 
-def test_an_answer_that_nobody_waited_for_is_not_taken_for_the_next(arenas):
+def test_an_answer_that_nobody_waited_for_is_not_taken_for_the_next(running):
     for process in range(2):
-        arenas._ask(process, "step", IDLE[:3])  # as when Ctrl-C comes between question and answer
-    assert arenas.get_attribute("tick", [0, 1]) == [1, 1]
-    assert arenas.step(IDLE).obs.shape[0] == 6
+        running._ask(process, "step", IDLE[:3])  # as when Ctrl-C comes between question and answer
+    assert running.get_attribute("tick", [0, 1]) == [1, 1]
+    assert running.step(IDLE).obs.shape[0] == 6
 
 
-def test_processes_end_even_when_their_answers_were_never_read(arenas):
+def test_processes_end_even_when_their_answers_were_never_read_and_stay_closed(arenas):
     size = 200_000  # more than a pipe holds, so that the process waits for a reader
     for process in range(2):
         arenas._ask(process, "call_method", "__getattribute__", [0] * size, "tick")
     arenas.close()
     assert [process.exitcode for process in arenas._processes] == [0, 0]
+    arenas.close()
+    with pytest.raises(RuntimeError, match="were closed"):
+        arenas.step(IDLE)
 
 
 class _StrangeError(Exception):

@@ -80,6 +80,14 @@ def test_log_uniform_whole_numbers_are_as_frequent_as_their_ranges_are_wide():
         assert counts[number] / len(shares) == pytest.approx(expected, abs=0.015)
 
 
+def test_static_caches_without_room_are_refused_before_one_is_drawn():
+    crowded = {"preset": "warehouse_medium", "caches": "static", "side_share": {"uniform": [0.05, 0.5]}}
+    with pytest.raises(
+        ConfigError, match=r"World 1 of the sampler .* side_share = 0\.5: Expected static caches inside"
+    ):
+        ScenarioSampler(worlds=(SampledWorld(scenario=crowded),))
+
+
 def test_a_sampler_is_read_back_from_json():
     worlds = sampler()
     assert ScenarioSampler.from_mapping(json.loads(json.dumps(worlds.to_mapping()))) == worlds

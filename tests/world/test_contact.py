@@ -112,6 +112,7 @@ def test_of_two_robots_at_one_target_one_gets_there(rows, mirrored):
     assert abs(env.swarm.position[rows[1], 0] - MIDDLE[0]) < 0.02
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("rows", [(0, 1), (1, 0)])
 @pytest.mark.parametrize("ahead_m", [0.0, 1e-9, 1e-4])
 def test_of_two_that_are_equally_strong_one_gets_there_too(rows, ahead_m):

@@ -115,6 +115,7 @@ def test_a_message_that_is_not_finite_is_refused():
     assert env.tick == 0
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("physics", ["chipmunk", "compiled"])
 def test_runs_of_scripted_policies_stay_what_they_are(physics):
     small = scenario("warehouse_small", **SMALL | {"physics": physics}, horizon_s=40.0, interval_s=20.0)

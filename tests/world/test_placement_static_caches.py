@@ -89,3 +89,18 @@ def test_squares_outside_the_arena_are_refused():
     config = scenario("warehouse_medium", width_m=16.0, nest_centre_m=(8.0, 24.0), nest_size_m=(2.0, 2.0), n_robots=5)
     with pytest.raises(ConfigError, match="Expected static caches inside the arena"):
         static_cache_centres(config)
+
+
+def test_a_centre_where_no_object_may_lie_is_refused():
+    """The last object of a cache stays on its centre; here the eastern one has to stand beyond a nest in the east."""
+    small = {
+        "width_m": 11.2,
+        "height_m": 13.0,
+        "side_share": 0.03,
+        "start_margin_m": 0.5,
+        "n_robots": 2,
+        "n_objects": 9,
+    }
+    config = scenario("warehouse_quad", nest_centre_m=(9.2, 4.6), nest_size_m=(1.2, 4.4), **small)
+    with pytest.raises(ConfigError, match=r"centres between 15 % and 85 % .* got one at \(9\.9, 6\.5\) m"):
+        static_cache_centres(config)

@@ -226,6 +226,7 @@ def test_unknown_slice_to_read_is_refused():
 # Declared bounds
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("caches", CACHE_KINDS)
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 def test_observations_and_state_stay_inside_their_spaces(name, caches):

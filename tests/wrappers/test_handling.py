@@ -138,6 +138,7 @@ def test_policies_wait_and_deliver_less(policy):
     assert 0 < hard.collected.sum() < easy.collected.sum()
 
 
+@pytest.mark.compiled
 def test_a_world_with_slow_handling_equals_the_wrapper_that_makes_it_slow():
     world = quick_world("warehouse_small", n_robots=20, horizon_s=60.0, interval_s=60.0)
     slow = with_overrides(world, pickup_ticks=7, drop_ticks=7)

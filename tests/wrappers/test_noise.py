@@ -90,6 +90,7 @@ def test_position_noise_is_in_metres_along_each_axis():
     assert change[..., 1].std() * 8.0 == pytest.approx(0.5, rel=0.04)
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("sigma", [0.0043, 0.1, 3.0, 1000.0])
 @pytest.mark.parametrize("distribution", ["gaussian", "uniform"])
 def test_observations_stay_in_their_space(world, sigma, distribution):

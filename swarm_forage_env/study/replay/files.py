@@ -18,6 +18,7 @@ from swarm_forage_env._internal.files import replacing
 from swarm_forage_env.contract.codes import Counter, Task
 from swarm_forage_env.rendering.page import PageError, build_page, take_page_apart
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.kinds import RobotKind, kind_sizes
 from swarm_forage_env.scenarios.performance import quantity
 from swarm_forage_env.scenarios.units import CELL_M, WALL_M
 from swarm_forage_env.study.replay.coding import pack, unpack
@@ -167,6 +168,7 @@ def _about(replay: Replay) -> dict[str, Any]:
         "policy": spec.policy,
         "seed": spec.seed,
         "n_robots": scenario.robots.n_robots,
+        "kinds": [[kind.name, size] for kind, size in _kinds(scenario)],
         "n_objects": scenario.objects.n_objects,
         "n_cache_slots": int(replay.cache_events[:, 1].max(initial=-1)) + 1,
         "n_frames": replay.n_frames,
@@ -190,6 +192,12 @@ def _about(replay: Replay) -> dict[str, Any]:
         "versions": dict(replay.versions),
         "spec": spec.to_mapping(),
     }
+
+
+def _kinds(scenario: ScenarioConfig) -> Iterable[tuple[RobotKind, int]]:
+    """Return the kinds of robots and how many there are of each, in the order of their rows."""
+    robots = scenario.robots
+    return zip(robots.robot_kinds, kind_sizes(robots.robot_kinds, robots.n_robots), strict=True)
 
 
 def _performance(scenario: ScenarioConfig) -> dict[str, str]:

@@ -89,7 +89,12 @@ class DatasetPlan:
 
 
 def plan_dataset(
-    spec: RunSpec, seeds: Sequence[int], *, observation: str | None = None, compress: bool = False
+    spec: RunSpec,
+    seeds: Sequence[int],
+    *,
+    observation: str | None = None,
+    site_memory: bool | None = None,
+    compress: bool = False,
 ) -> DatasetPlan:
     """Plan a data set. The policy is opened to see how it decides.
 
@@ -102,6 +107,8 @@ def plan_dataset(
         observation: "full" or "compact": what is recorded instead of what a learned policy sees, or of "full". All
             neighbours and own sensors of the scenario are then recorded for a learned policy, too, unless it says
             which ones it sees.
+        site_memory: Whether the columns of `InterfaceConfig.site_memory` are recorded; None = those that a learned
+            policy sees, none for others.
         compress: See `DatasetPlan`.
 
     Raises:
@@ -115,6 +122,8 @@ def plan_dataset(
         raise ConfigError(f"Expected different seeds, at most {MOST_SEEDS:,}, got {len(seeds)} of them.")
     world = SwarmSpec.of(spec.scenario)
     config = _interface_of(spec, world, observation)
+    if site_memory is not None:
+        config = replace(config, site_memory=site_memory)
     interface = LearnerInterface(config, world)
     space = interface.action_space
     parts: dict[str, int] = {}
@@ -143,7 +152,12 @@ def _interface_of(spec: RunSpec, world: SwarmSpec, observation: str | None) -> I
     config = replace(config, message_size=config.message_size or 0)
     if observation is None:
         # Of what else it says nothing, it sees nothing; `for_scenario` would write down what it never saw.
-        config = replace(config, neighbours_seen=config.neighbours_seen or 0, own_sensors=config.own_sensors or ())
+        config = replace(
+            config,
+            neighbours_seen=config.neighbours_seen or 0,
+            sees_kind=bool(config.sees_kind),
+            own_sensors=config.own_sensors or (),
+        )
     else:
         config = replace(config, observation=observation)
     return config.for_scenario(spec.scenario)

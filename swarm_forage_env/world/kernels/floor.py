@@ -133,6 +133,7 @@ def line_of_sight(
     shares: ObsArray,
     caches: tuple[BoolArray, IntArray, IntArray, IntArray],
     half_side: int,
+    half_windows: IntArray,
     obs: ObsArray,
     starts: tuple[int, int, int],
 ) -> None:
@@ -140,6 +141,7 @@ def line_of_sight(
 
     `shares` (M + 1,) = what is written for no object, and for each object (row + 1) / M;
     `caches` = alive, centre cell, serial, count per slot; `half_side` = (cache side in cells - 1) / 2;
+    `half_windows` (N,) = cells that a robot sees on either side of its own, the others of its window hold nothing;
     `starts` = first columns of los_cell, los_object, los_cache.
     """
     ny, nx = floor.shape
@@ -159,10 +161,13 @@ def line_of_sight(
             _whole_window(floor, cell_x - _HALF_WINDOW, cell_y - _HALF_WINDOW, shares, window)
         else:
             _cut_window(floor, cell_x - _HALF_WINDOW, cell_y - _HALF_WINDOW, shares, window)
+        if half_windows[i] < _HALF_WINDOW:
+            _narrow_window(half_windows[i], window)
         for k in range(cache_start, cache_start + CACHE_FIELDS * VISIBLE_CACHES):
             obs[i, k] = 0.0
         if caches[0].shape[0] > 0:
-            _visible_caches(cell_x, cell_y, position, caches, half_side, i, obs, cache_start, (nx, ny, n_objects))
+            reach = half_side + half_windows[i]
+            _visible_caches(cell_x, cell_y, position, caches, reach, i, obs, cache_start, (nx, ny, n_objects))
 
 
 @kernel
@@ -184,18 +189,27 @@ def _cut_window(floor: IntArray, x_low: int, y_low: int, shares: ObsArray, windo
 
 
 @kernel
+def _narrow_window(half: int, window: ObsArray) -> None:
+    """Empty the cells of a window that are more than `half` cells from its middle along x or y."""
+    for y in range(WINDOW_CELLS):
+        for x in range(WINDOW_CELLS):
+            if max(abs(x - _HALF_WINDOW), abs(y - _HALF_WINDOW)) > half:
+                window[y * WINDOW_CELLS + x] = 0.0
+
+
+@kernel
 def _visible_caches(
     cell_x: int,
     cell_y: int,
     position: FloatArray,
     caches: tuple[BoolArray, IntArray, IntArray, IntArray],
-    half_side: int,
+    reach: int,
     i: int,
     obs: ObsArray,
     start: int,
     sizes: tuple[int, int, int],
 ) -> None:
-    """List up to VISIBLE_CACHES caches whose square meets the window, nearest centre first, ties by slot."""
+    """List up to VISIBLE_CACHES caches with a centre within `reach` cells, nearest centre first, ties by slot."""
     alive, centre, serial, count = caches
     last_distance = -1.0
     last_slot = -1
@@ -205,7 +219,6 @@ def _visible_caches(
         for slot in range(alive.shape[0]):
             if not alive[slot]:
                 continue
-            reach = half_side + _HALF_WINDOW
             if abs(centre[slot, 0] - cell_x) > reach or abs(centre[slot, 1] - cell_y) > reach:
                 continue
             dx = (centre[slot, 0] + 0.5) / CELLS_PER_M - position[i, 0]

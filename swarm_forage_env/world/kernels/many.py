@@ -78,7 +78,7 @@ def state_at(s: InteractionState, at: np.ndarray) -> InteractionState:
 
 @kernel
 def sensors_at(s: Sensors, at: np.ndarray) -> Sensors:
-    """Sensors like `s` whose arrays are `at` (9,) these addresses."""
+    """Sensors like `s` whose arrays are `at` (12,) these addresses."""
     return Sensors(
         array_at(s.obs, at[0]),
         array_at(s.near, at[1]),
@@ -99,12 +99,16 @@ def sensors_at(s: Sensors, at: np.ndarray) -> Sensors:
         s.reads_ground,
         s.reads_line_of_sight,
         s.behind_counts,
+        array_at(s.half_windows, at[9]),
+        array_at(s.kinds, at[10]),
+        s.kind_start,
+        array_at(s.blanks, at[11]),
     )
 
 
 @kernel
 def world_at(w: World, at: np.ndarray) -> World:
-    """World like `w` whose arrays are `at` (52,) these addresses, in the order of `world.rack.addresses`."""
+    """World like `w` whose arrays are `at` (56,) these addresses, in the order of `world.rack.addresses`."""
     before, now = w.pressing
     return World(
         state_at(w.state, at[:28]),
@@ -116,15 +120,16 @@ def world_at(w: World, at: np.ndarray) -> World:
         array_at(w.twist, at[32]),
         array_at(w.command, at[33]),
         array_at(w.drive_limits, at[34]),
+        array_at(w.speeds, at[35]),
         w.dt_s,
         w.touch_m,
         (
-            (array_at(before[0], at[35]), array_at(before[1], at[36]), array_at(before[2], at[37])),
-            (array_at(now[0], at[38]), array_at(now[1], at[39]), array_at(now[2], at[40])),
+            (array_at(before[0], at[36]), array_at(before[1], at[37]), array_at(before[2], at[38])),
+            (array_at(now[0], at[39]), array_at(now[1], at[40]), array_at(now[2], at[41])),
         ),
-        sensors_at(w.sensors, at[41:50]),
-        array_at(w.interfering, at[50]),
-        array_at(w.interference_sum, at[51]),
+        sensors_at(w.sensors, at[42:54]),
+        array_at(w.interfering, at[54]),
+        array_at(w.interference_sum, at[55]),
         w.wandering,
         w.n_static_caches,
         w.has_caches,

@@ -18,7 +18,7 @@ from typing import Any
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray
-from swarm_forage_env.world.kernels import beams, floor, proprioception
+from swarm_forage_env.world.kernels import beams, floor, kinds, proprioception
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.contact import press
 from swarm_forage_env.world.kernels.drive import drive
@@ -90,9 +90,12 @@ def sense(w: World) -> None:
             s.shares,
             (a.cache_alive, a.cache_cell, a.cache_serial, a.cache_count),
             s.cache_half_side,
+            s.half_windows,
             s.obs,
             (c.los_cell, c.los_object, c.los_cache),
         )
+    kinds.tell_kinds(s.kinds, w.present, s.obs, s.kind_start)
+    kinds.blank(s.obs, s.blanks)
 
 
 @kernel
@@ -110,7 +113,18 @@ def set_out(w: World, actions: ActionArray, wheel_gain: FloatArray, tick: int, l
     gain is not finite; then nothing has happened.
     """
     a, s = w.state, w.sensors
-    bad = drive(actions, wheel_gain, a.active, a.pending_kind, w.facing, w.drive_limits, w.dt_s, w.wheel_speed, w.twist)
+    bad = drive(
+        actions,
+        wheel_gain,
+        w.speeds,
+        a.active,
+        a.pending_kind,
+        w.facing,
+        w.drive_limits,
+        w.dt_s,
+        w.wheel_speed,
+        w.twist,
+    )
     if bad >= 0:
         return bad
     if look_first:

@@ -6,6 +6,7 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.contract.layout import NEIGHBOUR_FIELDS, RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.world.kernels.kinds import blank
 from swarm_forage_env.wrappers.kernels.gaussian import to_normal
 
 NOT_NOISY = -1
@@ -23,6 +24,7 @@ def disturb(
     spans: IntArray,
     lows: ObsArray,
     heading: tuple[int, int],
+    blanks: IntArray,
     proximity: int,
     behind_counts: bool,
 ) -> float:
@@ -38,6 +40,7 @@ def disturb(
         spans: (S, 3) runs of neighbouring columns: first in obs, first in draws, length.
         lows: (S,) float32, lower clamp of each run.
         heading: First column of the heading in obs, and its column in draws, or `NOT_NOISY`.
+        blanks: (B, 4) what stays zero, as `world.kernels.kinds.blank` takes it: a sensor that is lacking has no noise.
         proximity: First column of the proximity readings.
         behind_counts: Quirk `obstacle_behind_counts`.
 
@@ -54,6 +57,8 @@ def disturb(
             _perturb_readings(obs[i], draws[i], centre, factors, spans, lows)
             if heading[1] != NOT_NOISY:
                 _turn_heading(obs[i], heading[0], (float(draws[i, heading[1]]) - centre) * float(factors[heading[1]]))
+    blank(obs, blanks)
+    for i in range(obs.shape[0]):
         if active[i]:
             n_active += 1
             n_seeing += sees_obstacle(obs[i, proximity : proximity + RING_SENSORS], behind_counts)
