@@ -2,7 +2,7 @@
 
 from .entry import Entry, Training, read_entry
 from .figure import draw_benchmark
-from .page import page_block
+from .page import details_page, page_block
 from .protocol import BenchmarkError, Protocol, load_protocol
 from .running import benchmark_specs, run_benchmark
 from .standing import Standing, reference_of, scripted_entries, standing_of
@@ -16,6 +16,7 @@ __all__ = [
     "reference_of",
     "standing_of",
     "page_block",
+    "details_page",
     "draw_benchmark",
     "Protocol",
     "Entry",

@@ -1,4 +1,7 @@
-"""The page of the benchmark: tables of all entries, written between two marks of a Markdown file."""
+"""The page of the benchmark: tables of all entries, written between two marks of a Markdown file.
+
+What is wide and long, every world and every measure, is a page of its own, `details_page`.
+"""
 
 import math
 import re
@@ -51,14 +54,14 @@ def board_rows(standings: Sequence[Standing]) -> list[tuple[str, ...]]:
     ]
 
 
-def page_block(standings: Sequence[Standing], reference: Reference, protocol: Protocol, picture: str = "") -> str:
+def page_block(standings: Sequence[Standing], protocol: Protocol, picture: str = "", details: str = "") -> str:
     """Return the generated part of the page.
 
     Args:
         standings: All entries.
-        reference: The best scripted controllers.
         protocol: What they are entries of.
         picture: Path of the figure as the page links it; empty for none.
+        details: Path of `details_page` as the page links it; empty for none.
     """
     ranked = sorted_standings(standings)
     entries = [standing.entry for standing in ranked]
@@ -68,16 +71,36 @@ def page_block(standings: Sequence[Standing], reference: Reference, protocol: Pr
         f"runs of {protocol.horizon_s:,g} s that count per policy.",
         markdown(BOARD_HEADER, board_rows(ranked)),
         *([f"![Scores of all entries, and their shares in each world]({picture})"] if picture else []),
+        *([f"All numbers, world by world and measure by measure: [{details}]({details})."] if details else []),
         "### How each was made\n\n" + markdown(*_origins(entries)),
+        "These commands make them again:\n\n" + _commands(entries),
         "### Group by group\n\n" + markdown(*_groups(ranked, protocol)),
         "### One against the other\n\nHow often a run of the row's entry is better than one of the column's in the "
         "same world.\n\n" + markdown(*_duels(entries, protocol)),
-        "### World by world\n\nPerformance per 1,000 s, mean over runs; the best of all entries is bold.\n\n"
-        + markdown(*_worlds(entries, reference, protocol)),
-        "### All measures\n\nMeans over runs; amounts and distances as shares of performance.\n\n"
-        + markdown(*_measures(entries)),
     ]
     return f"{BEGIN}\n\n" + "\n\n".join(parts) + f"\n\n{END}"
+
+
+def details_page(standings: Sequence[Standing], reference: Reference, protocol: Protocol, page: str) -> str:
+    """Return the page of all worlds and measures, which is generated as a whole.
+
+    Args:
+        standings: All entries.
+        reference: The best scripted controllers.
+        protocol: What they are entries of.
+        page: Path of the page of the benchmark, as this one links it.
+    """
+    entries = [standing.entry for standing in sorted_standings(standings)]
+    parts = [
+        "# Benchmark in detail",
+        f"The numbers behind the [benchmark]({page}), the entry with the highest score first. `swarm-forage benchmark "
+        "page` writes this page.",
+        "## World by world\n\nPerformance per 1,000 s, mean over runs; the best of all entries is bold.\n\n"
+        + markdown(*_worlds(entries, reference, protocol)),
+        "## All measures\n\nMeans over runs; amounts and distances as shares of performance.\n\n"
+        + markdown(*_measures(entries)),
+    ]
+    return "\n\n".join(parts) + "\n"
 
 
 def with_block(text: str, block: str, where: str) -> str:
@@ -119,25 +142,28 @@ def _cell(text: str) -> str:
     return " ".join(text.split()).replace("|", r"\|").replace("<", "&lt;")
 
 
-def _code(text: str) -> str:
-    return f"`{text.replace('`', '')}`" if text else ""
-
-
 def _origins(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    header = ("entry", "trained in", "training seeds", "training", "core-hours", "scored by", "core-hours")
+    header = ("entry", "trained in", "library", "training seeds", "core-hours of training", "core-hours of its runs")
     rows = [
         (
             entry.name,
             _TRAINED[entry.training.worlds],
+            entry.training.library or "-",
             ", ".join("-" if p.training_seed is None else str(p.training_seed) for p in entry.policies),
-            " ".join(filter(None, (entry.training.library, _code(entry.training.command)))) or "-",
             "-" if entry.training.core_hours is None else number(entry.training.core_hours),
-            _code(entry.command) or "-",
             "-" if entry.core_hours is None else number(entry.core_hours),
         )
         for entry in entries
     ]
     return header, rows
+
+
+def _commands(entries: Sequence[Entry]) -> str:
+    """What to type for each entry, its training first, as a block of code that no text of an entry can end."""
+    lines = [
+        line for entry in entries for line in (f"# {entry.name}", entry.training.command, entry.command) if line.strip()
+    ]
+    return "\n".join(["```bash", *(" ".join(line.replace("```", "").split()) for line in lines), "```"])
 
 
 def _groups(ranked: Sequence[Standing], protocol: Protocol) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

@@ -58,8 +58,7 @@ def run(  # long: one parameter per option
     if context.invoked_subcommand is not None:
         return
     from swarm_forage_env._internal.files import as_file_name, check_file
-    from swarm_forage_env.cli.benchmark_report import Wanted, plan_text, run_and_show
-    from swarm_forage_env.policies.registry import policy_label
+    from swarm_forage_env.cli.benchmark_report import Wanted, default_name, plan_text, run_and_show
 
     if not policy:
         raise typer.BadParameter(
@@ -69,7 +68,7 @@ def run(  # long: one parameter per option
         raise typer.BadParameter("Expected --name for an entry of several policies.")
     if quick and out is not None:
         raise typer.BadParameter("Expected --out without --quick: a quick look is no entry.")
-    called = name or policy_label(policy[0])
+    called = name or default_name(policy[0], quick=quick)
     wanted = Wanted(
         policies=tuple(policy),
         name=called,

@@ -5,14 +5,14 @@ import os
 import shlex
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import typer
 
 from metrics.benchmark.entry import Entry, Training, read_entry
-from metrics.benchmark.page import BOARD_HEADER, board_rows, page_block, sorted_standings, with_block
+from metrics.benchmark.page import BOARD_HEADER, board_rows, details_page, page_block, sorted_standings, with_block
 from metrics.benchmark.protocol import BenchmarkError, Protocol, load_protocol, scenario_fields
 from metrics.benchmark.running import benchmark_specs, run_benchmark
 from metrics.benchmark.standing import SCRIPTED, Reference, Standing, reference_of, scripted_entries, standing_of
@@ -23,6 +23,8 @@ from swarm_forage_env._internal.printable import printable
 from swarm_forage_env.cli.interrupts import resumable
 from swarm_forage_env.cli.options import NO_PICTURE
 from swarm_forage_env.cli.report import estimate, estimated_seconds
+from swarm_forage_env.policies.mixture import is_mixture, mixture_of, mixture_parts
+from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_label
 from swarm_forage_env.study.runner import available_cores
 from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.study.store import RunStore
@@ -43,14 +45,20 @@ class Wanted:
 
     @property
     def command(self) -> str:
-        """What makes the same entry again, in the words that were given; files are found from the same folder."""
-        policies = [word for policy in self.policies for word in ("--policy", policy)]
+        """What makes the same entry again from the same folder: as given, but for files with their whole paths."""
+        policies = [word for policy in self.policies for word in ("--policy", _from_here(policy))]
         return shlex.join(["swarm-forage", "benchmark", *policies, "--name", self.name])
 
     @property
     def is_scripted(self) -> bool:
         """Whether this makes the entry of a scripted controller again, which comes with the package."""
         return self.name in SCRIPTED and self.policies == (self.name,) and not self.quick
+
+
+def default_name(policy: str, *, quick: bool) -> str:
+    """Return the name of an entry of one policy; a quick look at a scripted controller is not the shipped entry."""
+    label = policy_label(policy)
+    return f"{label}, quick" if quick and label in SCRIPTED else label
 
 
 def run_and_show(wanted: Wanted, file: Path | None, records: Path, jobs: int | None, *, as_json: bool) -> None:
@@ -97,7 +105,7 @@ def show_entries(paths: Sequence[Path], *, as_json: bool) -> None:
 
 
 def write_page(paths: Sequence[Path], page: Path, picture: Path) -> tuple[Path, ...]:
-    """Write the generated part of a page and its figure; returns what was written.
+    """Write the generated part of a page, its figure, and the page of details beside it; returns what was written.
 
     Raises:
         BenchmarkError: a file that is no entry, or a page without the marks.
@@ -108,15 +116,17 @@ def write_page(paths: Sequence[Path], page: Path, picture: Path) -> tuple[Path, 
     standings, reference = _standings([read_entry(path, protocol) for path in entry_files(paths)], protocol)
     text = page.read_text(encoding="utf-8")
     link = Path(os.path.relpath(picture, page.parent)).as_posix()
-    text = with_block(text, page_block(standings, reference, protocol, link), str(page))
+    details = page.with_name(f"{page.stem}_in_detail{page.suffix}")
+    text = with_block(text, page_block(standings, protocol, link, details.name), str(page))
     try:
         with replacing(picture, ending=picture.suffix) as draft:
             draw_benchmark(standings, reference, protocol, draft)
     except ImportError as error:
         raise ImportError(NO_PICTURE) from error
-    with replacing(page) as draft:
-        draft.write_text(text, encoding="utf-8")
-    return page, picture
+    for file, content in ((details, details_page(standings, reference, protocol, page.name)), (page, text)):
+        with replacing(file) as draft:
+            draft.write_text(content, encoding="utf-8")
+    return page, details, picture
 
 
 def entry_files(given: Sequence[Path]) -> list[Path]:
@@ -208,6 +218,18 @@ def _standings(entries: Sequence[Entry], protocol: Protocol) -> tuple[list[Stand
     standings = [standing_of(entry, reference, full) for entry in scripted if entry.name not in counts]
     standings += [standing_of(entry, reference, protocol) for entry in added]
     return sorted_standings(standings), reference
+
+
+def _from_here(policy: str) -> str:
+    """Return a policy with the path of each of its files from the current folder, where the whole path was given."""
+    if is_mixture(policy):
+        parts = mixture_parts(policy)
+        told = [replace(part, policy=_from_here(part.policy)) for part in parts]
+        return policy if told == list(parts) else mixture_of(told)  # as given: 20% stays 20%
+    file = file_of(policy)
+    if not (is_policy_file(policy) and Path(file).is_absolute()):
+        return policy
+    return Path(os.path.relpath(file)).as_posix() + policy.removeprefix(file)
 
 
 def _is_scripted(entry: Entry) -> bool:

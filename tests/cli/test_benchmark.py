@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -83,10 +84,12 @@ def test_a_page_is_written_with_its_figure(command, mine):
     Path("docs/benchmark.md").write_text(f"# Benchmark\n\n{BEGIN}\n{END}\n\nend\n")
     code, out, err = command("benchmark", "page", "mine.json")
     assert code == 0, err
-    assert out.split() == ["docs/benchmark.md", "docs/images/benchmark.png"]
+    assert out.split() == ["docs/benchmark.md", "docs/benchmark_in_detail.md", "docs/images/benchmark.png"]
     text = Path("docs/benchmark.md").read_text()
     assert "| mine | " in text
     assert "](images/benchmark.png)" in text
+    assert "](benchmark_in_detail.md)" in text
+    assert "| room, noisy wheels | " in Path("docs/benchmark_in_detail.md").read_text()
     assert text.endswith(f"{END}\n\nend\n")
 
 
@@ -95,6 +98,22 @@ def test_a_mixed_swarm_can_be_run_again_with_the_command_of_its_entry():
     assert Wanted(policies=(policy,), name="a few").command == (
         f"swarm-forage benchmark --policy {policy} --name 'a few'"
     )
+
+
+def test_a_file_with_its_whole_path_is_told_from_the_current_folder(tmp_path, monkeypatch):
+    """Another machine has other folders; a mixed swarm and words about the interface go on to fit."""
+    monkeypatch.chdir(tmp_path)
+    given = ("runs/a.npz", f"{tmp_path}/runs/a.npz", f"{tmp_path}/m.zip:decision_ticks=5",
+             f"mixed:{tmp_path}/a.npz=20%,crw=rest", "dpo")  # fmt: skip
+    words = Wanted(policies=given, name="x").command.split()
+    told = [word for before, word in pairwise(words) if before == "--policy"]
+    assert told == ["runs/a.npz", "runs/a.npz", "m.zip:decision_ticks=5", "mixed:a.npz=0.2,crw=rest", "dpo"]
+
+
+def test_a_quick_look_at_a_scripted_controller_has_another_name_than_its_entry(command, tiny):
+    code, out, err = command("benchmark", "--policy", "dpo", "--quick", "--jobs", "1", "--json")
+    assert code == 0, err
+    assert {standing["name"] for standing in json.loads(out)} == {*SCRIPTED, "dpo, quick"}
 
 
 def test_the_entry_of_a_scripted_controller_that_was_made_again_is_shown(command, folder, tiny, tmp_path):
@@ -111,7 +130,7 @@ def test_the_entry_of_a_scripted_controller_that_was_made_again_is_shown(command
 def test_nothing_is_run_under_the_name_of_a_scripted_controller_or_without_their_entries(
     command, tiny, tmp_path, monkeypatch
 ):
-    for words in (("--policy", "random", "--name", "dpo"), ("--policy", "dpo", "--quick")):
+    for words in (("--policy", "random", "--name", "dpo"), ("--policy", "dpo", "--name", "dpo", "--quick")):
         code, _, err = command("benchmark", *words, "--jobs", "1")
         assert (code, len(err.splitlines())) == (2, 1)
         assert "Expected another name than 'dpo'" in err

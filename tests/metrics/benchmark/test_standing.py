@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from metrics.benchmark import BenchmarkError, draw_benchmark, load_protocol, page_block, reference_of, standing_of
+from metrics.benchmark import (
+    BenchmarkError,
+    Training,
+    details_page,
+    draw_benchmark,
+    load_protocol,
+    page_block,
+    reference_of,
+    standing_of,
+)
 from metrics.benchmark.page import BEGIN, END, markdown, with_block
 from metrics.benchmark.standing import SCRIPTED, improvements, scripted_entries
 from tests.support.entries import TINY, made_up_entry
@@ -82,16 +91,24 @@ def test_improvements_of_a_pair_add_up_to_one(protocol, scripted):
 
 
 def test_the_page_has_every_entry_with_its_command_cost_and_seeds(protocol, scripted, reference):
-    entries = [*scripted, made_up_entry(protocol, "mine|<b>", lambda k: 39.0, n_policies=2)]
-    block = page_block([standing_of(e, reference, protocol) for e in entries], reference, protocol, "it.png")
+    training = Training(worlds="given", command="train ``` it\nrm", library="torchrl 0.14.1", core_hours=1.5)
+    mine = made_up_entry(protocol, "mine|<b>", lambda k: 39.0, n_policies=2, training=training)
+    standings = [standing_of(e, reference, protocol) for e in [*scripted, mine]]
+    block = page_block(standings, protocol, "it.png", "in_detail.md")
     rows = [line for line in block.splitlines() if line.startswith("|")]
     first = rows[2]  # after the heading and the line below it
     assert first.startswith(r"| mine\|&lt;b> | 2.0")  # the best comes first, and its name ends no cell
     assert "![Scores of all entries, and their shares in each world](it.png)" in block
-    assert r"`swarm-forage benchmark --policy crw` | 0.25 |" in block
-    assert "| 0, 1 |" in block
-    assert "| room, noisy wheels | 4 robots, 60 objects, 9 x 9 m | dpo |" in block
-    assert "| scalability, room | N = 2 to 4 | higher |" in block
+    assert "[in_detail.md](in_detail.md)" in block
+    assert r"| mine\|&lt;b> | training worlds | torchrl 0.14.1 | 0, 1 | 1.5 | 0.25 |" in block
+    commands = block.split("```")
+    assert len(commands) == 3  # no text of an entry ends the block
+    assert "\n# mine|<b>\ntrain it rm\nswarm-forage benchmark --policy mine|<b>\n" in commands[1]
+    assert "\n# crw\nswarm-forage benchmark --policy crw\n" in commands[1]
+    details = details_page(standings, reference, protocol, "benchmark.md")
+    assert "[benchmark](benchmark.md)" in details
+    assert "| room, noisy wheels | 4 robots, 60 objects, 9 x 9 m | dpo |" in details
+    assert "| scalability, room | N = 2 to 4 | higher |" in details
 
 
 def test_a_page_gets_another_block_between_its_marks():

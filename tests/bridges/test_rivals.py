@@ -1,0 +1,183 @@
+"""The scripts behind entries of the benchmark carry out a plan, with libraries that `scripts/test_bridges` installs."""
+
+import numpy as np
+import pytest
+
+from swarm_forage_env import load_policy
+from swarm_forage_env.policies.network import Network
+from swarm_forage_env.training.plan import read_plan
+from tests.bridges.test_pages import ROOT, check_runs, require, run
+
+PLAN = ROOT / "tests" / "support" / "tiny_plan.toml"
+PLANS = sorted((ROOT / "docs" / "benchmark" / "plans").glob("*.toml"))
+
+
+@pytest.mark.parametrize("path", PLANS, ids=lambda path: path.stem)
+def test_rivals_train_in_the_training_worlds_as_they_are(path):
+    """Their last stages; nothing disturbs them, and no world has another number of robots than its preset."""
+    from metrics.benchmark import load_protocol
+
+    wanted = {
+        world.scenario.name: world.scenario.robots.n_robots for world in load_protocol().worlds if not world.is_held_out
+    }
+    plan = read_plan(path)
+    assert plan.sampler is not None
+    for sampler in (plan.sampler, *(stage.sampler for stage in plan.stages if stage.sampler)):
+        assert {config.name: config.robots.n_robots for config in sampler.corners} == wanted
+        assert not sampler.wrappers
+        assert not any(world.wrappers for world in sampler.worlds)
+    assert plan.stages[-1].sampler is None
+    sizes = {config.name: (config.arena.width_m, config.arena.height_m) for config in plan.sampler.corners}
+    given = [world.scenario for world in load_protocol().worlds if not world.is_held_out]
+    assert sizes == {config.name: (config.arena.width_m, config.arena.height_m) for config in given}
+
+
+def test_mappo_with_torchrl_carries_out_a_plan(tmp_path):
+    require("torchrl", "torchrl")
+    words = ["--plan", str(PLAN), "--seed", "3", "--out", "mappo.npz"]
+    lines = run([str(ROOT / "scripts" / "torchrl_mappo.py"), *words], tmp_path).splitlines()
+    assert [int(line.split()[0].replace(",", "")) for line in lines] == [384, 768, 1152]
+    check_runs(tmp_path / "mappo.npz")
+    about = Network.load(tmp_path / "mappo.npz").about
+    assert (about.samples, about.card["plan"]["seed"]) == (True, 3)
+
+
+def test_the_critic_of_mappo_with_torchrl_sees_robots_at_work_only():
+    require("torchrl", "torchrl")
+    import torch
+
+    from scripts.torchrl_mappo import swarm_rows
+
+    obs = torch.tensor([[0.2, -0.5], [0.4, -0.1], [9.0, 9.0], [-0.3, -0.3], [9.0, 9.0], [9.0, 9.0]])
+    active = torch.tensor([True, True, False, True, False, False])
+    rows = swarm_rows(obs, active, n_arenas=2)
+    expected = [[0.3, -0.3, 0.4, -0.1]] * 3 + [[-0.3, -0.3, -0.3, -0.3]] * 3
+    np.testing.assert_allclose(rows, expected, rtol=1e-6)
+    assert not swarm_rows(obs, torch.zeros(6, dtype=torch.bool), n_arenas=2).any()
+
+
+class ThreeSteps:
+    """Two robots of one arena: the first dies in step 1; the run ends by time in step 2, and the next begins."""
+
+    n_arenas = 1
+    num_envs = 2
+    seen = np.float32([[[0.1], [0.2]], [[0.0], [0.3]], [[0.5], [0.6]], [[0.7], [0.8]]])
+    final = np.float32([0.4])
+    active = np.array([[True, True], [False, True], [True, True], [True, True]])
+    rewards = np.float32([[1.0, 2.0], [0.0, 3.0], [4.0, 5.0]])
+    terminated = np.array([[True, False], [True, False], [False, False]])
+    truncated = np.array([[False, False], [False, True], [False, False]])
+
+    def __init__(self):
+        self.k = 0
+
+    def step(self, actions):
+        k, self.k = self.k, self.k + 1
+        infos = {"active": self.active[k + 1]}
+        if k == 1:
+            infos["final_obs"] = np.array([None, self.final], dtype=object)
+        return self.seen[k + 1], self.rewards[k], self.terminated[k], self.truncated[k], infos
+
+
+def test_mappo_with_torchrl_values_what_would_have_followed_a_time_limit_and_nothing_after_death():
+    require("torchrl", "torchrl")
+    import torch
+
+    from scripts.torchrl_mappo import OPTIONS, Learner, rollout, swarm_rows
+
+    envs, learner = ThreeSteps(), Learner(1, 2, (8,))
+
+    def value(rows, active):
+        seen = torch.tensor(rows)
+        return learner.value(seen, swarm_rows(seen, torch.tensor(active), 1)).detach().numpy()[:, 0]
+
+    options = {**OPTIONS, "n_steps": 3, "gae_lambda": 0.0, "gamma": 0.9}
+    batch, obs, active, _ = rollout(envs, learner, envs.seen[0], envs.active[0], options)
+    ended = value([[0.5], [0.4]], [False, True])  # the swarm as it was, not as the next run begins
+    expected = [
+        1.0,  # died: nothing follows
+        2.0 + 0.9 * value(envs.seen[1], envs.active[1])[1],
+        3.0 + 0.9 * ended[1],
+        4.0 + 0.9 * value(envs.seen[3], envs.active[3])[0],
+        5.0 + 0.9 * value(envs.seen[3], envs.active[3])[1],
+    ]
+    np.testing.assert_allclose(batch["value_target"][:, 0], expected, rtol=1e-5)  # the dead row teaches nothing
+    assert np.array_equal(obs, envs.seen[3])
+    assert active.all()
+
+
+def test_mappo_with_torchrl_draws_its_actions_and_is_paid_for_doubt():
+    require("torchrl", "torchrl")
+    import torch
+    from tensordict import TensorDict
+
+    from scripts.torchrl_mappo import OPTIONS, Learner
+
+    torch.manual_seed(0)
+    learner = Learner(1, 4, (8,))
+    seen = TensorDict({"observation": torch.ones(200, 1), "swarm": torch.zeros(200, 2)}, [200])
+    step = learner.actor(seen)
+    assert len(step["action"].unique()) == 4
+    with torch.no_grad():
+        learner.body[-1].bias[0] += 2.0
+        batch = learner.actor(seen.clone())
+    batch["advantage"], batch["value_target"] = torch.zeros(200, 1), torch.zeros(200, 1)
+
+    def doubt():
+        logits = learner.body(torch.ones(1, 1))
+        return float(torch.distributions.Categorical(logits=logits).entropy().detach())
+
+    before = doubt()
+    learner.update(batch, {**OPTIONS, "ent_coef": 1.0, "vf_coef": 0.0})
+    assert doubt() > before
+
+
+def test_a_plan_for_another_algorithm_is_refused_by_mappo_with_torchrl():
+    require("torchrl", "torchrl")
+    from scripts.torchrl_mappo import options_of
+
+    plan = read_plan(PLANS[[path.stem for path in PLANS].index("dqn")])
+    with pytest.raises(SystemExit, match="got dqn"):
+        options_of(plan, plan.stages[0])
+
+
+def test_a_recurrent_rival_carries_out_a_plan(tmp_path, monkeypatch):
+    require("sb3_contrib", "sb3")
+    words = ["--plan", str(PLAN), "--out", "recurrent.zip"]
+    last = run([str(ROOT / "scripts" / "recurrent_ppo.py"), *words], tmp_path).splitlines()[-1]
+    assert last.startswith("960 decisions in ")  # 10 robots; two rows to spare are left out
+    check_runs(tmp_path / "recurrent.zip")
+    assert load_policy(tmp_path / "recurrent.zip")
+
+
+def test_a_recurrent_rival_learns_from_rows_of_robots_only():
+    require("sb3_contrib", "sb3")
+    from scripts.recurrent_ppo import UsedRows, environment
+    from swarm_forage_env.training.sb3 import SwarmVecEnv
+
+    plan = read_plan(PLAN)
+    env = environment(plan, plan.stages[0])
+    env.seed(5)
+    every = SwarmVecEnv(n_arenas=2, interface=plan.interface, sampler=plan.sampler)
+    every.seed(5)
+    used = [0, 1, 2, 3, 6, 7, 8, 9, 10, 11]
+    np.testing.assert_array_equal(env.reset(), every.reset()[used])
+    actions = np.arange(10) % 6
+    whole = np.zeros(12, int)
+    whole[used] = actions
+    for _ in range(20):
+        ours, theirs = env.step(actions), every.step(whole)
+        for mine, wanted in zip(ours[:3], theirs[:3], strict=True):
+            np.testing.assert_array_equal(mine, wanted[used])
+        assert [sorted(info) for info in ours[3]] == [sorted(theirs[3][row]) for row in used]
+    mortal = UsedRows(SwarmVecEnv("warehouse_small", n_robots=3, n_objects=20, interface=plan.interface,
+                                  wrappers=["population:death_per_tick=0.2"]), {})  # fmt: skip
+    mortal.seed(1)
+    mortal.reset()
+
+    def live():
+        for _ in range(40):
+            mortal.step(np.zeros(3, int))
+
+    with pytest.raises(SystemExit, match="robots that come or go"):
+        live()
