@@ -163,3 +163,16 @@ def test_kinds_can_be_drawn():
         ScenarioSampler(worlds=(SampledWorld(scenario={"preset": "warehouse_small", "robot_kinds": too_fast}),))
     with pytest.raises(ConfigError, match="either all or none two or more robot_kinds"):
         ScenarioSampler(worlds=(world, SampledWorld(scenario="warehouse_small")))
+
+
+@pytest.mark.parametrize("window", [{"uniform": [1, 5]}, {"log_uniform": [1, 3]}, {"uniform": [3, 3]}])
+def test_windows_are_drawn_from_a_choice(window):
+    kinds = [{"name": "near", "share": 0.5, "window_cells": window}, HAULER]
+    with pytest.raises(ConfigError, match=r"window_cells of robot kind near .*choice of 1, 3, 5, got"):
+        SampledWorld(scenario={"preset": "warehouse_small", "robot_kinds": kinds})
+    shared = {"robot_kinds": kinds}
+    with pytest.raises(ConfigError, match=r"choice = \[1, 3, 5\]"):
+        ScenarioSampler(worlds=(SampledWorld(scenario="warehouse_small"),), scenario=shared)
+    chosen = [{**kinds[0], "window_cells": {"choice": [1, 3, 5]}}, HAULER]
+    worlds = ScenarioSampler(worlds=(SampledWorld(scenario={"preset": "warehouse_small", "robot_kinds": chosen}),))
+    assert {worlds.world_of(seed)[0].robots.robot_kinds[0].window_cells for seed in range(20)} == {1, 3, 5}
