@@ -146,13 +146,7 @@ def recipe(
         options=_algorithm_options(
             algorithm, n_arenas * config.robots.n_robots, {**measured.options.get(algorithm, {}), **(options or {})}
         ),
-        stages=_stages(
-            config,
-            steps,
-            episodes,
-            late=_late_options(algorithm, options or {}),
-            small_start=small_start,
-        ),
+        stages=_stages(config, steps, episodes, late=_late_options(algorithm, options or {}), small_start=small_start),
         evaluation=_evaluation(evaluation, config, chosen.decision_ticks, sampler),
         seed=seed,
         samples=_can_draw(algorithm, chosen) if samples is None else samples,

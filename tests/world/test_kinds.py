@@ -265,7 +265,7 @@ def test_a_policy_that_sees_kinds_says_what_it_needs():
     assert InterfaceConfig().for_scenario(plain).sees_kind is None
     with pytest.raises(ConfigError, match=r"several kinds, which the policy sees, .* two or more robot_kinds"):
         LearnerInterface(shown, SwarmSpec.of(plain))
-    with pytest.raises(ConfigError, match=r"with robots of several kinds, because .* 'kind', .* two or more robot_kinds"):
+    with pytest.raises(ConfigError, match=r"several kinds, because .* 'kind', .* two or more robot_kinds"):
         ForageEnv(plain, reads=shown.reads)
     LearnerInterface(shown, SwarmSpec.of(scenario("warehouse_small", robot_kinds=OTHERS)))
 
