@@ -40,11 +40,14 @@ def test_every_kind_of_world_is_drawn():
         found["obstacles"] += bool(config.arena.obstacles)
         found["neighbours"] += config.robots.neighbours_seen > 0
         found["messages"] += config.robots.message_size > 0
+        found["kinds"] += len(config.robots.robot_kinds) > 1
         found["message noise"] += any(one.name == "message_noise" for one in random_wrappers(random, config))
         found[config.objects.placement] += 1
         found[config.caches] += 1
     assert found["valid"] > 60
-    assert min(found[name] for name in ("obstacles", "neighbours", "messages", "message noise", "positions")) > 3
+    assert (
+        min(found[name] for name in ("obstacles", "neighbours", "messages", "message noise", "kinds", "positions")) > 3
+    )
     assert min(found[name] for name in ("power_law", "quad_source", "none", "static", "dynamic")) > 3
 
 
