@@ -26,6 +26,8 @@ from swarm_forage_env.study.store import RunStore
 
 LEVEL = 0.95
 """Confidence level of all intervals."""
+NO_NUMBER = "-"
+"""In a table, what robots do on average where there are none."""
 ASSUMED_ROBOT_TICKS_PER_S = 0.5e6
 """Speed that estimates assume per core, in robots times ticks per second; our choice: the low end of what scripted
 controllers reach."""
@@ -33,15 +35,20 @@ controllers reach."""
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A mean over seeds with its t interval; NaN ends where a single seed allows none."""
+    """A mean over seeds with its t interval; NaN ends where a single seed allows none, all NaN of what nobody does."""
 
     mean: float
     low: float
     high: float
 
     def __str__(self) -> str:
+        if math.isnan(self.mean):
+            return NO_NUMBER
         half = self.high - self.mean
         return f"{self.mean:.2f}" + ("" if math.isnan(half) else f" ± {half:.2f}")
+
+
+_NONE = Estimate(math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +59,10 @@ class PartSummary:
     n_robots: int
     deliveries_per_1000_s: Estimate
     deliveries_per_robot_per_1000_s: Estimate
-    """Per robot of the part that is present."""
+    """Per robot of the part that is present; NaN where the part has no robots, as of a share that is too small."""
     first_pickups_per_1000_s: Estimate
     interference_fraction: float
+    """NaN where the part has no robots."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,9 +143,9 @@ def _parts(spec: RunSpec, records: Sequence[RunRecord]) -> tuple[PartSummary, ..
                 policy=label,
                 n_robots=size,
                 deliveries_per_1000_s=rate("collected"),
-                deliveries_per_robot_per_1000_s=rate("collected_per_robot"),
+                deliveries_per_robot_per_1000_s=rate("collected_per_robot") if size else _NONE,
                 first_pickups_per_1000_s=rate("first_picked"),
-                interference_fraction=float(np.mean(fractions)),
+                interference_fraction=float(np.mean(fractions)) if size else math.nan,
             )
         )
     return tuple(summaries)
@@ -171,7 +179,8 @@ def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummar
         for part in row.parts:
             name = f"  of which {part.policy} ({counted(part.n_robots, 'robot')})"
             rates = [str(part.deliveries_per_1000_s), str(part.deliveries_per_robot_per_1000_s)]
-            table.add_row(name, "", "", *([""] if other else []), *rates, f"{part.interference_fraction:.3f}", "")
+            interference = f"{part.interference_fraction:.3f}" if part.n_robots else NO_NUMBER
+            table.add_row(name, "", "", *([""] if other else []), *rates, interference, "")
     return table
 
 

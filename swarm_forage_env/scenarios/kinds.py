@@ -17,7 +17,7 @@ from fractions import Fraction
 from math import floor
 from typing import Any, cast
 
-from swarm_forage_env._internal.fields import ConfigError, as_tuples, known_keys, number, one_of, unique_names
+from swarm_forage_env._internal.fields import ConfigError, as_tuples, known_keys, number, one_of, unique_names, whole
 from swarm_forage_env._internal.printable import shown
 
 SENSORS = ("proximity", "light", "los_object", "los_cache", "neighbours", "messages")
@@ -27,6 +27,8 @@ WINDOWS_CELLS = (1, 3, 5)
 """Sides of the line-of-sight window that a kind may have, in cells; the last is that of robots of one kind."""
 MAX_KINDS = 16
 """Most kinds of a swarm (our choice: more than any swarm that we know of has)."""
+_NO_NAME = "none"
+"""On the axis of a study it stands for a swarm without kinds."""
 _SUM_SLACK = 1e-9
 """Shares whose sum is this close to 1 are the whole swarm: thirds are not exact."""
 
@@ -40,7 +42,7 @@ class RobotKind:
     """
 
     name: str
-    """For people: letters, digits and _."""
+    """For people: letters, digits and _; not "none", which is a study's word for no kinds."""
     share: float | None = None
     """Of the swarm, 0 to 1; None, for one kind at most, is what the others leave."""
     speed: float = 1.0
@@ -54,6 +56,11 @@ class RobotKind:
         where = "the name of a robot kind"
         if not isinstance(self.name, str) or not self.name.isidentifier():  # pyright: ignore[reportUnnecessaryIsInstance] - files give anything
             raise ConfigError(f"Expected {where} to be made of letters, digits and _, got {shown(self.name)}.")
+        if self.name == _NO_NAME:
+            raise ConfigError(
+                f"Expected {where} not to be {_NO_NAME!r}, which stands for a swarm without kinds on the axis of a "
+                "study; give the kind another name, or leave robot_kinds out where all robots are alike."
+            )
         of = f"of robot kind {self.name}"
         if self.share is not None:
             number(f"the share {of}", self.share, at_least=0.0, at_most=1.0)
@@ -63,7 +70,8 @@ class RobotKind:
                 f"Expected the speed {of} to be at most 1, got {self.speed:g}: it is a share of max_speed_mps, the "
                 "fastest that contact is checked for; raise that, and lower the speed of the other kinds."
             )
-        if isinstance(self.window_cells, bool) or self.window_cells not in WINDOWS_CELLS:
+        whole(f"the window_cells {of}", self.window_cells)
+        if self.window_cells not in WINDOWS_CELLS:
             raise ConfigError(
                 f"Expected the window_cells {of} to be one of {', '.join(map(str, WINDOWS_CELLS))}, the side of the "
                 f"window in cells, got {shown(self.window_cells)}."
@@ -157,7 +165,7 @@ def kind_from_words(word: str) -> RobotKind:
     Example: "hauler:share=0.8,speed=0.5,lacks=light/proximity"; "scout" alone is a kind that gets the rest.
 
     Raises:
-        ConfigError: unknown fields, or values of another type or out of range.
+        ConfigError: unknown fields, one given twice, or values of another type or out of range.
     """
     name, _, settings = word.strip().partition(":")
     values: dict[str, Any] = {"name": name.strip()}
@@ -165,13 +173,16 @@ def kind_from_words(word: str) -> RobotKind:
         key, equals, text = (part.strip() for part in setting.partition("="))
         if not equals or key not in _FROM_TEXT:
             raise ConfigError(
-                f"Expected a robot kind as NAME:key=value,key=value with the keys {', '.join(_FROM_TEXT)}, got "
-                f"{word!r}."
+                f"Expected a robot kind as NAME:key=value,key=value with the keys {', '.join(_FROM_TEXT)}, several "
+                f"sensors as lacks=light/proximity, got {word!r}."
             )
+        if key in values:
+            raise ConfigError(f"Expected each key of robot kind {values['name']} once, got {key} twice in {word!r}.")
+        read, what = _FROM_TEXT[key]
         try:
-            values[key] = _FROM_TEXT[key](text)
+            values[key] = read(text)
         except ValueError as error:
-            raise ConfigError(f"Expected {key} of robot kind {values['name']} to be a number, got {text!r}.") from error
+            raise ConfigError(f"Expected {key} of robot kind {values['name']} to be {what}, got {text!r}.") from error
     return RobotKind(**values)
 
 
@@ -182,13 +193,22 @@ def words_of_kind(kind: RobotKind | Mapping[str, Any]) -> str:
     said = [
         f"{key}={'/'.join(value) if key == 'lacks' else value}"
         for key, value in values.items()
-        if key != "name" and value != default.get(key)
+        if key != "name" and as_tuples(value) != default.get(key)
     ]
     return ":".join(filter(None, (str(values.get("name", "")), ",".join(said))))
 
 
 def _names(text: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in text.split("/"))
+    names = tuple(name.strip() for name in text.split("/"))
+    if not all(names):
+        raise ValueError("an empty name")
+    return names
 
 
-_FROM_TEXT: dict[str, Callable[[str], Any]] = {"share": float, "speed": float, "window_cells": int, "lacks": _names}
+_FROM_TEXT: dict[str, tuple[Callable[[str], Any], str]] = {
+    "share": (float, "a number"),
+    "speed": (float, "a number"),
+    "window_cells": (int, "a whole number"),
+    "lacks": (_names, "sensors, such as light or light/proximity (leave lacks out for a kind that has all)"),
+}
+"""Key -> how its text is read, and what the text should be, for messages."""

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError, known_keys, table
+from swarm_forage_env._internal.fields import ConfigError, known_keys, table, whole
 from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.obstacles import stretched
@@ -88,7 +88,7 @@ def recipe(
             worlds are taken as they are, with their rewards and horizons. Evaluations take place in the largest world
             of each name that it draws, unless `evaluation` has worlds.
         algorithm: One of `plan.ALGORITHMS`.
-        steps: Decisions of single robots in all stages.
+        steps: Decisions of single robots in all stages, 1 or more; 1 or 2 make a single stage.
         n_arenas: Arenas side by side; default `DEFAULT_ARENAS`, fewer of swarms that make more than `DEFAULT_ROBOTS`
             in all.
         interface: What a learner sees and does: an `InterfaceConfig`, or fields by name that differ from the
@@ -106,13 +106,15 @@ def recipe(
         samples: Whether the trained policy draws its actions, see `TrainingPlan.samples`; default where it can:
             discrete actions of ppo and a2c.
         overrides: Scenario fields by name; they go before the recipe's (`nest_progress=0.1`). `horizon_s` is the length
-            of the episodes; evaluations last as long as the scenario. Where nothing is said of `physics`, stages have
-            `TRAINING_PHYSICS` and evaluations those of the scenario.
+            of the episodes; evaluations last as long as the scenario. Where nothing is said of `physics`, the stages of
+            a preset have `TRAINING_PHYSICS` and its evaluations those of the scenario; a complete configuration and
+            the worlds of a sampler keep their own in both.
 
     Raises:
         ConfigError: an unknown name or field, values that are refused by what they are for (see `TrainingPlan`), or
             a smaller arena that cannot be.
     """
+    whole("steps", steps, at_least=1)
     if sampler is not None:
         refused = {"scenario": scenario, "wrappers": tuple(wrappers), "small_start": small_start, **overrides}
         given = [name for name, value in refused.items() if value not in (None, ())]
@@ -144,13 +146,7 @@ def recipe(
         options=_algorithm_options(
             algorithm, n_arenas * config.robots.n_robots, {**measured.options.get(algorithm, {}), **(options or {})}
         ),
-        stages=_stages(
-            config,
-            steps,
-            episodes,
-            late=_late_options(algorithm, options or {}),
-            small_start=small_start,
-        ),
+        stages=_stages(config, steps, episodes, late=_late_options(algorithm, options or {}), small_start=small_start),
         evaluation=_evaluation(evaluation, config, chosen.decision_ticks, sampler),
         seed=seed,
         samples=_can_draw(algorithm, chosen) if samples is None else samples,
@@ -271,13 +267,18 @@ def _stages(
     late: Mapping[str, Any],
     small_start: bool,
 ) -> tuple[Stage, ...]:
-    """Return a third of the steps in a smaller arena if asked for, and a third with the `late` options if any."""
-    third = max(1, steps // 3)
-    middle = Stage(steps=max(1, steps - third * (small_start + bool(late))), scenario=episodes)
-    stages = (middle, Stage(steps=third, scenario=episodes, options=late)) if late else (middle,)
-    if not small_start:
-        return stages
-    return (Stage(steps=third, scenario={**_fitting_small_arena(scenario), **episodes}), *stages)
+    """Return a third of the steps in a smaller arena if asked for, and a third with the `late` options if any.
+
+    Stages without steps are left out: one or two steps are all in the middle.
+    """
+    small = {**_fitting_small_arena(scenario), **episodes} if small_start else {}
+    third = steps // 3
+    middle = Stage(steps=steps - third * (small_start + bool(late)), scenario=episodes)
+    if not third:
+        return (middle,)
+    first = (Stage(steps=third, scenario=small),) if small_start else ()
+    last = (Stage(steps=third, scenario=episodes, options=late),) if late else ()
+    return (*first, middle, *last)
 
 
 def _fitting_small_arena(scenario: ScenarioConfig) -> dict[str, Any]:

@@ -33,7 +33,8 @@ from swarm_forage_env.contract.layout import BUILT_IN_SLICES, LayoutRow
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
-from swarm_forage_env.scenarios.draws import KINDS, corners, draw_fields, drawn_names, plain_fields, read_fields
+from swarm_forage_env.scenarios.draws import KINDS, Drawn, corners, draw_fields, drawn_names, plain_fields, read_fields
+from swarm_forage_env.scenarios.kinds import WINDOWS_CELLS
 from swarm_forage_env.scenarios.overrides import field_types
 from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.scenarios.units import CELL_M
@@ -56,7 +57,7 @@ class SampledWorld:
     """Worlds of one kind: a preset or a configuration, with fields that are fixed or drawn.
 
     Raises:
-        ConfigError: no preset, a distribution that is none, or a weight that is not above 0.
+        ConfigError: no preset, a distribution that is none, a range of window_cells, or a weight that is not above 0.
     """
 
     scenario: str | ScenarioConfig | Mapping[str, Any] = field(hash=False)
@@ -100,7 +101,20 @@ def _scenario_fields(given: Mapping[str, Any]) -> dict[str, Any]:
     for name, value in fields.items():
         if isinstance(value, Mapping):  # no field is a table, so this is a misspelt distribution
             known_keys(value, KINDS, "distribution", prefix=f"{name}.")
+    _check_windows(fields.get("robot_kinds"))
     return fields
+
+
+def _check_windows(kinds: Any) -> None:
+    """Refuse a range of window_cells: its ends may be windows, but numbers between them are none."""
+    for kind in kinds if isinstance(kinds, tuple) else ():
+        window = kind.get("window_cells") if isinstance(kind, Mapping) else None
+        if isinstance(window, Drawn) and window.kind in ("uniform", "log_uniform"):
+            raise ConfigError(
+                f"Expected the window_cells of robot kind {kind.get('name')} to be drawn from a choice of "
+                f"{', '.join(map(str, WINDOWS_CELLS))}, got {window.to_mapping()}; give it "
+                f"{{choice = {list(WINDOWS_CELLS)}}}."
+            )
 
 
 def _wrapper_tables(given: Any) -> dict[str, dict[str, Any]]:

@@ -18,8 +18,12 @@ from swarm_forage_env.world.physics import obstacle_rows
 
 PROXIMITY_RANGE_M = 0.1
 """Reach of a proximity beam beyond the body."""
-_SWITCHES = {NEIGHBOURS: "neighbours_seen", MESSAGES: "message_size", KIND: "two or more robot_kinds"}
-"""Slices that only some scenarios have, and the field that gives them."""
+_SWITCHES = {
+    NEIGHBOURS: ("neighbours", "neighbours_seen"),
+    MESSAGES: ("messages", "message_size"),
+    KIND: ("robots of several kinds", "two or more robot_kinds"),
+}
+"""Slices that only some scenarios have: what such a scenario has, and the field that gives it."""
 
 
 def read_slices(reads: Collection[str] | None, layout: ObservationLayout) -> tuple[str, ...]:
@@ -32,8 +36,10 @@ def read_slices(reads: Collection[str] | None, layout: ObservationLayout) -> tup
         return layout.names
     for name in reads:
         if name in _SWITCHES and name not in layout.names:
+            what, field = _SWITCHES[name]
             raise ConfigError(
-                f"Expected a scenario with {name}, which the policy reads, got one without; give it {_SWITCHES[name]}."
+                f"Expected a scenario with {what}, because the policy reads the slice {name!r}, got one without; give "
+                f"it {field}."
             )
         known_name("entry of reads", name, (*layout.names, LIGHT_IF_CARRYING))
     return tuple("light" if name == LIGHT_IF_CARRYING else name for name in reads)

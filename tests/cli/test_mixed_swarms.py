@@ -38,6 +38,20 @@ def test_the_table_of_a_run_has_a_row_for_each_kind_of_robots(command):
     )
 
 
+def test_a_kind_without_robots_has_no_numbers_per_robot(command):
+    words = ("run", "--policy", "random", *TINY, "--set", "robot_kinds=few:share=0.01+many")
+    code, out, err = command(*words)
+    assert code == 0, err
+    few, many = (line.split() for line in out.splitlines() if "of which" in line)
+    assert (few.count("-"), many.count("-")) == (2, 0)
+    (found,) = json.loads(command(*words, "--json")[1])["controllers"]
+    few, many = found["parts"]
+    assert (few["n_robots"], many["n_robots"]) == (0, 4)
+    assert few["deliveries_per_1000_s"]["mean"] == 0.0
+    assert few["deliveries_per_robot_per_1000_s"]["mean"] is few["interference_fraction"] is None
+    assert many["deliveries_per_robot_per_1000_s"]["mean"] is not None
+
+
 def test_films_and_information_take_mixed_swarms(command, tmp_path):
     code, _, err = command("record", "--policy", MIXED, "--robots", "4", "--seconds", "8", "--size", "300")
     assert (code, err) == (0, "")

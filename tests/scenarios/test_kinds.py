@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -76,11 +77,14 @@ def test_the_first_rows_are_of_the_first_kind():
         (({"name": "a", "spead": 0.2},), r"'spead'\. Did you mean 'speed'"),
         (({"name": "two words"},), "letters, digits and _"),
         (({"name": 3},), "letters, digits and _"),
+        (({"name": "none"},), "not to be 'none', which stands for a swarm without kinds"),
         (({"name": "a", "speed": 1.5},), r"at most 1, got 1\.5: it is a share of max_speed_mps"),
         (({"name": "a", "speed": 0},), "the speed of robot kind a"),
         (({"name": "a", "share": -0.1}, {"name": "b"}), "the share of robot kind a"),
         (({"name": "a", "window_cells": 2},), "window_cells of robot kind a to be one of 1, 3, 5"),
-        (({"name": "a", "window_cells": True},), "window_cells of robot kind a"),
+        (({"name": "a", "window_cells": True},), "window_cells of robot kind a to be a whole number"),
+        (({"name": "a", "window_cells": 3.0},), r"window_cells of robot kind a to be a whole number, got 3\.0"),
+        (({"name": "a", "window_cells": np.int64(3)},), r"a whole number, got .*int\("),
         (({"name": "a", "lacks": "light"},), "lacks as a tuple of names"),
         (({"name": "a", "lacks": ["light", "light"]},), "each name once"),
         (({"name": "a", "lacks": ["lihgt"]},), "what robot kind a lacks .* Did you mean 'light'"),
@@ -121,7 +125,7 @@ def test_kinds_are_read_back_from_every_form():
     assert parse_setting(f"robot_kinds={WORDS}") == ("robot_kinds", (SCOUT, HAULER))
     assert "+".join(map(words_of_kind, (SCOUT, HAULER))) == list_word(tables) == WORDS
     assert kind_from_words("scout") == RobotKind(name="scout")
-    assert words_of_kind(RobotKind(name="scout")) == "scout"
+    assert words_of_kind(RobotKind(name="scout")) == words_of_kind({"name": "scout", "lacks": []}) == "scout"
     Axis(name="robot_kinds", values=("none", WORDS))
 
 
@@ -131,6 +135,12 @@ def test_kinds_are_read_back_from_every_form():
         ("scout:speed=fast", "speed of robot kind scout to be a number, got 'fast'"),
         ("scout:spead=1", "with the keys share, speed, window_cells, lacks"),
         ("scout:speed", "NAME:key=value"),
+        ("scout:lacks=light,proximity", "several sensors as lacks=light/proximity"),
+        ("scout:lacks=", r"lacks of robot kind scout to be sensors, such as light or light/proximity .*, got ''"),
+        ("scout:lacks=light/", "lacks of robot kind scout to be sensors"),
+        ("scout:share=0.2,share=0.4", "each key of robot kind scout once, got share twice"),
+        ("scout:window_cells=3.0", r"window_cells of robot kind scout to be a whole number, got '3\.0'"),
+        ("none:speed=0.5", "not to be 'none'"),
         ("scout:speed=2", "at most 1, got 2"),
     ],
 )
@@ -163,3 +173,16 @@ def test_kinds_can_be_drawn():
         ScenarioSampler(worlds=(SampledWorld(scenario={"preset": "warehouse_small", "robot_kinds": too_fast}),))
     with pytest.raises(ConfigError, match="either all or none two or more robot_kinds"):
         ScenarioSampler(worlds=(world, SampledWorld(scenario="warehouse_small")))
+
+
+@pytest.mark.parametrize("window", [{"uniform": [1, 5]}, {"log_uniform": [1, 3]}, {"uniform": [3, 3]}])
+def test_windows_are_drawn_from_a_choice(window):
+    kinds = [{"name": "near", "share": 0.5, "window_cells": window}, HAULER]
+    with pytest.raises(ConfigError, match=r"window_cells of robot kind near .*choice of 1, 3, 5, got"):
+        SampledWorld(scenario={"preset": "warehouse_small", "robot_kinds": kinds})
+    shared = {"robot_kinds": kinds}
+    with pytest.raises(ConfigError, match=r"choice = \[1, 3, 5\]"):
+        ScenarioSampler(worlds=(SampledWorld(scenario="warehouse_small"),), scenario=shared)
+    chosen = [{**kinds[0], "window_cells": {"choice": [1, 3, 5]}}, HAULER]
+    worlds = ScenarioSampler(worlds=(SampledWorld(scenario={"preset": "warehouse_small", "robot_kinds": chosen}),))
+    assert {worlds.world_of(seed)[0].robots.robot_kinds[0].window_cells for seed in range(20)} == {1, 3, 5}

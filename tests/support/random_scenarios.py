@@ -110,7 +110,10 @@ def _company(random: Random) -> dict[str, Any]:
 
 
 def _kinds(random: Random) -> tuple[RobotKind, ...]:
-    """One kind or some, a few of which are those of all robots; the last has what the others leave."""
+    """One kind or some, a few of which are those of all robots; the last has what the others leave.
+
+    They may lack neighbours and messages where the scenario has none: that takes nothing away.
+    """
     n_kinds = random.randint(1, 4)
     return tuple(
         RobotKind(
@@ -118,7 +121,7 @@ def _kinds(random: Random) -> tuple[RobotKind, ...]:
             share=None if k == n_kinds - 1 else random.choice((0.0, 1 / n_kinds, random.uniform(0.0, 1 / n_kinds))),
             speed=random.choice((1.0, random.uniform(0.01, 1.0))),
             window_cells=random.choice(WINDOWS_CELLS),
-            lacks=tuple(random.sample(SENSORS[:4], random.choice((0, 0, 1, 3)))),
+            lacks=tuple(random.sample(SENSORS, random.choice((0, 0, 1, 3)))),
         )
         for k in range(n_kinds)
     )

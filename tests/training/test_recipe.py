@@ -86,8 +86,22 @@ def test_the_last_third_learns_more_slowly_unless_people_say_how_fast():
     assert plan.options["learning_rate"] == 0.01
     assert [dict(stage.options) for stage in recipe(options=LATE_OPTIONS["ppo"]).stages] == [{}, {}]
     assert [dict(stage.options) for stage in recipe(algorithm="dqn").stages] == [{}, {}]
-    for steps in (1, 2, 3, 4, 100):
-        assert sum(stage.steps for stage in recipe(steps=steps).stages) == max(3, steps)
+
+
+@pytest.mark.parametrize(
+    ("steps", "stages"),
+    [(1, [1]), (2, [2]), (3, [1, 1, 1]), (4, [1, 2, 1]), (100, [33, 34, 33])],
+)
+def test_stages_have_all_steps_and_none_more(steps, stages):
+    assert [stage.steps for stage in recipe(steps=steps).stages] == stages
+    assert sum(stage.steps for stage in recipe(steps=steps, small_start=False).stages) == steps
+    assert [stage.steps for stage in recipe(steps=steps, small_start=False, algorithm="dqn").stages] == [steps]
+
+
+@pytest.mark.parametrize("steps", [0, -5, 2.5, True])
+def test_a_training_without_steps_is_refused(steps):
+    with pytest.raises(ConfigError, match="Expected steps to be a whole number"):
+        recipe(steps=steps)
 
 
 @pytest.mark.parametrize(

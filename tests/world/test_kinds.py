@@ -158,7 +158,7 @@ def test_the_dead_come_back_as_what_they_were():
 def test_a_sensor_that_is_lacking_has_no_noise():
     register_sensor("of_kinds", lambda world: np.ones(len(world.swarm.active)), meaning="one")
     kinds = (
-        RobotKind(name="none", share=0.5, lacks=("proximity", "light", "neighbours", "messages", "of_kinds")),
+        RobotKind(name="bare", share=0.5, lacks=("proximity", "light", "neighbours", "messages", "of_kinds")),
         RobotKind(name="all"),
     )
     world = {"neighbours_seen": 2, "neighbour_range_m": 9.0, "message_size": 1, "message_range_m": 9.0}
@@ -265,7 +265,7 @@ def test_a_policy_that_sees_kinds_says_what_it_needs():
     assert InterfaceConfig().for_scenario(plain).sees_kind is None
     with pytest.raises(ConfigError, match=r"several kinds, which the policy sees, .* two or more robot_kinds"):
         LearnerInterface(shown, SwarmSpec.of(plain))
-    with pytest.raises(ConfigError, match=r"a scenario with kind, which the policy reads, .* two or more robot_kinds"):
+    with pytest.raises(ConfigError, match=r"several kinds, because .* 'kind', .* two or more robot_kinds"):
         ForageEnv(plain, reads=shown.reads)
     LearnerInterface(shown, SwarmSpec.of(scenario("warehouse_small", robot_kinds=OTHERS)))
 

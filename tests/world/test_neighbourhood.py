@@ -238,7 +238,7 @@ def test_a_policy_says_what_it_needs():
     ):
         with pytest.raises(ConfigError, match=words):
             LearnerInterface(shown, SwarmSpec.of(scenario("warehouse_small", **fields)))
-    with pytest.raises(ConfigError, match=r"a scenario with neighbours, which the policy reads, .* neighbours_seen"):
+    with pytest.raises(ConfigError, match=r"a scenario with neighbours, because the policy reads .* neighbours_seen"):
         ForageEnv(scenario("warehouse_small"), reads=shown.reads)
     blind = InterfaceConfig(neighbours_seen=0, message_size=0).for_scenario(scenario("warehouse_small", **BOTH))
     assert blind.sensors == ()

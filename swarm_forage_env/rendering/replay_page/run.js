@@ -118,12 +118,12 @@ class Run {
     const events = this.arrays.memory_events;
     if (!events) return null;
     const count = events.length / 5;
-    const [frames, robots, kinds, x, y] = [0, 1, 2, 3, 4].map((k) => events.subarray(k * count, (k + 1) * count));
+    const [frames, robots, changes, x, y] = [0, 1, 2, 3, 4].map((k) => events.subarray(k * count, (k + 1) * count));
     const places = new Map();
     for (let i = countUpTo(robots, robot - 1); i < count && robots[i] === robot && frames[i] <= this.frame; i++) {
-      const key = [Math.abs(kinds[i]), x[i], y[i]].join();
-      if (kinds[i] < 0) places.delete(key);
-      else places.set(key, [kinds[i], this.header.position_step_m * x[i], this.header.position_step_m * y[i]]);
+      const key = [Math.abs(changes[i]), x[i], y[i]].join();
+      if (changes[i] < 0) places.delete(key);
+      else places.set(key, [changes[i], this.header.position_step_m * x[i], this.header.position_step_m * y[i]]);
     }
     return [...places.values()];
   }
