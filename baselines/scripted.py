@@ -83,6 +83,8 @@ class ScriptedPolicy:
         self._chance = TickDraws(rng, spec.n_robots, n_draws)
         self._constants = constants
         self._robots = robots
+        robots["object_reach"] = spec.object_reach_cells
+        robots["cache_reach"] = spec.cache_reach_cells
         self._actions: ActionArray = np.zeros((spec.n_robots, 3), np.float32)
         self._state = (constants, robots, *memory, self._actions)
         self.n_ticks = 0

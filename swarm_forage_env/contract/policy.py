@@ -5,7 +5,7 @@ A policy, scripted or trained, sees observations and never the state of the worl
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -86,6 +86,10 @@ class SwarmSpec:
     """SITE and CREATE_CACHE drops are refused within this distance of a cache centre."""
     message_size: int
     """Numbers that a robot may say, columns of its action after `COMMANDS`."""
+    object_reach_cells: tuple[int, ...]
+    """(N,) cells on either side of its own in which each robot sees objects: half its window, -1 if it sees none."""
+    cache_reach_cells: tuple[int, ...]
+    """(N,) the same of caches."""
     quirks: Quirks
 
     @property
@@ -102,6 +106,15 @@ class SwarmSpec:
     def state_size(self) -> int:
         """Numbers in the global view `ForageEnv.state()`: six per robot, three per object."""
         return state_size(self.n_robots, self.n_objects)
+
+    def part(self, rows: slice) -> "SwarmSpec":
+        """Return what a policy knows that drives these rows only, from `rows.start` to before `rows.stop`."""
+        return replace(
+            self,
+            n_robots=rows.stop - rows.start,
+            object_reach_cells=self.object_reach_cells[rows],
+            cache_reach_cells=self.cache_reach_cells[rows],
+        )
 
     @classmethod
     def of(cls, scenario: ScenarioConfig, *, horizon_s: float | None = None) -> "SwarmSpec":
@@ -137,6 +150,8 @@ class SwarmSpec:
             min_dist_m=scenario.min_dist_m,
             cache_proximity_m=scenario.cache_proximity_m,
             message_size=robots.message_size,
+            object_reach_cells=robots.reach_cells("los_object"),
+            cache_reach_cells=robots.reach_cells("los_cache"),
             quirks=scenario.quirks,
         )
 

@@ -28,7 +28,7 @@ from swarm_forage_env.contract.layout import (
     neighbours_row,
 )
 from swarm_forage_env.contract.policy import COMMANDS, ActionError, SwarmSpec
-from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
+from swarm_forage_env.contract.types import ActionArray, BoolArray, IntArray, ObsArray
 from swarm_forage_env.policies.kernels.commands import (
     GRIP_COMMANDS,
     MOTION_WHEELS,
@@ -208,6 +208,7 @@ class LearnerInterface:
             self.layout.size - len(self._own_columns) - (N_SITES * SITE_COLUMNS if config.site_memory else 0)
         )
         self._sites = new_site_memory(spec.n_robots) if config.site_memory else None
+        self._reach_cells: IntArray = np.array(spec.object_reach_cells, np.int32)
         self._pose_starts = (start["position"], start["heading"])
         self._cargo_starts = (start["carrying"], start["los_cell"], start["los_object"])
         self.observation_space = self.new_observation_space()
@@ -261,7 +262,7 @@ class LearnerInterface:
         at = self._n_shown
         if self._sites is not None:
             half = self._half_x, self._half_y
-            remember_sites(obs, self._pose_starts, self._cargo_starts, half, self._sites)
+            remember_sites(obs, self._pose_starts, self._cargo_starts, half, self._reach_cells, self._sites)
             show_sites(obs, self._pose_starts, half, self._sites, out[:, at:])
             at += N_SITES * SITE_COLUMNS
         if len(self._own_columns):

@@ -1,7 +1,6 @@
 """MixedPolicy: a swarm in which several policies drive robots beside each other."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -77,7 +76,7 @@ class MixedPolicy:
         self._driving: list[tuple[Policy, slice]] = []
         for policy, rows, chance, size in everyone:
             if size:
-                policy.reset(replace(spec, n_robots=size), chance)
+                policy.reset(spec.part(rows), chance)
                 self._driving.append((policy, rows))
         self._busy: list[tuple[Any, slice]] = [entry for entry in self._driving if hasattr(entry[0], "task")]
         vars(self).pop("task", None)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.scenarios.kinds import RobotKind, kind_rows, read_kinds
+from swarm_forage_env.scenarios.kinds import WINDOWS_CELLS, RobotKind, kind_rows, read_kinds
 from swarm_forage_env.scenarios.units import EAST_WALL_M
 
 MAX_NEIGHBOURS_SEEN = 64
@@ -64,6 +64,17 @@ class RobotConfig:
     def kind_rows(self) -> tuple[slice, ...]:
         """Rows of each of the `robot_kinds`."""
         return kind_rows(self.robot_kinds, self.n_robots)
+
+    def reach_cells(self, sensor: str) -> tuple[int, ...]:
+        """Return how many cells each robot sees on either side of its own, by "los_object" or "los_cache".
+
+        -1 is for robots that lack the sensor.
+        """
+        found = [WINDOWS_CELLS[-1] // 2] * self.n_robots
+        for kind, rows in zip(self.robot_kinds, self.kind_rows, strict=True):
+            reach = -1 if sensor in kind.lacks else kind.window_cells // 2
+            found[rows] = [reach] * (rows.stop - rows.start)
+        return tuple(found)
 
     def kind_of(self, robot: int) -> str | None:
         """Return the name of a robot's kind; None where there are no kinds."""

@@ -11,6 +11,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.policies.kernels.sites import SiteMemory
 from swarm_forage_env.policies.learned import LearnedPolicy
+from swarm_forage_env.scenarios.kinds import RobotKind
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.learner_arena import LearnerArena, plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
@@ -38,15 +39,25 @@ def seen(interface: LearnerInterface, env: ForageEnv, name: str) -> np.ndarray:
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("observation", ["compact", "full"])
-def test_sites_match_their_twin_along_a_run(observation):
-    env = ForageEnv(scenario("search_and_rescue", n_robots=30, side_m=16.0, physics="compiled"))
+@pytest.mark.parametrize(("observation", "has_kinds"), [("compact", False), ("full", False), ("compact", True)])
+def test_sites_match_their_twin_along_a_run(observation, has_kinds):
+    kinds = (RobotKind(name="near", share=0.3, window_cells=3), RobotKind(name="here", share=0.3, window_cells=1))
+    env = ForageEnv(
+        scenario(
+            "search_and_rescue",
+            n_robots=30,
+            side_m=16.0,
+            physics="compiled",
+            robot_kinds=(*kinds, RobotKind(name="others")) if has_kinds else (),
+        )
+    )
     stack = parse_wrapper("sensor_noise:sigma=0.02").wrap(env)
     policy = load_policy("dpo")
     policy.reset(env.swarm_spec, stream_rng(0, Stream.POLICY))
-    interface, twins = remembering(env, observation=observation), [RobotSites() for _ in range(30)]
+    interface = remembering(env, observation=observation)
+    twins = [RobotSites(reach) for reach in ((1,) * 9 + (0,) * 9 + (2,) * 12 if has_kinds else (2,) * 30)]
     columns = slice(interface.layout["pickup_site"].start, interface.layout["sighting_site"].stop)
-    obs, kinds = stack.reset_batch(3), np.zeros(8)
+    obs, columns_used = stack.reset_batch(3), np.zeros(8)
     for tick in range(2000):
         obs, *_ = stack.step_batch(policy.act(obs, env.active))
         if tick == 1500:
@@ -58,8 +69,8 @@ def test_sites_match_their_twin_along_a_run(observation):
                 rows, [twin.look(row, env.layout) for twin, row in zip(twins, obs, strict=True)], atol=1e-5
             )
             np.testing.assert_array_equal(interface.observe(obs)[:, columns], rows, "looking twice changes nothing")
-            kinds += np.abs(rows).sum(axis=0)
-    assert kinds.all(), "every column is put to the test"
+            columns_used += np.abs(rows).sum(axis=0)
+    assert columns_used.all(), "every column is put to the test"
     interface.forget()
     assert not remembered(interface).is_known.any()
 

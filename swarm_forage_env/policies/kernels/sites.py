@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.layout import WINDOW_CELLS
-from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.policies.kernels.compact import nearest_object, write_direction
 from swarm_forage_env.scenarios.units import CELLS_PER_M
 
@@ -24,8 +23,8 @@ SITE_COLUMNS = 4
 PICKUP, SIGHTING = 0, 1
 FAR_M = 20.0
 """Distance from which on a site counts as far (our choice: more than half of an arena of 32 m)."""
-NEAR_M = (WINDOW_CELLS // 2) / CELLS_PER_M
-"""A site that is less far along both axes lies in the window of line of sight, wherever in its cell the robot is."""
+_LEAST_REACH = 0.5
+"""Cells: so near to a site a robot has arrived, also one that sees only the cell it stands on."""
 
 
 class SiteMemory(NamedTuple):
@@ -47,9 +46,13 @@ def new_site_memory(n_robots: int) -> SiteMemory:
 
 
 @kernel
-def is_near(place: FloatArray, x: float, y: float) -> bool:
-    """Return whether a place lies in the window of a robot at (x, y)."""
-    return abs(place[0] - x) < NEAR_M and abs(place[1] - y) < NEAR_M
+def is_near(place: FloatArray, x: float, y: float, reach_cells: int) -> bool:
+    """Return whether a place lies in the window of a robot at (x, y), wherever in its cell the robot is.
+
+    `reach_cells` on either side of its own are in the window.
+    """
+    near_m = max(reach_cells, _LEAST_REACH) / CELLS_PER_M
+    return abs(place[0] - x) < near_m and abs(place[1] - y) < near_m
 
 
 @kernel
@@ -58,12 +61,13 @@ def remember_sites(
     pose_starts: tuple[int, int],
     cargo_starts: tuple[int, int, int],
     half: tuple[float, float],
+    reach_cells: IntArray,
     memory: SiteMemory,
 ) -> None:
     """Bring the memories up to date with observations (N, D); twice with the same ones is as good as once.
 
     Rows of robots that are not in the world forget everything. `pose_starts` = first columns of position, heading;
-    `cargo_starts` = those of carrying, los_cell, los_object; `half` = half the arena, m.
+    `cargo_starts` = those of carrying, los_cell, los_object; `half` = half the arena, m; `reach_cells` (N,): `is_near`.
     """
     position, heading = pose_starts
     carrying, cell, window = cargo_starts
@@ -85,7 +89,7 @@ def remember_sites(
             place[PICKUP, 0] = x
             place[PICKUP, 1] = y
             is_known[PICKUP] = True
-            if is_near(place[SIGHTING], x, y):
+            if is_near(place[SIGHTING], x, y, reach_cells[i]):
                 is_known[SIGHTING] = False  # it was this object
         memory.carried[i] = carries
         if carries and sees:
@@ -94,7 +98,7 @@ def remember_sites(
             is_known[SIGHTING] = True
         if not carries and not sees:
             for k in range(N_SITES):
-                if is_near(place[k], x, y):
+                if is_near(place[k], x, y, reach_cells[i]):
                     is_known[k] = False
 
 
