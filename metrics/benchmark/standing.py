@@ -117,7 +117,8 @@ def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Stand
         entry=entry,
         score=interquartile_mean([shares[world.name].ravel() for world in counting], seed=_SEED),
         improvement=probability_of_improvement(ours, theirs, seed=_SEED),
-        n_won=sum(bool(shares[world.name].mean() > 1.0) for world in counting),
+        # Of performances, not of shares: a share of itself may be rounded to a little more than 1.
+        n_won=sum(bool(our.mean() > their.mean()) for our, their in zip(ours, theirs, strict=True)),
         n_worlds=len(counting),
         calm=middle(lambda world: world.counts and not world.is_disturbed),
         disturbed=middle(lambda world: world.counts and world.is_disturbed),

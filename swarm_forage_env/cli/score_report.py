@@ -43,6 +43,9 @@ def run_and_show(
     Raises:
         typer.Exit: Ctrl-C, or runs have failed.
     """
+    remark = _missing_kinds(plan)
+    if remark:
+        typer.echo(remark, err=True)
     if dry_run:
         show = plan_json if as_json else plan_text
         typer.echo(show(plan, RunStore(folder), jobs or available_cores()))
@@ -52,6 +55,23 @@ def run_and_show(
     show_scores(tables, folder / picture, as_json=as_json, band=band)
     if any(table.failures for table in tables):
         raise typer.Exit(EXIT_FAILURE)
+
+
+def _missing_kinds(plan: ScoringPlan) -> str:
+    """Say which swarms are too small for some kind of robots; empty where all have all kinds."""
+    swarms = {spec.scenario.robots.n_robots: spec.scenario.robots for spec in plan.specs}
+    missing: dict[str, list[int]] = {}
+    for size, robots in sorted(swarms.items()):
+        for kind, rows in zip(robots.robot_kinds, robots.kind_rows, strict=True):
+            if rows.start == rows.stop:
+                missing.setdefault(kind.name, []).append(size)
+    if not missing:
+        return ""
+    told = "; ".join(f"no {name} with {', '.join(map(str, sizes))} robots" for name, sizes in missing.items())
+    return (
+        f"Kinds are shares of a swarm, and small swarms lack some: {told}. Measures over the size of the swarm compare "
+        "other mixtures there."
+    )
 
 
 def show_scores(tables: Sequence[ScoreTable], picture: Path | None, *, as_json: bool, band: bool = False) -> None:

@@ -40,6 +40,8 @@ def run_training(
 
     console = Console(stderr=True, highlight=False, markup=False, emoji=False)
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    if not console.is_terminal:
+        console.print(f"{plan.total_steps:,} decisions; a line about every minute says how many are done.")
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         try:
             report = _reporter(plan, bar)

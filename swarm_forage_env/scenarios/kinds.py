@@ -17,7 +17,16 @@ from fractions import Fraction
 from math import floor
 from typing import Any, cast
 
-from swarm_forage_env._internal.fields import ConfigError, as_tuples, known_keys, number, one_of, unique_names, whole
+from swarm_forage_env._internal.fields import (
+    ConfigError,
+    as_tuples,
+    known_keys,
+    known_name,
+    number,
+    one_of,
+    unique_names,
+    whole,
+)
 from swarm_forage_env._internal.printable import shown
 
 SENSORS = ("proximity", "light", "los_object", "los_cache", "neighbours", "messages")
@@ -171,11 +180,12 @@ def kind_from_words(word: str) -> RobotKind:
     values: dict[str, Any] = {"name": name.strip()}
     for setting in filter(None, settings.split(",")):
         key, equals, text = (part.strip() for part in setting.partition("="))
-        if not equals or key not in _FROM_TEXT:
+        if not equals:
             raise ConfigError(
                 f"Expected a robot kind as NAME:key=value,key=value with the keys {', '.join(_FROM_TEXT)}, several "
-                f"sensors as lacks=light/proximity, got {word!r}."
+                f"sensors as lacks=light/proximity, and a + between kinds, got {word!r}."
             )
+        known_name("key of a robot kind", key, _FROM_TEXT)
         if key in values:
             raise ConfigError(f"Expected each key of robot kind {values['name']} once, got {key} twice in {word!r}.")
         read, what = _FROM_TEXT[key]

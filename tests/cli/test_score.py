@@ -137,6 +137,14 @@ def test_a_dry_run_shows_the_experiments_and_runs_nothing(command):
     assert sum(run["stored"] for run in answer["runs"]) == 8
 
 
+def test_swarms_too_small_for_a_kind_are_named(command):
+    kinds = ("--set", "robot_kinds=scout:share=0.2+hauler:speed=0.5")
+    _, _, err = command(*SCORE, *kinds, "--dry-run")
+    assert "small swarms lack some: no scout with 1" in err
+    _, _, err = command(*SCORE, "--set", "robot_kinds=only", "--dry-run")
+    assert "small swarms" not in err
+
+
 def test_a_plan_counts_in_words(command):
     one = (*SCORE, "--measures", "availability", "--seeds", "1")
     _, out, _ = command(*one, "--dry-run")

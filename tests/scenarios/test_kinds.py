@@ -133,7 +133,7 @@ def test_kinds_are_read_back_from_every_form():
     ("word", "words"),
     [
         ("scout:speed=fast", "speed of robot kind scout to be a number, got 'fast'"),
-        ("scout:spead=1", "with the keys share, speed, window_cells, lacks"),
+        ("scout:spead=1", "Did you mean 'speed'. Known: share, speed, window_cells, lacks"),
         ("scout:speed", "NAME:key=value"),
         ("scout:lacks=light,proximity", "several sensors as lacks=light/proximity"),
         ("scout:lacks=", r"lacks of robot kind scout to be sensors, such as light or light/proximity .*, got ''"),

@@ -44,6 +44,13 @@ def test_the_reference_is_the_best_scripted_controller_of_each_world(protocol, r
     assert "room, 1 robot" not in reference.best
 
 
+def test_no_scripted_controller_wins_against_itself():
+    protocol = load_protocol()
+    entries = scripted_entries(protocol)
+    reference = reference_of(entries, protocol)
+    assert [standing_of(entry, reference, protocol).n_won for entry in entries] == [0] * len(entries)
+
+
 def test_a_world_in_which_no_scripted_controller_achieves_anything_is_refused(protocol):
     nobody = [made_up_entry(protocol, name, lambda k: -1.0) for name in SCRIPTED]  # -1 and 1 objects: 0 on average
     with pytest.raises(BenchmarkError, match="training: here"):
