@@ -40,8 +40,6 @@ def run_training(
 
     console = Console(stderr=True, highlight=False, markup=False, emoji=False)
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    if not console.is_terminal:
-        console.print(f"{plan.total_steps:,} decisions; a line about every minute says how many are done.")
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         try:
             report = _reporter(plan, bar)
@@ -123,11 +121,15 @@ def stage_ends(plan: TrainingPlan) -> list[int]:
 def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | Evaluation], None]:
     task = bar.add_task("training", total=plan.total_steps)
     first_words = heading(plan)
+    has_begun = False
     told: TrainingStatus | None = None
     told_at = time.monotonic()
 
     def report(news: TrainingStatus | Evaluation) -> None:
-        nonlocal first_words, told, told_at
+        nonlocal first_words, has_begun, told, told_at
+        if bar.disable and not has_begun:
+            bar.console.print(f"{plan.total_steps:,} decisions; a line about every minute says how many are done.")
+            has_begun = True
         if isinstance(news, Evaluation):
             if first_words:
                 bar.console.print(first_words)
