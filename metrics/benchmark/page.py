@@ -10,15 +10,25 @@ from collections.abc import Sequence
 from metrics.scoring.texts import number, percent
 from metrics.statistics import Estimate
 
-from .entry import Entry
+from .entry import Entry, EntryMeasure
 from .protocol import BenchmarkError, Protocol, scenario_fields
-from .standing import Reference, Standing, improvements, measure_mean
+from .standing import SCRIPTED, Reference, Standing, improvements, measure_mean
 
 BEGIN = "<!-- generated: swarm-forage benchmark page -->"
 END = "<!-- end of entries -->"
 _BLOCK = re.compile(re.escape(BEGIN) + r".*?" + re.escape(END), re.DOTALL)
 _TRAINED = {"given": "training worlds", "other": "also other worlds", "nothing": "not trained", "unknown": "not said"}
 """`Training.worlds` -> words of the table."""
+MATCHED = (
+    "spatial_emergence",
+    "task_emergence",
+    "scalability",
+    "reactivity",
+    "adaptability",
+    "noise_robustness",
+    "population_robustness",
+)
+"""Measures of which the page says how often an entry is as good as the best scripted controller."""
 BOARD_HEADER = (
     "entry",
     "score",
@@ -75,6 +85,8 @@ def page_block(standings: Sequence[Standing], protocol: Protocol, picture: str =
         "### How each was made\n\n" + markdown(*_origins(entries)),
         "These commands make them again:\n\n" + _commands(entries),
         "### Group by group\n\n" + markdown(*_groups(ranked, protocol)),
+        "### Measure by measure\n\nIn how many rows of a measure an entry is at least as good as the best of the four "
+        "scripted controllers; amounts and distances as shares of performance.\n\n" + markdown(*_matched(entries)),
         "### One against the other\n\nHow often a run of the row's entry is better than one of the column's in the "
         "same world.\n\n" + markdown(*_duels(entries, protocol)),
     ]
@@ -179,6 +191,28 @@ def _groups(ranked: Sequence[Standing], protocol: Protocol) -> tuple[tuple[str, 
         for standing in ranked
     ]
     return header, rows
+
+
+def _matched(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    scripted = [entry for entry in entries if entry.name in SCRIPTED]
+    best: dict[tuple[str, str, str], float] = {}
+    for entry in scripted:
+        for measure in entry.measures:
+            best[measure.key] = max(best.get(measure.key, -math.inf), _goodness(measure))  # NaN is never the larger
+    rows: list[tuple[str, ...]] = []
+    for entry in entries:
+        won = {label: [0, 0] for label in MATCHED}
+        for measure in entry.measures:
+            if measure.label in won and measure.key in best:
+                won[measure.label][0] += _goodness(measure) >= best[measure.key]
+                won[measure.label][1] += 1
+        rows.append((entry.name, *(f"{reached} of {of}" if of else "-" for reached, of in won.values())))
+    return ("entry", *(label.replace("_", " ") for label in MATCHED)), rows
+
+
+def _goodness(measure: EntryMeasure) -> float:
+    """The mean of a measure, higher where it is better."""
+    return measure_mean(measure) * (1.0 if measure.higher_is_better else -1.0)
 
 
 def _duels(entries: Sequence[Entry], protocol: Protocol) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

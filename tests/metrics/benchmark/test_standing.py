@@ -1,5 +1,7 @@
 """What entries are worth, checked on numbers made up: shares of the best scripted controller, and the page."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -116,6 +118,21 @@ def test_the_page_has_every_entry_with_its_command_cost_and_seeds(protocol, scri
     assert "[benchmark](benchmark.md)" in details
     assert "| room, noisy wheels | 4 robots, 60 objects, 9 x 9 m | dpo |" in details
     assert "| scalability, room | N = 2 to 4 | higher |" in details
+
+
+@pytest.mark.parametrize(("higher_is_better", "value", "told"), [(True, 0.6, 1), (True, 0.4, 0), (False, 0.4, 1)])
+def test_the_page_counts_in_how_many_comparisons_an_entry_is_as_good(protocol, scripted, reference, higher_is_better,
+                                                                     value, told):  # fmt: skip
+    def measured(entry, value):
+        (measure,) = entry.measures
+        measure = replace(measure, label="reactivity", higher_is_better=higher_is_better, values=((value, None),))
+        return replace(entry, measures=(measure,))
+
+    entries = [measured(entry, float("nan") if entry.name == "crw" else 0.5) for entry in scripted]
+    mine = measured(made_up_entry(protocol, "mine", lambda k: 39.0), value)
+    block = page_block([standing_of(entry, reference, protocol) for entry in [*entries, mine]], protocol)
+    row = block.partition("### Measure by measure")[2].partition("| mine |")[2].splitlines()[0]
+    assert row == f" - | - | - | {told} of 1 | - | - | - |"
 
 
 def test_a_page_gets_another_block_between_its_marks():
