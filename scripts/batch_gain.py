@@ -66,7 +66,9 @@ def row(label: str, policy_name: str, wrappers: Sequence[str], n_robots: int, gi
     # Copies, so that each way meets the same worlds in each round.
     alone, seated = (copy.deepcopy([env.arena for env in envs]) for _ in range(2))
     asked, together = copy.deepcopy(policies), load_policy(policy_name)
-    together.reset(replace(envs[0].swarm_spec, n_robots=n_seeds * n_robots), np.random.default_rng(0))
+    spec = envs[0].swarm_spec
+    reach = {name: n_seeds * getattr(spec, name) for name in ("object_reach_cells", "cache_reach_cells")}
+    together.reset(replace(spec, n_robots=n_seeds * n_robots, **reach), np.random.default_rng(0))
     obs = np.concatenate([arena.obs for arena in alone])
     active = np.ones(len(obs), np.bool_)
     actions = np.array(together.act(obs, active), np.float32).reshape(n_seeds, n_robots, 3)

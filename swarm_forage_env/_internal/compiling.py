@@ -35,11 +35,14 @@ _COMPILED_IN_EVERYWHERE = tuple(
         "contract/codes",
         "contract/detection",
         "contract/layout",
+        "scenarios/sensors",
         "scenarios/units",
     )
 )
 """Modules whose functions and constants are compiled into those of other folders."""
-_COMPILED_IN_BY_FOLDER = {_PACKAGE / "wrappers/kernels": (_PACKAGE / "world/kernels/drive.py",)}
+_COMPILED_IN_BY_FOLDER = {
+    _PACKAGE / "wrappers/kernels": (_PACKAGE / "world/kernels/drive.py", _PACKAGE / "world/kernels/kinds.py")
+}
 """Further modules that are compiled into the functions of one folder."""
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TypeAlias
 
-from swarm_forage_env.scenarios.kinds import SENSORS, WINDOWS_CELLS
+from swarm_forage_env.scenarios.sensors import SENSORS, WINDOWS_CELLS
 from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 
 RING_SENSORS = 24

@@ -108,7 +108,7 @@ class SwarmSpec:
         return state_size(self.n_robots, self.n_objects)
 
     def part(self, rows: slice) -> "SwarmSpec":
-        """Return what a policy knows that drives these rows only, from `rows.start` to before `rows.stop`."""
+        """Return what a policy knows that drives these rows only."""
         return replace(
             self,
             n_robots=rows.stop - rows.start,

@@ -28,12 +28,8 @@ from swarm_forage_env._internal.fields import (
     whole,
 )
 from swarm_forage_env._internal.printable import shown
+from swarm_forage_env.scenarios.sensors import SENSORS, WINDOWS_CELLS
 
-SENSORS = ("proximity", "light", "los_object", "los_cache", "neighbours", "messages")
-"""Slices of the observation that a kind may lack, besides own sensors. Zero there means that nothing is seen or heard.
-The floor is not among them: zero is an object there, and a robot that does not feel the nest never delivers."""
-WINDOWS_CELLS = (1, 3, 5)
-"""Sides of the line-of-sight window that a kind may have, in cells; the last is that of robots of one kind."""
 MAX_KINDS = 16
 """Most kinds of a swarm (our choice: more than any swarm that we know of has)."""
 _NO_NAME = "none"

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.scenarios.kinds import WINDOWS_CELLS, RobotKind, kind_rows, read_kinds
+from swarm_forage_env.scenarios.kinds import RobotKind, kind_rows, read_kinds
+from swarm_forage_env.scenarios.sensors import WINDOWS_CELLS
 from swarm_forage_env.scenarios.units import EAST_WALL_M
 
 MAX_NEIGHBOURS_SEEN = 64

@@ -34,9 +34,9 @@ from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
 from swarm_forage_env.scenarios.draws import KINDS, Drawn, corners, draw_fields, drawn_names, plain_fields, read_fields
-from swarm_forage_env.scenarios.kinds import WINDOWS_CELLS
 from swarm_forage_env.scenarios.overrides import field_types
 from swarm_forage_env.scenarios.presets import chosen_scenario
+from swarm_forage_env.scenarios.sensors import WINDOWS_CELLS
 from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.placement import static_cache_centres
 from swarm_forage_env.wrappers.base import WrapperConfig

@@ -7,8 +7,9 @@ import numpy as np
 
 from swarm_forage_env.contract.layout import KIND_COLUMNS, WINDOW_CELLS, ObservationLayout
 from swarm_forage_env.contract.types import FloatArray, IntArray, ObsArray
-from swarm_forage_env.scenarios.kinds import SENSORS, RobotKind
+from swarm_forage_env.scenarios.kinds import RobotKind
 from swarm_forage_env.scenarios.robots import RobotConfig
+from swarm_forage_env.scenarios.sensors import SENSORS
 
 
 def speeds(robots: RobotConfig) -> FloatArray:
