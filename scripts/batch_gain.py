@@ -24,7 +24,7 @@ from speed_cases import WRAPPERS
 
 from swarm_forage_env import build_stack, load_policy, parse_wrapper, scenario
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.study.run import LiveRun
+from swarm_forage_env.runs.run import LiveRun
 from swarm_forage_env.world.rack import Rack
 
 CASES: tuple[tuple[str, str, tuple[str, ...]], ...] = (

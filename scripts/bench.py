@@ -36,11 +36,11 @@ from site_search import share_of_run
 from speed_cases import WRAPPERS, large_world
 
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.run import LiveRun, build_stack
+from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import warehouse_medium
-from swarm_forage_env.study.run import LiveRun, build_stack
-from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.pettingzoo import parallel_env
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.kernels.gaussian import to_normal
@@ -277,8 +277,8 @@ def frame_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a c
 
     The window's display is none, so the time in which a real one shows the picture is not in it.
     """
+    from swarm_forage_env.inspect.watch import Watch
     from swarm_forage_env.rendering.window import Pressed, Window
-    from swarm_forage_env.study.watch import Watch
 
     env = parallel_env("search_and_rescue", n_robots=819, physics="compiled", render_mode="rgb_array")
     env.reset(seed=0)

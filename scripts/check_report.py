@@ -14,7 +14,7 @@ from pathlib import Path
 from metrics.claims import CLAIMS, INTUITIONS
 from metrics.scoring.figure_panels import FIGURE_MEASURES
 from metrics.scoring.measures import MEASURE_CRITERIA
-from swarm_forage_env.study.studies import READING_NAMES
+from swarm_forage_env.studies.study import READING_NAMES
 
 TABLES = {"verdicts": CLAIMS, "intuitions": INTUITIONS}
 """Table of the page -> what it lists."""

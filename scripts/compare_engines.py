@@ -22,10 +22,10 @@ from metrics.statistics import aggregate
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.run import LiveRun, build_env
+from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.run import LiveRun, build_env
-from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.world.contact import TOUCH_SLACK_M
 
 MEASURES = {

@@ -17,8 +17,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from swarm_forage_env.rendering.plots import COLOURS
-from swarm_forage_env.study.record import RunRecord
-from swarm_forage_env.study.store import load
+from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.store import load
 
 Curves = dict[str, dict[int, tuple[float, float]]]
 """Controller -> swarm size -> performance per 1,000 s, and share of robot time in interference; means over seeds."""

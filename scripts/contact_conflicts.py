@@ -18,9 +18,9 @@ from baselines.robots import ACQUIRE
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.study.run import LiveRun, build_env
 from swarm_forage_env.world.contact import TOUCH_SLACK_M
 
 UNRESOLVED_TICKS = 1_000

@@ -14,10 +14,10 @@ import numpy as np
 from PIL import Image
 
 from swarm_forage_env import load_policy, plan_run, scenario
+from swarm_forage_env.inspect.watch import Watch
 from swarm_forage_env.rendering.frame import Trails, render_frame
 from swarm_forage_env.rendering.window import Pressed, Window
-from swarm_forage_env.study.run import LiveRun, build_env
-from swarm_forage_env.study.watch import Watch
+from swarm_forage_env.runs.run import LiveRun, build_env
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 PICTURES = {

@@ -25,7 +25,7 @@ from metrics.laws import LAW_WORDS, SYMBOLS
 from metrics.scoring.plots import COLOURS
 from metrics.scoring.study_models import DRAWN_LAWS, ForagingRuns, foraging_runs
 from metrics.scoring.study_tables import study_lines
-from swarm_forage_env.study.study_table import read_study
+from swarm_forage_env.studies.study_table import read_study
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGE, PICTURE = "laws.md", "images/laws.png"

@@ -15,11 +15,11 @@ from pathlib import Path
 from PIL import Image
 
 from swarm_forage_env import RunSpec, load_policy, parse_wrapper, plan_run, scenario
+from swarm_forage_env.inspect.film import record_run
+from swarm_forage_env.inspect.replay.capture import record_replay
+from swarm_forage_env.inspect.replay.files import read_replays, write_replays
 from swarm_forage_env.rendering.frame import Trails, render_frame
-from swarm_forage_env.study.film import record_run
-from swarm_forage_env.study.replay.capture import record_replay
-from swarm_forage_env.study.replay.files import read_replays, write_replays
-from swarm_forage_env.study.run import LiveRun, build_env
+from swarm_forage_env.runs.run import LiveRun, build_env
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 FOLDER = DOCS / "gallery"

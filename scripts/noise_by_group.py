@@ -15,13 +15,13 @@ import numpy as np
 from arguments import whole
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs.record import RecordError, RunRecord
+from swarm_forage_env.runs.runner import run_all
+from swarm_forage_env.runs.spec import RunSpec, plan_run
+from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import READINGS
-from swarm_forage_env.study.record import RecordError, RunRecord
-from swarm_forage_env.study.runner import run_all
-from swarm_forage_env.study.spec import RunSpec, plan_run
-from swarm_forage_env.study.store import RunStore
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.noise import NOISE_GROUPS, ActuatorNoiseConfig, SensorNoiseConfig
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from scripts.arguments import whole
 from swarm_forage_env import plan_run, record_replay, scenario, write_replays
-from swarm_forage_env.study.replay.frames import Replay
+from swarm_forage_env.inspect.replay.frames import Replay
 from tests.support.browser import NAMES, Browser, find_chromium
 from tests.support.replay_page import choose, seek
 

@@ -19,8 +19,8 @@ from baselines.tasks import Goal
 from swarm_forage_env._internal.compiling import direct, kernel
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.study.run import LiveRun, build_stack, run_one, warm_up
-from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.runs.run import LiveRun, build_stack, run_one, warm_up
+from swarm_forage_env.runs.spec import RunSpec
 
 MOST_KEPT = 20_000
 """Searches whose inputs are kept; of more, evenly spaced ones."""

@@ -25,7 +25,7 @@ from swarm_forage_env import SCENARIO_NAMES, build_stack, load_policy, scenario
 from swarm_forage_env._internal.compiling import direct
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.study.run import LiveRun
+from swarm_forage_env.runs.run import LiveRun
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.kernels import bodies, drive, floor, interact, interfere, proprioception, tick
 

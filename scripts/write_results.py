@@ -29,8 +29,8 @@ from metrics.scoring.verdicts import VARIANTS
 from swarm_forage_env import read_study
 from swarm_forage_env.cli.study_page import command_of
 from swarm_forage_env.cli.study_verdict import scored_studies, waiting_lines
-from swarm_forage_env.study.studies import StudySpec
-from swarm_forage_env.study.study_file import (
+from swarm_forage_env.studies.study import StudySpec
+from swarm_forage_env.studies.study_file import (
     PAPER,
     budget_names,
     is_set_of_paper,
@@ -38,8 +38,8 @@ from swarm_forage_env.study.study_file import (
     load_study,
     set_names,
 )
-from swarm_forage_env.study.study_run import DONE
-from swarm_forage_env.study.study_table import StudyTable
+from swarm_forage_env.studies.study_folder import DONE
+from swarm_forage_env.studies.study_table import StudyTable
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PICTURES = Path("images/results")

@@ -20,22 +20,22 @@ if TYPE_CHECKING:
     from swarm_forage_env.contract.own import OwnSensor, register_reward, register_sensor
     from swarm_forage_env.contract.policy import Policy, SwarmSpec
     from swarm_forage_env.env import ForageEnv
+    from swarm_forage_env.inspect.film import record_run
+    from swarm_forage_env.inspect.replay.capture import record_replay
+    from swarm_forage_env.inspect.replay.files import read_replays, write_replays
     from swarm_forage_env.policies.registry import RandomPolicy, from_callable, load_policy, policy_names
+    from swarm_forage_env.runs.record import RunRecord
+    from swarm_forage_env.runs.run import build_stack, run_one, run_policy
+    from swarm_forage_env.runs.runner import run_all
+    from swarm_forage_env.runs.spec import RunSpec, plan_run
     from swarm_forage_env.scenarios.config import ScenarioConfig
     from swarm_forage_env.scenarios.kinds import RobotKind
     from swarm_forage_env.scenarios.overrides import with_overrides
     from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
-    from swarm_forage_env.study.film import record_run
-    from swarm_forage_env.study.record import RunRecord
-    from swarm_forage_env.study.replay.capture import record_replay
-    from swarm_forage_env.study.replay.files import read_replays, write_replays
-    from swarm_forage_env.study.run import build_stack, run_one, run_policy
-    from swarm_forage_env.study.runner import run_all
-    from swarm_forage_env.study.spec import RunSpec, plan_run
-    from swarm_forage_env.study.studies import StudySpec
-    from swarm_forage_env.study.study_file import load_study
-    from swarm_forage_env.study.study_run import StudyFolder, run_study
-    from swarm_forage_env.study.study_table import StudyTable, read_study
+    from swarm_forage_env.studies.study import StudySpec
+    from swarm_forage_env.studies.study_file import load_study
+    from swarm_forage_env.studies.study_folder import StudyFolder, run_study
+    from swarm_forage_env.studies.study_table import StudyTable, read_study
     from swarm_forage_env.views.pettingzoo import parallel_env
     from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
     from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
@@ -137,9 +137,9 @@ _HOMES = {
     "Quirks": "scenarios.quirks",
     "RandomPolicy": "policies.registry",
     "RobotKind": "scenarios.kinds",
-    "RunRecord": "study.record",
+    "RunRecord": "runs.record",
     "RunRecorder": "wrappers.recorder",
-    "RunSpec": "study.spec",
+    "RunSpec": "runs.spec",
     "SampledWorld": "views.sampler",
     "ScenarioConfig": "scenarios.config",
     "ScenarioSampler": "views.sampler",
@@ -147,37 +147,37 @@ _HOMES = {
     "SensorNoiseConfig": "wrappers.noise",
     "Snapshot": "world.snapshots",
     "SnapshotError": "world.snapshots",
-    "StudyFolder": "study.study_run",
-    "StudySpec": "study.studies",
-    "StudyTable": "study.study_table",
+    "StudyFolder": "studies.study_folder",
+    "StudySpec": "studies.study",
+    "StudyTable": "studies.study_table",
     "SwarmSpec": "contract.policy",
     "Task": "contract.codes",
     "Throttle": "wrappers.throttle",
     "ThrottleConfig": "wrappers.throttle",
     "Waveform": "wrappers.waveform",
-    "build_stack": "study.run",
+    "build_stack": "runs.run",
     "check_determinism": "checks",
     "check_env": "checks",
     "check_policy": "checks",
     "from_callable": "policies.registry",
     "load_policy": "policies.registry",
-    "load_study": "study.study_file",
+    "load_study": "studies.study_file",
     "parallel_env": "views.pettingzoo",
     "parse_wrapper": "wrappers.registry",
-    "plan_run": "study.spec",
+    "plan_run": "runs.spec",
     "policy_names": "policies.registry",
-    "read_replays": "study.replay.files",
-    "record_replay": "study.replay.capture",
-    "read_study": "study.study_table",
-    "record_run": "study.film",
+    "read_replays": "inspect.replay.files",
+    "record_replay": "inspect.replay.capture",
+    "read_study": "studies.study_table",
+    "record_run": "inspect.film",
     "register_reward": "contract.own",
     "register_sensor": "contract.own",
-    "run_all": "study.runner",
-    "run_one": "study.run",
-    "run_policy": "study.run",
-    "run_study": "study.study_run",
+    "run_all": "runs.runner",
+    "run_one": "runs.run",
+    "run_policy": "runs.run",
+    "run_study": "studies.study_folder",
     "with_overrides": "scenarios.overrides",
-    "write_replays": "study.replay.files",
+    "write_replays": "inspect.replay.files",
 }
 """Public name -> submodule that defines it, loaded when the name is first used."""
 

@@ -15,8 +15,8 @@ from swarm_forage_env._internal.compiling import Callback, kernel
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import from_callable, policy_names
+from swarm_forage_env.runs.run import build_stack
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.study.run import build_stack
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.registry import parse_wrapper

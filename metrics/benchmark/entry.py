@@ -241,7 +241,7 @@ def _lists(rows: Sequence[Sequence[float]]) -> list[list[float]]:
 
 
 def _digest(content: Mapping[str, Any]) -> str:
-    from swarm_forage_env.study.spec import identity_of
+    from swarm_forage_env.runs.spec import identity_of
 
     return identity_of(json.loads(json.dumps(content)))
 

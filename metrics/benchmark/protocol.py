@@ -14,7 +14,7 @@ from metrics.scoring.columns import SIZE, UNDISTURBED
 
 if TYPE_CHECKING:
     from swarm_forage_env.scenarios.config import ScenarioConfig
-    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.studies.ladders import Experiment
     from swarm_forage_env.wrappers.base import WrapperConfig
 
 LATEST = 1
@@ -124,7 +124,7 @@ def load_protocol(file: str | Path | None = None, *, quick: bool = False) -> Pro
 
 def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
     from swarm_forage_env._internal.fields import known_keys, unique_names
-    from swarm_forage_env.study.spec import identity_of
+    from swarm_forage_env.runs.spec import identity_of
 
     known_keys(content, _KEYS, "key of a protocol")
     chosen = {name: content[name] for name in ("physics", "horizon_s", "interval_s", "seeds")}
@@ -157,14 +157,14 @@ def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
 
 def _scenario(entry: Mapping[str, Any], of_all: Mapping[str, Any]) -> "ScenarioConfig":
     from swarm_forage_env.scenarios.presets import scenario
-    from swarm_forage_env.study.studies import plain_settings
+    from swarm_forage_env.studies.study import plain_settings
 
     return scenario(entry["scenario"], **plain_settings(entry.get("set", {})), **of_all)
 
 
 def _group(entry: Mapping[str, Any], base: "ScenarioConfig") -> tuple[Group, list[World]]:
     """The worlds of a group, and what they are to the measures."""
-    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.studies.ladders import Experiment
     from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 
     name: str = entry["name"]
@@ -194,7 +194,7 @@ def _group(entry: Mapping[str, Any], base: "ScenarioConfig") -> tuple[Group, lis
 
 def _disturbances(levels: Mapping[str, Any], base: "ScenarioConfig") -> "Iterator[tuple[str, Experiment, bool]]":
     """Yield the name, the experiment and whether it is only a reference, of each level of each criterion."""
-    from swarm_forage_env.study.experiments import Experiment, wrappers_at
+    from swarm_forage_env.studies.ladders import Experiment, wrappers_at
 
     for criterion, values in levels.items():
         # Only what varies over time has a reference of its own; others are held against the undisturbed run.

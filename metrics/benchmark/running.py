@@ -19,8 +19,8 @@ from .protocol import BenchmarkError, Group, Protocol, load_protocol
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from swarm_forage_env.study.record import RunRecord
-    from swarm_forage_env.study.spec import RunSpec
+    from swarm_forage_env.runs.record import RunRecord
+    from swarm_forage_env.runs.spec import RunSpec
 
 _Records = Mapping[tuple[str, int], "RunRecord"]
 """World and seed -> the run."""
@@ -69,12 +69,12 @@ def run_benchmark(
     Raises:
         BenchmarkError: runs failed, or there is not one training seed per policy.
         ValueError: an unknown policy, or a file that cannot be opened.
-        swarm_forage_env.study.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
+        swarm_forage_env.runs.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
     """
     from swarm_forage_env.policies.registry import policy_label
-    from swarm_forage_env.study.record import software_versions
-    from swarm_forage_env.study.runner import run_all
-    from swarm_forage_env.study.store import RunStore
+    from swarm_forage_env.runs.record import software_versions
+    from swarm_forage_env.runs.runner import run_all
+    from swarm_forage_env.runs.store import RunStore
 
     chosen = protocol or load_protocol()
     if training_seeds and len(training_seeds) != len(policies):
@@ -123,7 +123,7 @@ def _contestants(policies: Sequence[str], protocol: Protocol) -> tuple[Contestan
 
 def _planned(contestant: Contestant, protocol: Protocol) -> "dict[tuple[str, int], RunSpec]":
     """World and seed -> the run."""
-    from swarm_forage_env.study.spec import plan_run
+    from swarm_forage_env.runs.spec import plan_run
 
     return {
         (world.name, seed): plan_run(

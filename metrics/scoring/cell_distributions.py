@@ -18,7 +18,7 @@ from .study_tables import StudyLine, study_lines
 if TYPE_CHECKING:
     import polars as pl
 
-    from swarm_forage_env.study.study_table import StudyTable
+    from swarm_forage_env.studies.study_table import StudyTable
 
 ENOUGH = 20.0
 """What the reference must achieve in a window: with fewer objects, breakdowns are chance (`find_breakdowns`)."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from swarm_forage_env.scenarios.config import ScenarioConfig
-    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.studies.ladders import Experiment
 
 MET, NOT_MET, UNDECIDED = "met", "not met", "undecided"
 """Verdicts: the whole 95 % interval of mean performance reaches the demand, stays below it, or contains it."""
@@ -266,7 +266,7 @@ def choose_policy(
         deliver: Performance that an undisturbed run must reach, summed over its intervals, more than 0.
         keep: Share of `deliver` that is still demanded under each disturbance.
         failures: Malfunctions per tick of the whole swarm. Robots stop where they are and are repaired one after the
-            other, a little faster than they fail, see `swarm_forage_env.study.experiments.repairs_per_tick`.
+            other, a little faster than they fail, see `swarm_forage_env.studies.ladders.repairs_per_tick`.
         deaths: Robots that are expected to die during a run, one by one at random times; they do not come back.
         noise: Standard deviation of the noise of all sensors and wheels, see `SensorNoise` and `ActuatorNoise`.
         seeds: How many, at least two, or which. All policies and conditions share them.
@@ -280,7 +280,7 @@ def choose_policy(
         CurveError: a demand or a disturbance that is no number above 0, more deaths than robots, or fewer than two
             seeds.
         ValueError: an unknown policy or scenario.
-        swarm_forage_env.study.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
+        swarm_forage_env.runs.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
     """
     plan = plan_choice(
         policies,
@@ -310,7 +310,7 @@ def plan_choice(
 ) -> ChoicePlan:
     """Return the runs that `choose_policy` makes; arguments and errors as there."""
     from swarm_forage_env.scenarios.presets import scenario as preset
-    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.studies.ladders import Experiment
 
     chosen = preset(scenario) if isinstance(scenario, str) else scenario
     given = {"deliver": deliver, "keep": keep, "failures": failures, "deaths": deaths, "noise": noise}
@@ -397,7 +397,7 @@ def _missing(candidate: Candidate) -> str:
 
 def _failing(scenario: "ScenarioConfig", rate: float) -> "Experiment":
     """Malfunctions per tick, and repairs as in the study."""
-    from swarm_forage_env.study.experiments import Experiment, repairs_per_tick
+    from swarm_forage_env.studies.ladders import Experiment, repairs_per_tick
     from swarm_forage_env.wrappers.population import PopulationConfig
 
     repair = repairs_per_tick(rate, scenario.robots.n_robots)
@@ -407,7 +407,7 @@ def _failing(scenario: "ScenarioConfig", rate: float) -> "Experiment":
 
 def _dying(scenario: "ScenarioConfig", count: float) -> "Experiment":
     """Deaths per tick, so many that `count` are expected in a run."""
-    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.studies.ladders import Experiment
     from swarm_forage_env.wrappers.population import PopulationConfig
 
     rate = count / scenario.horizon_ticks
@@ -418,7 +418,7 @@ def _dying(scenario: "ScenarioConfig", count: float) -> "Experiment":
 
 def _noisy(scenario: "ScenarioConfig", sigma: float) -> "Experiment":
     """Noise of all sensors and wheels, as in scores."""
-    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.studies.ladders import Experiment
     from swarm_forage_env.wrappers.noise import noise_levels
 
     _, noisy = noise_levels(sigma, n_levels=2)

@@ -48,7 +48,7 @@ def contestants_of(
         policies: As in `compare_policies`.
         parameters: Keyword arguments of registered policies and classes.
         scenario: Where they run.
-        caches: Which caches were asked for; default see `swarm_forage_env.study.spec.chosen_caches`.
+        caches: Which caches were asked for; default see `swarm_forage_env.runs.spec.chosen_caches`.
 
     Raises:
         TypeError: something that is no policy.
@@ -83,7 +83,7 @@ def _contestant(
 ) -> Contestant:
     """Find out what was given as a policy."""
     from swarm_forage_env.policies.registry import from_callable, policy_label
-    from swarm_forage_env.study.spec import chosen_caches, pin_policy
+    from swarm_forage_env.runs.spec import chosen_caches, pin_policy
 
     if isinstance(policy, (str, Path)):
         found, pinned, stating = pin_policy(policy, parameters)

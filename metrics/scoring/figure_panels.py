@@ -22,8 +22,8 @@ from .study_tables import StudyLine, study_lines
 from .table import Score
 
 if TYPE_CHECKING:
-    from swarm_forage_env.study.studies import Value
-    from swarm_forage_env.study.study_table import StudyTable
+    from swarm_forage_env.studies.study import Value
+    from swarm_forage_env.studies.study_table import StudyTable
 
 FIGURE_MEASURES = (
     "raw_performance",

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from swarm_forage_env.scenarios.config import ScenarioConfig
-    from swarm_forage_env.study.experiments import Budget
+    from swarm_forage_env.studies.ladders import Budget
 
 
 def score_policy(
@@ -53,7 +53,7 @@ def score_policy(
             are copied for each run.
         scenario: Name of a preset, or a complete configuration; its horizon and interval are those of the budget.
         measures: Names out of `MEASURE_CRITERIA`; default all.
-        budget: "quick", "standard", "paper" (`swarm_forage_env.study.experiments.BUDGETS`), or one of your own.
+        budget: "quick", "standard", "paper" (`swarm_forage_env.studies.ladders.BUDGETS`), or one of your own.
         seeds: How many, or which; default those of the budget. Experiments share them, so runs are paired.
         horizon_s: Length of a run in seconds, whole intervals; default that of the budget.
         performance: What P(N, t) is: a recorded column ("n_carrying"), "1/" and a column of which less is better
@@ -62,7 +62,7 @@ def score_policy(
         name: Name in tables and stored runs. A policy given as object or function needs one for `out`; it then stands
             for the code: give another name when the code has changed.
         parameters: Keyword arguments of a registered policy or a class.
-        caches: "none", "static", "dynamic"; default see `swarm_forage_env.study.spec.chosen_caches`.
+        caches: "none", "static", "dynamic"; default see `swarm_forage_env.runs.spec.chosen_caches`.
         density: Robots per m^2 that all swarm sizes keep: the arena grows with the swarm, one robot is in the smallest.
             Default: all sizes in the scenario's arena (in search and rescue at its density).
         disturbance: What reactivity and adaptability are scored under: "throttle" (robots lose speed) or
@@ -80,7 +80,7 @@ def score_policy(
         CurveError: unknown measures, or a performance that is negative or no number.
         ValueError: an unknown policy, performance, scenario, budget, or values that describe no run.
         ImportError: the policy is a model, and stable-baselines3 is not installed.
-        swarm_forage_env.study.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
+        swarm_forage_env.runs.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
     """
     plan = plan_scores(
         {name: policy} if name else [policy],

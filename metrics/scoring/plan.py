@@ -12,10 +12,10 @@ from .measures import ScoreForms, check_measures, criteria_of
 from .performance import Performance, PerformanceLike, own_performance
 
 if TYPE_CHECKING:
+    from swarm_forage_env.runs.spec import RunSpec
     from swarm_forage_env.scenarios.config import ScenarioConfig
     from swarm_forage_env.scenarios.performance import Quantity
-    from swarm_forage_env.study.experiments import Budget, Experiment
-    from swarm_forage_env.study.spec import RunSpec
+    from swarm_forage_env.studies.ladders import Budget, Experiment
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,7 +36,7 @@ class ScoringPlan:
 
     def specs_of(self, contestant: Contestant) -> "tuple[RunSpec, ...]":
         """Return the runs of one policy, seed by seed."""
-        from swarm_forage_env.study.experiments import plan_specs
+        from swarm_forage_env.studies.ladders import plan_specs
 
         return plan_specs(
             self.experiments,
@@ -75,7 +75,7 @@ def plan_scores(
 ) -> ScoringPlan:
     """Return the runs that `score_policy` and `compare_policies` make; arguments and errors as there."""
     from swarm_forage_env.scenarios.presets import scenario as preset
-    from swarm_forage_env.study import experiments
+    from swarm_forage_env.studies import ladders as experiments
 
     wanted = check_measures(measures)
     budget_name = budget if isinstance(budget, str) else "custom"

@@ -219,7 +219,7 @@ def predict_policy(
     Raises:
         CurveError: too few sizes, sizes that are not rising or do not exist, too few runs that did not fail.
         ValueError: an unknown policy or scenario.
-        swarm_forage_env.study.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
+        swarm_forage_env.runs.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
     """
     plan = plan_prediction(
         {name: policy} if name else [policy],
@@ -245,7 +245,7 @@ def plan_prediction(
 ) -> PredictionPlan:
     """Return the runs that `predict_policy` makes; arguments and errors as there."""
     from swarm_forage_env.scenarios.presets import scenario as preset
-    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.studies.ladders import Experiment
 
     chosen = preset(scenario) if isinstance(scenario, str) else scenario
     fitted, held = _checked_sizes(fit_sizes(chosen) if fit is None else fit, hold)
@@ -366,7 +366,7 @@ def _with_robots(scenario: "ScenarioConfig", n_robots: int) -> "ScenarioConfig":
             )
         return worlds[n_robots]
     from swarm_forage_env.scenarios.presets import scenario as preset
-    from swarm_forage_env.study.experiments import SIZE_SWEEP_OBJECTS
+    from swarm_forage_env.studies.ladders import SIZE_SWEEP_OBJECTS
 
     objects = scenario.objects
     enough = SIZE_SWEEP_OBJECTS.get(scenario.name)
@@ -378,7 +378,7 @@ def _with_robots(scenario: "ScenarioConfig", n_robots: int) -> "ScenarioConfig":
 def _growing_worlds(scenario: "ScenarioConfig") -> "dict[int, ScenarioConfig]":
     """Return the worlds of power-law clusters by swarm size: one robot in the smallest arena, and all arenas filled."""
     from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, search_and_rescue
-    from swarm_forage_env.study.experiments import size_ladder
+    from swarm_forage_env.studies.ladders import size_ladder
 
     series = [search_and_rescue(side_m=float(side)) for side in SEARCH_AND_RESCUE_OBJECTS]
     if (scenario.arena, scenario.objects.n_objects) not in [(each.arena, each.objects.n_objects) for each in series]:

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from swarm_forage_env.study.experiments import Experiment
-    from swarm_forage_env.study.record import RunRecord
-    from swarm_forage_env.study.runner import StudyResult
+    from swarm_forage_env.runs.record import RunRecord
+    from swarm_forage_env.runs.runner import StudyResult
+    from swarm_forage_env.studies.ladders import Experiment
 
 
 def run_scores(
@@ -51,8 +51,8 @@ def run_plan(
 ) -> "list[StudyResult]":
     """Run a plan and return the outcomes of its runs; arguments and errors as in `score_policy`."""
     from swarm_forage_env.policies.registry import local_policy
-    from swarm_forage_env.study.runner import run_all
-    from swarm_forage_env.study.store import RunStore
+    from swarm_forage_env.runs.runner import run_all
+    from swarm_forage_env.runs.store import RunStore
 
     store = None if out is None else RunStore(out)
     unnamed = [contestant.label for contestant in plan.contestants if not contestant.is_named]

@@ -19,8 +19,8 @@ from metrics.significance import ROUNDING, holm
 from .texts import plain
 
 if TYPE_CHECKING:
-    from swarm_forage_env.study.studies import Cell
-    from swarm_forage_env.study.study_table import StudyTable
+    from swarm_forage_env.studies.study import Cell
+    from swarm_forage_env.studies.study_table import StudyTable
 
 COLUMNS = ("performance", "interference_fraction", "n_carrying", "cache_pickups")
 """Columns that are compared by default: what is achieved, the time lost, and what robots do. Each run counts with the

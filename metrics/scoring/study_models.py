@@ -25,7 +25,7 @@ from .texts import number
 if TYPE_CHECKING:
     import polars as pl
 
-    from swarm_forage_env.study.study_table import StudyTable
+    from swarm_forage_env.studies.study_table import StudyTable
 
 DRAWN_LAWS = ("linear", "contention", "universal", "hamann")
 """Laws that are drawn; the table has those of `metrics.fit_ladder`."""

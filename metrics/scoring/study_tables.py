@@ -1,7 +1,7 @@
 """From the table of a study to curves that can be scored: one set of curves per line of its figures.
 
-A study of `swarm_forage_env.study` has cells: a policy in a reading at one value of each axis. The cells that differ on
-the last axis alone are a line of a figure, and one of them is the reference of the others.
+A study of `swarm_forage_env.studies` has cells: a policy in a reading at one value of each axis. The cells that differ
+on the last axis alone are a line of a figure, and one of them is the reference of the others.
 """
 
 from collections.abc import Mapping
@@ -15,8 +15,8 @@ from .runs import rates_of
 from .studies import RunCurves, StudyCurves
 
 if TYPE_CHECKING:
-    from swarm_forage_env.study.studies import Cell, Value
-    from swarm_forage_env.study.study_table import StudyTable
+    from swarm_forage_env.studies.study import Cell, Value
+    from swarm_forage_env.studies.study_table import StudyTable
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,7 +48,7 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
         ValueError: no such performance.
     """
     from swarm_forage_env.scenarios.performance import quantity
-    from swarm_forage_env.study.studies import value_words
+    from swarm_forage_env.studies.study import value_words
 
     spec = table.spec
     names = [axis.name for axis in spec.axes[:-1]]

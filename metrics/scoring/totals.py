@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from swarm_forage_env.scenarios.config import ScenarioConfig
-    from swarm_forage_env.study.experiments import Experiment
+    from swarm_forage_env.studies.ladders import Experiment
 
 
 class ReadAs(Protocol):
@@ -61,13 +61,13 @@ def plan_conditions(
         experiments: What is run.
         seeds: How many, at least two, or which.
         parameters: Keyword arguments of a registered policy or a class.
-        caches: "none", "static", "dynamic"; default see `swarm_forage_env.study.spec.chosen_caches`.
+        caches: "none", "static", "dynamic"; default see `swarm_forage_env.runs.spec.chosen_caches`.
 
     Raises:
         CurveError: fewer than two seeds.
         ValueError: an unknown policy, or policies of equal names.
     """
-    from swarm_forage_env.study.experiments import Budget
+    from swarm_forage_env.studies.ladders import Budget
 
     chosen = chosen_seeds(seeds, 0)
     if len(chosen) < 2:

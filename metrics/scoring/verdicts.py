@@ -15,7 +15,7 @@ from .measures import MEASURE_VARIANTS, label_of
 from .texts import plain
 
 if TYPE_CHECKING:
-    from swarm_forage_env.study.study_table import StudyTable
+    from swarm_forage_env.studies.study_table import StudyTable
 
 VARIANTS: tuple[Variant, ...] = ("corrected", "paper", "sierra")
 

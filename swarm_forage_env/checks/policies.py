@@ -36,7 +36,7 @@ def check_policy(
     Args:
         policy: A registered name, the path of a policy file, a class that needs no arguments, or an object (which is
             copied).
-        scenario: Where it acts; with the caches of `study.spec.chosen_caches`. Choose one in which your policy meets
+        scenario: Where it acts; with the caches of `runs.spec.chosen_caches`. Choose one in which your policy meets
             everything that it reacts to.
         seed: Seed of the environment and of the policy.
         ticks: How long it acts.

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env.contract.policy import Policy
+from swarm_forage_env.runs.run import LiveRun, build_env, build_stack
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.study.run import LiveRun, build_env, build_stack
 from swarm_forage_env.wrappers.recorder import RunRecorder
 
 from .faults import CheckError
@@ -29,7 +29,7 @@ def check_determinism(
 
     Args:
         policy: As in `check_policy`; each run gets a fresh one.
-        scenario: Where it runs; with the caches of `study.spec.chosen_caches`.
+        scenario: Where it runs; with the caches of `runs.spec.chosen_caches`.
         seeds: Seeds of the runs.
         seconds: Simulated length of a run, rounded to recording intervals of `INTERVAL_TICKS`.
 

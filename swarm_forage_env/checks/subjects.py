@@ -10,9 +10,9 @@ from typing import Any
 
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.spec import chosen_caches
 from swarm_forage_env.scenarios.config import CACHE_KINDS, ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario as preset
-from swarm_forage_env.study.spec import chosen_caches
 
 from .faults import CheckError
 

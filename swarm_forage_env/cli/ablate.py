@@ -10,8 +10,8 @@ from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, Caches, DryRun, J
 from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
-    from swarm_forage_env.study.ablation import Ablation
-    from swarm_forage_env.study.store import RunStore
+    from swarm_forage_env.runs.store import RunStore
+    from swarm_forage_env.studies.ablation import Ablation
 
 
 @takes_world("performance", "settings", "wrappers")
@@ -44,7 +44,7 @@ def ablate(
 
     from swarm_forage_env._internal.fields import MOST_SEEDS, whole
     from swarm_forage_env.cli.scenario_options import split_names, split_numbers
-    from swarm_forage_env.study.store import RunStore
+    from swarm_forage_env.runs.store import RunStore
 
     whole("--seeds", seeds, at_least=2, at_most=MOST_SEEDS)
     worlds = [
@@ -66,7 +66,7 @@ def _plan(
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.cli.scenario_options import described_world, split_names
     from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
-    from swarm_forage_env.study.ablation import plan_ablation
+    from swarm_forage_env.studies.ablation import plan_ablation
 
     worlds = [described_world(one) for one in described]
     every = {"all": QUIRK_NAMES, "none": ()}
@@ -86,7 +86,7 @@ def _plan(
 
 def _show_plan(plan: "Ablation", store: "RunStore", seeds: int, jobs: int | None) -> None:
     from swarm_forage_env.cli.report import estimated_seconds, plan_note
-    from swarm_forage_env.study.runner import available_cores
+    from swarm_forage_env.runs.runner import available_cores
 
     todo = [spec for spec in plan.all if spec.run_id not in store]
     processes = jobs or available_cores()
@@ -98,7 +98,7 @@ def _run(plan: "Ablation", store: "RunStore", jobs: int | None, *, as_json: bool
     from swarm_forage_env.cli.ablation_report import ablation_json, ablation_pages
     from swarm_forage_env.cli.interrupts import resumable
     from swarm_forage_env.scenarios.performance import quantity
-    from swarm_forage_env.study.ablation import run_ablation
+    from swarm_forage_env.studies.ablation import run_ablation
 
     with resumable(store.folder):
         result = run_ablation(plan, store=store, jobs=jobs, progress=True)

@@ -14,7 +14,7 @@ from swarm_forage_env.cli.report import performance_number, span
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.performance import Quantity
 from swarm_forage_env.scenarios.quirks import READINGS
-from swarm_forage_env.study.ablation import TASK_COLUMNS, AblationResult, Cell, Effect
+from swarm_forage_env.studies.ablation import TASK_COLUMNS, AblationResult, Cell, Effect
 
 CLOSE = 0.05
 """Policies whose means differ by a smaller share count as equal in an order (our choice)."""

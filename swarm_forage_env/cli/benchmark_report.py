@@ -25,9 +25,9 @@ from swarm_forage_env.cli.options import NO_PICTURE
 from swarm_forage_env.cli.report import estimate, estimated_seconds
 from swarm_forage_env.policies.mixture import is_mixture, mixture_of, mixture_parts
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_label
-from swarm_forage_env.study.runner import available_cores
-from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.study.store import RunStore
+from swarm_forage_env.runs.runner import available_cores
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import RunStore
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -107,8 +107,8 @@ def _levels(curve: "TrainingCurve", names: Sequence[str], jobs: int | None) -> d
     import numpy as np
 
     from swarm_forage_env._internal.fields import ConfigError
-    from swarm_forage_env.study.runner import run_all
-    from swarm_forage_env.study.spec import plan_run
+    from swarm_forage_env.runs.runner import run_all
+    from swarm_forage_env.runs.spec import plan_run
 
     judged = curve.plan.judging_runs("policy")
     try:

@@ -23,8 +23,8 @@ from swarm_forage_env.cli.interrupts import resumable
 from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, complain, no_picture
 from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
 from swarm_forage_env.cli.score_report import plan_json, plan_text
-from swarm_forage_env.study.runner import available_cores
-from swarm_forage_env.study.store import RunStore
+from swarm_forage_env.runs.runner import available_cores
+from swarm_forage_env.runs.store import RunStore
 
 _PICTURE = "prediction.png"
 _Result = TypeVar("_Result")

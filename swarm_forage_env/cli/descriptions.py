@@ -18,9 +18,9 @@ from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.python_files import classes_of
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_names
+from swarm_forage_env.runs.spec import stated_caches
 from swarm_forage_env.scenarios import presets
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.study.spec import stated_caches
 
 
 def overview() -> tuple[Table, Table]:

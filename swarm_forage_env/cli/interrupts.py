@@ -12,7 +12,7 @@ from typing import Any
 import typer
 
 from swarm_forage_env.cli.options import EXIT_INTERRUPTED, complain
-from swarm_forage_env.study.runner import StudyInterrupted
+from swarm_forage_env.runs.runner import StudyInterrupted
 
 AGAIN_S = 0.2
 """When an interrupt that was lost is sent again; our choice: soon, and late enough to be elsewhere."""

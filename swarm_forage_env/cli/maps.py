@@ -10,7 +10,7 @@ from swarm_forage_env.cli.options import NO_PICTURE
 from swarm_forage_env.cli.terminal import notes
 
 if TYPE_CHECKING:
-    from swarm_forage_env.study.maps import FloorMaps
+    from swarm_forage_env.inspect.maps import FloorMaps
 
 
 OwnScales: TypeAlias = Annotated[
@@ -33,9 +33,9 @@ def maps(
     """
     from metrics.scoring.texts import counted
     from swarm_forage_env._internal.files import check_file
-    from swarm_forage_env.study.maps import floor_maps
-    from swarm_forage_env.study.replay.files import read_replays
-    from swarm_forage_env.study.replay.frames import ReplayError
+    from swarm_forage_env.inspect.maps import floor_maps
+    from swarm_forage_env.inspect.replay.files import read_replays
+    from swarm_forage_env.inspect.replay.frames import ReplayError
 
     if page.suffix == ".parquet":
         raise typer.BadParameter(
@@ -67,8 +67,8 @@ def write_maps(every: "Sequence[FloorMaps]", picture: Path, *, per: str = "", ow
         own_scales: See `rendering.plots.draw_maps`.
     """
     from swarm_forage_env._internal.files import as_file_name
+    from swarm_forage_env.inspect.maps import MEANINGS
     from swarm_forage_env.rendering.plots import draw_maps
-    from swarm_forage_env.study.maps import MEANINGS
 
     picture.parent.mkdir(parents=True, exist_ok=True)
     for one in every:

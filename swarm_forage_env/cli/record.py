@@ -35,11 +35,11 @@ def record(
     """
     from swarm_forage_env._internal.files import as_file_name
     from swarm_forage_env.cli.scenario_options import described_world
+    from swarm_forage_env.inspect.film import picture_run, record_run
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.policies.registry import policy_label
     from swarm_forage_env.rendering.view import RenderError
-    from swarm_forage_env.study.film import picture_run, record_run
 
     world, asked_caches, disturbances = described_world(described)
     _refuse_unknown(policy)

@@ -13,9 +13,9 @@ from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
     from swarm_forage_env.cli.scenario_options import ScenarioOptions
-    from swarm_forage_env.study.record import RunRecord
-    from swarm_forage_env.study.replay.frames import Replay
-    from swarm_forage_env.study.spec import RunSpec
+    from swarm_forage_env.inspect.replay.frames import Replay
+    from swarm_forage_env.runs.record import RunRecord
+    from swarm_forage_env.runs.spec import RunSpec
 
 RESULTS = Path("results")
 """Where the runs of a run id are looked for: the folder that `swarm-forage run` stores them in."""
@@ -69,7 +69,7 @@ def replay(
 
 
 def _write(path: Path, replays: "Sequence[Replay]") -> None:
-    from swarm_forage_env.study.replay.files import write_replays
+    from swarm_forage_env.inspect.replay.files import write_replays
 
     written = write_replays(path, replays)
     typer.echo(f"wrote {written} ({written.stat().st_size / 1e6:.1f} MB)")
@@ -78,7 +78,7 @@ def _write(path: Path, replays: "Sequence[Replay]") -> None:
 def _planned(words: Sequence[str], options: "ScenarioOptions", seed: int) -> "list[tuple[RunSpec, RunRecord | None]]":
     """Return a specification for each run or policy, and the record of stored ones; the first decides the world."""
     from swarm_forage_env.cli.scenario_options import plan_runs
-    from swarm_forage_env.study.spec import RunSpec, plan_run
+    from swarm_forage_env.runs.spec import RunSpec, plan_run
 
     runs: list[tuple[RunSpec, RunRecord | None]] = []
     for word in words:
@@ -96,7 +96,7 @@ def _planned(words: Sequence[str], options: "ScenarioOptions", seed: int) -> "li
 
 def _stored_run(word: str) -> "RunRecord | None":
     """Return the record that a word names, or None if it names a policy."""
-    from swarm_forage_env.study.record import RecordError, RunRecord
+    from swarm_forage_env.runs.record import RecordError, RunRecord
 
     if Path(word).suffix == ".parquet":
         return RunRecord.read(word)
@@ -124,8 +124,8 @@ def _refuse_scenario_options(context: typer.Context) -> None:
 
 
 def _recorded(spec: "RunSpec", stored: "RunRecord | None", seconds: float | None, frame_s: float | None) -> "Replay":
+    from swarm_forage_env.inspect.replay.capture import record_replay
     from swarm_forage_env.policies.registry import load_policy
-    from swarm_forage_env.study.replay.capture import record_replay
 
     with _refusing_policies():
         policy = load_policy(spec.policy, spec.parameters)
@@ -142,10 +142,10 @@ def _recorded(spec: "RunSpec", stored: "RunRecord | None", seconds: float | None
 @contextmanager
 def _complaints() -> Iterator[None]:
     """Turn what is wrong with the words into a complaint about them."""
+    from swarm_forage_env.inspect.replay.frames import ReplayError
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.rendering.view import RenderError
-    from swarm_forage_env.study.replay.frames import ReplayError
 
     try:
         yield

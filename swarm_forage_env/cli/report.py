@@ -16,13 +16,13 @@ from metrics.statistics import aggregate
 from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts, part_sizes
 from swarm_forage_env.policies.registry import part_labels
 from swarm_forage_env.rendering.plots import Curve, draw_curves
+from swarm_forage_env.runs.progress import duration
+from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.runner import StudyResult
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.scenarios.kinds import kind_sizes
 from swarm_forage_env.scenarios.performance import Quantity, part_column, performance_curve, quantity
-from swarm_forage_env.study.progress import duration
-from swarm_forage_env.study.record import RunRecord
-from swarm_forage_env.study.runner import StudyResult
-from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.study.store import RunStore
 
 LEVEL = 0.95
 """Confidence level of all intervals."""

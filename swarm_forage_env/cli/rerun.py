@@ -8,17 +8,17 @@ import typer
 from swarm_forage_env.cli.options import EXIT_FAILURE, complain
 
 if TYPE_CHECKING:
-    from swarm_forage_env.study.spec import RunSpec
+    from swarm_forage_env.runs.spec import RunSpec
 
 
 def rerun(file: Annotated[Path, typer.Argument(help="A record (.parquet) or a failure (.json).")]) -> None:
     """Run a stored run again, here; a record is compared with what comes out, a failure shows its traceback."""
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.policies.registry import load_policy
-    from swarm_forage_env.study.record import RunRecord
-    from swarm_forage_env.study.run import run_policy
-    from swarm_forage_env.study.spec import RunSpec
-    from swarm_forage_env.study.store import read_failure
+    from swarm_forage_env.runs.record import RunRecord
+    from swarm_forage_env.runs.run import run_policy
+    from swarm_forage_env.runs.spec import RunSpec
+    from swarm_forage_env.runs.store import read_failure
 
     if file.suffix == ".json":
         _show_failure_again(read_failure(file).spec)
@@ -41,7 +41,7 @@ def _show_failure_again(spec: "RunSpec") -> None:
     import traceback
 
     from swarm_forage_env.policies.trust import UntrustedModelError
-    from swarm_forage_env.study.run import run_one
+    from swarm_forage_env.runs.run import run_one
 
     try:
         record = run_one(spec)

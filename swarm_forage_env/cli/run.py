@@ -10,9 +10,9 @@ from swarm_forage_env.cli.terminal import notes, output
 from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
-    from swarm_forage_env.study.runner import StudyResult
-    from swarm_forage_env.study.spec import RunSpec
-    from swarm_forage_env.study.store import RunStore
+    from swarm_forage_env.runs.runner import StudyResult
+    from swarm_forage_env.runs.spec import RunSpec
+    from swarm_forage_env.runs.store import RunStore
 
 
 @takes_world()
@@ -43,7 +43,7 @@ def run(
     holds already are not repeated, so an interrupted command can simply be given again.
     """
     from swarm_forage_env.cli.scenario_options import default_folder, plan_runs, split_names
-    from swarm_forage_env.study.store import RunStore
+    from swarm_forage_env.runs.store import RunStore
 
     options = replace(described, horizon=horizon, performance=performance)
     specs = plan_runs(options, split_names(policy), n_seeds=seeds, first_seed=first_seed)
@@ -57,7 +57,7 @@ def run(
 
 def _show_plan(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None, *, as_json: bool) -> None:
     from swarm_forage_env.cli.report import estimated_seconds, plan_json, plan_note, plan_table
-    from swarm_forage_env.study.runner import available_cores
+    from swarm_forage_env.runs.runner import available_cores
 
     todo = [spec for spec in specs if spec.run_id not in store]
     processes = jobs or available_cores()
@@ -72,7 +72,7 @@ def _show_plan(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None
 
 def _run_specs(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None) -> "StudyResult":
     from swarm_forage_env.cli.interrupts import resumable
-    from swarm_forage_env.study.runner import run_all
+    from swarm_forage_env.runs.runner import run_all
 
     with resumable(store.folder):
         return run_all(specs, store=store, jobs=jobs, progress=True)

@@ -13,7 +13,7 @@ from swarm_forage_env.cli.world_options import World, takes_world
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swarm_forage_env.study.saliency import Saliency
+    from swarm_forage_env.inspect.saliency import Saliency
 
 
 @takes_world()
@@ -32,9 +32,9 @@ def saliency(
     """
     from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.cli.scenario_options import plan_runs
+    from swarm_forage_env.inspect.saliency import GROUPS, open_network_of
+    from swarm_forage_env.inspect.saliency import saliency as measured
     from swarm_forage_env.rendering.plots import draw_saliency
-    from swarm_forage_env.study.saliency import GROUPS, open_network_of
-    from swarm_forage_env.study.saliency import saliency as measured
 
     network = open_network_of(policy)
     (spec,) = plan_runs(described, (policy,), n_seeds=1, first_seed=seed)
@@ -71,7 +71,7 @@ def _axis_words(found: "Saliency") -> str:
 def _table(found: "Saliency", title: str) -> "Table":
     from rich.table import Table
 
-    from swarm_forage_env.study.saliency import GROUPS
+    from swarm_forage_env.inspect.saliency import GROUPS
 
     table = Table(title=title, caption=f"{_words(found)} when a slice comes from another observation")
     table.add_column("slice")

@@ -11,11 +11,11 @@ from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.policies.mixture import leading_mixture
 from swarm_forage_env.policies.registry import split_interface
+from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.sizing import checked_density
-from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
 

@@ -15,8 +15,8 @@ from metrics.scoring.texts import aligned, counted
 from swarm_forage_env.cli.interrupts import resumable
 from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, no_picture
 from swarm_forage_env.cli.report import estimate, estimated_seconds
-from swarm_forage_env.study.runner import available_cores
-from swarm_forage_env.study.store import RunStore
+from swarm_forage_env.runs.runner import available_cores
+from swarm_forage_env.runs.store import RunStore
 
 
 def run_and_show(

@@ -25,6 +25,6 @@ def info(name: Annotated[str, typer.Argument(help="A scenario, an environment id
 
 def schema() -> None:
     """Show the columns of run records: name, type, unit, meaning."""
-    from swarm_forage_env.study.record import schema_table
+    from swarm_forage_env.runs.record import schema_table
 
     typer.echo(schema_table())

@@ -11,8 +11,8 @@ from swarm_forage_env.cli.world_options import World, takes_world
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from swarm_forage_env.study.spec import RunSpec
-    from swarm_forage_env.study.stuck import StuckRobot
+    from swarm_forage_env.inspect.stuck import StuckRobot
+    from swarm_forage_env.runs.spec import RunSpec
 
 
 @takes_world()
@@ -36,7 +36,7 @@ def stuck(
     from metrics.scoring.texts import counted
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.cli.scenario_options import plan_runs, split_names
-    from swarm_forage_env.study.stuck import find_stuck
+    from swarm_forage_env.inspect.stuck import find_stuck
 
     if not (window > 0.0 and moved > 0.0):
         raise ConfigError(f"Expected --window and --moved above 0, got {window:g} and {moved:g}.")

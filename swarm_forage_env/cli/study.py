@@ -14,7 +14,7 @@ from swarm_forage_env.cli.study_plot import plot
 from swarm_forage_env.cli.study_verdict import verdict
 
 if TYPE_CHECKING:
-    from swarm_forage_env.study.studies import StudySpec
+    from swarm_forage_env.studies.study import StudySpec
 
 Name = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A set of the paper (S1a to S2d), or a study file.")]
 Place = Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Folder of a study, or its packed file.")]
@@ -46,7 +46,7 @@ def list_studies(
 def show(name: Name, budget: Budget = None, seeds: Seeds = None, reading: Reading = "file") -> None:
     """Show what a study varies, and how many runs each of its budgets makes."""
     from swarm_forage_env.cli.study_report import described
-    from swarm_forage_env.study.study_file import budget_names
+    from swarm_forage_env.studies.study_file import budget_names
 
     typer.echo(described(_chosen(name, budget, seeds, reading)))
     others = [other for other in budget_names(name) if other != budget]
@@ -83,9 +83,9 @@ def run(  # long: one parameter per option
     """
     from swarm_forage_env.cli.study_report import plan_report, state_report
     from swarm_forage_env.cli.terminal import notes
-    from swarm_forage_env.study.cluster import cluster_executor
-    from swarm_forage_env.study.runner import available_cores
-    from swarm_forage_env.study.study_run import FAILED, StudyFolder, parse_shard, run_study
+    from swarm_forage_env.runs.cluster import cluster_executor
+    from swarm_forage_env.runs.runner import available_cores
+    from swarm_forage_env.studies.study_folder import FAILED, StudyFolder, parse_shard, run_study
 
     spec = _chosen(name, budget, seeds, reading)
     part = parse_shard(shard)
@@ -111,7 +111,7 @@ def run(  # long: one parameter per option
 def status(place: Place, as_json: AsJson = False) -> None:
     """Show which runs of a study are done, missing or failed, cell by cell; exit code 1 unless all are done."""
     from swarm_forage_env.cli.study_report import status_json, status_report
-    from swarm_forage_env.study.study_table import read_study
+    from swarm_forage_env.studies.study_table import read_study
 
     table = read_study(place)
     typer.echo(status_json(table) if as_json else status_report(table))
@@ -133,8 +133,8 @@ for command in (verdict, plot, maps, report, diff):
 
 
 def _pack(folder: Path, out: Path | None) -> Path:
-    from swarm_forage_env.study.study_run import StudyFolder
-    from swarm_forage_env.study.study_table import gather_study
+    from swarm_forage_env.studies.study_folder import StudyFolder
+    from swarm_forage_env.studies.study_table import gather_study
 
     table = gather_study(StudyFolder(folder))
     file = out or folder / f"{table.spec.name}.parquet"
@@ -146,8 +146,8 @@ def _pack(folder: Path, out: Path | None) -> Path:
 def _chosen(name: str, budget: str | None, seeds: int | None, reading: str) -> "StudySpec":
     """Return the study that the options describe."""
     from swarm_forage_env._internal.fields import known_name
-    from swarm_forage_env.study.studies import READING_NAMES
-    from swarm_forage_env.study.study_file import load_study
+    from swarm_forage_env.studies.study import READING_NAMES
+    from swarm_forage_env.studies.study_file import load_study
 
     known_name("reading", reading, (*READING_NAMES, "both", "file"))
     readings = {"both": tuple(READING_NAMES), "file": None}.get(reading, (reading,))

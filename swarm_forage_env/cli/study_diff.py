@@ -31,7 +31,7 @@ def diff(
     """
     from metrics.scoring.study_diff import COLUMNS, diff_studies
     from swarm_forage_env._internal.fields import ConfigError
-    from swarm_forage_env.study.study_table import read_study
+    from swarm_forage_env.studies.study_table import read_study
 
     names = COLUMNS if columns is None else tuple(name.strip() for name in columns.split(","))
     mine, other = read_study(first), read_study(second)

@@ -36,8 +36,8 @@ def maps(
     from metrics.scoring.texts import counted
     from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.cli.terminal import notes, progress_bar
-    from swarm_forage_env.study.cell_maps import choose_cells, maps_of_cells, robot_ticks
-    from swarm_forage_env.study.study_table import read_study
+    from swarm_forage_env.inspect.study_maps import choose_cells, maps_of_cells, robot_ticks
+    from swarm_forage_env.studies.study_table import read_study
 
     table = read_study(place)
     chosen = choose_cells(table.spec, cells or ())

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from metrics.scoring.study_models import ModelFigure
     from metrics.scoring.study_plots import StudyFigure
     from metrics.scoring.verdicts import Judged, Waiting
-    from swarm_forage_env.study.studies import StudySpec
-    from swarm_forage_env.study.study_table import StudyTable
+    from swarm_forage_env.studies.study import StudySpec
+    from swarm_forage_env.studies.study_table import StudyTable
 
 WAITS = "waits"
 """What stands in place of an answer for which runs are missing."""
@@ -49,7 +49,7 @@ def report(
     from swarm_forage_env._internal.fields import ConfigError, known_name
     from swarm_forage_env._internal.files import check_file, replacing
     from swarm_forage_env.cli.terminal import notes
-    from swarm_forage_env.study.study_table import read_study
+    from swarm_forage_env.studies.study_table import read_study
 
     known_name("band", band, ("ci", "sd"))
     if out.suffix != ".html":
@@ -343,7 +343,7 @@ def _claims_about(
 
 def _cost(table: "StudyTable") -> list[str | int | float]:
     """Return a row about what a study took."""
-    from swarm_forage_env.study.study_run import DONE
+    from swarm_forage_env.studies.study_folder import DONE
 
     spec = table.spec
     n_done = sum(state.n_runs[DONE] for state in table.cell_states())
@@ -356,7 +356,7 @@ def command_of(table: "StudyTable") -> str:
     """Return the command that makes the runs of a study."""
     from swarm_forage_env.policies import trust
     from swarm_forage_env.policies.registry import file_of
-    from swarm_forage_env.study.study_file import is_set_of_paper
+    from swarm_forage_env.studies.study_file import is_set_of_paper
 
     spec = table.spec
     reading, *others = spec.readings
@@ -383,7 +383,7 @@ def _policy_files(spec: "StudySpec") -> list[str]:
 
 def version_names(tables: "Sequence[StudyTable]") -> list[str]:
     """Return of what the versions are shown: our own first, then the commit, which only runs from a checkout have."""
-    from swarm_forage_env.study.record import PACKAGES
+    from swarm_forage_env.runs.record import PACKAGES
 
     names = {name for table in tables for made in table.versions for name, version in made.items() if version}
     return sorted(names, key=lambda name: ((PACKAGES[0], "commit", name).index(name), name))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from metrics.scoring.study_models import ModelFigure
     from metrics.scoring.study_plots import StudyFigure
     from swarm_forage_env.cli.theory import TheoryFigure
-    from swarm_forage_env.study.studies import StudySpec
+    from swarm_forage_env.studies.study import StudySpec
 
     Draw: TypeAlias = Callable[[Sequence[Path]], None]
 
@@ -44,7 +44,7 @@ def plot(
     from swarm_forage_env._internal.fields import known_name
     from swarm_forage_env.cli.score_options import score_forms
     from swarm_forage_env.cli.theory import theory_of
-    from swarm_forage_env.study.study_table import read_study
+    from swarm_forage_env.studies.study_table import read_study
 
     known_name("band", band, ("ci", "sd"))
     forms = score_forms(variants, "marginal")
@@ -146,7 +146,7 @@ def snapshot_written(spec: "StudySpec", file: Path) -> Path:
     Raises:
         ImportError: Pillow is not installed.
     """
-    from swarm_forage_env.study.snapshot import snapshot
+    from swarm_forage_env.inspect.snapshot import snapshot
 
     picture = snapshot(spec)
     from PIL import Image  # after the frame, which says what to install without it

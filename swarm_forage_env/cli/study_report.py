@@ -7,13 +7,13 @@ from rich.table import Table
 
 from metrics.scoring.texts import aligned, counted
 from swarm_forage_env.cli.terminal import notes
-from swarm_forage_env.study.calibration import calibrate, kind_of
-from swarm_forage_env.study.progress import duration
-from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.study.studies import StudySpec, value_words
-from swarm_forage_env.study.study_file import PAPER, left_out_words, load_study, set_names
-from swarm_forage_env.study.study_run import DONE, FAILED, MISSING, STATES, StudyFolder, StudyState, shard
-from swarm_forage_env.study.study_table import StudyTable
+from swarm_forage_env.runs.cost import calibrate, kind_of
+from swarm_forage_env.runs.progress import duration
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.studies.study import StudySpec, value_words
+from swarm_forage_env.studies.study_file import PAPER, left_out_words, load_study, set_names
+from swarm_forage_env.studies.study_folder import DONE, FAILED, MISSING, STATES, StudyFolder, StudyState, shard
+from swarm_forage_env.studies.study_table import StudyTable
 
 FAILURES_SHOWN = 10
 """Failed runs that are named; the packed file and `--json` have all."""

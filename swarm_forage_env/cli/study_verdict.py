@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from metrics.curves import Variant
     from metrics.scoring.figure_panels import StudyPanels
     from metrics.scoring.verdicts import Judged, Waiting
-    from swarm_forage_env.study.study_table import StudyTable
+    from swarm_forage_env.studies.study_table import StudyTable
 
 Places = Annotated[list[Path], typer.Argument(metavar="DIR|FILE...", help="Folders of studies, or their packed files.")]
 
@@ -31,8 +31,8 @@ def verdict(
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env._internal.files import check_file, replacing
     from swarm_forage_env.cli.terminal import notes, output
-    from swarm_forage_env.study.study_file import is_set_of_paper
-    from swarm_forage_env.study.study_table import read_study
+    from swarm_forage_env.studies.study_file import is_set_of_paper
+    from swarm_forage_env.studies.study_table import read_study
 
     tables = [read_study(place) for place in places]
     refused = next(filter(None, map(why_no_claims, tables)), "")

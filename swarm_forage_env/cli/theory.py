@@ -18,7 +18,7 @@ from metrics.scoring.plots import COLOURS
 from metrics.scoring.study_plots import save_picture
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.study.studies import SIZE, StudySpec
+from swarm_forage_env.studies.study import SIZE, StudySpec
 
 if TYPE_CHECKING:
     import polars as pl

@@ -13,8 +13,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from metrics.scoring.texts import counted
 from swarm_forage_env.cli.options import EXIT_INTERRUPTED, NO_PICTURE, complain, no_picture
 from swarm_forage_env.rendering.plots import draw_trainings
+from swarm_forage_env.runs.progress import duration
 from swarm_forage_env.scenarios.performance import quantity
-from swarm_forage_env.study.progress import duration
 from swarm_forage_env.training.evaluation_worlds import ALL_WORLDS
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.training.status import Evaluation, TrainingStatus

@@ -21,11 +21,11 @@ def watch(
     The window shows the keys. Needs a display; without one, see record and replay.
     """
     from swarm_forage_env.cli.scenario_options import described_world
+    from swarm_forage_env.inspect.watch import watch_run
     from swarm_forage_env.policies.model_files import ModelError
     from swarm_forage_env.policies.network import NetworkError
     from swarm_forage_env.policies.registry import policy_class
     from swarm_forage_env.rendering.view import RenderError
-    from swarm_forage_env.study.watch import watch_run
 
     world, asked_caches, disturbances = described_world(described)
     try:

@@ -261,10 +261,10 @@ class Policy(Protocol):
     """Controls every robot at once. An instance drives one run; its memory is created by `reset`.
 
     Optional attributes: `task`, an (N,) int8 array of `Task` codes; `describe_robot(row) -> str`, what one robot is
-    doing, for people (`study.stuck` shows it); `describe_robots() -> RobotStates`, the same of all robots as arrays
-    (`study.replay` keeps it); `describe_memories() -> Memories`, where all robots remember things (`study.replay` keeps
-    it, and the window shows those of one); `part_rows`, slices of rows that the record tells apart, set by `reset` (of
-    mixed swarms, whose runs are counted tick by tick);
+    doing, for people (`inspect.stuck` shows it); `describe_robots() -> RobotStates`, the same of all robots as arrays
+    (`inspect.replay` keeps it); `describe_memories() -> Memories`, where all robots remember things (`inspect.replay`
+    keeps it, and the window shows those of one); `part_rows`, slices of rows that the record tells apart, set by
+    `reset` (of mixed swarms, whose runs are counted tick by tick);
     `compiled() -> CompiledPolicy | None`, for runs without Python between ticks; the class attributes `caches` ("none",
     "static", "dynamic": those that the policy is made for) and `reads` (names of the slices it looks at; default all;
     "light if carrying" = light only of robots that carry).

@@ -1,6 +1,6 @@
 """A window on the screen: it shows scenes and says which keys and clicks came in. pygame draws it.
 
-A process has one window at a time. Nothing here knows a run; `study.watch` decides what is shown and what a key does.
+A process has one window at a time. Nothing here knows a run; `inspect.watch` decides what is shown and what a key does.
 """
 
 import io

@@ -22,11 +22,11 @@ from swarm_forage_env._internal.fields import (
 )
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import load_policy, policy_class
+from swarm_forage_env.runs.run import run_policy
+from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.config import from_mapping as config_from_mapping
 from swarm_forage_env.scenarios.presets import scenario as preset
-from swarm_forage_env.study.run import run_policy
-from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.training.defaults import SCRIPTED
 from swarm_forage_env.training.status import WorldEvaluation
 from swarm_forage_env.wrappers.base import WrapperConfig

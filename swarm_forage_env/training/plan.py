@@ -23,9 +23,9 @@ from swarm_forage_env._internal.parsing import parse_json, parse_toml
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping, learner_layout
 from swarm_forage_env.policies.registry import policy_class
+from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size, with_overrides
-from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.training.defaults import DEFAULT_ARENAS, DEFAULT_HIDDEN, DEFAULT_STEPS, EVALUATE_EVERY
 from swarm_forage_env.training.evaluation_worlds import CHOSEN_BY, COUNTED, EvaluationWorld, scenario_of, tuples
 from swarm_forage_env.views.sampler import ScenarioSampler, columns_of

@@ -2,7 +2,7 @@
 
 Example: one process calls `compile_half(config, 0)` and another one `compile_half(config, 1)`; the outermost kernel,
 which is made of both, is compiled afterwards and finds its parts in the cache. What is compiled is the same in any
-order. `study.first_run` decides when this pays.
+order. `runs.first_compilation` decides when this pays.
 """
 
 import numpy as np

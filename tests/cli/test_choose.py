@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from swarm_forage_env.policies.registry import RandomPolicy
-from swarm_forage_env.study.store import load
+from swarm_forage_env.runs.store import load
 
 WORLD = ("--robots", "3", "--objects", "20", "--horizon", "4", "--set", "interval_s=2", "--seeds", "2", "--jobs", "1")
 CHOOSE = ("choose", "--policy", "random,crw", "--deliver", "5", *WORLD)

@@ -18,11 +18,11 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.registry import RandomPolicy, policy_names
+from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.study.record import RunRecord
-from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.study.store import load
 from tests.support.pictures import keep_figures
 
 SHORT = ("--robots", "3", "--objects", "20", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")

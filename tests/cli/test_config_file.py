@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from swarm_forage_env.study.store import load
+from swarm_forage_env.runs.store import load
 
 CONFIG = """
 [scenario]

@@ -24,7 +24,7 @@ def broken(monkeypatch):
     def fail():
         raise ZeroDivisionError("a fault of ours")
 
-    monkeypatch.setattr("swarm_forage_env.study.record.schema_table", fail)
+    monkeypatch.setattr("swarm_forage_env.runs.record.schema_table", fail)
 
 
 @pytest.mark.usefixtures("broken")

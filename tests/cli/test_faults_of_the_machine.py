@@ -12,8 +12,8 @@ import pytest
 
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import RandomPolicy
-from swarm_forage_env.study.record import RunRecord
-from swarm_forage_env.study.store import load
+from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.store import load
 
 RUN = ("run", "--policy", "random", "--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--jobs", "1")
 NO_SPACE = OSError(28, "No space left on device")

@@ -9,8 +9,8 @@ import pytest
 
 from metrics import SizeLaw, predict_performance
 from swarm_forage_env.policies.registry import RandomPolicy
-from swarm_forage_env.study.runner import StudyInterrupted, StudyResult
-from swarm_forage_env.study.store import load
+from swarm_forage_env.runs.runner import StudyInterrupted, StudyResult
+from swarm_forage_env.runs.store import load
 
 RUNS = ("predict", "--policy", "crw", "--fit", "1,2,3,4", "--hold", "6", "--seeds", "2", "--jobs", "1")
 WORLD = ("--horizon", "4", "--set", "interval_s=2", "--objects", "20")
@@ -135,7 +135,7 @@ def test_ctrl_c_says_what_is_kept(command, monkeypatch):
     def interrupted(*_, **__):
         raise StudyInterrupted(StudyResult(records=(), failures=(), n_stored=0), 10)
 
-    monkeypatch.setattr("swarm_forage_env.study.runner.run_all", interrupted)
+    monkeypatch.setattr("swarm_forage_env.runs.runner.run_all", interrupted)
     code, out, err = command(*RUNS, *WORLD)
     assert (code, out) == (130, "")
     assert "0 of 10 runs are finished and kept. They are in results/warehouse_small" in err

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from swarm_forage_env.inspect import film
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkAbout
-from swarm_forage_env.study import film
 
 SHORT_FILM = ("--robots", "3", "--seconds", "4", "--size", "240", "--fps", "5")
 

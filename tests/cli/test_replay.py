@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.policies import pretrained
-from swarm_forage_env.study.replay.files import read_replays
-from swarm_forage_env.study.store import RunStore
+from swarm_forage_env.runs.store import RunStore
 
 pytestmark = pytest.mark.compiled
 SHORT = ("--robots", "3", "--seconds", "4")
@@ -119,7 +119,7 @@ def test_an_interrupt_leaves_no_file(command, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("swarm_forage_env.study.run.LiveRun.advance", interrupted)
+    monkeypatch.setattr("swarm_forage_env.runs.run.LiveRun.advance", interrupted)
     told = "swarm-forage: Interrupted. What was under way is not kept; the same command starts it again.\n"
     assert command("replay", "random", *SHORT, "-o", "run.html") == (130, "", told)
     assert not list(Path().iterdir())

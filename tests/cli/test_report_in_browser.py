@@ -9,8 +9,8 @@ from metrics.claims import CLAIMS, INTUITIONS
 from metrics.scoring import judge_claims, study_panels
 from metrics.scoring.verdicts import VARIANTS
 from swarm_forage_env.cli.study_page import Verdicts, page_of
-from swarm_forage_env.study.studies import Axis
-from swarm_forage_env.study.study_file import load_study
+from swarm_forage_env.studies.study import Axis
+from swarm_forage_env.studies.study_file import load_study
 from tests.support.browser import Browser, chromium
 from tests.support.made_tables import FOUR, made_study, made_table
 

@@ -72,6 +72,6 @@ def test_saliency_is_shown_even_if_its_picture_cannot_be_written(command, monkey
 
 def test_the_place_of_the_picture_is_looked_at_before_anything_is_run(command, monkeypatch):
     Path("taken.png").mkdir()
-    monkeypatch.setattr("swarm_forage_env.study.saliency.saliency", lambda *_, **__: pytest.fail("a run was started"))
+    monkeypatch.setattr("swarm_forage_env.inspect.saliency.saliency", lambda *_, **__: pytest.fail("a run was started"))
     told = "swarm-forage: Expected a file to write, got a folder: taken.png\n"
     assert command("saliency", "ppo_warehouse_small", *WORDS, "-o", "taken.png") == (1, "", told)

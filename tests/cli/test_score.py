@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from swarm_forage_env.policies.registry import RandomPolicy
-from swarm_forage_env.study.experiments import BUDGETS, Budget
-from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.study.store import RunStore, load
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import RunStore, load
+from swarm_forage_env.studies.ladders import BUDGETS, Budget
 
 WORLD = ("--robots", "3", "--objects", "20", "--jobs", "1", "--budget", "tiny")
 SCORE = ("score", "--policy", "random", *WORLD)

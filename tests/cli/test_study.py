@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from swarm_forage_env.cli import study_report
-from swarm_forage_env.study import calibration, study_run
-from swarm_forage_env.study.study_table import read_study
+from swarm_forage_env.runs import cost as calibration
+from swarm_forage_env.studies import study_folder as study_run
+from swarm_forage_env.studies.study_table import read_study
 
 FILE = """
 name = "mine"

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from swarm_forage_env.policies import pretrained
-from swarm_forage_env.study.study_table import read_study
+from swarm_forage_env.studies.study_table import read_study
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 BLOCKS = re.findall(r"^```toml\n(.*?)^```", (DOCS / "studies.md").read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)

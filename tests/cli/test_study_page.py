@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from swarm_forage_env.cli.study_page import command_of, version_names
-from swarm_forage_env.study.study_file import load_study
-from swarm_forage_env.study.study_run import StudyFolder
+from swarm_forage_env.studies.study_file import load_study
+from swarm_forage_env.studies.study_folder import StudyFolder
 from tests.support.made_tables import made_study, made_table
 
 FILE = 'name = "mine"\nscenario = "warehouse_small"\npolicies = [{words}]\nreadings = ["described"]\n[budget.tiny]\n'

@@ -10,7 +10,7 @@ import pytest
 
 from metrics.scoring import diff_studies
 from swarm_forage_env.cli.study_diff import diff_report
-from swarm_forage_env.study.studies import Axis
+from swarm_forage_env.studies.study import Axis
 from tests.support.made_tables import made_study, made_table
 
 FILE = """
@@ -227,7 +227,7 @@ def test_what_a_diff_refuses(ran):
 @pytest.mark.parametrize(
     ("words", "place", "work"),
     [
-        (("maps", "--out", "there"), "there/maps.png", "swarm_forage_env.study.cell_maps.maps_of_cells"),
+        (("maps", "--out", "there"), "there/maps.png", "swarm_forage_env.inspect.study_maps.maps_of_cells"),
         (("report", "--out", "page.html"), "page.html", "metrics.scoring.figure_panels.study_panels"),
         (("verdict", "--json", "all.json"), "all.json", "metrics.scoring.figure_panels.study_panels"),
     ],

@@ -11,9 +11,9 @@ import pytest
 from swarm_forage_env.policies import registry, trust
 from swarm_forage_env.policies.model_files import ModelError, look_at_model
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.spec import RunSpec, pin_policy
+from swarm_forage_env.runs.store import RunFailure, RunStore
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.spec import RunSpec, pin_policy
-from swarm_forage_env.study.store import RunFailure, RunStore
 
 TINY = ("--robots", "2", "--objects", "10", "--horizon", "200")
 NOTE = {"interface": {"observation": "compact"}, "caches": "static"}

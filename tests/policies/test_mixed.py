@@ -9,14 +9,14 @@ from swarm_forage_env import ConfigError, check_policy, load_policy, plan_run, r
 from swarm_forage_env.cli.scenario_options import split_names
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.policy import SwarmSpec
+from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.policies.mixed import MixedPolicy
 from swarm_forage_env.policies.mixture import mixture_of, mixture_parts, part_sizes
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.registry import local_policy, policy_label
+from swarm_forage_env.runs.run import LiveRun, build_stack
 from swarm_forage_env.scenarios.performance import PART_COLUMNS, performance_curve, quantity
-from swarm_forage_env.study.replay.capture import record_replay
-from swarm_forage_env.study.run import LiveRun, build_stack
 
 TINY = scenario("warehouse_small", n_robots=6, n_objects=400, horizon_s=100.0, interval_s=50.0, physics="compiled")
 

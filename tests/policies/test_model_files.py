@@ -32,10 +32,10 @@ from swarm_forage_env.policies.registry import (
     policy_class,
     split_interface,
 )
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import RunSpec, pin_policy, plan_run
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.experiments import Budget
-from swarm_forage_env.study.run import run_one
-from swarm_forage_env.study.spec import RunSpec, pin_policy, plan_run
+from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.views.pettingzoo import parallel_env
 from tests.support.branches import pickled
 

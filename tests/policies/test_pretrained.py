@@ -8,9 +8,9 @@ import pytest
 
 from swarm_forage_env.policies import pretrained
 from swarm_forage_env.policies.network import Network
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.study.run import run_one
-from swarm_forage_env.study.spec import plan_run
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
 
 FOLDER = Path(pretrained.__file__).parent
@@ -31,8 +31,8 @@ def test_shipped_policies_run_by_name_without_torch():
     code = (
         "import sys; sys.modules['torch'] = sys.modules['stable_baselines3'] = None\n"
         "from swarm_forage_env.scenarios.presets import warehouse_small\n"
-        "from swarm_forage_env.study.run import run_one\n"
-        "from swarm_forage_env.study.spec import plan_run\n"
+        "from swarm_forage_env.runs.run import run_one\n"
+        "from swarm_forage_env.runs.spec import plan_run\n"
         "world = warehouse_small(n_robots=5, horizon_s=20.0, interval_s=20.0)\n"
         f"print(*(run_one(plan_run(world, name, seed=1)).controller for name in {(*SHIPPED,)}))"
     )

@@ -11,9 +11,9 @@ import pytest
 from swarm_forage_env.policies.model_files import ModelError
 from swarm_forage_env.policies.python_files import PythonFileError, classes_of
 from swarm_forage_env.policies.registry import file_of, is_policy_file, load_policy, policy_label, split_class
+from swarm_forage_env.runs.runner import run_all
+from swarm_forage_env.runs.spec import pin_policy, plan_run
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.runner import run_all
-from swarm_forage_env.study.spec import pin_policy, plan_run
 
 CODE = """
     from dataclasses import dataclass

@@ -13,12 +13,12 @@ import pytest
 
 from metrics.benchmark import BenchmarkError, load_protocol, read_entry
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.inspect.replay.files import read_replays
+from swarm_forage_env.inspect.replay.frames import ReplayError
 from swarm_forage_env.policies.network import Network, NetworkError
-from swarm_forage_env.study.record import SCHEMA_VERSION, RecordError, RunRecord
-from swarm_forage_env.study.replay.files import read_replays
-from swarm_forage_env.study.replay.frames import ReplayError
-from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.study.store import read_failure
+from swarm_forage_env.runs.record import SCHEMA_VERSION, RecordError, RunRecord
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import read_failure
 from swarm_forage_env.training.datasets.layout import DatasetError
 from swarm_forage_env.training.datasets.reading import TrajectoryDataset
 from swarm_forage_env.training.evaluations import read_evaluations, read_training

@@ -5,10 +5,10 @@ from importlib import resources
 import pytest
 
 from scripts.make_gallery import EXHIBITS, FILMS, FOLDER, README, page, table_of_films
+from swarm_forage_env.inspect.replay.files import FORMAT_VERSION
 from swarm_forage_env.policies.registry import policy_names
 from swarm_forage_env.rendering.page import SCRIPTS, take_page_apart
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES
-from swarm_forage_env.study.replay.files import FORMAT_VERSION
 from swarm_forage_env.wrappers.registry import WRAPPERS
 
 MOST_BYTES = 6

@@ -9,11 +9,11 @@ from metrics import waveform
 from metrics.scoring.columns import CRITERIA, CURVE_COLUMNS, UNDISTURBED
 from metrics.scoring.curves_table import study_curves
 from metrics.scoring.measures import MEASURE_CRITERIA
+from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study import experiments
-from swarm_forage_env.study.record import RunRecord
-from swarm_forage_env.study.run import run_one
-from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.studies import ladders as experiments
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform

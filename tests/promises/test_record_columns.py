@@ -1,8 +1,8 @@
 """Records hold the columns that `metrics` reads by name; the two share nothing but this list of columns."""
 
 from metrics.scoring.columns import CURVE_COLUMNS
+from swarm_forage_env.runs.record import schema_table
 from swarm_forage_env.scenarios.performance import PERFORMANCE_COLUMNS
-from swarm_forage_env.study.record import schema_table
 
 NOT_RECORDED = {"deaths_per_s", "malfunctions_per_s", "births_per_s", "repairs_per_s"}
 """Rates are part of a run's specification, not measured; who scores a study adds them."""

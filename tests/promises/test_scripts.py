@@ -13,11 +13,11 @@ from metrics.claims import CLAIMS, INTUITIONS
 from metrics.laws import ALL_LAWS
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import plan_run
+from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.run import run_one
-from swarm_forage_env.study.spec import plan_run
-from swarm_forage_env.study.store import RunStore
-from swarm_forage_env.study.study_file import load_study, set_names
+from swarm_forage_env.studies.study_file import load_study, set_names
 from tests.support.foraging_table import foraging_table
 from tests.support.made_tables import made_table
 

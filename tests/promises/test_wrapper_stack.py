@@ -14,10 +14,10 @@ from pettingzoo.utils.conversions import parallel_to_aec
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.runs.record import KNOWN_CONTRIBUTIONS, RunRecord
+from swarm_forage_env.runs.run import build_stack, run_one
+from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.record import KNOWN_CONTRIBUTIONS, RunRecord
-from swarm_forage_env.study.run import build_stack, run_one
-from swarm_forage_env.study.spec import RunSpec, plan_run
 from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.wrappers.base import STACK_ORDER, WrapperConfig
 from swarm_forage_env.wrappers.handling import HandlingCostConfig

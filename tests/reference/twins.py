@@ -168,7 +168,7 @@ WITHOUT = {
     "swarm_forage_env.world.kernels.tick.meet_and_close": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.observe": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.run": "the loop of `LiveRun`; both are compared in "
-    "tests/study/test_compiled_runs.py",
+    "tests/runs/test_compiled_runs.py",
     "swarm_forage_env.world.kernels.tick.set_out": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.whole": IN_ORDER,
     "swarm_forage_env.wrappers.kernels.noise.noisy_gain": "one product per wheel; by hand in "

@@ -13,7 +13,7 @@ from swarm_forage_env.contract.layout import WINDOW_CELLS, observation_layout
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
 from swarm_forage_env.scenarios.kinds import RobotKind, kind_from_words, kind_rows, kind_sizes, words_of_kind
 from swarm_forage_env.scenarios.sensors import SENSORS, WINDOWS_CELLS
-from swarm_forage_env.study.studies import Axis, list_word
+from swarm_forage_env.studies.study import Axis, list_word
 from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
 
 SCOUT = RobotKind(name="scout", share=0.2, window_cells=3)

@@ -8,11 +8,11 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.config_file import read_config
 from swarm_forage_env.cli.scenario_options import parse_setting
+from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
 from swarm_forage_env.scenarios.obstacles import MAX_OBSTACLES, blocked_cells, covered_area_m2, distances_m
 from swarm_forage_env.scenarios.presets import at_density, scenario
-from swarm_forage_env.study.spec import RunSpec
-from swarm_forage_env.study.study_file import load_study
+from swarm_forage_env.studies.study_file import load_study
 
 WALL = (14.0, 4.0, 14.4, 12.0)
 PILLAR = (18.0, 7.5, 19.0, 8.5)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import warehouse_medium
-from swarm_forage_env.study.run import run_one
-from swarm_forage_env.study.spec import plan_run
 
 pytestmark = [pytest.mark.slow, pytest.mark.compiled]
 

@@ -2,10 +2,10 @@
 
 import pytest
 
+from swarm_forage_env.inspect.stuck import StuckRobot, find_stuck
+from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
-from swarm_forage_env.study.spec import plan_run
-from swarm_forage_env.study.stuck import StuckRobot, find_stuck
 from swarm_forage_env.wrappers.registry import parse_wrapper
 
 pytestmark = [pytest.mark.slow, pytest.mark.compiled]

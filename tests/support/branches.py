@@ -9,7 +9,7 @@ import numpy as np
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.study.run import build_stack
+from swarm_forage_env.runs.run import build_stack
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.registry import parse_wrapper

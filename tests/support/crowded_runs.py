@@ -10,8 +10,8 @@ from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy, policy_names
+from swarm_forage_env.runs.run import build_stack
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.run import build_stack
 from tests.support.busy import BusyPolicy, change_population
 from tests.support.foraging import mild_wrappers, quick_world
 

@@ -3,8 +3,8 @@
 import polars as pl
 
 from metrics.foraging_model import ForagingRates, mean_field
-from swarm_forage_env.study.studies import Axis, StudyPolicy
-from swarm_forage_env.study.study_table import StudyTable
+from swarm_forage_env.studies.study import Axis, StudyPolicy
+from swarm_forage_env.studies.study_table import StudyTable
 from tests.support.made_tables import made_study
 
 SIZES = (1, 2, 4, 8)

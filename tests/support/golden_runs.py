@@ -14,8 +14,8 @@ import numpy as np
 
 from scripts.update_docs import made_with
 from swarm_forage_env import AUTHORS_PROGRAM, SCENARIO_NAMES, Quirks
-from swarm_forage_env.study.run import run_one
-from swarm_forage_env.study.spec import RunSpec, plan_run
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.learner_arena import plan_arena
 from tests.support.foraging import mild_wrappers, quick_world

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from swarm_forage_env.study.record import RunRecord
+from swarm_forage_env.runs.record import RunRecord
 
 LIMIT_S = 600.0
 """Longest a command may take; our choice for a machine that does other work, too."""

@@ -3,8 +3,8 @@
 import numpy as np
 import polars as pl
 
-from swarm_forage_env.study.studies import Axis, StudyPolicy, StudySpec
-from swarm_forage_env.study.study_table import StudyTable
+from swarm_forage_env.studies.study import Axis, StudyPolicy, StudySpec
+from swarm_forage_env.studies.study_table import StudyTable
 
 FOUR = ("crw", "dpo", "stochm", "stochx")
 N_INTERVALS = 4

@@ -32,8 +32,10 @@ from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_US
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.pretrained import network_file, plan_file
-from swarm_forage_env.study import ablation, run, runner, study_run
-from swarm_forage_env.study.study_file import find_study
+from swarm_forage_env.runs import run, runner
+from swarm_forage_env.studies import ablation
+from swarm_forage_env.studies import study_folder as study_run
+from swarm_forage_env.studies.study_file import find_study
 
 EXIT_CODES = (0, EXIT_FAILURE, EXIT_USAGE, EXIT_INTERRUPTED)
 """What a command may end with; the code of an error that nobody foresaw is not among them."""
@@ -265,8 +267,8 @@ def _page(random: Random, folder: Path) -> Path:
 def _stored(random: Random, folder: Path) -> Path:
     if random.random() < 0.5:
         return _table(random, folder)
+    from swarm_forage_env.runs.spec import RunSpec
     from swarm_forage_env.scenarios.presets import scenario
-    from swarm_forage_env.study.spec import RunSpec
 
     spec = RunSpec(scenario=scenario("warehouse_small", n_robots=3, n_objects=20), policy="random").to_mapping()
     content: dict[str, Any] = {"run": "x", "error": "e", "traceback": ["t"], "spec": spec}

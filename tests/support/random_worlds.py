@@ -19,9 +19,9 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.run import build_stack
+from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.study.run import build_stack
-from swarm_forage_env.study.spec import RunSpec
 from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig

@@ -1,6 +1,6 @@
 """What a reader does with a replay page in a browser."""
 
-from swarm_forage_env.study.replay.frames import Replay
+from swarm_forage_env.inspect.replay.frames import Replay
 from tests.support.browser import Browser
 
 _MARGIN_PX = 8

@@ -1,6 +1,6 @@
 """A study of two policies, two axes and two readings whose runs take a moment."""
 
-from swarm_forage_env.study.studies import Axis, StudyPolicy, StudySpec
+from swarm_forage_env.studies.study import Axis, StudyPolicy, StudySpec
 
 RANDOM = StudyPolicy(label="random", policy="random")
 TWIN = StudyPolicy(label="twin", policy="random", caches="static")

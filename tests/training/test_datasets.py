@@ -10,7 +10,7 @@ import pytest
 from swarm_forage_env import ConfigError, load_policy, plan_run, run_one, scenario
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.policies.interface import LearnerInterface
-from swarm_forage_env.study.run import build_env
+from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.training.datasets import recording
 from swarm_forage_env.training.datasets.layout import DatasetError, chunk_file, summary_file
 from swarm_forage_env.training.datasets.reading import TrajectoryDataset

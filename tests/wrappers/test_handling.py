@@ -5,9 +5,9 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Event, Grip
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.overrides import with_overrides
-from swarm_forage_env.study.run import run_one
-from swarm_forage_env.study.spec import plan_run
 from swarm_forage_env.wrappers.handling import HandlingCost, HandlingCostConfig
 from swarm_forage_env.wrappers.recorder import RunRecorder
 from swarm_forage_env.wrappers.registry import parse_wrapper

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from swarm_forage_env import SCENARIO_NAMES, SnapshotError, load_policy
+from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
-from swarm_forage_env.study.run import LiveRun, build_env
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.branches import Branch, pickled, whole_stack

@@ -1,4 +1,4 @@
-// From the text in the page to typed arrays. The twin of swarm_forage_env/study/replay/coding.py.
+// From the text in the page to typed arrays. The twin of swarm_forage_env/inspect/replay/coding.py.
 
 const ARRAY_TYPES = { u1: Uint8Array, u2: Uint16Array, i4: Int32Array, f4: Float32Array };
 

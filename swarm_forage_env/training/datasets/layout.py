@@ -26,7 +26,7 @@ from swarm_forage_env._internal.fields import ConfigError, known_keys, table
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping
-from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.runs.spec import RunSpec
 
 SCHEMA_VERSION = 1
 """Version of the folder; raised whenever an array or a field changes its name, type or meaning."""

@@ -22,9 +22,9 @@ from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.mixture import is_mixture, part_sizes
 from swarm_forage_env.policies.model_files import look_at_file
 from swarm_forage_env.policies.registry import file_of, is_policy_file, load_policy, part_labels
-from swarm_forage_env.study.record import software_versions
-from swarm_forage_env.study.run import build_env
-from swarm_forage_env.study.spec import RunSpec
+from swarm_forage_env.runs.record import software_versions
+from swarm_forage_env.runs.run import build_env
+from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.training.datasets.layout import (
     CARD_FILE,
     Card,
@@ -102,7 +102,7 @@ def plan_dataset(
     policies are recorded in every tick, with their commands as actions.
 
     Args:
-        spec: The run, see `study.spec.plan_run`.
+        spec: The run, see `runs.spec.plan_run`.
         seeds: Seeds of the runs, each once.
         observation: "full" or "compact": what is recorded instead of what a learned policy sees, or of "full". All
             neighbours and own sensors of the scenario are then recorded for a learned policy, too, unless it says

@@ -10,7 +10,7 @@ from metrics.scoring.measures import MEASURE_CRITERIA
 from swarm_forage_env import run_one
 from swarm_forage_env.policies.model_files import file_digest
 from swarm_forage_env.policies.pretrained import network_file
-from swarm_forage_env.study.record import RunRecord
+from swarm_forage_env.runs.record import RunRecord
 from tests.support.entries import TINY
 
 FROM_RATES_ALONE = {"availability"}

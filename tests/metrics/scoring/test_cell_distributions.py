@@ -5,8 +5,8 @@ import polars as pl
 import pytest
 
 from metrics.scoring.cell_distributions import cell_distributions
-from swarm_forage_env.study.studies import Axis
-from swarm_forage_env.study.study_table import StudyTable
+from swarm_forage_env.studies.study import Axis
+from swarm_forage_env.studies.study_table import StudyTable
 from tests.support.made_tables import FOUR, made_study, made_table
 
 N_INTERVALS = 20

@@ -11,8 +11,8 @@ import pytest
 from metrics import CurveError, choose_policy
 from metrics.scoring.choosing import MET, NOT_MET, UNDECIDED, Constraint, Evidence, plan_choice, rank_policies
 from metrics.scoring.totals import PolicyTotals
+from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.store import load
 from swarm_forage_env.wrappers.noise import NOISE_GROUPS, ActuatorNoiseConfig, SensorNoiseConfig
 from swarm_forage_env.wrappers.population import malfunction_levels
 

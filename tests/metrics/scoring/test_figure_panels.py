@@ -9,9 +9,9 @@ from metrics.claims import EXPERIMENTS, INTUITIONS, PanelName
 from metrics.scoring import judge_claims, study_panels
 from metrics.scoring.figure_panels import experiment_of
 from metrics.scoring.verdicts import VARIANTS
-from swarm_forage_env.study.studies import Axis, StudyPolicy
-from swarm_forage_env.study.study_file import load_study, set_names
-from swarm_forage_env.study.study_table import StudyTable
+from swarm_forage_env.studies.study import Axis, StudyPolicy
+from swarm_forage_env.studies.study_file import load_study, set_names
+from swarm_forage_env.studies.study_table import StudyTable
 from tests.support.made_tables import FOUR, made_study, made_table
 
 SIMPLE_FIRST = {"crw": 10.0, "dpo": 11.0, "stochm": 5.0, "stochx": 4.0}

@@ -12,12 +12,12 @@ from metrics import CurveError, compare_policies, score_policy
 from metrics.scoring import plan_scores, run_scores
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import registry as policy_module
+from swarm_forage_env.runs import runner
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.runner import StudyInterrupted
+from swarm_forage_env.runs.store import RunStore, load
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study import runner
-from swarm_forage_env.study.experiments import Budget
-from swarm_forage_env.study.run import run_one
-from swarm_forage_env.study.runner import StudyInterrupted
-from swarm_forage_env.study.store import RunStore, load
+from swarm_forage_env.studies.ladders import Budget
 
 WORLD = scenario("warehouse_small", n_robots=4, n_objects=20)
 TINY = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=2, n_sizes=2, n_levels=1)

@@ -9,12 +9,12 @@ import metrics
 from metrics import CurveError, Performance, compare_policies, compare_tables, score_curves, score_policy
 from metrics.scoring.performance import checked_performance
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs import runner
+from swarm_forage_env.runs.record import schema_table
+from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.performance import DERIVED_PERFORMANCES, PERFORMANCE_COLUMNS
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study import runner
-from swarm_forage_env.study.experiments import Budget
-from swarm_forage_env.study.record import schema_table
-from swarm_forage_env.study.store import load
+from swarm_forage_env.studies.ladders import Budget
 from tests.support.curve_tables import rows, table
 
 WORLD = scenario("warehouse_small", n_robots=4, n_objects=20)

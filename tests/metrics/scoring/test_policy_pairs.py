@@ -6,7 +6,7 @@ import pytest
 from metrics.scoring import study_figures, study_panels
 from metrics.scoring.policy_pairs import policy_pairs
 from metrics.significance import holm, paired_p
-from swarm_forage_env.study.studies import Axis, StudyPolicy
+from swarm_forage_env.studies.study import Axis, StudyPolicy
 from tests.support.made_tables import FOUR, made_study, made_table
 
 HEIGHTS = dict(zip(FOUR, (4.0, 4.0, 6.0, 9.0), strict=True))

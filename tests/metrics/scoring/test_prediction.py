@@ -12,9 +12,9 @@ from metrics.scoring.prediction import counted_inside, law_text, plan_prediction
 from metrics.scoring.prediction_plots import draw_predictions
 from metrics.scoring.totals import PolicyTotals
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.study.experiments import Budget, plan_experiments
-from swarm_forage_env.study.store import load
+from swarm_forage_env.studies.ladders import Budget, plan_experiments
 from tests.support.pictures import PNG, keep_figures
 
 WORLD = scenario("warehouse_small", n_objects=20, horizon_s=4.0, interval_s=2.0)

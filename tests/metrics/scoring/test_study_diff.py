@@ -9,8 +9,8 @@ from scipy import stats
 
 from metrics import CurveError
 from metrics.scoring import diff_studies
-from swarm_forage_env.study.studies import Axis
-from swarm_forage_env.study.study_table import StudyTable
+from swarm_forage_env.studies.study import Axis
+from swarm_forage_env.studies.study_table import StudyTable
 from tests.support.made_tables import made_study, made_table
 
 PERFORMANCE = ("performance",)

@@ -8,7 +8,7 @@ import pytest
 from metrics.queues import PopulationRates, robots_at_work
 from metrics.scoring.model_plots import draw_models
 from metrics.scoring.study_models import MEAN_FIELD, model_figures
-from swarm_forage_env.study.studies import Axis, StudyPolicy
+from swarm_forage_env.studies.study import Axis, StudyPolicy
 from tests.support.foraging_table import ONE, SIZES, foraging_table
 from tests.support.made_tables import made_study, made_table
 

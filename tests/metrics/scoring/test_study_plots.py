@@ -10,7 +10,7 @@ import pytest
 from metrics.scoring import study_panels
 from metrics.scoring.study_plots import caption, draw_figure, draw_map, limit_height, study_figures
 from metrics.statistics import aggregate
-from swarm_forage_env.study.studies import Axis
+from swarm_forage_env.studies.study import Axis
 from tests.support.made_tables import FOUR, made_study, made_table
 
 WALKING = Axis(name="walk_probability", values=(0.0, 0.3))

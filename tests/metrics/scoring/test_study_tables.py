@@ -7,7 +7,7 @@ from metrics import ScoreForms
 from metrics.scoring.study_scores import score_study
 from metrics.scoring.study_tables import study_lines
 from swarm_forage_env import StudyFolder, read_study, run_study
-from swarm_forage_env.study.studies import Axis
+from swarm_forage_env.studies.study import Axis
 from tests.support.tiny_study import RANDOM, tiny_study
 
 

@@ -1,0 +1,142 @@
+"""Maps of the floor: where robots were, where they took and left objects, where they got in each other's way."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import ConfigError, number
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.inspect.replay.frames import Replay, Status
+from swarm_forage_env.scenarios.obstacles import Rectangle
+from swarm_forage_env.scenarios.units import CELL_M
+
+MEANINGS: Mapping[str, tuple[str, str]] = {
+    "density": ("active robots, mean over time", "per m²"),
+    "interference": ("robots in interference, mean over time", "per m²"),
+    "pickups": ("objects picked up", "per m² and 1,000 s"),
+    "drops": ("objects dropped", "per m² and 1,000 s"),
+}
+"""Map -> what is counted, and in which unit."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FloorMaps:
+    """Arrays over the squares of a floor, or differences of two such arrays."""
+
+    label: str
+    """What they are of, for people."""
+    side_m: float
+    """Side of a square."""
+    size_m: tuple[float, float]
+    """Extent of the arena along x and y."""
+    n_robots: int
+    """Swarm size; of a difference, that of the first swarm."""
+    arrays: Mapping[str, FloatArray]
+    """Name, as in `MEANINGS` -> (ny, nx), row = y from below."""
+    is_difference: bool = False
+    obstacles_m: tuple[Rectangle, ...] = ()
+    """Boxes on the floor; of a difference, those of the first."""
+
+    def minus(self, other: "FloorMaps") -> "FloorMaps":
+        """Return what is more here than in `other`, square by square.
+
+        Arenas may differ in size if they have the same proportions and as many squares: then squares at corresponding
+        places are compared.
+
+        Raises:
+            ConfigError: arenas of other proportions, or another number of squares.
+        """
+        if not (same_proportions(self.size_m, other.size_m) and self._grid == other._grid):
+            mine, theirs = ((maps.size_m, maps.side_m) for maps in (self, other))
+            raise ConfigError(
+                "Expected maps of arenas of one shape with as many squares, got sizes and sides of "
+                f"{mine} and {theirs} m."
+            )
+        return replace(
+            self,
+            label=f"{self.label} minus {other.label}",
+            arrays={name: array - other.arrays[name] for name, array in self.arrays.items()},
+            is_difference=True,
+        )
+
+    def per_robot(self) -> "FloorMaps":
+        """Return everything divided by the swarm size, so that swarms of several sizes can be compared."""
+        return replace(self, arrays={name: array / self.n_robots for name, array in self.arrays.items()})
+
+    @property
+    def _grid(self) -> tuple[int, ...]:
+        """Number of squares along y and x."""
+        return self.arrays["density"].shape
+
+    def write(self, path: str | Path) -> None:
+        """Write the arrays to an .npz file, whole or not at all."""
+        content: dict[str, Any] = {
+            **self.arrays,
+            "side_m": self.side_m,
+            "size_m": self.size_m,
+            "n_robots": self.n_robots,
+        }
+        with replacing(Path(path)) as draft, draft.open("wb") as file:
+            np.savez_compressed(file, **content)
+
+
+def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
+    """Count robots, pick-ups and drops of a replay in squares of the floor.
+
+    Args:
+        replay: The run. Robots count at its frames; pick-ups that are undone before the next frame are missing.
+        side_m: Side of a square, default two cells. Where the arena is no multiple of it, the squares at its upper and
+            right border are cut off there, and their numbers are per m² of what is left of them.
+
+    Raises:
+        ConfigError: `side_m` is smaller than a cell, or larger than the arena.
+    """
+    arena = replay.scenario.arena
+    number("side_m", side_m, at_least=CELL_M, at_most=max(arena.width_m, arena.height_m))
+    extents = arena.height_m, arena.width_m
+    edges = [np.arange(0.0, extent + side_m - 1e-9, side_m) for extent in extents]
+    area_m2 = np.outer(*(_sides(side_m, len(marks) - 1, extent) for marks, extent in zip(edges, extents, strict=True)))
+
+    def count(places_m: FloatArray) -> FloatArray:
+        inside = np.clip(places_m, 0.0, [arena.width_m, arena.height_m])
+        return np.histogram2d(inside[:, 1], inside[:, 0], bins=edges)[0]
+
+    active = ~(replay.has(Status.ABSENT) | replay.has(Status.REPAIR))
+    position_m = replay.position_m
+    _, signs, places_m = replay.handovers
+    of_frames = 1.0 / (area_m2 * replay.n_frames)
+    of_events = 1000.0 / (area_m2 * float(replay.times_s[-1]))
+    return FloorMaps(
+        label=replay.label,
+        side_m=side_m,
+        size_m=(arena.width_m, arena.height_m),
+        n_robots=replay.scenario.robots.n_robots,
+        obstacles_m=arena.obstacles,
+        arrays={
+            "density": count(position_m[active]) * of_frames,
+            "interference": count(position_m[active & replay.has(Status.INTERFERING)]) * of_frames,
+            "pickups": count(places_m[signs > 0]) * of_events,
+            "drops": count(places_m[signs < 0]) * of_events,
+        },
+    )
+
+
+def _sides(side_m: float, n: int, extent_m: float) -> FloatArray:
+    """Return the sides of squares along one axis, (n,) m: the last is what is left of the arena."""
+    return np.append(np.full(n - 1, side_m), min(side_m, extent_m - (n - 1) * side_m))
+
+
+def mean_maps(maps: Sequence[FloorMaps], label: str) -> FloorMaps:
+    """Return the mean of maps of several runs of one experiment, under another label."""
+    arrays = {name: np.mean([one.arrays[name] for one in maps], axis=0) for name in MEANINGS}
+    return replace(maps[0], label=label, arrays=arrays)
+
+
+def same_proportions(size_m: tuple[float, float], other_m: tuple[float, float]) -> bool:
+    """Return whether two floors differ by a scale at most."""
+    return math.isclose(size_m[0] * other_m[1], size_m[1] * other_m[0], rel_tol=1e-6)

@@ -1,0 +1,260 @@
+"""Replays in files: pages that any browser shows, from which `read_replays` gets the arrays back.
+
+The header of a page says what it holds: format, version, and per run the specification, units, geometry for the page,
+and which array lies where in the run's block of bytes (`coding` says how). `docs/replay.md` has the table.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env.contract.codes import Counter, Task
+from swarm_forage_env.inspect.replay.coding import pack, unpack
+from swarm_forage_env.inspect.replay.frames import Replay, ReplayError
+from swarm_forage_env.rendering.page import PageError, build_page, take_page_apart
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.kinds import RobotKind, kind_sizes
+from swarm_forage_env.scenarios.performance import quantity
+from swarm_forage_env.scenarios.units import CELL_M, WALL_M
+from swarm_forage_env.wrappers.recorder import TOTALS
+
+FORMAT = "swarm_forage_env replay"
+FORMAT_VERSION = 3
+"""Raised whenever an array or a field is new, or changes its name, type or meaning."""
+READ_VERSIONS = (2, 3)
+"""Versions that `read_replays` reads; 2 is without `memory_events`."""
+_ARRAYS = {
+    "position": "u2",
+    "heading": "u1",
+    "status": "u1",
+    "activity": "u1",
+    "remembered": "u2",
+    "counters": "i4",
+    "object_events": "i4",
+    "deliveries": "i4",
+    "cache_events": "i4",
+    "memory_events": "i4",
+}
+"""Arrays of a `Replay` and their types in a file; those that are None are left out."""
+_SIGNALS = {"throttle": ("throttle", ""), "handling_cost": ("handling cost", " ticks")}
+"""Wrapper -> what its waveform is called in the page, and its unit."""
+_TASKS = {Task.NONE: "no task", Task.CACHE_COLLECTOR: "cache collector"}
+"""Names of tasks for people, where they are not just the lower case of the code."""
+
+
+def write_replays(path: str | Path, replays: Replay | Sequence[Replay], *, title: str | None = None) -> Path:
+    """Write one replay, or several to be seen side by side, as a page; whole or not at all.
+
+    Args:
+        path: File to create or replace, by custom with the suffix .html; a missing folder is made.
+        replays: At least one. Side by side makes sense for runs of one arena and seed.
+        title: Headline; default the names of policies and scenarios.
+
+    Returns:
+        The path written.
+
+    Raises:
+        ReplayError: there is no replay.
+    """
+    replays = (replays,) if isinstance(replays, Replay) else tuple(replays)
+    if not replays:
+        raise ReplayError("Expected at least one replay to write, got none.")
+    path = Path(path)
+    page = page_of(replays, title=title)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as draft:
+        draft.write_text(page, encoding="utf-8")
+    return path
+
+
+def page_of(replays: Sequence[Replay], *, title: str | None = None) -> str:
+    """Return the page that `write_replays` writes, as text."""
+    replays = _told_apart(replays)
+    packed = [_packed(replay) for replay in replays]
+    header = {"format": FORMAT, "version": FORMAT_VERSION, "runs": [about for about, _ in packed]}
+    return build_page(title or _headline(replays), header, [block for _, block in packed])
+
+
+def read_replays(path: str | Path) -> tuple[Replay, ...]:
+    """Read the replays of a page.
+
+    Raises:
+        ReplayError: the file is missing, no replay page, damaged, or of another version; the message names it.
+    """
+    try:
+        header, blocks = take_page_apart(Path(path).read_text(encoding="utf-8"))
+        return tuple(_replay_of(about, block) for about, block in zip(_runs_of(header), blocks, strict=True))
+    except OSError as error:
+        raise ReplayError(f"Cannot read {path}: {error.strerror or error}.") from error
+    except UnicodeDecodeError as error:
+        raise ReplayError(f"Cannot read {path}: it is no text, so no replay page.") from error
+    except PageError as error:
+        raise ReplayError(f"Cannot read {path}: {error}.") from error
+    except (ConfigError, ReplayError, KeyError, TypeError, ValueError) as error:
+        reason = f"no {error}" if isinstance(error, KeyError) else str(error).rstrip(".")
+        raise ReplayError(f"Cannot read {path}: its content is damaged ({reason}).") from error
+
+
+def _told_apart(replays: Sequence[Replay]) -> list[Replay]:
+    """Return the replays with labels that differ: those of one policy get what disturbs the run, then a number."""
+    labels = [replay.label for replay in replays]
+    labels = [_with_disturbance(replay) if labels.count(replay.label) > 1 else replay.label for replay in replays]
+    seen = [labels[: index + 1].count(label) for index, label in enumerate(labels)]
+    return [
+        replace(replay, label=label if nth == 1 else f"{label} ({nth})")
+        for replay, label, nth in zip(replays, labels, seen, strict=True)
+    ]
+
+
+def _with_disturbance(replay: Replay) -> str:
+    names = ", ".join(config.name.replace("_", " ") for config in replay.spec.wrappers)
+    return f"{replay.label} with {names}" if names else replay.label
+
+
+def _headline(replays: Sequence[Replay]) -> str:
+    if len(replays) == 1:
+        return f"{replays[0].label}, {replays[0].scenario.name.replace('_', ' ')}"
+    return ", ".join(replay.label for replay in replays)
+
+
+def _runs_of(header: dict[str, Any]) -> list[dict[str, Any]]:
+    if header.get("format") != FORMAT:
+        raise PageError("it is no replay page of swarm_forage_env")
+    if header.get("version") not in READ_VERSIONS:
+        raise PageError(
+            f"it has version {header.get('version')} of the format, this version of swarm_forage_env reads "
+            f"{' and '.join(map(str, READ_VERSIONS))}; read it with the version that wrote it"
+        )
+    return header["runs"]
+
+
+def _packed(replay: Replay) -> tuple[dict[str, Any], bytes]:
+    """Return the header of a run, and its block of bytes."""
+    arrays: dict[str, np.ndarray] = {
+        name: array for name in _ARRAYS if (array := getattr(replay, name)) is not None
+    } | {f"signal_{name}": values for name, values in replay.signals.items()}
+    places: list[dict[str, Any]] = []
+    block = b""
+    for name, array in arrays.items():
+        packed = pack(array)
+        places.append(
+            {
+                "name": name,
+                "dtype": _ARRAYS.get(name, "f4"),
+                "shape": list(array.shape),
+                "offset": len(block),
+                "size": len(packed),
+            }
+        )
+        block += packed
+    about = _about(replay) | {"arrays": places}
+    return about | {"digest": _digest(about, block)}, block
+
+
+def _about(replay: Replay) -> dict[str, Any]:
+    spec, scenario = replay.spec, replay.scenario
+    return {
+        "label": replay.label,
+        "run_id": spec.run_id,
+        "scenario": scenario.name,
+        "policy": spec.policy,
+        "seed": spec.seed,
+        "n_robots": scenario.robots.n_robots,
+        "kinds": [[kind.name, size] for kind, size in _kinds(scenario)],
+        "n_objects": scenario.objects.n_objects,
+        "n_cache_slots": int(replay.cache_events[:, 1].max(initial=-1)) + 1,
+        "n_frames": replay.n_frames,
+        "frame_ticks": replay.frame_ticks,
+        "end_tick": replay.end_tick,
+        "dt_s": scenario.dt_s,
+        "position_step_m": replay.position_step_m,
+        "remembered_frames": replay.remembered_frames,
+        "has_tasks": replay.has_tasks,
+        "tasks": [_TASKS.get(task, task.name.lower()) for task in Task],
+        "activities": list(replay.activities),
+        "counters": [counter.name.lower() for counter in Counter],
+        "performance": _performance(scenario),
+        "signals": [
+            {"name": name, "title": title, "unit": unit}
+            for name, (title, unit) in _SIGNALS.items()
+            if name in replay.signals
+        ],
+        "disturbances": [config.in_words(scenario.dt_s) for config in spec.wrappers],
+        "world": _world(scenario),
+        "versions": dict(replay.versions),
+        "spec": spec.to_mapping(),
+    }
+
+
+def _kinds(scenario: ScenarioConfig) -> Iterable[tuple[RobotKind, int]]:
+    """Return the kinds of robots and how many there are of each, in the order of their rows."""
+    robots = scenario.robots
+    return zip(robots.robot_kinds, kind_sizes(robots.robot_kinds, robots.n_robots), strict=True)
+
+
+def _performance(scenario: ScenarioConfig) -> dict[str, str]:
+    """Return what the page counts: performance if it is something that the world counts, else deliveries."""
+    column = scenario.performance if scenario.performance in TOTALS else "collected"
+    return {"counter": TOTALS[column].name.lower(), "words": quantity(column).title}
+
+
+def _world(scenario: ScenarioConfig) -> dict[str, Any]:
+    """Return the geometry that the page draws, in m."""
+    arena = scenario.arena
+    sources: Iterable[tuple[int, ...]] = ()
+    if scenario.objects.placement != "power_law":  # its clusters differ from run to run
+        sources = scenario.source_cells
+    return {
+        "width_m": arena.width_m,
+        "height_m": arena.height_m,
+        "wall_m": WALL_M,
+        "cell_m": CELL_M,
+        "interior_m": list(arena.interior_m),
+        "nest_box_m": list(arena.nest_box_m),
+        "obstacles_m": [list(box) for box in arena.obstacles],
+        "lights_m": [[x, y] for x, y, _ in arena.lights_m],
+        "sources_m": [[CELL_M * edge for edge in box] for box in sources],
+        "robot_radius_m": scenario.robots.radius_m,
+        "caches": scenario.caches,
+        "cache_side_m": scenario.cache_side_cells * CELL_M,
+    }
+
+
+def _replay_of(about: dict[str, Any], block: bytes) -> Replay:
+    digest = about.pop("digest")
+    if _digest(about, block) != digest:
+        raise ReplayError("it does not match its digest")
+    arrays = {
+        place["name"]: unpack(
+            block[place["offset"] : place["offset"] + place["size"]], place["dtype"], tuple(place["shape"])
+        )
+        for place in about["arrays"]
+    }
+    own: dict[str, Any] = {name: arrays.get(name) for name in _ARRAYS}
+    signals = {name.removeprefix("signal_"): array for name, array in arrays.items() if name not in _ARRAYS}
+    return Replay(
+        spec=RunSpec.from_mapping(about["spec"]),
+        label=about["label"],
+        frame_ticks=about["frame_ticks"],
+        end_tick=about["end_tick"],
+        activities=tuple(about["activities"]),
+        remembered_frames=about["remembered_frames"],
+        versions=about["versions"],
+        has_tasks=about["has_tasks"],
+        signals=signals,
+        **own,
+    )
+
+
+def _digest(about: dict[str, Any], block: bytes) -> str:
+    state = hashlib.blake2b(json.dumps(about, sort_keys=True).encode(), digest_size=16)
+    state.update(block)
+    return state.hexdigest()

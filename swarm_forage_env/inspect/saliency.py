@@ -1,0 +1,190 @@
+"""What a trained network looks at: how much its actions change when one slice of its observations is exchanged.
+
+Our choice is exchange by slice, not a gradient. A gradient asks what an endless small change does, but most columns of
+an observation jump: an object is in view or not, a robot carries or does not. Zeros in place of a slice would be
+observations that no robot ever makes, and networks answer those by chance. So a robot gets the slice of another robot,
+or of itself at another moment: values that occur, but do not belong to the rest of its observation. The measure is
+"permutation importance" (L. Breiman, Random forests, Machine Learning 45, 2001, section 10), with the change of
+actions in place of the loss of accuracy.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_forage_env._internal.fields import ConfigError, number
+from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.contract.layout import ObservationLayout
+from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
+from swarm_forage_env.policies.learned import LearnedPolicy
+from swarm_forage_env.policies.network import Network
+from swarm_forage_env.policies.pretrained import network_file, network_names
+from swarm_forage_env.runs.run import LiveRun, build_env
+from swarm_forage_env.runs.spec import RunSpec
+
+MOST_ROWS = 20_000
+"""Observations that are kept of a run (our choice: shares of so many are exact to a percent)."""
+EXCHANGES = 8
+"""How often each observation gets the slice of another."""
+
+Group: TypeAlias = Literal["all", "empty", "carrying"]
+"""Which robots a number is about."""
+GROUPS: tuple[Group, ...] = get_args(Group)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Saliency:
+    """What a network looked at in a run, by slice of its observations (S of them) and by group of robots."""
+
+    slices: tuple[str, ...]
+    """(S,) names."""
+    n_columns: tuple[int, ...]
+    """(S,) sizes."""
+    meanings: tuple[str, ...]
+    """(S,) what the columns hold."""
+    n_rows: dict[Group, int]
+    """How many observations there are of each group."""
+    changed: dict[Group, FloatArray]
+    """Group -> (S,) discrete actions: share of decisions that come out different; continuous ones: mean change of the
+    commands, which lie in [-1, 1]. NaN where the group has no observation."""
+    moved: dict[Group, FloatArray] | None
+    """Group -> (S,) mean total variation distance between the probabilities of actions before and after, in [0, 1]; as
+    if outputs were logits, which they are in ppo and a2c. None for continuous actions."""
+
+    @property
+    def ranked(self) -> tuple[int, ...]:
+        """Rows of slices, that with the largest change over all robots first."""
+        return tuple(np.argsort(-self.changed["all"], kind="stable").tolist())
+
+
+def open_network_of(policy: str) -> Network:
+    """Return the network of a policy.
+
+    Args:
+        policy: Name of a shipped policy, or path of a network file.
+
+    Raises:
+        ConfigError: the policy is no network in a file.
+        NetworkError: the file holds none.
+        OSError: the file cannot be read.
+    """
+    file = network_file(policy) or Path(policy)
+    if file.suffix.lower() != ".npz":
+        known = network_names()
+        raise ConfigError(
+            f"Expected a network, that is the name of a shipped one ({', '.join(known)}) or an .npz file, got "
+            f"{policy!r}.{suggestion(policy, known)} Training leaves policy.npz beside a model; other policies have no "
+            "network to look into."
+        )
+    return Network.load(file)
+
+
+def saliency(
+    network: Network, spec: RunSpec, *, seconds: float | None = None, progress: Callable[[int, int], None] | None = None
+) -> Saliency:
+    """Let a network steer a run and measure what it looks at.
+
+    Args:
+        network: The network; `spec.policy` is only its name.
+        spec: The run.
+        seconds: Simulated time to take observations from; default the whole run.
+        progress: Called with (ticks done, ticks in all).
+
+    Raises:
+        ConfigError: `seconds` is longer than the run, or no robot was at work at any decision.
+    """
+    scenario = spec.scenario
+    number("seconds", scenario.horizon_s if seconds is None else seconds, above=0.0, at_most=scenario.horizon_s)
+    end = scenario.horizon_ticks if seconds is None else max(1, round(seconds / scenario.dt_s))
+    interface = network.about.interface
+    n_decisions = -(-end // interface.decision_ticks)
+    every = max(1, -(-n_decisions * scenario.robots.n_robots // MOST_ROWS))
+    album = _Album(network, every)
+    policy = LearnedPolicy(interface, album.choose, caches=network.about.caches)
+    run = LiveRun(build_env(scenario, spec.wrappers, reads=policy.reads), policy, spec.seed)
+    step = max(1, end // 100)
+    while run.forage_env.tick < end and not run.over:
+        run.advance(to_tick=min(run.forage_env.tick + step, end))
+        if progress is not None:
+            progress(run.forage_env.tick, end)
+    seen = np.concatenate(album.rows)
+    rows = seen[seen[:, policy.interface.active_column] > 0.5]
+    if not len(rows):
+        raise ConfigError("Expected robots at work, got a run in which no robot decided anything; choose another seed.")
+    return saliency_of_rows(network, policy.interface.layout, rows, np.random.default_rng(spec.seed))
+
+
+def saliency_of_rows(network: Network, layout: ObservationLayout, rows: ObsArray, rng: np.random.Generator) -> Saliency:
+    """Measure what a network looks at, in given observations.
+
+    Args:
+        network: The network.
+        layout: Columns of what it sees.
+        rows: (K, d) observations, at least one.
+        rng: Chooses whose slice an observation gets.
+    """
+    is_discrete = network.about.interface.actions == "discrete"
+    before = network.outputs(rows)
+    carrying = rows[:, layout["carrying"]][:, 0] > 0.5
+    members: dict[Group, BoolArray] = dict(
+        zip(GROUPS, (np.ones(len(rows), np.bool_), ~carrying, carrying), strict=True)
+    )
+    changed: dict[Group, list[float]] = {group: [] for group in GROUPS}
+    moved: dict[Group, list[float]] = {group: [] for group in GROUPS}
+    donors = [rng.permutation(len(rows)) for _ in range(EXCHANGES)]  # the same for all slices, so that they compare
+    for part in layout:
+        change, distance = np.zeros(len(rows)), np.zeros(len(rows))
+        for donor in donors:
+            exchanged = rows.copy()
+            exchanged[:, part.start : part.stop] = rows[donor, part.start : part.stop]
+            after = network.outputs(exchanged)
+            change += _changes(before, after, is_discrete=is_discrete) / EXCHANGES
+            if is_discrete:
+                distance += 0.5 * np.abs(_probabilities(after) - _probabilities(before)).sum(axis=1) / EXCHANGES
+        for group, rows_of_group in members.items():
+            changed[group].append(_mean(change[rows_of_group]))
+            moved[group].append(_mean(distance[rows_of_group]))
+    return Saliency(
+        slices=layout.names,
+        n_columns=tuple(part.size for part in layout),
+        meanings=tuple(part.meaning for part in layout),
+        n_rows={group: int(rows_of_group.sum()) for group, rows_of_group in members.items()},
+        changed={group: np.array(values) for group, values in changed.items()},
+        moved={group: np.array(values) for group, values in moved.items()} if is_discrete else None,
+    )
+
+
+class _Album:
+    """Lets the network choose, and keeps what it saw at every so-many-th decision."""
+
+    def __init__(self, network: Network, every: int) -> None:
+        self._network = network
+        self._every = every
+        self._n_decisions = 0
+        self.rows: list[ObsArray] = []
+
+    def choose(self, rows: ObsArray, rng: np.random.Generator) -> np.ndarray:
+        if self._n_decisions % self._every == 0:
+            self.rows.append(rows.copy())
+        self._n_decisions += 1
+        return self._network.choose(rows, rng)
+
+
+def _changes(before: np.ndarray, after: np.ndarray, *, is_discrete: bool) -> NDArray[np.float64]:
+    """Return (K,): whether the most probable action is another one, or how far continuous commands move on average."""
+    if is_discrete:
+        return (before.argmax(axis=1) != after.argmax(axis=1)).astype(np.float64)
+    return np.abs(np.clip(after, -1.0, 1.0) - np.clip(before, -1.0, 1.0)).mean(axis=1, dtype=np.float64)
+
+
+def _probabilities(logits: np.ndarray) -> NDArray[np.float64]:
+    powers = np.exp(np.subtract(logits, logits.max(axis=1, keepdims=True), dtype=np.float64))
+    return powers / powers.sum(axis=1, keepdims=True)
+
+
+def _mean(values: NDArray[np.float64]) -> float:
+    return float(values.mean()) if len(values) else float("nan")

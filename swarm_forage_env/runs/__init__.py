@@ -1,0 +1,1 @@
+"""Runs as data: specification, execution, storage, many at once."""

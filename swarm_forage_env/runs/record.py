@@ -1,0 +1,376 @@
+"""RunRecord: one run as columns over recording intervals, and the Parquet file that holds it.
+
+The fields of `RunRecord` are the schema: name, type, unit and meaning stand there and nowhere else; `schema_table()`
+returns them as text. A file is self-contained: its metadata hold the complete specification of the run, the versions
+that made it, and a digest by which a damaged file is noticed.
+"""
+
+import hashlib
+import json
+import os
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
+from importlib import metadata
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env.contract.types import FloatArray, IntArray
+from swarm_forage_env.scenarios.performance import PART_COLUMNS, PERFORMANCE_COLUMNS, part_column, performance_curve
+
+if TYPE_CHECKING:
+    import polars as pl
+
+SCHEMA_VERSION = 2
+"""Version of the file layout; raised whenever a column changes its name, type or meaning."""
+PACKAGES = ("swarm-forage-env", "numpy", "scipy", "numba", "llvmlite", "pymunk", "pettingzoo")
+"""Distributions whose versions are part of every record."""
+
+CountArray: TypeAlias = NDArray[np.int64]
+
+_PREFIX = "swarm_forage_env."
+_FILE_KEYS = tuple(_PREFIX + name for name in ("schema_version", "spec", "provenance", "digest"))
+
+
+class RecordError(ValueError):
+    """A record that cannot be built, or a file that holds no undamaged record; the message names the file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """What a field of `RunRecord` holds: per interval, or once per run for keys."""
+
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunRecord:
+    """One run: its keys and arrays over T intervals, all of length T and read-only.
+
+    After an early end (every robot dead) the remaining intervals are zeros.
+    """
+
+    run_id: Annotated[str, Column("", "hash of the run's specification")]
+    scenario: Annotated[str, Column("", "name of the scenario")]
+    controller: Annotated[str, Column("", "name of the policy")]
+    n_robots: Annotated[int, Column("robots", "swarm size N, all rows that can appear")]
+    criterion: Annotated[str, Column("", "what a study varied, 'none' for a single run")]
+    criterion_value: Annotated[float, Column("", "value of the criterion")]
+    seed: Annotated[int, Column("", "seed of the run")]
+
+    interval: Annotated[IntArray, Column("", "index of the interval, from 0")]
+    t_end_s: Annotated[FloatArray, Column("s", "end of the interval")]
+    performance: Annotated[FloatArray, Column("", "what `performance` of the scenario names, in its unit")]
+    collected: Annotated[CountArray, Column("objects", "delivered to the nest")]
+    first_picked: Annotated[CountArray, Column("objects", "picked up that no robot had carried since they were placed")]
+    free_pickups: Annotated[CountArray, Column("objects", "picked up from the floor")]
+    cache_pickups: Annotated[CountArray, Column("objects", "picked up from a cache")]
+    cache_drops: Annotated[CountArray, Column("objects", "dropped into a cache")]
+    floor_drops: Annotated[CountArray, Column("objects", "laid on the floor by a robot, displaced ones included")]
+    displaced_drops: Annotated[CountArray, Column("objects", "dropped without a free cell and re-placed elsewhere")]
+    objects_moved: Annotated[CountArray, Column("cells", "steps taken by randomly walking objects")]
+    caches_created: Annotated[CountArray, Column("caches", "created")]
+    caches_depleted: Annotated[CountArray, Column("caches", "dissolved because one object was left")]
+    interference_ticks: Annotated[CountArray, Column("robot-ticks", "active robots in interference, summed over ticks")]
+    interference_fraction: Annotated[FloatArray, Column("1", "share of active robots in interference, mean over ticks")]
+    n_active: Annotated[FloatArray, Column("robots", "mean over ticks of the tasked swarm: present and not in repair")]
+    n_present: Annotated[FloatArray, Column("robots", "mean over ticks of robots that are born and alive")]
+    n_carrying: Annotated[FloatArray, Column("robots", "mean over ticks of active robots that carry an object")]
+    n_caches: Annotated[FloatArray, Column("caches", "mean over ticks")]
+    n_objects_cached: Annotated[FloatArray, Column("objects", "mean over ticks of objects inside caches")]
+    adversity: Annotated[
+        FloatArray, Column("1 or ticks", "mean over ticks of a throttle, else of the ticks that handling takes, else 0")
+    ]
+
+    contributed: Mapping[str, FloatArray]
+    """Further columns, (T,) float64 each, from wrappers and policies; see `KNOWN_CONTRIBUTIONS`."""
+    spec: str
+    """The run's complete specification as JSON (`runs.spec.RunSpec.from_json`)."""
+    provenance: Mapping[str, str]
+    """Versions, commit, time of creation, seconds of the clock and of a core."""
+
+    def __post_init__(self) -> None:
+        n_intervals = len(self.interval)
+        for name, dtype in _COLUMN_DTYPES.items():
+            object.__setattr__(self, name, _checked(name, getattr(self, name), dtype, n_intervals))
+        taken = sorted(set(self.contributed) & (set(_COLUMN_DTYPES) | set(_KEY_DTYPES)))
+        if taken:
+            raise RecordError(f"Expected contributed columns with names of their own, got {', '.join(taken)}.")
+        contributed = {
+            name: _checked(name, values, np.float64, n_intervals) for name, values in sorted(self.contributed.items())
+        }
+        object.__setattr__(self, "contributed", contributed)
+        object.__setattr__(self, "provenance", dict(self.provenance))
+
+    @property
+    def n_intervals(self) -> int:
+        """Number of intervals T."""
+        return len(self.interval)
+
+    @property
+    def horizon_s(self) -> float:
+        """Length of the run in simulated seconds."""
+        return float(self.t_end_s[-1])
+
+    @property
+    def wall_time_s(self) -> float:
+        """Wall-clock seconds that the run took, policy and recording included; NaN where unknown."""
+        return float(self.provenance.get("wall_time_s", "nan"))
+
+    @property
+    def cpu_time_s(self) -> float:
+        """Seconds of a core that the run took, other work of the machine left out; NaN where unknown."""
+        return float(self.provenance.get("cpu_time_s", "nan"))
+
+    def keys(self) -> dict[str, str | int | float]:
+        """Return the identifying fields by name."""
+        return {name: getattr(self, name) for name in _KEY_DTYPES}
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Return all (T,) columns by name, contributed ones last."""
+        return {name: getattr(self, name) for name in _COLUMN_DTYPES} | dict(self.contributed)
+
+    @classmethod
+    def column_names(cls) -> tuple[str, ...]:
+        """Return the names of the columns that every record has, keys first, in their order."""
+        return (*_KEY_DTYPES, *_COLUMN_DTYPES)
+
+    def rate_per_1000_s(self, column: str) -> float:
+        """Return the sum of a column over the run, per 1,000 simulated seconds."""
+        return float(self.columns()[column].sum()) * 1000.0 / self.horizon_s
+
+    def read_as(self, performance: str) -> "RunRecord":
+        """Return the same run with another performance; column and specification say so, the identity stays.
+
+        Args:
+            performance: As in `swarm_forage_env.scenarios.performance.quantity`.
+
+        Raises:
+            ConfigError: there is no such performance.
+        """
+        spec = json.loads(self.spec)
+        if spec["scenario"]["performance"] == performance:
+            return self
+        spec["scenario"]["performance"] = performance
+        curve = performance_curve(performance, self.columns())
+        return replace(self, performance=curve, spec=json.dumps(spec, sort_keys=True))
+
+    def made_by(self, versions: Mapping[str, str]) -> bool:
+        """Return whether the run was made by these `software_versions`, the commit included."""
+        return all(self.provenance.get(name, "") == versions.get(name, "") for name in (*PACKAGES, "commit"))
+
+    def same_results(self, other: "RunRecord") -> bool:
+        """Return whether both records hold the same keys and bit-equal columns; provenance may differ."""
+        return self.keys() == other.keys() and self.same_columns(other)
+
+    def same_columns(self, other: "RunRecord") -> bool:
+        """Return whether both records hold the same columns, bit for bit, whatever run they are of."""
+        mine, theirs = self.columns(), other.columns()
+        return mine.keys() == theirs.keys() and all(np.array_equal(mine[name], theirs[name]) for name in mine)
+
+    def describe(self) -> str:
+        """Return a few lines about the run for people."""
+        seconds = self.horizon_s
+        lines = [
+            f"run {self.run_id}: {self.controller} in {self.scenario}, {self.n_robots} robots, seed {self.seed}",
+            f"  criterion      {self.criterion} = {self.criterion_value:g}",
+            f"  length         {seconds:g} s in {self.n_intervals} intervals of {seconds / self.n_intervals:g} s",
+            f"  delivered      {self.collected.sum()} ({self.rate_per_1000_s('collected'):.1f} per 1,000 s)",
+            f"  first pick-ups {self.first_picked.sum()} ({self.rate_per_1000_s('first_picked'):.1f} per 1,000 s)",
+            f"  interference   {self.interference_fraction.mean():.3f} of active robot time",
+            f"  active robots  {self.n_active.mean():.1f} on average",
+        ]
+        origin = [f"{name} {value}" for name, value in sorted(self.provenance.items()) if value]
+        return "\n".join([*lines, "  made with      " + ", ".join(origin)])
+
+    def to_frame(self) -> "pl.DataFrame":
+        """Return the record as a table of T rows; keys are repeated on each row."""
+        import polars as pl
+
+        keys = [
+            pl.lit(getattr(self, name), dtype=_polars_type(dtype)).alias(name) for name, dtype in _KEY_DTYPES.items()
+        ]
+        return pl.DataFrame(self.columns()).select(*keys, pl.all())
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the record to a Parquet file, whole or not at all.
+
+        Args:
+            path: File to create or replace; its folder must exist.
+        """
+        provenance = json.dumps(dict(self.provenance), sort_keys=True)
+        values = (str(SCHEMA_VERSION), self.spec, provenance, _digest(self, provenance))
+        with replacing(Path(path)) as draft:
+            # By way of memory: polars tells a full disk as an error of its own, among many others.
+            content = BytesIO()
+            self.to_frame().write_parquet(content, metadata=dict(zip(_FILE_KEYS, values, strict=True)))
+            draft.write_bytes(content.getvalue())
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> "RunRecord":
+        """Read a record back.
+
+        Raises:
+            RecordError: the file is missing, no record, damaged, or of another schema version; the message names it.
+        """
+        import polars as pl
+
+        name = str(path)
+        try:
+            with Path(path).open("rb"):  # a missing or unreadable file gets another message than a damaged one
+                pass
+            stamp = pl.read_parquet_metadata(name)
+            _check_stamp(name, stamp)
+            frame = pl.read_parquet(name, glob=False)
+        except OSError as error:
+            raise RecordError(f"Cannot read {name}: {error.strerror or error}.") from error
+        except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+            raise RecordError(f"Cannot read {name}: it is no Parquet file or a damaged one ({error}).") from error
+        version, spec, provenance, digest = (stamp[key] for key in _FILE_KEYS)
+        try:
+            record = _from_frame(frame, spec, parse_json(provenance))
+        except (pl.exceptions.PolarsError, LookupError, OverflowError, RecursionError, TypeError, ValueError) as error:
+            raise RecordError(f"Cannot read {name}: its content does not match schema {version} ({error}).") from error
+        if _digest(record, provenance) != digest:
+            raise RecordError(f"Cannot read {name}: its content does not match its digest, so the file is damaged.")
+        return record
+
+
+_DTYPES: dict[Any, type] = {
+    str: str,
+    int: int,
+    float: float,
+    IntArray: np.int32,
+    CountArray: np.int64,
+    FloatArray: np.float64,
+}
+_HINTS = {
+    name: hint for name, hint in get_type_hints(RunRecord, include_extras=True).items() if get_origin(hint) is Annotated
+}
+_KEY_DTYPES = {name: _DTYPES[hint.__origin__] for name, hint in _HINTS.items() if hint.__origin__ in (str, int, float)}
+_COLUMN_DTYPES = {name: _DTYPES[hint.__origin__] for name, hint in _HINTS.items() if name not in _KEY_DTYPES}
+
+KNOWN_CONTRIBUTIONS: dict[str, tuple[str, str]] = {
+    "task_share_none": ("1", "mean over ticks of the share of active robots without a task"),
+    "task_share_generalist": ("1", "the same for the task Generalist"),
+    "task_share_harvester": ("1", "the same for the task Harvester"),
+    "task_share_collector": ("1", "the same for the task Collector"),
+    "task_share_starter": ("1", "the same for the task Cache Starter"),
+    "task_share_finisher": ("1", "the same for the task Cache Finisher"),
+    "task_share_transferer": ("1", "the same for the task Cache Transferer"),
+    "task_share_cache_collector": ("1", "the same for the task Cache Collector"),
+    "throttle": ("1", "waveform V(t) of the throttle at the last tick of the interval"),
+    "throttle_mean": ("1", "waveform V(t) of the throttle, mean over the ticks of the interval"),
+    "believed_interference_fraction": (
+        "1",
+        "share of active robots that see an obstacle under sensor noise, false ones included, mean over ticks",
+    ),
+    "handling_cost": ("ticks", "mean ticks of a pick-up and a drop that start in the last tick of the interval"),
+    "handling_cost_mean": ("ticks", "the same, mean over the ticks of the interval"),
+    "deaths": ("robots", "that died in the interval"),
+    "births": ("robots", "that were born"),
+    "malfunctions": ("robots", "that went into repair"),
+    "repairs": ("robots", "that came back from repair"),
+    "n_in_repair": ("robots", "length of the repair queue, mean over ticks"),
+    "time_at_work_s": ("s", "mean length of the stays in the tasked swarm that ended in the interval; 0 = none ended"),
+    "time_in_repair_s": ("s", "mean length of the absences that ended with a repair in the interval; 0 = none ended"),
+}
+KNOWN_CONTRIBUTIONS |= {
+    part_column("K", name): (
+        PERFORMANCE_COLUMNS[name].unit,
+        f"{name} of part K of a mixed swarm, or of kind K of robots, from 1",
+    )
+    for name in PART_COLUMNS
+}
+"""Columns of `RunRecord.contributed` that this package may write: unit and meaning. Present only where they apply."""
+
+
+def schema_table() -> str:
+    """Return the schema as a text table: name, type, unit, meaning; contributed columns last."""
+    dtypes = _KEY_DTYPES | _COLUMN_DTYPES
+    notes: dict[str, Column] = {name: hint.__metadata__[0] for name, hint in _HINTS.items()}
+    rows = [(name, dtypes[name].__name__, note.unit or "-", note.meaning) for name, note in notes.items()]
+    rows += [(name, "float64", unit, meaning + " (optional)") for name, (unit, meaning) in KNOWN_CONTRIBUTIONS.items()]
+    width = max(len(name) for name, *_ in rows) + 2
+    header = f"{'column':<{width}}{'type':<9}{'unit':<13}meaning"
+    return "\n".join(
+        [header, *(f"{name:<{width}}{dtype:<9}{unit:<13}{meaning}" for name, dtype, unit, meaning in rows)]
+    )
+
+
+@lru_cache(maxsize=1)
+def software_versions() -> dict[str, str]:
+    """Return the versions that results depend on, and the commit where the package runs from a checkout."""
+    versions = {name: metadata.version(name) for name in PACKAGES}
+    commit = _commit()
+    return versions | ({"commit": commit} if commit else {})
+
+
+@cache  # git is asked once per process: every run of a study needs the answer
+def _commit() -> str:
+    """Return the checked-out commit ("-dirty" appended when edited), or "" outside a checkout of this package."""
+    here = Path(__file__)
+    tracked = ["git", "ls-files", "--error-unmatch", here.name]
+    describe = ["git", "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"]
+    try:
+        for command in (tracked, describe):
+            answer = subprocess.run(command, cwd=here.parent, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return answer.stdout.strip()
+
+
+def _checked(name: str, values: Any, dtype: type, n_intervals: int) -> np.ndarray:
+    given = np.asarray(values)
+    if given.shape != (n_intervals,):
+        raise RecordError(f"Expected column {name} with shape (intervals,) = ({n_intervals},), got {given.shape}.")
+    column = np.array(given, dtype=dtype)
+    if not (np.isfinite(column).all() and np.array_equal(column, given)):
+        raise RecordError(f"Expected column {name} to hold finite {np.dtype(dtype).name} values, got {given.tolist()}.")
+    column.flags.writeable = False
+    return column
+
+
+def _digest(record: RunRecord, provenance: str) -> str:
+    state = hashlib.blake2b(digest_size=16)
+    state.update(json.dumps([record.keys(), record.spec, provenance], sort_keys=True).encode())
+    for name, values in record.columns().items():
+        state.update(name.encode())
+        state.update(values.tobytes())
+    return state.hexdigest()
+
+
+def _polars_type(dtype: type) -> Any:
+    import polars as pl
+
+    return {str: pl.String, int: pl.Int64, float: pl.Float64}[dtype]
+
+
+def _check_stamp(name: str, stamp: Mapping[str, str]) -> None:
+    if not set(_FILE_KEYS) <= stamp.keys():
+        raise RecordError(f"Cannot read {name}: it is a Parquet file, but no run record of swarm_forage_env.")
+    version = stamp[_FILE_KEYS[0]]
+    if version != str(SCHEMA_VERSION):
+        raise RecordError(
+            f"Cannot read {name}: it has schema version {version}, this version of swarm_forage_env reads "
+            f"{SCHEMA_VERSION}; read it with the version that wrote it."
+        )
+
+
+def _from_frame(frame: "pl.DataFrame", spec: str, provenance: dict[str, str]) -> RunRecord:
+    missing = [name for name in (*_KEY_DTYPES, *_COLUMN_DTYPES) if name not in frame.columns]
+    if missing:
+        raise RecordError(f"it has no column {missing[0]}")
+    first = frame.row(0, named=True)
+    values: dict[str, Any] = {name: dtype(first[name]) for name, dtype in _KEY_DTYPES.items()}
+    values |= {name: frame[name].to_numpy() for name in _COLUMN_DTYPES}
+    contributed = {name: frame[name].to_numpy() for name in frame.columns if name not in values}
+    return RunRecord(**values, contributed=contributed, spec=spec, provenance=provenance)

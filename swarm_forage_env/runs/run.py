@@ -1,0 +1,219 @@
+"""One run: from a specification to its record.
+
+`LiveRun` is the loop of policy and environment. Records, films and measurements of speed all use it.
+"""
+
+import time
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.contract.policy import CompiledPolicy, Policy
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.record import RunRecord, software_versions
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
+from swarm_forage_env.wrappers.recorder import RunRecorder
+
+WARM_UP_TICKS = 5
+"""Ticks of a warm-up run under its policy: enough to compile every kernel that each tick calls."""
+
+
+class LiveRun:
+    """A run between its first and its last tick. The constructor resets the environment and the policy.
+
+    Attributes:
+        forage_env: The ForageEnv at the bottom of the stack; only read it.
+        over: Whether the run has ended: horizon reached, or every robot dead.
+    """
+
+    def __init__(self, stack: ForageEnv | SwarmWrapper, policy: Policy, seed: int, *, by_ticks: bool = False) -> None:
+        """Start a run.
+
+        Args:
+            stack: The environment, with or without wrappers and recorder.
+            policy: A policy that drives no other run.
+            seed: Seed of the environment, of its wrappers and of the policy.
+            by_ticks: Never leave several ticks to one kernel: for those who look after every tick, which is then
+                faster. The run is the same.
+        """
+        self.forage_env: ForageEnv = stack.unwrapped
+        self.over = False
+        self._stack = stack
+        self._policy = policy
+        self._by_ticks = by_ticks
+        policy.reset(self.forage_env.swarm_spec, stream_rng(seed, Stream.POLICY))
+        self._obs = stack.reset_batch(seed)
+        if isinstance(stack, RunRecorder):
+            stack.divide(_told_apart(policy, self.forage_env.scenario))
+        self._has_tasks = hasattr(policy, "task")
+
+    @property
+    def compiled_policy(self) -> CompiledPolicy | None:
+        """The policy for a run without Python between ticks, see `compiled_policy_of`."""
+        return None if self._by_ticks else compiled_policy_of(self._stack, self._policy)
+
+    def advance(self, *, to_tick: int | None = None) -> None:
+        """Let policy and environment act in turn until `to_tick` ticks have passed since the start, or the run ends."""
+        compiled = self.compiled_policy
+        if compiled is not None and isinstance(self._stack, RunRecorder):
+            end = self.forage_env.max_cycles
+            n_ticks = (end if to_tick is None else min(to_tick, end)) - self.forage_env.tick
+            self._stack.run(compiled, max(0, n_ticks))
+            self.over = self.forage_env.tick >= end
+            return
+        world, policy, has_tasks, obs, over = self.forage_env, self._policy, self._has_tasks, self._obs, self.over
+        act, step = policy.act, self._stack.step_batch
+        while not over and world.tick != to_tick:
+            actions = act(obs, world.active)
+            tasks = policy.task if has_tasks else None  # type: ignore[attr-defined] - optional, see Policy
+            obs, _, terminated, truncated = step(actions, tasks=tasks)
+            # Checking the first row alone is fast, and in almost every tick it is enough.
+            over = truncated or bool(terminated[0] and terminated.all())
+        self._obs, self.over = obs, over
+
+
+def compiled_policy_of(stack: ForageEnv | SwarmWrapper, policy: Policy) -> CompiledPolicy | None:
+    """Return a policy, which was reset, for a run without Python between ticks; None where anybody might have a say.
+
+    That is a wrapper other than the recorder, a subclass, a method that was replaced, neighbours, messages
+    or an own sensor that the policy reads, a mixed swarm, robots of several kinds, or Chipmunk.
+    """
+    env = stack.unwrapped
+    if _told_apart(policy, env.scenario):  # parts are counted tick by tick
+        return None
+    is_bare = type(stack) is RunRecorder and stack.env is env and type(env) is ForageEnv
+    if not is_bare or env.scenario.physics != "compiled" or not hasattr(type(policy), "compiled"):
+        return None
+    if "after_step" in vars(stack) or "step_batch" in {*vars(stack), *vars(env)}:
+        return None
+    if env.arena.needs_python:
+        return None
+    return policy.compiled()  # type: ignore[attr-defined] - optional, see Policy
+
+
+def _told_apart(policy: Policy, scenario: ScenarioConfig) -> Sequence[slice]:
+    """Return the rows of what a record tells apart: parts of a mixed swarm, else kinds of robots, else nothing."""
+    if hasattr(policy, "part_rows"):
+        return policy.part_rows  # type: ignore[attr-defined] - optional, see Policy
+    return scenario.robots.kind_rows if scenario.robots.tells_kinds else ()
+
+
+def build_env(
+    scenario: ScenarioConfig,
+    wrappers: Iterable[WrapperConfig] = (),
+    *,
+    reads: tuple[str, ...] | None = None,
+    snapshots: bool = False,
+) -> ForageEnv | SwarmWrapper:
+    """Build the environment with its wrappers, in the documented order.
+
+    Args:
+        scenario: The scenario.
+        wrappers: Wrapper configurations in any order, each kind at most once.
+        reads: Observation slices that the policy looks at; default all.
+        snapshots: Keep what copies and snapshots need; see `ForageEnv`.
+    """
+    return wrap_in_order(ForageEnv(scenario, reads=reads, snapshots=snapshots), wrappers)
+
+
+def build_stack(
+    scenario: ScenarioConfig,
+    wrappers: Iterable[WrapperConfig] = (),
+    *,
+    reads: tuple[str, ...] | None = None,
+    snapshots: bool = False,
+) -> RunRecorder:
+    """Build the environment by `build_env`, with a recorder around it; the horizon must be whole intervals."""
+    return RunRecorder(build_env(scenario, wrappers, reads=reads, snapshots=snapshots))
+
+
+def run_policy(policy: Policy, spec: RunSpec) -> RunRecord:
+    """Drive a policy object through the run that `spec` describes.
+
+    This is for policies without a registered name, such as a closure over a trained model. `spec.policy` is then only
+    the name under which the result is stored.
+
+    Args:
+        policy: A fresh instance; it drives only this run.
+        spec: The run.
+    """
+    started = Started.now()
+    recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
+    LiveRun(recorder, policy, spec.seed).advance()
+    recorder.close()
+    return finished_record(recorder, spec, started)
+
+
+class Started(NamedTuple):
+    """When a run began, by the clocks of this process, s."""
+
+    wall_s: float
+    cpu_s: float
+    """Of all threads: another run in the same process counts, too."""
+
+    @classmethod
+    def now(cls) -> "Started":
+        """Read both clocks."""
+        return cls(time.perf_counter(), time.process_time())
+
+
+def finished_record(recorder: RunRecorder, spec: RunSpec, started: Started) -> RunRecord:
+    """Return the record of a run that has ended.
+
+    Args:
+        recorder: Outermost wrapper of the run.
+        spec: The run.
+        started: When it began.
+    """
+    columns: dict[str, Any] = recorder.columns()
+    origin = {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "wall_time_s": f"{time.perf_counter() - started.wall_s:.3f}",
+        "cpu_time_s": f"{time.process_time() - started.cpu_s:.3f}",
+    }
+    return RunRecord(
+        run_id=spec.run_id,
+        scenario=spec.scenario.name,
+        controller=spec.policy,
+        n_robots=spec.scenario.robots.n_robots,
+        criterion=spec.criterion,
+        criterion_value=spec.criterion_value,
+        seed=spec.seed,
+        **columns,
+        contributed=recorder.contributed(),
+        spec=spec.to_json(),
+        provenance=software_versions() | origin,
+    )
+
+
+def run_one(spec: RunSpec) -> RunRecord:
+    """Run a specification. The result depends only on `spec`, the machine and the installed versions.
+
+    Raises:
+        ValueError: no installed policy has the name, or it refuses its parameters.
+    """
+    return run_policy(load_policy(spec.policy, spec.parameters), spec)
+
+
+def warm_up(spec: RunSpec) -> None:
+    """Step a run a few ticks, so that its kernels are compiled and cached before many processes need them.
+
+    So early in a run a policy may not use the gripper. In one more tick every robot therefore grasps, because the
+    kernel of interactions takes longest to compile. Where the whole run is one kernel, it is compiled already.
+    """
+    policy = load_policy(spec.policy, spec.parameters)
+    recorder = build_stack(spec.scenario, spec.wrappers, reads=getattr(policy, "reads", None))
+    run = LiveRun(recorder, policy, spec.seed)
+    run.advance(to_tick=WARM_UP_TICKS)
+    if run.compiled_policy is None:
+        grasping = np.zeros((spec.scenario.robots.n_robots, 3), np.float32)
+        grasping[:, 2] = Grip.GRASP
+        recorder.step_batch(grasping)
+    recorder.close()

@@ -1,0 +1,147 @@
+"""RunStore: a folder with one file per finished run, and one per failed run.
+
+    <folder>/<run_id>.parquet         a RunRecord
+    <folder>/failures/<run_id>.json   a RunFailure; gone once the run succeeds
+
+Every file appears whole or not at all, and only the driver of a study writes, so a folder can be read at any time.
+"""
+
+import errno
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env.runs.record import RecordError, RunRecord
+from swarm_forage_env.runs.spec import RunSpec
+
+FAILURES = "failures"
+"""Name of the sub-folder for failed runs."""
+_WAY_OUT = "Move the file away, and its run will be made again."
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RunFailure:
+    """A run that did not finish, and why."""
+
+    spec: RunSpec
+    error: str
+    """The exception in one line."""
+    traceback: str
+
+    @property
+    def run_id(self) -> str:
+        """Identity of the run that failed."""
+        return self.spec.run_id
+
+
+class RunStore:
+    """Records and failures in a folder; the folder is created by the first write."""
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        """Use `folder`.
+
+        Raises:
+            NotADirectoryError: there is a file of that name.
+        """
+        self.folder = Path(folder)
+        if self.folder.exists() and not self.folder.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, "Expected a folder for run records, got a file", str(self.folder))
+
+    def path(self, run_id: str) -> Path:
+        """Return where the record of a run is, or would be."""
+        return self.folder / f"{run_id}.parquet"
+
+    def failure_path(self, run_id: str) -> Path:
+        """Return where the failure of a run is, or would be."""
+        return self.folder / FAILURES / f"{run_id}.json"
+
+    def __contains__(self, run_id: str) -> bool:
+        return self.path(run_id).is_file()
+
+    def run_ids(self) -> tuple[str, ...]:
+        """Return the ids of all finished runs, sorted."""
+        return tuple(sorted(file.stem for file in self.folder.glob("*.parquet") if not file.name.startswith(".")))
+
+    def read(self, run_id: str) -> RunRecord:
+        """Return a stored record.
+
+        Raises:
+            RecordError: the file is missing, damaged, no record, or holds another run than its name says.
+        """
+        path = self.path(run_id)
+        try:
+            record = RunRecord.read(path)
+        except RecordError as error:
+            raise RecordError(f"{error} {_WAY_OUT}" if path.exists() else str(error)) from error
+        if record.run_id != run_id:
+            raise RecordError(
+                f"Expected {path} to hold run {run_id}, got run {record.run_id}; was the file renamed? {_WAY_OUT}"
+            )
+        return record
+
+    def write(self, record: RunRecord) -> None:
+        """Store a record; an earlier failure of the same run is removed."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        record.write(self.path(record.run_id))
+        self.failure_path(record.run_id).unlink(missing_ok=True)
+
+    def write_failure(self, failure: RunFailure) -> None:
+        """Store why a run failed, with the command that runs it again."""
+        path = self.failure_path(failure.run_id)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        content = {
+            "run": failure.spec.describe(),
+            "error": failure.error,
+            "rerun": f"swarm-forage rerun {path}",
+            "traceback": failure.traceback.splitlines(),
+            "spec": failure.spec.to_mapping(),
+        }
+        with replacing(path) as draft:
+            draft.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+    def records(self) -> Iterator[RunRecord]:
+        """Read all records, in the order of their ids; raises as `read`."""
+        return (self.read(run_id) for run_id in self.run_ids())
+
+    def failures(self) -> tuple[RunFailure, ...]:
+        """Return the runs that failed and have not succeeded since.
+
+        Raises:
+            RecordError: a file in the failures folder is no failure.
+        """
+        files = sorted((self.folder / FAILURES).glob("*.json"))
+        return tuple(read_failure(file) for file in files if not file.name.startswith("."))
+
+
+def read_failure(path: str | os.PathLike[str]) -> RunFailure:
+    """Read a failure back.
+
+    Raises:
+        RecordError: the file is missing or no failure.
+    """
+    try:
+        content = parse_json(Path(path).read_text(encoding="utf-8"))
+        spec = RunSpec.from_mapping(content["spec"])
+        return RunFailure(spec=spec, error=content["error"], traceback="\n".join(content["traceback"]))
+    except OSError as error:
+        raise RecordError(f"Cannot read {path}: {error.strerror or error}.") from error
+    except (ConfigError, KeyError, TypeError, ValueError) as error:
+        raise RecordError(f"Cannot read {path}: it is no failure of a run ({error}).") from error
+
+
+def load(folder: str | os.PathLike[str]) -> tuple[RunRecord, ...]:
+    """Return all records in a folder, in the order of their ids.
+
+    Raises:
+        RecordError: the folder holds no records, or a Parquet file in it is damaged or no record; the message names it.
+    """
+    store = RunStore(folder)
+    records = tuple(store.records())
+    if not records:
+        raise RecordError(f"Expected run records (*.parquet) in {store.folder}, found none.")
+    return records

@@ -1,0 +1,437 @@
+"""The experiments behind the measures: ladders of swarm sizes and of adversity, at three budgets.
+
+An experiment is a run with one criterion at one value; every experiment is run once per seed. The criteria, the value
+that each of them varies, and its reference run:
+
+    population_size       number of robots; reference: one robot
+    throttle              amplitude of the waveform by which robots lose speed; reference: value 0, ideal throttle
+    handling_cost         amplitude of the waveform by which handling takes longer; reference: value 0, one tick
+    noise                 standard deviation of sensor and actuator noise; reference: the undisturbed run
+    population_dynamics   rates of malfunctions and repairs, or of deaths; reference: the undisturbed run
+    none                  the undisturbed run itself
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, TypeVar
+
+from swarm_forage_env._internal.fields import ConfigError, known_name, whole
+from swarm_forage_env.runs.spec import RunSpec, plan_run
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.presets import DENSITY, SEARCH_AND_RESCUE_OBJECTS, at_density, search_and_rescue
+from swarm_forage_env.scenarios.presets import scenario as preset_scenario
+from swarm_forage_env.scenarios.sizing import arena_at_density, in_arena, robots_at_density
+from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.handling import HandlingCostConfig, square_costs
+from swarm_forage_env.wrappers.noise import noise_levels
+from swarm_forage_env.wrappers.population import PopulationConfig, death_levels, malfunction_levels
+from swarm_forage_env.wrappers.throttle import ThrottleConfig, sine_throttles, square_throttles
+
+CRITERIA = ("population_size", "throttle", "handling_cost", "noise", "population_dynamics")
+UNDISTURBED = "none"
+"""Criterion of the runs in which nothing is varied."""
+STUDY_HORIZON_S = 10_000.0
+"""Length of the study's runs, for which the periods of its throttle waveforms are chosen."""
+SIZE_SWEEP_OBJECTS = {
+    "warehouse_small": 512,
+    "warehouse_medium": 2048,
+    "warehouse_dual": 512,
+    "warehouse_quad": 2048,
+}
+"""Objects while the swarm size varies: enough for the largest swarm (study configuration; dual and quad: our choice, as
+in the warehouse of that size)."""
+STUDY_LARGEST_SIZE = 2.56
+"""Largest swarm of the size sweeps in units of the usual one: 128 of 50 and 512 of 200 (study configuration)."""
+SIGMA_MAX = {
+    "warehouse_small": 0.03,
+    "warehouse_medium": 0.03,
+    "warehouse_dual": 0.03,
+    "warehouse_quad": 0.03,
+    "search_and_rescue": 0.10,
+}
+"""Highest noise of the robustness studies (paper; dual and quad: our choice, as in the other warehouses)."""
+STUDY_SIZES_OF_MALFUNCTIONS = (50, 200)
+MALFUNCTION_PER_TICK = 0.001
+AWAY_SHARE = 0.9
+"""Share of the swarm away in the equilibrium of an unlimited queue at the study's malfunction and repair rates."""
+
+_T = TypeVar("_T")
+_Waved = TypeVar("_Waved", ThrottleConfig, HandlingCostConfig)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Budget:
+    """How much computing a score may cost."""
+
+    horizon_s: float
+    """Length of a run. Throttle waveforms are compressed to it, so that they pass as many cycles as in the study;
+    population rates and noise stay as they are."""
+    interval_s: float
+    """Length of a recording interval."""
+    n_seeds: int
+    n_sizes: int | None
+    """Swarm sizes from one robot up, the largest the scenario's own; None = the sweep of the study."""
+    n_levels: int | None
+    """Levels of each kind of adversity, evenly spread up to the study's strongest; None = all of the study."""
+
+    def __post_init__(self) -> None:
+        whole("n_seeds of a budget", self.n_seeds, at_least=1)
+        whole("n_sizes of a budget", self.n_sizes, at_least=2, or_none=True)
+        whole("n_levels of a budget", self.n_levels, at_least=1, or_none=True)
+
+
+BUDGETS: dict[str, Budget] = {
+    "quick": Budget(horizon_s=4_000.0, interval_s=100.0, n_seeds=4, n_sizes=3, n_levels=2),
+    "standard": Budget(horizon_s=10_000.0, interval_s=200.0, n_seeds=16, n_sizes=5, n_levels=4),
+    "paper": Budget(horizon_s=STUDY_HORIZON_S, interval_s=200.0, n_seeds=192, n_sizes=None, n_levels=None),
+}
+"""quick: about a minute per policy, shows large differences; standard: ten minutes to an hour per policy; paper: the
+sizes, levels, length and number of runs of the study. Times for the warehouses on two cores."""
+
+
+def budget(name: str) -> Budget:
+    """Return a budget by name; raises ConfigError on an unknown one."""
+    known_name("budget", name, BUDGETS)
+    return BUDGETS[name]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Experiment:
+    """What is run once per seed."""
+
+    criterion: str
+    """One of `CRITERIA`, or `UNDISTURBED`."""
+    value: float
+    scenario: ScenarioConfig
+    wrappers: tuple[WrapperConfig, ...] = ()
+
+    @property
+    def population(self) -> PopulationConfig | None:
+        """Rates of the population dynamics, if there are any."""
+        return next((config for config in self.wrappers if isinstance(config, PopulationConfig)), None)
+
+
+def plan_experiments(
+    base: ScenarioConfig, criteria: Collection[str], budget: Budget, *, density: float | None = None
+) -> tuple[Experiment, ...]:
+    """Return the experiments of `criteria`, reference runs included, none of them twice.
+
+    Args:
+        base: The scenario; its horizon and recording interval are replaced by those of the budget.
+        criteria: Some of `CRITERIA`.
+        budget: How many sizes and levels, and how long a run is.
+        density: Robots per m^2 that all swarm sizes keep, see `size_ladder`; None = all sizes in the scenario's arena.
+
+    Raises:
+        ConfigError: an unknown criterion, a swarm of one robot when sizes are varied, or a size for which the arena has
+            no room.
+    """
+    for name in criteria:
+        known_name("criterion", name, CRITERIA)
+    scenario = replace(base, horizon_s=budget.horizon_s, interval_s=budget.interval_s)
+    experiments: list[Experiment] = []
+    if "population_size" in criteria:
+        experiments += [
+            Experiment(criterion="population_size", value=sized.robots.n_robots, scenario=sized)
+            for sized in size_ladder(scenario, budget.n_sizes, density)
+        ]
+    if "noise" in criteria or "population_dynamics" in criteria:
+        experiments.append(Experiment(criterion=UNDISTURBED, value=0.0, scenario=scenario))
+    for criterion, adversity in _ADVERSITIES.items():
+        if criterion in criteria:
+            reference, disturbed = adversity.levels(scenario)
+            chosen = spread(disturbed, budget.n_levels)
+            experiments += [
+                Experiment(criterion=criterion, value=value, scenario=scenario, wrappers=wrappers)
+                for value, wrappers in (*reference, *chosen)
+            ]
+    return tuple(experiments)
+
+
+def plan_specs(
+    experiments: Sequence[Experiment],
+    policy: str,
+    *,
+    seeds: Sequence[int],
+    parameters: Mapping[str, Any] | None = None,
+    caches: str | None = None,
+) -> tuple[RunSpec, ...]:
+    """Return one specification per experiment and seed, seed by seed.
+
+    In this order an interrupted study has complete sets of experiments, and the estimate of the remaining time is soon
+    stable.
+
+    Args:
+        experiments: What to run.
+        policy: Registered name.
+        seeds: Seeds of the runs; all experiments share them, so their runs are paired.
+        parameters: Keyword arguments of the policy.
+        caches: Which caches there are; default see `runs.spec.chosen_caches`.
+
+    Raises:
+        ConfigError: see `runs.spec.RunSpec`.
+        ValueError: no installed policy has that name.
+    """
+    return tuple(
+        plan_run(
+            experiment.scenario,
+            policy,
+            caches=caches,
+            parameters=parameters or {},
+            wrappers=experiment.wrappers,
+            criterion=experiment.criterion,
+            criterion_value=experiment.value,
+            seed=seed,
+        )
+        for seed in seeds
+        for experiment in experiments
+    )
+
+
+def spread(levels: Sequence[_T], count: int | None) -> tuple[_T, ...]:
+    """Return `count` of `levels`, evenly spread and ending with the last one; None = all."""
+    if count is None or count >= len(levels):
+        return tuple(levels)
+    return tuple(levels[(index + 1) * len(levels) // count - 1] for index in range(count))
+
+
+def size_ladder(
+    scenario: ScenarioConfig, count: int | None, density: float | None = None
+) -> tuple[ScenarioConfig, ...]:
+    """Return the scenario with one robot, with more robots, up to its own swarm size (or the largest of the study).
+
+    In search and rescue, and where a density is given, the arena grows with the swarm; the one-robot run is in the
+    smallest arena.
+
+    Args:
+        scenario: With the usual number of robots.
+        count: Number of sizes; None = powers of two up to 2.56 times the usual size (which gives the study's 128 and
+            512), or all eight arenas of search and rescue.
+        density: Robots per m^2 of all sizes but one robot; the arenas have the proportions of the scenario. Sizes for
+            which the arena would be too small are left out. Search and rescue keeps to its arenas; its default is the
+            density of the scenario.
+
+    Raises:
+        ConfigError: the scenario has one robot only, or there is no room for the largest swarm.
+    """
+    n_robots = scenario.robots.n_robots
+    if n_robots < 2:
+        raise ConfigError("Expected a scenario of at least 2 robots where swarm sizes are compared, got 1.")
+    if scenario.name == "search_and_rescue":
+        return _growing_arenas(scenario, count, density)
+    if count is None:
+        sizes = {2**power for power in range(64) if 2**power <= STUDY_LARGEST_SIZE * n_robots}
+    else:
+        # Halves of halves, so that neighbours differ by the same factor: 1, 25, 50 or 1, 6, 12, 25, 50.
+        sizes = {1, *(max(2, n_robots >> halvings) for halvings in range(count - 1))}
+    if density is not None:
+        return _growing_with_swarm(scenario, sorted(sizes), density)
+    return _in_one_arena(scenario, sorted(sizes))
+
+
+def swarms_of_sizes(
+    scenario: ScenarioConfig, sizes: Sequence[int], density: float | None = None
+) -> dict[int, ScenarioConfig]:
+    """Return the scenario with each of some swarm sizes, by size; the rules are those of `size_ladder`.
+
+    Args:
+        scenario: The scenario.
+        sizes: Numbers of robots, each once.
+        density: Robots per m^2 that all sizes but one robot keep; None = the arena of the scenario, in search and
+            rescue the smallest of its arenas that holds the swarm at 5 %.
+
+    Raises:
+        ConfigError: a size for which there is no room, or no arena.
+    """
+    for size in sizes:
+        whole("population_size", size, at_least=1)
+    if density is None and scenario.name != "search_and_rescue":
+        return dict(zip(sizes, _in_one_arena(scenario, sizes), strict=True))
+    # One robot is in the smallest arena of the others, because at the density alone it would have next to none.
+    smallest = min((size for size in sizes if size > 1), default=1)
+    worlds = {size: at_density(scenario, density or DENSITY, n_robots=max(size, smallest)) for size in sizes}
+    return {size: replace(world, robots=replace(world.robots, n_robots=size)) for size, world in worlds.items()}
+
+
+def study_values(scenario: ScenarioConfig, criterion: str) -> tuple[float, ...]:
+    """Return the values that the study gives a criterion in a scenario, the smallest first, without the value 0.
+
+    Raises:
+        ConfigError: an unknown criterion, or a swarm of one robot when sizes are varied.
+    """
+    known_name("criterion", criterion, CRITERIA)
+    if criterion == "population_size":
+        return tuple(sized.robots.n_robots for sized in size_ladder(scenario, None))
+    _, disturbed = _ADVERSITIES[criterion].levels(scenario)
+    return tuple(value for value, _ in disturbed)
+
+
+def wrappers_at(scenario: ScenarioConfig, criterion: str, value: float) -> tuple[WrapperConfig, ...]:
+    """Return the wrappers that make a value of a criterion, also a value that the study does not have.
+
+    Args:
+        scenario: With its horizon, to which waveforms are compressed, and its number of robots.
+        criterion: One of `CRITERIA` but the swarm size.
+        value: 0 is the ideal throttle or handling cost, and for the others no disturbance at all.
+
+    Raises:
+        ConfigError: an unknown criterion, or a value that its wrapper refuses.
+    """
+    known_name("criterion of adversity", criterion, _ADVERSITIES)
+    adversity = _ADVERSITIES[criterion]
+    reference, disturbed = adversity.levels(scenario)
+    known = dict([*reference, *disturbed])
+    if value in known or value == 0.0:
+        return known.get(value, ())
+    level, wrappers = disturbed[0]
+    return tuple(adversity.at(config, level, value) for config in wrappers)
+
+
+def _in_one_arena(scenario: ScenarioConfig, sizes: Sequence[int]) -> tuple[ScenarioConfig, ...]:
+    """The scenario with each size; a warehouse with its usual number of objects gets that of the size sweep."""
+    if scenario.objects.n_objects == _preset_objects(scenario.name):
+        scenario = replace(scenario, objects=replace(scenario.objects, n_objects=SIZE_SWEEP_OBJECTS[scenario.name]))
+    return tuple(replace(scenario, robots=replace(scenario.robots, n_robots=size)) for size in sizes)
+
+
+def _preset_objects(name: str) -> int | None:
+    """Number of objects in the size sweep of a preset, if it differs from the usual one; else None."""
+    return preset_scenario(name).objects.n_objects if name in SIZE_SWEEP_OBJECTS else None
+
+
+def _growing_with_swarm(scenario: ScenarioConfig, sizes: Sequence[int], density: float) -> tuple[ScenarioConfig, ...]:
+    """The scenario at constant density, one robot in the smallest arena first."""
+    arenas = {size: arena_at_density(scenario, density, size) for size in sizes if size > 1}
+    least = 2.0 * scenario.robots.start_margin_m
+    arenas = {size: arena for size, arena in arenas.items() if min(arena["width_m"], arena["height_m"]) > least}
+    if not arenas:
+        raise ConfigError(
+            f"Expected a swarm whose arena at a density of {density:g} is larger than twice robots.start_margin_m = "
+            f"{least / 2} m, got {max(sizes)} robots; ask for more robots or a lower density."
+        )
+    grown = [in_arena(scenario, arena, n_robots=size, n_objects=None) for size, arena in arenas.items()]
+    return replace(grown[0], robots=replace(grown[0].robots, n_robots=1)), *grown
+
+
+def _growing_arenas(scenario: ScenarioConfig, count: int | None, density: float | None) -> tuple[ScenarioConfig, ...]:
+    """Search and rescue at constant density, one robot in the smallest arena first."""
+    base_side = scenario.arena.width_m
+    if density is None:
+        density = scenario.robots.n_robots / (base_side * base_side)
+        if scenario.robots.n_robots == robots_at_density(base_side * base_side, DENSITY):
+            density = DENSITY  # that of the preset, without truncation to whole robots
+    smallest = min(SEARCH_AND_RESCUE_OBJECTS)
+    sides = [float(side) for side in SEARCH_AND_RESCUE_OBJECTS if count is None or side < base_side]
+    sides = sides if count is None else [*spread(sides, min(count - 2, len(sides))), base_side]
+    if count == 2:
+        sides = [base_side]
+    ladder = [_in_arena(scenario, float(smallest), 1)]
+    for side in sides:
+        sized = scenario if side == base_side else _in_arena(scenario, side, robots_at_density(side * side, density))
+        if sized.robots.n_robots > ladder[-1].robots.n_robots:
+            ladder.append(sized)
+    return tuple(ladder)
+
+
+def _in_arena(scenario: ScenarioConfig, side_m: float, n_robots: int) -> ScenarioConfig:
+    """Return `scenario` in the search and rescue arena of that side, everything else as it is."""
+    preset = search_and_rescue(side_m=side_m)
+    return replace(
+        scenario,
+        arena=preset.arena,
+        robots=replace(scenario.robots, n_robots=n_robots),
+        objects=replace(scenario.objects, n_objects=preset.objects.n_objects),
+    )
+
+
+_Level = tuple[float, tuple[WrapperConfig, ...]]
+"""Criterion value, and the wrappers that make it."""
+
+
+def _throttle_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    configs = sine_throttles() if scenario.name == "search_and_rescue" else square_throttles()
+    ideal, *levels = (_compressed(config, scenario.horizon_s / STUDY_HORIZON_S) for config in configs)
+    return [(0.0, (ideal,))], [(config.waveform.amplitude, (config,)) for config in levels]
+
+
+def _handling_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    ideal, *levels = (_compressed(config, scenario.horizon_s / STUDY_HORIZON_S) for config in square_costs())
+    return [(0.0, (ideal,))], [(config.waveform.amplitude, (config,)) for config in levels]
+
+
+def _compressed(config: _Waved, factor: float) -> _Waved:
+    period_s = config.waveform.period_s
+    if period_s is None:
+        return config
+    return replace(config, waveform=replace(config.waveform, period_s=period_s * factor))
+
+
+def _noise_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    levels: list[_Level] = []
+    for sensor, actuator in noise_levels(SIGMA_MAX.get(scenario.name, max(SIGMA_MAX.values()))):
+        assert isinstance(actuator.sigma, float), "levels are constant"
+        levels.append((actuator.sigma, (sensor, actuator)))
+    return [], levels[1:]  # the first is sigma = 0, the undisturbed run
+
+
+def _population_levels(scenario: ScenarioConfig) -> tuple[list[_Level], list[_Level]]:
+    if scenario.name == "search_and_rescue":
+        return [], [(config.death_per_tick, (config,)) for config in death_levels()]
+    return [], [(float(factor), (config,)) for factor, config in enumerate(_malfunctions(scenario.robots.n_robots), 1)]
+
+
+def repairs_per_tick(malfunction_per_tick: float, n_robots: int) -> float:
+    """Return the repair rate at which a queue without limit has `AWAY_SHARE` of the swarm in it, in equilibrium.
+
+    rho / (1 - rho) = AWAY_SHARE * N with rho = malfunctions / repairs. A swarm can lose no more robots than it has, so
+    fewer are away in its own equilibrium (docs/deciding.md).
+    """
+    return malfunction_per_tick * (1.0 + 1.0 / (AWAY_SHARE * n_robots))
+
+
+def _malfunctions(n_robots: int) -> tuple[PopulationConfig, ...]:
+    """Rates of the study; for other swarm sizes rates with the same share of the swarm away (our choice)."""
+    if n_robots in STUDY_SIZES_OF_MALFUNCTIONS:
+        return malfunction_levels(n_robots)
+    repair = repairs_per_tick(MALFUNCTION_PER_TICK, n_robots)
+    return tuple(
+        PopulationConfig(malfunction_per_tick=factor * MALFUNCTION_PER_TICK, repair_per_tick=factor * repair)
+        for factor in range(1, 9)
+    )
+
+
+def _waved_at(config: _Waved, level: float, value: float) -> _Waved:
+    wave = config.waveform
+    return replace(config, waveform=replace(wave, amplitude=value, offset=wave.offset - level + value))
+
+
+def _noise_at(config: Any, level: float, value: float) -> Any:
+    return replace(config, sigma=config.sigma - level + value)
+
+
+def _population_at(config: PopulationConfig, level: float, value: float) -> PopulationConfig:
+    factor = value / level
+    return replace(
+        config,
+        death_per_tick=config.death_per_tick * factor,
+        malfunction_per_tick=config.malfunction_per_tick * factor,
+        repair_per_tick=config.repair_per_tick * factor,
+    )
+
+
+class _Adversity(NamedTuple):
+    """One kind of adversity: the levels of the study, and what makes another level of one of them."""
+
+    levels: Callable[[ScenarioConfig], tuple[list[_Level], list[_Level]]]
+    """Scenario -> the reference, if it has wrappers, and the disturbed levels."""
+    at: Callable[[Any, float, float], Any]
+    """Wrapper of a level, value of that level, another value -> the wrapper of the other value."""
+
+
+_ADVERSITIES: dict[str, _Adversity] = {
+    "throttle": _Adversity(_throttle_levels, _waved_at),
+    "handling_cost": _Adversity(_handling_levels, _waved_at),
+    "noise": _Adversity(_noise_levels, _noise_at),
+    "population_dynamics": _Adversity(_population_levels, _population_at),
+}
+"""Criterion -> its adversity."""

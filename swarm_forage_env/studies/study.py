@@ -1,0 +1,487 @@
+"""StudySpec: all runs of a study as data: a scenario, policies, axes along which it varies, readings and seeds.
+
+A cell is one policy under one reading at one value of every axis. It is run once per seed, and all cells share the
+seeds. The last axis is the one that is plotted along x; each cell has its reference cell on it (`StudySpec.reference`).
+"""
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import cache, cached_property
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, get_origin
+
+from swarm_forage_env._internal.fields import (
+    ConfigError,
+    as_tuples,
+    check_file_name,
+    known_keys,
+    known_name,
+    several,
+    table,
+    whole,
+)
+from swarm_forage_env.policies.mixture import SHARE, has_open_share
+from swarm_forage_env.policies.registry import policy_label
+from swarm_forage_env.runs.spec import (
+    RunSpec,
+    identity_of,
+    pin_policy,
+    stated_caches,
+    wrappers_from_list,
+    wrappers_to_list,
+)
+from swarm_forage_env.scenarios.kinds import words_of_kind
+from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.quirks import READINGS
+from swarm_forage_env.studies.ladders import CRITERIA, UNDISTURBED, Experiment, swarms_of_sizes, wrappers_at
+from swarm_forage_env.wrappers.registry import wrapper_config_class
+
+if TYPE_CHECKING:
+    from swarm_forage_env.scenarios.config import ScenarioConfig
+    from swarm_forage_env.wrappers.base import WrapperConfig
+
+Value: TypeAlias = float | str | bool
+"""Place on an axis."""
+
+SIZE = "population_size"
+READING_NAMES = {"described": "DESCRIBED", "program": "AUTHORS_PROGRAM"}
+"""Word of studies -> name of the reading in `scenarios.quirks.READINGS`."""
+SCENARIO_FIELDS = (*field_sections(), "density", "side_m")
+"""What a study may set, and vary, of a scenario: all that `scenarios.presets.scenario` takes by name."""
+OF_THE_STUDY = {
+    "horizon_s": "the budget of a study sets it",
+    "interval_s": "the budget of a study sets it",
+    "quirks": "the readings of a study set them",
+}
+"""Scenario fields that something else in a study decides, and what."""
+NOTHING = "none"
+"""On an axis of lists, the list without entries."""
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Axis:
+    """What a study varies, and its values.
+
+    Raises:
+        ConfigError: a name that nothing has, no values, equal ones, or values of several kinds.
+    """
+
+    name: str
+    """A criterion (`experiments.CRITERIA`), a scenario field, a field of a wrapper ("sensor_noise.sigma",
+    "throttle.waveform.amplitude"), or `SHARE`, which policies like "mixed:ppo=share,crw=rest" have."""
+    values: tuple[Value, ...]
+    """Numbers, texts or truth values. Of a field that holds a list, texts with its entries between commas
+    (`list_word`)."""
+
+    def __post_init__(self) -> None:
+        wrapper, dot, _ = self.name.partition(".")
+        if dot:
+            wrapper_config_class(wrapper)  # refuses unknown names; the field is checked with its values
+        else:
+            allowed = (*CRITERIA, SHARE, *(name for name in SCENARIO_FIELDS if name not in OF_THE_STUDY))
+            shown_by = f"{', '.join(CRITERIA)}, {SHARE}, and the fields that swarm-forage info warehouse_small lists"
+            known_name("axis", self.name, allowed, all_by=shown_by)
+        several(f"the values of axis {self.name}", self.values, "values")
+        kinds = {_kind(value) for value in self.values}
+        if len(kinds) > 1 or "" in kinds or len(set(self.values)) < len(self.values):
+            raise ConfigError(
+                f"Expected different numbers, texts or truth values on axis {self.name}, got {list(self.values)!r}."
+            )
+        if self.name in _list_fields() and kinds != {"text"}:
+            raise ConfigError(
+                f"Expected lists on axis {self.name}, such as values = [[], [...]], got {list(self.values)!r}."
+            )
+
+    @property
+    def is_criterion(self) -> bool:
+        """Whether it varies a criterion, not a single field."""
+        return self.name in CRITERIA
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, bool):
+        return "truth value"
+    return "number" if isinstance(value, int | float) else "text" if isinstance(value, str) else ""
+
+
+def list_word(entries: Sequence[Any]) -> str:
+    """Return a list as a place on an axis: ["nest_distance", "x"] is "nest_distance,x", [] is "none".
+
+    Lists in it are joined by plus signs: [[1, 2], [3, 4]] is "1,2+3,4". So are tables, which are kinds of robots:
+    [{name = "scout", share = 0.2}, {name = "hauler"}] is "scout:share=0.2+hauler".
+    """
+    if entries and all(isinstance(entry, Mapping) for entry in entries):
+        return "+".join(map(words_of_kind, entries))
+    if any(isinstance(entry, list | tuple) for entry in entries):
+        return "+".join(map(list_word, entries))
+    return ",".join(map(str, entries)) or NOTHING
+
+
+@cache
+def _list_fields() -> dict[str, Any]:
+    """Scenario fields that hold a list -> their type."""
+    return {name: kind for name, kind in field_types().items() if get_origin(kind) is tuple}
+
+
+def _field_value(name: str, value: Value) -> Any:
+    """The value that a scenario takes for a place on the axis of a field."""
+    kind = _list_fields().get(name)
+    if kind is None:
+        return value
+    try:
+        return parse_tuple("" if value == NOTHING else str(value), kind)
+    except ConfigError:
+        raise
+    except ValueError as error:
+        raise ConfigError(f"Expected lists of numbers on axis {name}, got {value!r}.") from error
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StudyPolicy:
+    """A policy of a study."""
+
+    label: str
+    """Name in tables."""
+    policy: str
+    """Registered name, or path of a policy file."""
+    parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Keyword arguments of the policy; of a file with its digest."""
+    caches: str | None = None
+    """Which caches its runs have; None = those of the scenario."""
+
+
+def study_policy(
+    policy: str, *, label: str = "", parameters: Mapping[str, Any] | None = None, caches: str | None = None
+) -> StudyPolicy:
+    """Look a policy up and return it as a study runs it.
+
+    Args:
+        policy: Registered name, or path of a policy file.
+        label: Name in tables; default the registered name, of a file its name without the ending.
+        parameters: Keyword arguments of the policy.
+        caches: Which caches its runs have; default those that it states, else those of the scenario.
+
+    Raises:
+        ConfigError: there is no such policy, or its file cannot be opened.
+    """
+    try:
+        found, pinned, stating = pin_policy(policy, parameters or {})
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    return StudyPolicy(
+        label=label or policy_label(found),
+        policy=found,
+        parameters=pinned,
+        caches=caches or stated_caches(stating),
+    )
+
+
+class Cell(NamedTuple):
+    """One place of a study."""
+
+    reading: str
+    """Key of `READING_NAMES`."""
+    policy: str
+    """Label of a policy."""
+    values: tuple[Value, ...]
+    """One per axis."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudySpec:
+    """A study as frozen data; all values are written out, nothing is left to a budget.
+
+    Raises:
+        ConfigError: whatever cannot be: unknown names, values that scenarios or wrappers refuse, equal labels.
+    """
+
+    name: str
+    title: str = ""
+    scenario: str
+    """Name of a preset."""
+    settings: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    """Scenario fields that differ from the preset, by name."""
+    wrappers: "tuple[WrapperConfig, ...]" = ()
+    """In all runs; an axis may vary a field of them."""
+    policies: tuple[StudyPolicy, ...]
+    axes: tuple[Axis, ...]
+    reference: Value | None = None
+    """Value on the last axis at which the reference cells are; None = the study has none."""
+    readings: tuple[str, ...] = tuple(READING_NAMES)
+    budget: str = ""
+    """Name of the budget that the values follow; empty = none."""
+    seeds: tuple[int, ...]
+    horizon_s: float
+    interval_s: float
+    file: str = field(default="", compare=False)
+    """Path of the study file as it was given; empty for the paper's sets, and for studies made in Python."""
+
+    def __post_init__(self) -> None:
+        check_file_name("name of a study", self.name)
+        known_name("scenario", self.scenario, SCENARIO_NAMES)
+        for name in table("set", self.settings):
+            if name in OF_THE_STUDY:
+                raise ConfigError(f"Expected no {name} in set: {OF_THE_STUDY[name]}.")
+        known_keys(self.settings, SCENARIO_FIELDS, "scenario field")
+        several("readings", self.readings, f"of {', '.join(READING_NAMES)}")
+        for reading in self.readings:
+            known_name("reading", reading, READING_NAMES)
+        several("policies", self.policies, "policies")
+        several("seeds", self.seeds, "seeds")
+        for seed in self.seeds:
+            whole("a seed", seed, at_least=0)
+        for what, names in (
+            ("policies", [policy.label for policy in self.policies]),
+            ("axes", [axis.name for axis in self.axes]),
+            ("seeds", list(self.seeds)),
+        ):
+            if len(set(names)) < len(names):
+                raise ConfigError(f"Expected different {what} in study {self.name}, got {', '.join(map(str, names))}.")
+        if {SIZE, "n_robots"} <= {axis.name for axis in self.axes}:
+            raise ConfigError(f"Expected one axis for the swarm size, got {SIZE} and n_robots.")
+        if self.reference is not None and (not self.axes or self.reference not in self.axes[-1].values):
+            raise ConfigError(f"Expected the reference among the values of the last axis, got {self.reference!r}.")
+        if any(axis.name == SHARE for axis in self.axes):
+            for policy in self.policies:
+                if not has_open_share(policy.policy):
+                    raise ConfigError(
+                        f"Expected only mixed swarms with a part that the axis {SHARE} sets, such as "
+                        f"mixed:dpo={SHARE},crw=rest, got {policy.label}. At the share 0 or 1 they have one part."
+                    )
+        for cell in self.cells:
+            self._planned(cell)  # refuses what scenarios, wrappers and runs refuse
+
+    @cached_property
+    def cells(self) -> tuple[Cell, ...]:
+        """All cells: reading by reading, policy by policy, the last axis fastest."""
+        labels = [policy.label for policy in self.policies]
+        places = product(self.readings, labels, product(*(axis.values for axis in self.axes)))
+        return tuple(Cell(*place) for place in places)
+
+    def place_words(self, *others: "StudySpec") -> dict[Cell, tuple[str, ...]]:
+        """Return how cells are shown, those of other studies with the same axes, too: reading, policy, values."""
+        cells = dict.fromkeys(cell for study in (self, *others) for cell in study.cells)
+        words = [value_words(values) for values in zip(*(cell.values for cell in cells), strict=True)]
+        return {
+            cell: (cell.reading, cell.policy, *(of[value] for of, value in zip(words, cell.values, strict=True)))
+            for cell in cells
+        }
+
+    @property
+    def n_runs(self) -> int:
+        """How many runs there are."""
+        return len(self.cells) * len(self.seeds)
+
+    @property
+    def n_experiments(self) -> int:
+        """How many combinations of values there are, which each policy runs under each reading."""
+        return len(self.cells) // (len(self.policies) * len(self.readings))
+
+    @property
+    def robot_ticks(self) -> int:
+        """Robots times ticks of all runs."""
+        return sum(self._planned(cell).robot_ticks for cell in self.cells) * len(self.seeds)
+
+    def reference_of(self, cell: Cell) -> Cell | None:
+        """Return the cell that a cell is compared with, the same but for the last axis; None = the study has none."""
+        if self.reference is None:
+            return None
+        # The value of the axis, not an equal one of another kind: 1 and 1.0 are one place.
+        value = self.axes[-1].values[self.axes[-1].values.index(self.reference)]
+        return cell._replace(values=(*cell.values[:-1], value))
+
+    def experiment(self, cell: Cell) -> Experiment:
+        """Return scenario and wrappers of a cell, and the criterion that its runs are labelled with."""
+        return self._experiments[cell.reading, cell.values]
+
+    def specs_of(self, cell: Cell) -> tuple[RunSpec, ...]:
+        """Return the runs of a cell, one per seed."""
+        planned = self._planned(cell)
+        return tuple(replace(planned, seed=seed) for seed in self.seeds)
+
+    def expand(self) -> tuple[RunSpec, ...]:
+        """Return all runs, cell by cell and seed by seed."""
+        return tuple(spec for cell in self.cells for spec in self.specs_of(cell))
+
+    @property
+    def study_id(self) -> str:
+        """Short hexadecimal hash of all that decides which runs there are and how they are addressed."""
+        mapping = self.to_mapping()
+        for told in ("title", "budget", "file"):
+            mapping.pop(told, None)
+        return identity_of(mapping)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the study as nested plain values, ready for JSON."""
+        return {
+            "name": self.name,
+            "title": self.title,
+            "scenario": self.scenario,
+            "settings": dict(self.settings),
+            "wrappers": wrappers_to_list(self.wrappers),
+            "policies": [_plain(policy) for policy in self.policies],
+            "axes": [{"name": axis.name, "values": list(axis.values)} for axis in self.axes],
+            "reference": self.reference,
+            "readings": list(self.readings),
+            "budget": self.budget,
+            "seeds": list(self.seeds),
+            "horizon_s": self.horizon_s,
+            "interval_s": self.interval_s,
+            **({"file": self.file} if self.file else {}),
+        }
+
+    @classmethod
+    def from_toml(
+        cls,
+        file: str | Path,
+        budget: str | None = None,
+        *,
+        seeds: int | None = None,
+        readings: tuple[str, ...] | None = None,
+    ) -> "StudySpec":
+        """Read a study file; arguments and errors as in `study_file.load_study`."""
+        from swarm_forage_env.studies.study_file import load_study  # late: that module builds on this one
+
+        return load_study(file, budget, seeds=seeds, readings=readings)
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any]) -> "StudySpec":
+        """Build a study back from `to_mapping`.
+
+        Raises:
+            ConfigError: unknown or missing keys, or values that describe no study.
+        """
+        own = [item.name for item in fields(cls)]
+        known_keys(table("a study", mapping), own, "key of a study")
+        missing = [key for key in own if key not in mapping and key != "file"]
+        if missing:
+            raise ConfigError(f"Missing key {missing[0]!r} of a study.")
+        values: dict[str, Any] = dict(mapping)
+        for name, kind in (("policies", StudyPolicy), ("axes", Axis)):
+            entries = [{**table(name, entry)} for entry in values[name]]
+            for entry in entries:
+                known_keys(entry, [item.name for item in fields(kind)], f"key of {name}")
+                if "values" in entry:
+                    entry["values"] = tuple(entry["values"])
+            values[name] = tuple(kind(**entry) for entry in entries)
+        values["wrappers"] = wrappers_from_list(values["wrappers"])
+        values["settings"] = plain_settings(values["settings"])
+        for name in ("readings", "seeds"):
+            values[name] = tuple(values[name])
+        return cls(**values)
+
+    def to_json(self) -> str:
+        """Return the study as one line of JSON."""
+        return json.dumps(self.to_mapping(), sort_keys=True)
+
+    @cached_property
+    def _policies(self) -> dict[str, StudyPolicy]:
+        return {policy.label: policy for policy in self.policies}
+
+    @cached_property
+    def _experiments(self) -> dict[tuple[str, tuple[Value, ...]], Experiment]:
+        return {
+            (reading, values): self._experiment(values, world)
+            for reading in self.readings
+            for values, world in self._worlds(reading)
+        }
+
+    def _worlds(self, reading: str) -> "Iterator[tuple[tuple[Value, ...], ScenarioConfig]]":
+        """Every combination of values with its scenario: fields first, then the size of the swarm."""
+        fixed: dict[str, Any] = {"horizon_s": self.horizon_s, "interval_s": self.interval_s, **self.settings}
+        names = [axis.name for axis in self.axes]
+        place = names.index(SIZE) if SIZE in names else None
+        for values in product(*(axis.values for axis in self.axes if axis.name != SIZE)):
+            here: dict[str, Any] = dict(zip((name for name in names if name != SIZE), values, strict=True))
+            overrides: dict[str, Any] = fixed | {
+                name: _field_value(name, value) for name, value in here.items() if name in SCENARIO_FIELDS
+            }
+            density = None if place is None else overrides.pop("density", None)
+            world = scenario(self.scenario, quirks=READINGS[READING_NAMES[reading]], **overrides)
+            if place is None:
+                yield values, world
+                continue
+            sizes: Any = self.axes[place].values
+            for size, sized in swarms_of_sizes(world, sizes, density).items():
+                yield (*values[:place], size, *values[place:]), sized
+
+    def _experiment(self, values: tuple[Value, ...], sized: "ScenarioConfig") -> Experiment:
+        """Add what disturbs the swarm to its scenario, and name the criterion."""
+        configs = {config.name: config.to_mapping() for config in self.wrappers}
+        criterion, criterion_value = UNDISTURBED, 0.0
+        here = [
+            (axis, value) for axis, value in zip(self.axes, values, strict=True) if axis.name not in SCENARIO_FIELDS
+        ]
+        for axis, value in here:
+            wrapper, *path = axis.name.split(".")
+            if path:
+                configs[wrapper] = _with_value(configs.get(wrapper, {}), path, value)
+        adversities = [(axis.name, value) for axis, value in here if axis.is_criterion and axis.name != SIZE]
+        for name, value in adversities:
+            made = wrappers_at(sized, name, _as_number(name, value))
+            taken = sorted(configs.keys() & {config.name for config in made})
+            if taken:
+                raise ConfigError(f"Expected {taken[0]} from one place, got it from axis {name} and another.")
+            configs |= {config.name: config.to_mapping() for config in made}
+            if made:
+                criterion, criterion_value = name, _as_number(name, value)
+        if not adversities and any(axis.name == SIZE for axis, _ in here):
+            criterion, criterion_value = SIZE, float(sized.robots.n_robots)
+        wrappers = wrappers_from_list([{"wrapper": name, **values} for name, values in configs.items()])
+        return Experiment(criterion=criterion, value=criterion_value, scenario=sized, wrappers=wrappers)
+
+    def _planned(self, cell: Cell) -> RunSpec:
+        """The run of a cell with the first seed."""
+        experiment, policy = self.experiment(cell), self._policies[cell.policy]
+        asked = any(name == "caches" for name in (*self.settings, *(axis.name for axis in self.axes)))
+        world = experiment.scenario
+        here = zip((axis.name for axis in self.axes), cell.values, strict=True)
+        shares = {name: value for name, value in here if name == SHARE}
+        return RunSpec(
+            scenario=world if asked or policy.caches is None else replace(world, caches=policy.caches),
+            policy=policy.policy,
+            parameters={**policy.parameters, **shares},
+            wrappers=experiment.wrappers,
+            criterion=experiment.criterion,
+            criterion_value=experiment.value,
+            seed=self.seeds[0],
+        )
+
+
+def value_words(values: Iterable[Value]) -> dict[Value, str]:
+    """Return how the values of an axis are shown: 2/7 as 0.285714, but with all digits where two would look alike."""
+    short = {value: _short(value) for value in values}
+    shown = Counter(short.values())
+    return {value: word if shown[word] == 1 else str(value) for value, word in short.items()}
+
+
+def _short(value: Value) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _with_value(mapping: Mapping[str, Any], path: Sequence[str], value: Value) -> dict[str, Any]:
+    """Return nested tables with another value at the end of a path of keys."""
+    first, *others = path
+    inner = mapping.get(first, {})
+    return {**mapping, first: _with_value(table(first, inner), others, value) if others else value}
+
+
+def plain_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return scenario fields as scenarios take them: lists of a file become tuples."""
+    return {name: as_tuples(value) for name, value in settings.items()}
+
+
+def _plain(policy: StudyPolicy) -> dict[str, Any]:
+    return {item.name: getattr(policy, item.name) for item in fields(policy)} | {"parameters": dict(policy.parameters)}
+
+
+def _as_number(name: str, value: Value) -> float:
+    if isinstance(value, str | bool):
+        raise ConfigError(f"Expected numbers on axis {name}, got {value!r}.")
+    return float(value)

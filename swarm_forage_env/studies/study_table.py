@@ -1,0 +1,298 @@
+"""StudyTable: all runs of a study in one table, and the Parquet file that holds it.
+
+One row per interval of a run, in the order of the study's cells, seeds and intervals. A run that failed or is missing
+is one row without an interval, so that no run is a silent hole. The file needs nothing beside it: its metadata hold the
+study, the versions that made its runs, and a digest by which a damaged file is noticed. The same runs make the same
+bytes, in whatever order and on however many machines they were made.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.parsing import parse_json
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.runs.record import PACKAGES, RecordError, RunRecord
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import FAILURES, RunStore, read_failure
+from swarm_forage_env.studies.study import Cell, StudySpec
+from swarm_forage_env.studies.study_folder import DONE, FAILED, MISSING, CellState, StudyFolder, cell_state
+
+if TYPE_CHECKING:
+    import polars as pl
+
+TABLE_VERSION = 1
+"""Version of the layout; raised whenever a column changes its name, type or meaning."""
+AXIS = "axis_"
+"""Prefix of the columns of axes, which may be called like columns of records: throttle, handling_cost."""
+LOSS_COLUMNS = ("state", "error", "traceback", "rerun")
+"""Last columns: one of `study_run.STATES`; for failed runs the exception in one line, its traceback, and the command
+that makes the run again, given in the folder of the study."""
+_PREFIX = "swarm_forage_env.study."
+_FILE_KEYS = tuple(_PREFIX + name for name in ("table_version", "study", "versions", "digest"))
+_NOT_KEPT = ("controller",)
+"""Columns of records that are left out: the policy stands in a column of its own, under its label."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StudyTable:
+    """All runs of a study."""
+
+    spec: StudySpec
+    frame: "pl.DataFrame"
+    """Columns: `study`, `cell` (place in `spec.cells`), `reading`, `policy`, one `AXIS` column per axis; those of
+    `RunRecord`, null where a run has no such column; `LOSS_COLUMNS`."""
+    versions: tuple[Mapping[str, str], ...]
+    """Versions and commits that made the runs, each once."""
+    wall_time_s: float | None = None
+    """How long all finished runs took together, by the clock. None where it is not known: a file leaves it out, so that
+    the same runs make the same bytes."""
+
+    def rows(self, cell: Cell) -> "pl.DataFrame":
+        """Return the rows of a cell, those of failed and missing runs included.
+
+        Raises:
+            KeyError: the study has no such cell.
+        """
+        start, stop = self._spans[cell]
+        return self.frame[start:stop]
+
+    def curves(self, cell: Cell, *columns: str) -> tuple[tuple[int, ...], dict[str, FloatArray]]:
+        """Return the finished runs of a cell as arrays.
+
+        Args:
+            cell: Which cell; that of its reference is `spec.reference_of(cell)`.
+            columns: Columns of records; those that the cell's runs do not have are left out.
+
+        Returns:
+            The seeds of the R runs, rising, and for each column its values in T intervals, (R, T).
+
+        Raises:
+            KeyError: the study has no such cell.
+        """
+        rows = self.rows(cell)
+        rows = rows.filter(rows["state"] == DONE)
+        seeds = tuple(int(seed) for seed in rows["seed"].unique(maintain_order=True))
+        present = [name for name in columns if name in rows.columns and rows[name].null_count() == 0]
+        curves = {name: rows[name].to_numpy().astype(np.float64).reshape(len(seeds), -1) for name in present if seeds}
+        return seeds, curves
+
+    def spec_of(self, run_id: str) -> RunSpec:
+        """Return the specification of a run, by which it can be made again anywhere.
+
+        Raises:
+            KeyError: the study has no such run.
+        """
+        rows = self.frame.filter(self.frame["run_id"] == run_id)
+        if not len(rows):
+            raise KeyError(f"Study {self.spec.name} has no run {run_id!r}.")
+        first = rows.row(0, named=True)
+        specs = self.spec.specs_of(self.spec.cells[first["cell"]])
+        return next(spec for spec in specs if spec.seed == first["seed"])
+
+    def cell_states(self) -> tuple[CellState, ...]:
+        """Return how many runs of each cell are done, failed and missing."""
+        interval = self.frame["interval"]
+        states = self.frame.filter(interval.is_null() | (interval == 0))["state"].to_list()  # one row per run
+        n_seeds = len(self.spec.seeds)
+        return tuple(
+            cell_state(cell, states[number * n_seeds : (number + 1) * n_seeds])
+            for number, cell in enumerate(self.spec.cells)
+        )
+
+    def cells(self) -> "pl.DataFrame":
+        """Return one row per cell: where it is, whether it is a reference, and how many runs are in which state."""
+        import polars as pl
+
+        rows = [
+            {
+                **place(self.spec, state.cell),
+                "is_reference": self.spec.reference_of(state.cell) == state.cell,
+                "n_robots": self.spec.experiment(state.cell).scenario.robots.n_robots,
+                **{f"n_{name}": count for name, count in state.n_runs.items()},
+            }
+            for state in self.cell_states()
+        ]
+        return pl.DataFrame(rows, infer_schema_length=None)
+
+    def write(self, path: str | Path) -> None:
+        """Write the table to a Parquet file, whole or not at all."""
+        study, versions = self.spec.to_json(), json.dumps(self.versions, sort_keys=True)
+        values = (str(TABLE_VERSION), study, versions, _digest(self.frame, study, versions))
+        with replacing(Path(path)) as draft:
+            content = BytesIO()  # polars tells a full disk as an error of its own, among many others
+            self.frame.write_parquet(content, metadata=dict(zip(_FILE_KEYS, values, strict=True)))
+            draft.write_bytes(content.getvalue())
+
+    @cached_property
+    def _spans(self) -> dict[Cell, tuple[int, int]]:
+        """First row of each cell, and the row behind its last."""
+        numbers = np.arange(len(self.spec.cells) + 1)
+        ends = np.searchsorted(self.frame["cell"].to_numpy(), numbers).tolist()
+        return {cell: (ends[number], ends[number + 1]) for number, cell in enumerate(self.spec.cells)}
+
+
+def place(spec: StudySpec, cell: Cell) -> dict[str, Any]:
+    """Return where a cell is, by column: reading, policy, and its value on each axis; numbers are floats."""
+    values = {
+        AXIS + axis.name: value if isinstance(value, str | bool) else float(value)
+        for axis, value in zip(spec.axes, cell.values, strict=True)
+    }
+    return {"reading": cell.reading, "policy": cell.policy, **values}
+
+
+def gather_study(folder: StudyFolder) -> StudyTable:
+    """Return all runs of a study's folder as a table.
+
+    Raises:
+        RecordError: the folder holds no study, or a file of a failure is none.
+    """
+    import polars as pl
+
+    spec = folder.study()
+    versions: set[tuple[tuple[str, str], ...]] = set()
+    frames: list[pl.DataFrame] = []
+    wall_time_s = 0.0
+    for number, cell in enumerate(spec.cells):
+        records: list[RunRecord] = []
+        lost: list[dict[str, Any]] = []
+        for run in spec.specs_of(cell):
+            record = _record(folder.store, run)
+            if record is None:
+                lost.append(_loss(folder.store, run))
+            else:
+                records.append(record)
+                wall_time_s += record.wall_time_s
+                versions.add(tuple((name, record.provenance.get(name, "")) for name in (*PACKAGES, "commit")))
+        first = {"study": spec.name, "cell": number, **place(spec, cell)}
+        rows = pl.concat([_frame(records), _losses(lost)], how="diagonal").sort("seed", "interval")
+        frames.append(rows.select(*(pl.lit(value).alias(name) for name, value in first.items()), pl.all()))
+    frame = pl.concat(frames, how="diagonal")
+    return StudyTable(
+        spec=spec,
+        frame=frame.select(_in_order(frame.columns, spec)),
+        versions=tuple(dict(pairs) for pairs in sorted(versions)),
+        wall_time_s=None if math.isnan(wall_time_s) else wall_time_s,
+    )
+
+
+def read_study(path: str | Path) -> StudyTable:
+    """Read a study's table from its file; from its folder, gather it.
+
+    Raises:
+        RecordError: the file is missing, no study, damaged, or of another layout; the message names it.
+    """
+    import polars as pl
+
+    if Path(path).is_dir():
+        return gather_study(StudyFolder(path))
+    name = str(path)
+    try:
+        with Path(path).open("rb"):  # a missing or unreadable file gets another message than a damaged one
+            pass
+        stamp = pl.read_parquet_metadata(name)
+        frame = pl.read_parquet(name, glob=False)
+    except OSError as error:
+        raise RecordError(f"Cannot read {name}: {error.strerror or error}.") from error
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+        raise RecordError(f"Cannot read {name}: it is no Parquet file or a damaged one ({error}).") from error
+    if not set(_FILE_KEYS) <= stamp.keys():
+        raise RecordError(f"Cannot read {name}: it is a Parquet file, but no study of swarm_forage_env.")
+    version, study, versions, digest = (stamp[key] for key in _FILE_KEYS)
+    if version != str(TABLE_VERSION):
+        raise RecordError(
+            f"Cannot read {name}: it has layout {version}, this version of swarm_forage_env reads {TABLE_VERSION}; "
+            "read it with the version that wrote it."
+        )
+    if _digest(frame, study, versions) != digest:
+        raise RecordError(f"Cannot read {name}: its content does not match its digest, so the file is damaged.")
+    return StudyTable(spec=StudySpec.from_mapping(parse_json(study)), frame=frame, versions=tuple(parse_json(versions)))
+
+
+def _record(store: RunStore, run: RunSpec) -> RunRecord | None:
+    """The record of a run, read with the performance that the study asks for; None if it is missing or damaged."""
+    if run.run_id not in store:
+        return None
+    try:
+        return store.read(run.run_id).read_as(run.scenario.performance)
+    except RecordError:
+        return None
+
+
+def _loss(store: RunStore, run: RunSpec) -> dict[str, Any]:
+    """The row of a run without a usable record."""
+    row: dict[str, Any] = {
+        "run_id": run.run_id,
+        "scenario": run.scenario.name,
+        "n_robots": run.scenario.robots.n_robots,
+        "criterion": run.criterion,
+        "criterion_value": run.criterion_value,
+        "seed": run.seed,
+        "state": MISSING,
+    }
+    path = store.failure_path(run.run_id)
+    if run.run_id in store or not path.exists():
+        return row
+    failure = read_failure(path)
+    rerun = f"swarm-forage rerun {store.folder.name}/{FAILURES}/{path.name}"
+    return {**row, "state": FAILED, "error": failure.error, "traceback": failure.traceback, "rerun": rerun}
+
+
+def _losses(rows: Sequence[Mapping[str, Any]]) -> "pl.DataFrame":
+    """Rows of `_loss`; without a row, the columns alone."""
+    import polars as pl
+
+    schema: dict[str, Any] = {"run_id": str, "scenario": str, "n_robots": int, "criterion": str}
+    schema |= {"criterion_value": float, "seed": int, "interval": pl.Int32, **dict.fromkeys(LOSS_COLUMNS, str)}
+    return pl.DataFrame(rows, schema=schema)
+
+
+def _frame(records: Sequence[RunRecord]) -> "pl.DataFrame":
+    """The rows of one cell's records, which all have the same columns."""
+    import polars as pl
+
+    if not records:
+        return pl.DataFrame()
+    frame = pl.concat([record.to_frame() for record in records]).drop(*_NOT_KEPT)
+    return frame.with_columns(pl.lit(DONE).alias("state"))
+
+
+def _in_order(columns: Sequence[str], spec: StudySpec) -> list[str]:
+    """Columns of the place first, those of every record, contributed ones by name, and those of losses last."""
+    first = ["study", "cell", "reading", "policy", *(AXIS + axis.name for axis in spec.axes)]
+    of_records = [name for name in RunRecord.column_names() if name in columns]
+    contributed = sorted({*columns} - {*first, *of_records, *LOSS_COLUMNS})
+    return [*first, *of_records, *contributed, *LOSS_COLUMNS]
+
+
+def _digest(frame: "pl.DataFrame", *texts: str) -> str:
+    state = hashlib.blake2b(digest_size=16)
+    for part in (*texts, *_content(frame)):
+        state.update(part.encode() if isinstance(part, str) else part)
+        state.update(b"\0")
+    return state.hexdigest()
+
+
+def _content(frame: "pl.DataFrame") -> Iterator[str | bytes]:
+    """The content of a table as bytes; texts, of which most rows repeat the one above, as values and lengths."""
+    import polars as pl
+
+    for column in frame.iter_columns():
+        yield f"{column.name} {column.dtype}"
+        yield column.is_null().to_numpy().tobytes()
+        if column.dtype == pl.String:
+            runs = column.rle().struct
+            yield runs.field("len").to_numpy().tobytes()
+            yield json.dumps(runs.field("value").to_list())
+        elif column.null_count() < len(column):
+            filled = column.fill_null(False if column.dtype == pl.Boolean else 0)
+            yield filled.to_numpy().tobytes()

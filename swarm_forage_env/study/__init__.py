@@ -1,1 +1,0 @@
-"""Runs and studies: specification, execution, storage."""

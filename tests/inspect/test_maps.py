@@ -1,0 +1,119 @@
+"""Maps of the floor, from replays made by hand."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.contract.codes import ObjectStatus
+from swarm_forage_env.inspect.maps import MEANINGS, floor_maps, mean_maps
+from swarm_forage_env.inspect.replay.frames import Replay, Status
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.scenarios.presets import scenario
+
+WORLD = scenario("warehouse_small", n_robots=2, n_objects=1, horizon_s=200.0)
+
+
+@pytest.fixture
+def replay() -> Replay:
+    """Robot 0 stands at (10.1, 5.1) m and carries in frame 1, robot 1 drives from (20.1, 2.1) m to the right."""
+    metres = np.array([[[10.1, 5.1], [20.1 + frame, 2.1]] for frame in range(4)])
+    status = np.zeros((4, 2), np.uint8)
+    status[1, 0] = Status.CARRYING
+    status[2:, 0] = Status.INTERFERING
+    status[3, 1] = Status.ABSENT
+    events = [
+        (0, 0, ObjectStatus.FREE, 51, 26),
+        (1, 0, ObjectStatus.CARRIED, 0, -1),
+        (2, 0, ObjectStatus.FREE, 120, 30),
+    ]
+    return Replay(
+        spec=RunSpec(scenario=WORLD, policy="by hand"),
+        label="by hand",
+        frame_ticks=250,
+        end_tick=750,
+        position=np.rint(metres / 0.005).astype(np.uint16),
+        heading=np.zeros((4, 2), np.uint8),
+        status=status,
+        activity=None,
+        activities=(),
+        remembered=None,
+        remembered_frames=5,
+        counters=np.zeros((4, 16), np.int32),
+        object_events=np.array(events, np.int32),
+        deliveries=np.zeros((0, 4), np.int32),
+        cache_events=np.zeros((0, 5), np.int32),
+        signals={},
+        versions={},
+    )
+
+
+def test_robots_count_where_they_were_at_work(replay):
+    maps = floor_maps(replay, side_m=0.4)
+    density = maps.arrays["density"]
+    assert density.shape == (40, 80)
+    assert density[12, 25] * 0.16 == pytest.approx(1.0), "robot 0, in all frames"
+    assert [density[5, column] * 0.16 for column in (50, 52, 55)] == pytest.approx([0.25] * 3)
+    assert density.sum() * 0.16 == pytest.approx(7 / 4), "two robots, one of them gone in the last frame"
+    assert maps.arrays["interference"][12, 25] * 0.16 == pytest.approx(0.5)
+
+
+def test_objects_count_where_they_lay_and_where_they_were_dropped(replay):
+    arrays = floor_maps(replay, side_m=0.4).arrays
+    per_event = 1000.0 / 150.0 / 0.16
+    assert arrays["pickups"][13, 25] == pytest.approx(per_event), "the middle of cell (51, 26)"
+    assert arrays["drops"][12, 25] == pytest.approx(per_event), "where the robot was"
+    assert arrays["pickups"].sum() == arrays["drops"].sum() == pytest.approx(per_event)
+    assert arrays.keys() == MEANINGS.keys()
+
+
+def test_squares_need_not_fit_the_arena(replay):
+    """The arena is 32 m x 16 m: the last square is 2 m wide, and the uppermost row 1 m high."""
+    replay = dataclasses.replace(replay, position=np.rint(replay.position_m * [1.5, 3.0] / 0.005).astype(np.uint16))
+    density = floor_maps(replay, side_m=5.0).arrays["density"]
+    assert density.shape == (4, 7)
+    assert density[3, 3] * (5.0 * 1.0) == pytest.approx(1.0), "robot 0 at (15.15, 15.3) m, in all frames"
+    assert density[1, 6] * (2.0 * 5.0) == pytest.approx(3 / 4), "robot 1 from (30.15, 6.3) m on, until it is gone"
+
+
+def test_a_difference_is_what_is_more_here(replay):
+    other = floor_maps(dataclasses.replace(replay, status=np.full((4, 2), Status.REPAIR, np.uint8), label="other"))
+    mine = floor_maps(replay)
+    more = mine.minus(other)
+    assert (more.label, more.is_difference) == ("by hand minus other", True)
+    assert np.array_equal(more.arrays["density"], mine.arrays["density"])
+    assert not more.arrays["drops"].any()
+
+
+def test_maps_that_do_not_match_are_refused(replay):
+    with pytest.raises(ConfigError, match="one shape with as many squares"):
+        floor_maps(replay).minus(floor_maps(replay, side_m=1.0))
+    with pytest.raises(ConfigError, match="side_m"):
+        floor_maps(replay, side_m=0.1)
+
+
+def test_arenas_of_one_shape_are_compared_at_corresponding_places(replay):
+    mine = floor_maps(replay)
+    larger = dataclasses.replace(mine, size_m=(64.0, 32.0), side_m=0.8, arrays={"density": mine.arrays["density"] + 1})
+    assert larger.minus(mine).arrays["density"] == pytest.approx(1.0)
+    narrow = dataclasses.replace(mine, size_m=(64.0, 16.0))
+    with pytest.raises(ConfigError, match="one shape"):
+        narrow.minus(mine)
+
+
+def test_means_and_shares_of_robots(replay):
+    mine = floor_maps(replay)
+    assert np.array_equal(mine.per_robot().arrays["density"], mine.arrays["density"] / 2)
+    nothing = dataclasses.replace(mine, arrays={name: 0 * array for name, array in mine.arrays.items()})
+    both = mean_maps((mine, nothing), "both")
+    assert both.label == "both"
+    assert np.array_equal(both.arrays["drops"], mine.arrays["drops"] / 2)
+
+
+def test_arrays_go_to_a_file(replay, tmp_path):
+    maps = floor_maps(replay)
+    maps.write(tmp_path / "maps.npz")
+    with np.load(tmp_path / "maps.npz") as stored:
+        assert {*stored} == {*MEANINGS, "side_m", "size_m", "n_robots"}
+        assert np.array_equal(stored["density"], maps.arrays["density"])

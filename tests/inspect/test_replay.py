@@ -1,0 +1,476 @@
+"""Replays: they show the run that its record describes, come back from their files, and change nothing."""
+
+import dataclasses
+import json
+import tracemalloc
+import zlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from swarm_forage_env.contract.codes import Counter, ObjectStatus, Task
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.inspect.replay import capture
+from swarm_forage_env.inspect.replay import files as files_module
+from swarm_forage_env.inspect.replay.capture import record_replay
+from swarm_forage_env.inspect.replay.coding import pack, unpack
+from swarm_forage_env.inspect.replay.files import read_replays, write_replays
+from swarm_forage_env.inspect.replay.frames import HEADING_STEPS, Replay, ReplayError, Status
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.rendering.view import RenderError
+from swarm_forage_env.runs.run import LiveRun, build_env, run_one
+from swarm_forage_env.runs.spec import plan_run
+from swarm_forage_env.scenarios.kinds import RobotKind, kind_sizes
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.recorder import TOTALS
+from swarm_forage_env.wrappers.registry import parse_wrapper
+
+CROWDED = scenario(
+    "warehouse_small",
+    n_robots=12,
+    width_m=8.0,
+    height_m=8.0,
+    nest_centre_m=(1.0, 4.0),
+    nest_size_m=(1.6, 4.0),
+    n_objects=60,
+    horizon_s=80.0,
+    interval_s=20.0,
+)
+DISTURBED = (
+    parse_wrapper("population:malfunction_per_tick=0.01,repair_per_tick=0.02,death_per_tick=0.0005"),
+    parse_wrapper("throttle:waveform=sine,amplitude=0.2,offset=0.2,period_s=40"),
+    parse_wrapper("sensor_noise:sigma=0.02"),
+)
+ARRAYS = (
+    "position",
+    "heading",
+    "status",
+    "activity",
+    "remembered",
+    "counters",
+    "object_events",
+    "deliveries",
+    "cache_events",
+    "memory_events",
+)
+
+
+def spec_of(policy: str = "stochm", wrappers=DISTURBED, **fields):
+    return plan_run(dataclasses.replace(CROWDED, **fields), policy, wrappers=wrappers, seed=5)
+
+
+@pytest.fixture(scope="module")
+def replay() -> Replay:
+    return record_replay(spec_of())[0]
+
+
+def same(one: Replay, other: Replay) -> bool:
+    pairs = [(getattr(one, name), getattr(other, name)) for name in ARRAYS]
+    return all((a is None and b is None) or (a.dtype == b.dtype and np.array_equal(a, b)) for a, b in pairs)
+
+
+# What is kept
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("policy", "wrappers", "physics"),
+    [("stochm", DISTURBED, "chipmunk"), ("dpo", (), "chipmunk"), ("stochx", (), "compiled")],
+)
+def test_a_replay_does_not_change_the_record(policy, wrappers, physics):
+    spec = spec_of(policy, wrappers, physics=physics)
+    kept, record = record_replay(spec, frame_s=0.6)
+    assert record is not None
+    assert record.same_results(run_one(spec))
+    assert kept.ticks.tolist() == [*range(0, 400, 3), 400]
+    for name, counter in TOTALS.items():
+        assert kept.counters[-1, counter] == record.columns()[name].sum(), name
+
+
+@pytest.mark.compiled
+def test_frames_show_the_run_within_half_a_step(tmp_path, monkeypatch):
+    step, states = ForageEnv.step_batch, {}
+
+    def note(self, *arguments, **options):
+        result = step(self, *arguments, **options)
+        swarm = self.swarm
+        kept = swarm.position, swarm.heading, swarm.present, swarm.active, swarm.carried_object, self.objects.cell
+        states[self.tick] = [part.copy() for part in (*kept, self.objects.status)]
+        return result
+
+    with monkeypatch.context() as patch:
+        patch.setattr(ForageEnv, "step_batch", note)
+        run_one(spec_of())
+    (kept,) = read_replays(write_replays(tmp_path / "run.html", record_replay(spec_of(), frame_s=1.0)[0]))
+    table = np.full((60, 3), -9)
+    for frame, tick in enumerate(kept.ticks.tolist()):
+        changed = kept.object_events[kept.object_events[:, 0] == frame]
+        table[changed[:, 1]] = changed[:, 2:]
+        if tick == 0:
+            continue
+        position, heading, present, active, carried, cell, status = states[tick]
+        assert np.abs(kept.position_m[frame] - position)[present].max() <= kept.position_step_m / 2 + 1e-9
+        turned = np.angle(np.exp(1j * (kept.heading_rad[frame] - heading)))[present]
+        assert np.abs(turned).max() <= np.pi / HEADING_STEPS + 1e-9
+        assert np.array_equal(kept.has(Status.ABSENT)[frame], ~present)
+        assert np.array_equal(kept.has(Status.REPAIR)[frame], present & ~active)
+        assert np.array_equal(kept.has(Status.CARRYING)[frame], carried >= 0)
+        assert np.array_equal(table[:, 0], status)
+        lies = status != ObjectStatus.CARRIED
+        assert np.array_equal(table[lies, 1:], cell[lies])
+        assert np.array_equal(carried[table[~lies, 1]], np.flatnonzero(~lies))
+
+
+@pytest.mark.compiled
+def test_a_dead_robot_stays_where_it_was_last():
+    deadly = (parse_wrapper("population:death_per_tick=0.1"),)
+    kept, record = record_replay(spec_of("crw", deadly), frame_s=0.2)
+    absent = kept.has(Status.ABSENT)
+    assert not absent[0].any()
+    assert absent[-1].all()
+    assert kept.end_tick < 400, "the run ends with the last robot"
+    assert record is not None
+    for robot in range(12):
+        gone = kept.position[absent[:, robot], robot]
+        last = kept.position[~absent[:, robot], robot][-1]
+        assert (gone == last).all()
+
+
+@pytest.mark.compiled
+def test_pick_ups_and_drops_are_those_that_were_counted():
+    kept, _ = record_replay(spec_of("dpo", (), horizon_s=400.0, physics="compiled"), frame_s=0.2)
+    frames, signs, places = kept.handovers
+    assert (np.diff(frames) >= 0).all()
+    picked = kept.counters[-1, [Counter.FREE_PICKUPS, Counter.CACHE_PICKUPS]].sum()
+    assert np.count_nonzero(signs == 1) == picked > 0
+    assert np.count_nonzero(signs == -1) == kept.counters[-1, Counter.COLLECTED] > 0
+    assert (places[signs == -1, 0] < 1.8 + 0.2).all(), "in the nest"
+    assert (places[signs == 1, 0] > 1.8).all(), "outside of it"
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("policy", "wrappers", "physics"),
+    [("dpo", (parse_wrapper("population:death_per_tick=0.001"),), "chipmunk"), ("crw", (), "compiled")],
+)
+def test_every_delivery_is_kept_however_long_frames_are(policy, wrappers, physics):
+    spec = spec_of(policy, wrappers, horizon_s=200.0, physics=physics)
+    kept, record = record_replay(spec, frame_s=40.0)
+    assert record is not None
+    ticks, robots, *steps = kept.deliveries.T
+    assert len(ticks) == record.collected.sum() == kept.counters[-1, Counter.COLLECTED] > 3
+    assert [np.count_nonzero(ticks <= tick) for tick in kept.ticks] == kept.counters[:, Counter.COLLECTED].tolist()
+    assert set(robots.tolist()) <= set(range(12))
+    left, bottom, right, top = kept.scenario.arena.nest_box_m
+    x, y = np.multiply(steps, kept.position_step_m)
+    assert ((left <= x) & (x <= right) & (bottom <= y) & (y <= top)).all()
+
+
+def places_at(replay: Replay, frame: int, robot: int) -> set[tuple[int, float, float]]:
+    """Put together what a robot remembers at a frame: kind, x, y in m."""
+    places = set()
+    for when, row, kind, *steps in replay.memory_events.tolist():
+        if row == robot and when <= frame:
+            place = (abs(kind), *(round(step * replay.position_step_m, 3) for step in steps))
+            (places.add if kind > 0 else places.remove)(place)
+    return places
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("name", ["dpo", "stochm", "mixed:crw=2,dpo=rest", "generalist"])
+def test_places_are_those_that_robots_remember(name, tmp_path):
+    spec = spec_of(name, ())
+    kept, _ = record_replay(spec, frame_s=10.0)
+    (kept,) = read_replays(write_replays(tmp_path / "a.html", kept))
+    policy = load_policy(spec.policy, spec.parameters)
+    run = LiveRun(build_env(spec.scenario, reads=policy.reads), policy, spec.seed)
+    n_places = 0
+    for frame, tick in enumerate(kept.ticks.tolist()):
+        run.advance(to_tick=tick)
+        memories = policy.describe_memories()
+        for robot in range(spec.scenario.robots.n_robots):
+            told = memories.of_robot(robot)
+            expected = {
+                (kind, *(round(kept.position_step_m * step, 3) for step in steps))
+                for kind, places_m in ((1, told.objects_m), (2, told.caches_m))
+                for steps in np.rint(places_m / kept.position_step_m).tolist()
+            }
+            assert places_at(kept, frame, robot) == expected
+            n_places += len(expected)
+    assert n_places > 0
+    assert (kept.memory_events[:, 2] < 0).any(), "something has been forgotten"
+
+
+def test_robots_without_memory_have_no_places():
+    assert record_replay(spec_of("random", ()), seconds=2.0)[0].memory_events is None
+
+
+@pytest.mark.compiled
+def test_tasks_activities_and_memories_are_those_of_the_policy():
+    spec = spec_of("stochm", ())
+    kept, _ = record_replay(spec, frame_s=2.0)
+    policy = load_policy("stochm")
+    run = LiveRun(build_env(spec.scenario, reads=policy.reads), policy, spec.seed)
+    for frame, tick in enumerate(kept.ticks.tolist()):
+        run.advance(to_tick=tick)
+        assert np.array_equal(kept.task[frame], policy.task)
+        told = [kept.activities[code] for code in kept.activity[frame]]
+        for robot, words in enumerate(told):
+            said = policy.describe_robot(robot)
+            assert ("exploring" in words) == (said.startswith(("acquire", "transport")) and "goal (" not in said
+                                              and "start of a search" not in said)  # fmt: skip
+            assert (words == "going home") == (said.startswith("homing,") or "homing;" in said)
+        if frame % kept.remembered_frames == 0:
+            remembered = kept.remembered[frame // kept.remembered_frames]
+            assert np.array_equal(remembered, policy.n_known + policy.n_caches)
+    assert kept.has_tasks
+    assert (kept.task[-1] != Task.NONE).any()
+    assert kept.remembered.max() > 0
+
+
+@pytest.mark.compiled
+def test_signals_are_the_waveforms(replay):
+    signal = DISTURBED[1].waveform.signal(0.2)
+    assert replay.signals["throttle"].tolist() == [np.float32(signal(tick)) for tick in replay.ticks.tolist()]
+
+
+@pytest.mark.compiled
+def test_a_policy_that_tells_nothing_is_shown_all_the_same(tmp_path):
+    kept, _ = record_replay(spec_of("random", ()), seconds=4.0)
+    (again,) = read_replays(write_replays(tmp_path / "run.html", kept))
+    assert (again.activity, again.remembered, again.activities, again.has_tasks) == (None, None, (), False)
+    assert same(again, kept)
+
+
+@pytest.mark.compiled
+def test_a_part_of_a_run_has_no_record():
+    kept, record = record_replay(spec_of("crw", ()), seconds=10.0)
+    assert record is None
+    assert kept.times_s[-1] == pytest.approx(10.0)
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("most", "expected"), [(12 * 81, 5), (12 * 80, 10), (12 * 20, 25), (12 * 2, 500)])
+def test_many_robots_and_long_runs_get_fewer_frames(monkeypatch, most, expected):
+    monkeypatch.setattr(capture, "MOST_POSES", most)
+    kept, _ = record_replay(spec_of("random", ()))
+    assert kept.frame_ticks == expected
+
+
+@pytest.mark.compiled
+def test_positions_of_a_huge_arena_fit():
+    world = scenario("warehouse_small", n_robots=2, n_objects=4, width_m=400.0, nest_centre_m=(3.2, 8.0))
+    kept, _ = record_replay(plan_run(world, "random"), seconds=1.0)
+    assert kept.position_step_m == pytest.approx(400.0 / 65535)
+    assert kept.position_m.max() < 400.0
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "expected"),
+    [
+        ({"seconds": 81.0}, ReplayError, "seconds <= 80"),
+        ({"seconds": 0.0}, RenderError, "seconds"),
+        ({"frame_s": 0.1}, RenderError, "frame_s"),
+        ({"frame_s": 0.3}, ReplayError, r"whole ticks of 0.2 s, got 0.3; take 0.2 or 0.4\."),
+        ({"frame_s": float("nan")}, RenderError, "frame_s"),
+    ],
+)
+def test_impossible_wishes_are_refused_before_the_run(monkeypatch, options, error, expected):
+    monkeypatch.setattr(capture, "build_stack", None)
+    with pytest.raises(error, match=expected):
+        record_replay(spec_of(), **options)
+
+
+@pytest.mark.compiled
+def test_progress_is_told():
+    told = []
+    record_replay(spec_of("random", ()), seconds=3.0, progress=lambda done, total: told.append((done, total)))
+    assert told == [(5, 15), (10, 15), (15, 15)]
+
+
+# Files
+
+
+@pytest.mark.compiled
+def test_replays_come_back_from_their_file(replay, tmp_path):
+    other, _ = record_replay(spec_of("crw", ()))
+    path = write_replays(tmp_path / "new" / "two.html", [replay, other], title="two & two")
+    again = read_replays(path)
+    assert [one.label for one in again] == ["stochm", "crw"]
+    assert "<title>two &amp; two</title>" in path.read_text()
+    for one, kept in zip(again, (replay, other), strict=True):
+        assert same(one, kept)
+        assert one.spec == kept.spec
+        assert (one.frame_ticks, one.end_tick, one.n_frames) == (kept.frame_ticks, kept.end_tick, kept.n_frames)
+        assert one.activities == kept.activities
+        assert one.versions == kept.versions
+        assert one.signals.keys() == kept.signals.keys()
+        assert all(np.array_equal(one.signals[name], kept.signals[name]) for name in kept.signals)
+
+
+@pytest.mark.compiled
+def test_runs_of_one_policy_are_told_apart(replay, tmp_path):
+    again = read_replays(write_replays(tmp_path / "three.html", [replay] * 3))
+    assert [one.label for one in again] == [
+        f"stochm with sensor noise, population, throttle{nth}" for nth in ("", " (2)", " (3)")
+    ]
+    throttled = dataclasses.replace(replay, spec=spec_of(wrappers=DISTURBED[1:]))
+    calm = dataclasses.replace(replay, spec=spec_of(wrappers=()))
+    again = read_replays(write_replays(tmp_path / "two.html", [calm, throttled]))
+    assert [one.label for one in again] == ["stochm", "stochm with sensor noise, throttle"]
+
+
+def edited(text: str, change) -> str:
+    """The page with another header."""
+    start = text.index('id="header">') + len('id="header">')
+    end = text.index("</script>", start)
+    header = json.loads(text[start:end])
+    change(header)
+    return text[:start] + json.dumps(header) + text[end:]
+
+
+def flip(text: str) -> str:
+    at = text.index('class="run">') + 400
+    return text[:at] + ("A" if text[at] != "A" else "B") + text[at + 1 :]
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("damage", "expected"),
+    [
+        (lambda text: "<p>a page</p></html>", "it is no replay page"),
+        (lambda text: text[: len(text) // 3], "it is no replay page or cut short"),
+        (lambda text: text[:-20], "it is no replay page or cut short"),
+        (flip, "it does not match its digest"),
+        (lambda text: text.replace('class="run">', 'class="run">!'), "damaged"),
+        (lambda text: text.replace('class="run"', 'class="gone"'), "damaged"),
+        (
+            lambda text: edited(text, lambda h: h.update(version=99)),
+            "version 99 of the format, .* reads 2 and 3; read it",
+        ),
+        (lambda text: edited(text, lambda h: h.update(format="else")), "no replay page of swarm_forage_env"),
+        (lambda text: edited(text, lambda h: h["runs"][0].update(seed=3)), "digest"),
+        (lambda text: edited(text, lambda h: h.pop("runs")), "damaged .no 'runs'"),
+    ],
+)
+def test_damaged_files_are_told_in_one_line(replay, tmp_path, damage, expected):
+    path = write_replays(tmp_path / "run.html", replay)
+    path.write_text(damage(path.read_text()))
+    with pytest.raises(ReplayError, match=rf"^Cannot read .*run\.html: .*({expected})") as caught:
+        read_replays(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(ReplayError, match=r"Cannot read .*gone\.html: No such file"):
+        read_replays(tmp_path / "gone.html")
+
+
+def test_no_replay_is_no_page(tmp_path):
+    with pytest.raises(ReplayError, match="at least one replay"):
+        write_replays(tmp_path / "none.html", [])
+
+
+@pytest.mark.compiled
+def test_a_write_that_is_interrupted_leaves_the_old_file(replay, tmp_path, monkeypatch):
+    path = tmp_path / "run.html"
+    path.write_text("an older page")
+
+    def interrupted(draft, target):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(type(path), "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_replays(path, replay)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["run.html"]
+    assert path.read_text() == "an older page"
+
+
+@pytest.mark.compiled
+def test_performance_that_the_world_does_not_count_is_shown_as_deliveries(replay):
+    spec = dataclasses.replace(replay.spec, scenario=dataclasses.replace(CROWDED, performance="n_carrying"))
+    other = dataclasses.replace(replay, spec=spec)
+    for one, expected in ((replay, "deliveries"), (other, "deliveries")):
+        header, _ = files_module.take_page_apart(files_module.page_of([one]))
+        assert header["runs"][0]["performance"] == {"counter": "collected", "words": expected}
+
+
+def test_the_page_is_told_where_obstacles_are(replay):
+    boxes = ((3.0, 5.0, 4.0, 6.0), (5.0, 2.0, 5.2, 4.0))
+    arena = dataclasses.replace(CROWDED.arena, obstacles=boxes)
+    spec = dataclasses.replace(replay.spec, scenario=dataclasses.replace(CROWDED, arena=arena))
+    for one, expected in ((replay, []), (dataclasses.replace(replay, spec=spec), [list(box) for box in boxes])):
+        header, _ = files_module.take_page_apart(files_module.page_of([one]))
+        assert header["runs"][0]["world"]["obstacles_m"] == expected
+
+
+def test_the_page_is_told_who_is_of_which_kind(replay):
+    kinds = (RobotKind(name="scout", share=0.25), RobotKind(name="hauler"))
+    robots = dataclasses.replace(CROWDED.robots, robot_kinds=kinds)
+    spec = dataclasses.replace(replay.spec, scenario=dataclasses.replace(CROWDED, robots=robots))
+    n_scouts = kind_sizes(kinds, robots.n_robots)[0]
+    named = [["scout", n_scouts], ["hauler", robots.n_robots - n_scouts]]
+    for one, expected in ((replay, []), (dataclasses.replace(replay, spec=spec), named)):
+        header, _ = files_module.take_page_apart(files_module.page_of([one]))
+        assert header["runs"][0]["kinds"] == expected
+
+
+# Coding
+
+
+@given(
+    st.sampled_from(["u1", "u2", "i4"]).flatmap(
+        lambda dtype: arrays.arrays(dtype, arrays.array_shapes(min_dims=1, max_dims=3, min_side=0, max_side=5))
+    )
+)
+def test_whole_numbers_come_back(array):
+    kind = f"{array.dtype.kind}{array.dtype.itemsize}"
+    again = unpack(pack(array), kind, array.shape)
+    assert again.dtype == array.dtype
+    assert np.array_equal(again, array)
+
+
+def test_floats_come_back():
+    array = np.array([0.1, -2.5, 3e8], np.float32)
+    assert np.array_equal(unpack(pack(array), "f4", (3,)), array)
+
+
+def test_straight_drives_take_little_room():
+    steps = np.cumsum(np.full((1000, 20, 2), 7, np.uint16), axis=0, dtype=np.uint16)
+    assert len(pack(steps)) < steps.nbytes / 200
+
+
+@pytest.mark.parametrize(
+    ("dtype", "shape", "expected"),
+    [
+        ("f8", (3,), "types u1, u2, i4, f4"),
+        ("u1", (4,), "Expected 4 bytes"),
+        ("u2", (3,), "Expected 6 bytes"),
+        ("u1", (2,), "Expected 2 bytes .* got more"),
+        ("f4", (2**30,), "at most 2,147,483,648 bytes, got one of shape .1073741824,"),
+    ],
+)
+def test_arrays_of_another_kind_are_refused(dtype, shape, expected):
+    with pytest.raises(ReplayError, match=expected):
+        unpack(pack(np.zeros(3, np.uint8)), dtype, shape)
+
+
+def test_no_more_is_unpacked_than_the_shape_says():
+    bomb = zlib.compress(bytes(10_000_000), 9)
+    assert len(bomb) < 10_000
+    tracemalloc.start()
+    with pytest.raises(ReplayError, match=r"Expected 3 bytes .* got more"):
+        unpack(bomb, "u1", (3,))
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 1_000_000
+
+
+def test_bytes_that_are_cut_short_are_refused():
+    packed = pack(np.arange(50, dtype=np.uint8))
+    for end in (-1, 8):
+        with pytest.raises(ReplayError, match="cut short"):
+            unpack(packed[:end], "u1", (50,))

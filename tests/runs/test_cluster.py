@@ -1,0 +1,171 @@
+"""Studies on Dask clusters of this machine: workers that die and come late change nothing."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs import cluster
+from swarm_forage_env.runs.cluster import LOCAL, SLURM, cluster_executor, slurm_cluster
+from swarm_forage_env.studies.study_folder import DONE, StudyFolder, run_study
+from swarm_forage_env.studies.study_table import gather_study
+from tests.support.tiny_study import tiny_study
+
+distributed = pytest.importorskip("distributed")
+
+ROOT = Path(__file__).resolve().parents[2]
+STUDY = tiny_study(seeds=tuple(range(6)), horizon_s=40.0, interval_s=20.0)
+
+
+def with_executor(*words):
+    with cluster_executor(*words):
+        pytest.fail("there should be no executor")
+
+
+def packed(folder):
+    gather_study(folder).write(folder.folder / "tiny.parquet")
+    return (folder.folder / "tiny.parquet").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory):
+    """The packed file as one local process makes it."""
+    folder = StudyFolder(tmp_path_factory.mktemp("local"))
+    run_study(STUDY, folder, jobs=1)
+    return packed(folder)
+
+
+@pytest.fixture
+def loopback():
+    """A cluster without workers that only this machine can reach."""
+    with distributed.LocalCluster(n_workers=0, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as made:
+        yield made
+
+
+def once_some_runs_are_stored(folder, do):
+    """Start a thread that does something in the middle of a study."""
+
+    def wait_and_do():
+        while len(folder.store.run_ids()) < 2:
+            time.sleep(0.01)
+        do()
+
+    thread = threading.Thread(target=wait_and_do)
+    thread.start()
+    return thread
+
+
+@pytest.mark.slow
+def test_a_worker_killed_in_the_middle_changes_nothing(tmp_path, loopback, expected):
+    loopback.scale(1)
+    folder = StudyFolder(tmp_path)
+    with distributed.Client(loopback) as client, cluster_executor(loopback.scheduler_address) as executor:
+        client.wait_for_workers(1, timeout=60)
+        (pid,) = client.run(os.getpid).values()
+        thread = once_some_runs_are_stored(folder, lambda: os.kill(pid, signal.SIGKILL))
+        state = run_study(STUDY, folder, executor=executor)
+        thread.join()
+        assert pid not in client.run(os.getpid).values()
+    assert state.count(DONE) == STUDY.n_runs
+    assert packed(folder) == expected
+
+
+@pytest.mark.slow
+def test_workers_may_join_late(tmp_path, loopback, expected):
+    folder = StudyFolder(tmp_path)
+    with distributed.Client(loopback) as client, cluster_executor(loopback.scheduler_address) as executor:
+        first = threading.Timer(1.0, loopback.scale, (1,))
+        first.start()
+        second = once_some_runs_are_stored(folder, lambda: loopback.scale(2))
+        state = run_study(STUDY, folder, executor=executor)
+        second.join()
+        client.wait_for_workers(2, timeout=60)
+    assert state.count(DONE) == STUDY.n_runs
+    assert packed(folder) == expected
+
+
+@pytest.mark.slow
+def test_a_cluster_of_this_machine_is_one_word(tmp_path, expected):
+    with cluster_executor(LOCAL, 1) as executor:
+        run_study(STUDY, StudyFolder(tmp_path), executor=executor)
+    assert packed(StudyFolder(tmp_path)) == expected
+
+
+ALLOCATION = {"SLURM_JOB_ID": "7", "SLURM_STEP_ID": "0", "SLURM_PROCID": "1", "SLURM_NTASKS": "3"}
+
+
+@pytest.mark.slow
+def test_the_tasks_of_an_allocation_make_one_cluster(tmp_path, expected):
+    """The command of the page in three processes, as srun starts it, with its variables."""
+    pytest.importorskip("dask_jobqueue")
+    make_one = f"""
+from pathlib import Path
+from swarm_forage_env.runs.cluster import SLURM, cluster_executor
+from swarm_forage_env.studies.study_folder import StudyFolder, run_study
+from tests.study.test_cluster import STUDY
+
+with cluster_executor(SLURM) as executor:
+    run_study(STUDY, StudyFolder(Path({str(tmp_path / "done")!r})), executor=executor)
+    print("over")
+"""
+    environment = {**os.environ, **ALLOCATION, "DASK_JOBQUEUE__SLURM__INTERFACE": "lo", "PYTHONPATH": str(ROOT)}
+    tasks = [
+        subprocess.Popen(
+            [sys.executable, "-c", make_one],
+            cwd=tmp_path,
+            env={**environment, "SLURM_PROCID": str(number)},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for number in range(3)
+    ]
+    try:
+        printed = [task.communicate(timeout=240)[0] for task in tasks]
+    finally:
+        for task in tasks:
+            task.kill()
+    assert [task.returncode for task in tasks] == [0, 0, 0]
+    assert printed == ["", "over\n", ""], "the second task does what the command says"
+    assert packed(StudyFolder(tmp_path / "done")) == expected
+    assert [path.name for path in tmp_path.iterdir()] == ["done"], "the file by which they met is gone"
+
+
+@pytest.mark.parametrize(
+    ("changes", "got"),
+    [
+        ({"SLURM_NTASKS": "2"}, "got 2 tasks"),
+        ({"SLURM_STEP_ID": ""}, "got a process that srun did not start"),
+    ],
+)
+def test_slurm_needs_tasks_that_srun_started(monkeypatch, changes, got):
+    for name, value in {**ALLOCATION, **changes}.items():
+        monkeypatch.setenv(name, value)
+    with pytest.raises(ConfigError, match=f"the process that writes, at least one worker: srun .*; {got}"):
+        with_executor(SLURM)
+
+
+@pytest.mark.slow
+def test_jobs_of_slurm_have_one_core_each():
+    pytest.importorskip("dask_jobqueue")
+    with slurm_cluster(queue="short", scheduler_options={"host": "127.0.0.1", "dashboard_address": None}) as jobs:
+        script = jobs.job_script()
+    assert "#SBATCH -p short" in script
+    assert "#SBATCH --cpus-per-task=1" in script
+    assert "--nthreads 1" in script
+
+
+def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
+    monkeypatch.setattr(cluster, "CONNECT_WITHIN_S", 0.2)
+    address = "tcp://127.0.0.1:9"
+    with pytest.raises(ConfigError, match=f"a Dask scheduler, local, slurm or slurm-jobs, got '{address}'"):
+        with_executor(address)
+    with pytest.raises(ConfigError, match="no number of workers for a running scheduler"):
+        with_executor(address, 3)
+    with pytest.raises(ConfigError, match="no number of workers for tasks of an allocation"):
+        with_executor(SLURM, 3)

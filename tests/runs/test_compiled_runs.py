@@ -1,0 +1,158 @@
+"""Runs of compiled policies in worlds with compiled bodies: without Python between ticks, and the same bit for bit."""
+
+import numpy as np
+import pytest
+
+from baselines.crw import CRWPolicy
+from baselines.stochm import STOCHMPolicy
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.codes import Task
+from swarm_forage_env.contract.policy import ActionError, Policy
+from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.run import LiveRun, build_env, build_stack
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.recorder import RunRecorder
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from tests.support.foraging import quick_world
+from tests.support.stage import assert_same_world, snapshot
+
+
+def tick_by_tick(policy: Policy) -> Policy:
+    """The policy with an `act` of somebody else, so that Python is asked in every tick."""
+    act = policy.act
+    policy.act = lambda obs, active: act(obs, active)
+    return policy
+
+
+def recorded(world: ScenarioConfig, policy: Policy, *stops: int) -> RunRecorder:
+    recorder = build_stack(world, reads=policy.reads)
+    run = LiveRun(recorder, policy, seed=4)
+    for tick in stops:
+        run.advance(to_tick=tick)
+        assert run.forage_env.tick == tick
+        assert not run.over
+    run.advance()
+    assert run.over
+    return recorder
+
+
+WORLDS = [
+    ("crw", "warehouse_small", {"n_robots": 1}),
+    ("crw", "warehouse_small", {}),
+    ("dpo", "search_and_rescue", {}),
+    ("stochm", "warehouse_small", {"nest_centre_m": (3.2, 8.0), "nest_size_m": (3.2, 12.8)}),
+    ("stochx", "warehouse_medium", {}),
+]
+
+
+@pytest.mark.parametrize(("policy", "name", "fields"), WORLDS)
+def test_a_run_without_python_is_the_run_with_it(policy, name, fields):
+    caches = load_policy(policy).caches
+    world = quick_world(name, physics="compiled", caches=caches, interval_s=60.0, **fields)
+    one = recorded(world, load_policy(policy), 7, 299, 301)
+    other = recorded(world, tick_by_tick(load_policy(policy)))
+    expected = other.columns() | other.contributed()
+    assert (one.columns() | one.contributed()).keys() == expected.keys()
+    for column, values in (one.columns() | one.contributed()).items():
+        np.testing.assert_array_equal(values, expected[column], err_msg=column)
+    for state in ("position", "heading", "carried_object"):
+        np.testing.assert_array_equal(getattr(one.unwrapped.swarm, state), getattr(other.unwrapped.swarm, state))
+    np.testing.assert_array_equal(one.unwrapped.arena.obs, other.unwrapped.arena.obs)
+    if not fields:
+        assert one.columns()["first_picked"].sum() > 0
+
+
+def is_compiled(world: ScenarioConfig, policy: Policy, *wrappers: str) -> bool:
+    stack = build_stack(world, [parse_wrapper(text) for text in wrappers], reads=policy.reads)
+    return LiveRun(stack, policy, seed=0).compiled_policy is not None
+
+
+class Proxy:
+    """Hands everything on but what it does itself, as wrappers of policies often do."""
+
+    def __init__(self, policy):
+        self.policy = policy
+
+    def __getattr__(self, name):
+        return getattr(self.policy, name)
+
+    def act(self, obs, active):
+        return 0.5 * self.policy.act(obs, active)
+
+
+class Watcher(RunRecorder):
+    def after_step(self, tasks, terminated, truncated):
+        super().after_step(tasks, terminated, truncated)
+
+
+class Slow(CRWPolicy):
+    def act(self, obs, active):
+        return 0.5 * super().act(obs, active)
+
+
+def test_python_is_asked_wherever_it_has_a_say():
+    world = scenario("warehouse_small", n_robots=2, physics="compiled")
+    assert is_compiled(world, CRWPolicy())
+    assert not is_compiled(world, Slow())
+    assert not is_compiled(world, Proxy(CRWPolicy()))
+    assert LiveRun(Watcher(build_env(world)), CRWPolicy(), seed=0).compiled_policy is None
+    patched = build_stack(world)
+    patched.after_step = lambda *arguments: None
+    assert LiveRun(patched, CRWPolicy(), seed=0).compiled_policy is None
+    assert not is_compiled(world, tick_by_tick(CRWPolicy()))
+    assert not is_compiled(world, CRWPolicy(), "sensor_noise:sigma=0.01")
+    assert not is_compiled(scenario("warehouse_small", n_robots=2), CRWPolicy())
+
+
+LAST_TICK = 5
+"""Of the faulty policies."""
+NO_TASK = max(Task) + 1
+
+
+@kernel
+def drive_until_nan(_obs, active, _draws, state, now):
+    actions = state[-1]
+    for i in range(active.size):
+        actions[i, 0], actions[i, 1], actions[i, 2] = 0.5, 0.4, -1.0
+    if now == LAST_TICK:
+        actions[2, 1] = np.nan
+
+
+@kernel
+def drive_until_no_task(_obs, active, _draws, state, now):
+    allocation, actions = state[-2], state[-1]
+    for i in range(active.size):
+        actions[i, 0], actions[i, 1], actions[i, 2] = 0.5, 0.4, -1.0
+    if now == LAST_TICK:
+        allocation.task[1] = NO_TASK
+
+
+class UntilNaN(CRWPolicy):
+    _kernel = staticmethod(drive_until_nan)
+
+
+class UntilNoTask(STOCHMPolicy):
+    _kernel = staticmethod(drive_until_no_task)
+
+
+@pytest.mark.parametrize(
+    ("policy_class", "error", "message", "ticks"),
+    [
+        (UntilNaN, ActionError, r"got \[0.5, nan, -1.0\] and \[1.0, 1.0\] for robot_2", LAST_TICK - 1),
+        (UntilNoTask, ValueError, rf"tasks with shape .* = \(4,\) .* codes \[.*{NO_TASK}\]", LAST_TICK),
+    ],
+)
+@pytest.mark.parametrize("start", [0, LAST_TICK - 1])
+def test_a_fault_ends_a_run_where_it_ends_with_python(policy_class, error, message, ticks, start):
+    world = scenario("warehouse_small", n_robots=4, n_objects=20, caches=policy_class.caches, physics="compiled")
+    ended = []
+    for policy in (policy_class(), tick_by_tick(policy_class())):
+        run = LiveRun(build_stack(world, reads=policy.reads), policy, seed=4)
+        run.advance(to_tick=start)
+        with pytest.raises(error, match=message):
+            run.advance()
+        assert policy.n_ticks == LAST_TICK
+        ended.append(snapshot(run.forage_env))
+    assert ended[0]["tick"] == ticks
+    assert_same_world(*ended)

@@ -1,0 +1,57 @@
+"""What a study costs, from a moment of each kind of run."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarm_forage_env.runs import cost as calibration
+from swarm_forage_env.runs.cost import Cost, calibrate, kind_of
+from swarm_forage_env.studies.study import READING_NAMES, Axis
+from tests.support.tiny_study import tiny_study
+
+STUDY = tiny_study(
+    axes=(Axis(name="population_size", values=(1, 2, 4, 8, 16)), Axis(name="noise", values=(0.0, 0.02))),
+    reference=None,
+)
+
+
+def test_costs_between_measured_sizes_are_in_proportion():
+    cost = Cost(n_robots=np.array([2.0, 10.0]), start_s=np.array([0.0, 8.0]), tick_s=np.array([0.1, 0.9]))
+    cell = STUDY.cells[4]
+    (spec, _) = STUDY.specs_of(cell)
+    assert (spec.scenario.robots.n_robots, spec.scenario.horizon_ticks) == (4, 20)
+    assert cost.seconds(spec) == pytest.approx(2.0 + 0.3 * 20)
+
+
+def test_three_sizes_of_every_kind_are_measured(monkeypatch):
+    told = []
+    monkeypatch.setattr(calibration, "MEASURE_S", 0.001)
+    costs = calibrate(STUDY.expand(), tell=told.append)
+    assert set(costs) == {kind_of(run) for run in STUDY.expand()}
+    assert len(costs) == 4, "two kinds of caches, with and without noise"
+    for cost in costs.values():
+        assert cost.n_robots.tolist() == [1.0, 4.0, 16.0]
+        assert (cost.tick_s > 0.0).all()
+        assert (cost.start_s > 0.0).all()
+    assert len(told) == 12
+
+
+def test_readings_and_walking_objects_are_kinds_of_their_own():
+    """The authors' program and objects that walk are other code in every tick."""
+    worlds = tiny_study(
+        axes=(Axis(name="walk_probability", values=(0.0, 0.001, 0.051)),), reference=None, readings=tuple(READING_NAMES)
+    )
+    kinds = {cell: kind_of(worlds.specs_of(cell)[0]) for cell in worlds.cells if cell.policy == "random"}
+    assert len(set(kinds.values())) == 4, "two readings, with objects that stay and objects that walk"
+    assert all(
+        (kinds[a] == kinds[b]) == (a.reading == b.reading and bool(a.values[0]) == bool(b.values[0]))
+        for a in kinds
+        for b in kinds
+    )
+
+
+def test_a_run_that_is_short_is_measured_to_its_end():
+    one = replace(STUDY, axes=(), horizon_s=2.0)
+    costs = calibrate(one.expand()[:1])
+    assert costs[kind_of(one.expand()[0])].tick_s > 0.0

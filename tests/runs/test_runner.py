@@ -1,0 +1,363 @@
+"""From specifications to records: one run, many runs, failures, interrupts, executors."""
+
+import os
+import threading
+from collections import deque
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarm_forage_env.contract.codes import Grip
+from swarm_forage_env.policies.registry import RandomPolicy, from_callable
+from swarm_forage_env.runs import runner
+from swarm_forage_env.runs.record import RecordError, RunRecord
+from swarm_forage_env.runs.run import WARM_UP_TICKS, build_stack, run_one, run_policy, warm_up
+from swarm_forage_env.runs.runner import StudyInterrupted, WorkerError, run_all, run_each
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import RunFailure, RunStore
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.world.arena import ForagingArena
+from swarm_forage_env.wrappers.base import STACK_ORDER
+from tests.support.wrapper_configs import InnerConfig, OuterConfig
+
+WORLD = scenario("warehouse_small", n_robots=3, n_objects=20, horizon_s=4.0, interval_s=2.0)
+SPECS = tuple(RunSpec(scenario=WORLD, policy="random", seed=seed) for seed in range(4))
+UNKNOWN = RunSpec(scenario=WORLD, policy="nobody")
+REFUSED = RunSpec(scenario=WORLD, policy="random", parameters={"speed": 1})
+
+
+class Refusing(Executor):
+    """Fails the test when anything is run on it."""
+
+    def submit(self, fn, /, *args, **kwargs):
+        pytest.fail("nothing should have been run")
+
+
+class Breaking(Executor):
+    """A pool that breaks with one specification; with two workers that takes down the run just before it as well."""
+
+    def __init__(self, deadly, n_workers=2):
+        self.deadly = deadly
+        self.n_workers = n_workers
+        self.doomed = Future()
+        self.broken = False
+
+    def submit(self, fn, /, *args, **kwargs):
+        if self.broken:
+            raise BrokenProcessPool("the pool is not usable any more")
+        spec = args[0] if args else None  # the check whether workers start has no arguments
+        future = Future()
+        if spec == self.deadly:
+            self.broken = True
+            for lost in (self.doomed, future):
+                lost.set_exception(BrokenProcessPool("a process died"))
+        elif fn is run_one and self.n_workers > 1 and spec.seed == self.deadly.seed - 1:
+            return self.doomed
+        else:
+            future.set_result(fn(*args))
+        return future
+
+
+def idle(obs):
+    return np.zeros((3, 3), np.float32)
+
+
+def refuse(self, obs, active):
+    raise RuntimeError("I would rather not")
+
+
+def test_a_stored_run_is_read_with_the_performance_that_is_asked_for(tmp_path):
+    store = RunStore(tmp_path)
+    run_all(SPECS[:1], store=store, jobs=1)
+    other = replace(SPECS[0], scenario=replace(WORLD, performance="n_active"))
+    found = run_all([other], store=store, executor=Refusing())
+    assert found.n_stored == 1
+    assert found.records[0].performance.tolist() == [3.0, 3.0]
+    assert RunSpec.from_json(found.records[0].spec) == other
+    assert found.records[0].same_results(run_one(other))
+    (last,) = run_all([other, SPECS[0]], store=store, executor=Refusing()).records
+    assert last.performance.tolist() == last.collected.tolist()
+
+
+def test_a_run_is_a_function_of_its_specification():
+    first, second = run_one(SPECS[0]), run_one(SPECS[0])
+    assert first.same_results(second)
+    assert not first.same_results(run_one(SPECS[1]))
+    assert (first.run_id, first.controller, first.n_robots, first.seed) == (SPECS[0].run_id, "random", 3, 0)
+    assert RunSpec.from_json(first.spec) == SPECS[0]
+    assert first.wall_time_s >= 0.0
+    assert {"created", "numpy", "pymunk"} <= first.provenance.keys()
+
+
+def test_a_policy_object_drives_the_same_run_as_its_name():
+    spec = replace(SPECS[0], policy="mine")
+    by_object = run_policy(RandomPolicy(), spec)
+    assert by_object.controller == "mine"
+    np.testing.assert_array_equal(by_object.interference_fraction, run_one(SPECS[0]).interference_fraction)
+
+
+def test_a_plain_callable_can_be_run():
+    record = run_policy(from_callable(idle), SPECS[0])
+    assert record.first_picked.sum() == 0
+    assert record.n_active.tolist() == [3.0, 3.0]
+
+
+def test_tasks_of_a_policy_are_recorded():
+    class Tasked(RandomPolicy):
+        task = np.array([1, 1, 2], np.int8)
+
+    record = run_policy(Tasked(), SPECS[0])
+    np.testing.assert_allclose(record.contributed["task_share_generalist"], 2 / 3)
+    np.testing.assert_allclose(record.contributed["task_share_harvester"], 1 / 3)
+
+
+def test_the_stack_is_built_in_the_documented_order():
+    env, names = build_stack(WORLD, (InnerConfig(), OuterConfig())), []
+    while env is not env.unwrapped:
+        names.append(STACK_ORDER[env.stack_position])
+        env = env.env
+    assert names == ["RunRecorder", "SensorNoise", "ActuatorNoise"]
+
+
+def test_warm_up_stops_after_a_few_ticks(monkeypatch):
+    ticks = []
+
+    def counted(self, obs, active):
+        ticks.append(obs)
+        return idle(obs)
+
+    monkeypatch.setattr(RandomPolicy, "act", counted)
+    warm_up(SPECS[0])
+    assert len(ticks) == 5
+
+
+def test_warm_up_reaches_the_interactions_of_a_policy_that_asks_for_nothing(monkeypatch):
+    steps, step = [], ForagingArena.step
+
+    def spied(arena, actions, **options):
+        steps.append((arena.tick, actions[:, 2].tolist()))
+        return step(arena, actions, **options)
+
+    monkeypatch.setattr(ForagingArena, "step", spied)
+    warm_up(replace(SPECS[0], policy="crw"))
+    assert steps[-1] == (WARM_UP_TICKS, [Grip.GRASP] * 3)
+
+
+def test_outcomes_come_in_the_order_of_their_specifications(tmp_path):
+    result = run_all([SPECS[2], UNKNOWN, SPECS[0], REFUSED, SPECS[0]], store=RunStore(tmp_path), jobs=1)
+    assert [record.seed for record in result.records] == [2, 0]
+    assert [failure.spec for failure in result.failures] == [UNKNOWN, REFUSED]
+    assert result.n_stored == 0
+    assert set(RunStore(tmp_path).run_ids()) == {SPECS[0].run_id, SPECS[2].run_id}
+
+
+def test_a_failed_run_says_why_and_how_to_run_it_again(tmp_path):
+    store = RunStore(tmp_path)
+    (failure,) = run_all([UNKNOWN], store=store).failures
+    assert failure.error.startswith("ValueError: Unknown policy 'nobody'")
+    assert "load_policy" in failure.traceback
+    assert store.failures() == (failure,)
+
+
+def test_finished_runs_are_read_and_not_repeated(tmp_path):
+    store = RunStore(tmp_path)
+    first = run_all(SPECS[:2], store=store, jobs=1)
+    again = run_all(SPECS[:2], store=store, executor=Refusing())
+    assert again.n_stored == 2
+    assert all(a.same_results(b) for a, b in zip(first.records, again.records, strict=True))
+    assert run_all(SPECS, store=store, jobs=1).n_stored == 2
+
+
+def test_failed_runs_are_tried_again(tmp_path, monkeypatch):
+    store = RunStore(tmp_path)
+    monkeypatch.setattr(RandomPolicy, "act", refuse)
+    assert [type(failure) for failure in run_all(SPECS[:1], store=store).failures] == [RunFailure]
+    monkeypatch.undo()
+    assert len(run_all(SPECS[:1], store=store).records) == 1
+    assert store.failures() == ()
+
+
+def test_a_damaged_record_stops_the_study_before_anything_runs(tmp_path):
+    store = RunStore(tmp_path)
+    store.path(SPECS[1].run_id).write_bytes(b"damaged")
+    with pytest.raises(RecordError, match=SPECS[1].run_id):
+        run_all(SPECS, store=store, executor=Refusing())
+
+
+def test_ctrl_c_keeps_what_is_finished_and_says_so(tmp_path, monkeypatch):
+    store, reset = RunStore(tmp_path), RandomPolicy.reset
+    started = []
+
+    def interrupted_in_the_third_run(self, task, rng):
+        started.append(self)
+        if len(started) == 3:
+            raise KeyboardInterrupt
+        reset(self, task, rng)
+
+    monkeypatch.setattr(RandomPolicy, "reset", interrupted_in_the_third_run)
+    with pytest.raises(StudyInterrupted, match="2 of 4 runs are finished and kept") as caught:
+        run_all(SPECS, store=store, jobs=1)
+    assert [record.seed for record in caught.value.result.records] == [0, 1]
+    assert len(store.run_ids()) == 2
+    monkeypatch.undo()
+    assert run_all(SPECS, store=store, jobs=1).n_stored == 2
+
+
+def test_closing_the_iterator_cancels_the_rest():
+    with ThreadPoolExecutor(1) as pool:
+        gate = threading.Event()
+        pool.submit(gate.wait)
+        futures = []
+        original, pool.submit = pool.submit, lambda *args: futures.append(original(*args)) or futures[-1]
+        outcomes = run_each(SPECS, executor=pool)
+        starter = threading.Timer(0.2, gate.set)
+        starter.start()
+        next(outcomes)
+        outcomes.close()
+        assert any(future.cancelled() for future in futures)
+        starter.join()
+
+
+def test_any_executor_gives_the_same_records():
+    with ThreadPoolExecutor(2) as pool:
+        threaded = run_all([*SPECS, UNKNOWN], executor=pool)
+        assert pool.submit(int).result() == 0  # still open
+    in_process = run_all(SPECS, jobs=1)
+    assert all(a.same_results(b) for a, b in zip(threaded.records, in_process.records, strict=True))
+    assert [failure.spec for failure in threaded.failures] == [UNKNOWN]
+
+
+def test_a_run_that_its_executor_cancels_is_a_failure():
+    class Cancelling(Executor):
+        def submit(self, fn, /, *args, **kwargs):
+            future = Future()
+            future.cancel()
+            future.set_running_or_notify_cancel()
+            return future
+
+    (failure,) = run_all(SPECS[:1], executor=Cancelling()).failures
+    assert failure.error == "CancelledError: by its executor"
+
+
+def test_a_broken_executor_that_is_not_ours_stops_the_study():
+    seen = []
+    with pytest.raises(WorkerError, match="2 runs were not started"):
+        seen.extend(run_each(SPECS, executor=Breaking(SPECS[1])))
+    assert {failure.spec for failure in seen} == set(SPECS[:2])
+
+
+def test_a_crashed_worker_costs_only_the_run_that_crashed_it(monkeypatch):
+    pools = []
+
+    @contextmanager
+    def breaking_pool(n_workers):
+        pools.append(n_workers)
+        yield Breaking(SPECS[1], n_workers)
+
+    monkeypatch.setattr(runner, "_process_pool", breaking_pool)
+    outcomes = list(runner._run_in_pool(deque((spec,) for spec in SPECS), 2))
+    assert {outcome.seed for outcome in outcomes if isinstance(outcome, RunRecord)} == {0, 2, 3}
+    (failure,) = (outcome for outcome in outcomes if isinstance(outcome, RunFailure))
+    assert failure.spec == SPECS[1]
+    assert pools[:2] == [2, 2], "the first pool broke, a second one did the rest"
+    assert set(pools[2:]) == {1}, "what was under way is tried again alone"
+
+
+def test_a_worker_that_is_killed_while_it_compiles_costs_only_its_run(monkeypatch):
+    @contextmanager
+    def breaking_pool(n_workers):
+        yield Breaking(SPECS[3], n_workers)
+
+    monkeypatch.setattr(runner, "_process_pool", breaking_pool)
+    outcomes = list(runner._run_in_pool(deque((spec,) for spec in SPECS), 2))
+    assert {outcome.seed for outcome in outcomes if isinstance(outcome, RunRecord)} == {0, 1, 2}
+    (failure,) = (outcome for outcome in outcomes if isinstance(outcome, RunFailure))
+    assert failure.spec == SPECS[3]
+    assert "was killed, most likely because memory ran out" in failure.error
+
+
+def test_a_store_that_cannot_be_written_to_is_told_before_the_first_run(full_disk, tmp_path):
+    with pytest.raises(OSError, match="File too large") as caught:
+        run_all(SPECS, store=RunStore(tmp_path / "runs"), executor=Refusing())
+    assert caught.value.filename == str(tmp_path / "runs")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_workers_that_cannot_start_are_an_error_with_a_hint(monkeypatch):
+    @contextmanager
+    def dead_pool(n_workers):
+        yield Breaking(None)
+
+    monkeypatch.setattr(runner, "_process_pool", dead_pool)
+    with pytest.raises(WorkerError, match="if __name__ == '__main__'"):
+        list(runner._run_in_pool(deque([SPECS[:1]]), 2))
+
+
+def test_thread_settings_are_put_back(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    with runner._single_threaded_children():
+        assert {os.environ[name] for name in runner.THREAD_SETTINGS} == {"1"}
+    assert os.environ["OMP_NUM_THREADS"] == "7"
+    assert "MKL_NUM_THREADS" not in os.environ
+
+
+@pytest.mark.parametrize("jobs", [0, -1])
+def test_jobs_must_be_positive(jobs):
+    with pytest.raises(ValueError, match="Expected jobs to be a whole number >= 1"):
+        run_all(SPECS, jobs=jobs)
+
+
+def test_nothing_to_do_is_no_error():
+    assert run_all([]).records == ()
+
+
+def test_progress_where_stderr_is_no_terminal_is_plain(tmp_path, capsys):
+    store = RunStore(tmp_path)
+    run_all(SPECS[:1], store=store, jobs=1)
+    run_all([*SPECS[:2], UNKNOWN], store=store, jobs=1, progress=True)
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.splitlines() == [
+        "1 of 3 runs is stored already.",
+        "1/3 runs, an estimate follows when the first run ends",
+        "3/3 runs, all done, 1 failed",
+    ]
+
+
+def test_stored_runs_of_other_versions_are_pointed_out(tmp_path, monkeypatch, capsys):
+    store = RunStore(tmp_path)
+    run_all(SPECS[:2], store=store, jobs=1)
+    run_all(SPECS[:2], store=store, jobs=1, progress=True)
+    assert capsys.readouterr().err == "2 of 2 runs are stored already.\n"
+    monkeypatch.setattr(runner, "software_versions", lambda: {"numba": "0.0"})
+    run_all(SPECS[:2], store=store, jobs=1, progress=True)
+    assert "2 of them were made by another version or commit" in capsys.readouterr().err
+    run_all(SPECS[:1], store=store, jobs=1, progress=True)
+    assert "1 of them was made by another version or commit" in capsys.readouterr().err
+
+
+@pytest.mark.compiled
+def test_local_processes_give_the_same_records(tmp_path):
+    pooled = run_all([*SPECS, UNKNOWN], store=RunStore(tmp_path), jobs=2)
+    in_process = run_all(SPECS, jobs=1)
+    assert all(a.same_results(b) for a, b in zip(pooled.records, in_process.records, strict=True))
+    assert [failure.error[:28] for failure in pooled.failures] == ["ValueError: Unknown policy '"]
+    assert "load_policy" in pooled.failures[0].traceback
+
+
+@pytest.mark.slow
+def test_dask_gives_the_same_records():
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        remote = run_all([*SPECS, UNKNOWN], executor=client.get_executor())
+    in_process = run_all(SPECS, jobs=1)
+    assert all(a.same_results(b) for a, b in zip(remote.records, in_process.records, strict=True))
+    assert [failure.spec for failure in remote.failures] == [UNKNOWN]

@@ -1,0 +1,254 @@
+"""RunSpec: its identity, and its conversion to JSON and back."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs
+from swarm_forage_env.policies import model_files
+from swarm_forage_env.policies.interface import InterfaceConfig
+from swarm_forage_env.policies.model_files import file_digest
+from swarm_forage_env.policies.network import Network, NetworkAbout
+from swarm_forage_env.policies.registry import policy_class, policy_names
+from swarm_forage_env.runs.spec import RunSpec, chosen_caches, plan_run
+from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
+from swarm_forage_env.wrappers import registry
+from tests.support.wrapper_configs import InnerConfig, OuterConfig
+
+BASE = RunSpec(scenario=scenario("warehouse_small"), policy="crw")
+
+
+@pytest.fixture
+def registered(monkeypatch):
+    monkeypatch.setitem(registry.WRAPPERS, "test_outer", "tests.support.wrapper_configs:OuterConfig")
+    monkeypatch.setitem(registry.WRAPPERS, "test_inner", "tests.support.wrapper_configs:InnerConfig")
+
+
+@pytest.mark.parametrize("policy", policy_names())
+@pytest.mark.parametrize("name", SCENARIO_NAMES)
+def test_every_scenario_and_policy_survives_json(name, policy):
+    spec = plan_run(scenario(name), policy, seed=3, criterion="noise", criterion_value=0.0043)
+    again = RunSpec.from_json(spec.to_json())
+    assert again == spec
+    assert again.run_id == spec.run_id
+    assert hash(again) == hash(spec)
+
+
+def test_quirks_parameters_and_wrappers_survive_json(registered):
+    spec = replace(
+        BASE,
+        scenario=scenario("search_and_rescue", quirks=AUTHORS_PROGRAM, nest_centre_m=(20.0, 24.0)),
+        parameters={"gain": 0.1, "levels": (1, 2), "nested": {"on": True, "none": None}},
+        wrappers=(InnerConfig(sigma=1 / 3), OuterConfig(groups=("light", "ground"))),
+    )
+    again = RunSpec.from_mapping(json.loads(json.dumps(spec.to_mapping())))
+    assert again == spec
+    assert again.wrappers == (OuterConfig(groups=("light", "ground")), InnerConfig(sigma=1 / 3))
+
+
+def test_wrappers_are_kept_in_stack_order_and_at_most_once():
+    shuffled = replace(BASE, wrappers=(InnerConfig(), OuterConfig()))
+    assert shuffled == replace(BASE, wrappers=(OuterConfig(), InnerConfig()))
+    with pytest.raises(ConfigError, match="each wrapper at most once, got test_inner, test_inner"):
+        replace(BASE, wrappers=(InnerConfig(), InnerConfig(sigma=0.2)))
+
+
+def test_the_id_is_short_and_tells_every_difference_apart():
+    variants = [
+        BASE,
+        replace(BASE, seed=1),
+        replace(BASE, policy="dpo"),
+        replace(BASE, criterion="noise"),
+        replace(BASE, criterion_value=0.1),
+        replace(BASE, parameters={"a": 1}),
+        replace(BASE, parameters={"a": True}),
+        replace(BASE, wrappers=(InnerConfig(),)),
+        replace(BASE, wrappers=(InnerConfig(sigma=0.2),)),
+        replace(BASE, scenario=scenario("warehouse_small", quirks=AUTHORS_PROGRAM)),
+        replace(BASE, scenario=scenario("warehouse_small", n_robots=49)),
+    ]
+    ids = {spec.run_id for spec in variants}
+    assert len(ids) == len(variants)
+    assert {len(run_id) for run_id in ids} == {16}
+    assert all(int(run_id, 16) >= 0 for run_id in ids)
+
+
+def test_equal_numbers_give_equal_ids_however_they_are_spelt():
+    whole, real = (replace(BASE, scenario=scenario("warehouse_small", horizon_s=value)) for value in (2000, 2000.0))
+    assert whole == real
+    assert whole.run_id == real.run_id
+
+
+def test_another_performance_is_the_same_run():
+    other = replace(BASE, scenario=scenario("warehouse_small", performance="n_carrying"))
+    assert other != BASE
+    assert other.run_id == BASE.run_id
+
+
+def test_another_engine_is_another_run():
+    assert replace(BASE, scenario=scenario("warehouse_small", physics="compiled")).run_id != BASE.run_id
+
+
+def test_a_specification_without_an_engine_is_one_in_chipmunk():
+    mapping = BASE.to_mapping()
+    assert mapping["scenario"].pop("physics") == "chipmunk"
+    assert RunSpec.from_mapping(mapping) == BASE
+
+
+@pytest.mark.parametrize("seed", [-1, 2**63, 1.0, True, "1"])
+def test_bad_seeds_are_refused(seed):
+    with pytest.raises(ConfigError, match="Expected seed to be a whole number"):
+        replace(BASE, seed=seed)
+
+
+@pytest.mark.parametrize("value", [float("nan"), object(), {1, 2}])
+def test_parameters_must_be_plain(value):
+    with pytest.raises(ConfigError, match="plain JSON values"):
+        replace(BASE, parameters={"a": value})
+
+
+def test_a_horizon_of_broken_intervals_is_refused():
+    with pytest.raises(ConfigError, match="whole number of intervals of 200 s, got 300 s"):
+        replace(BASE, scenario=scenario("warehouse_small", horizon_s=300.0))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "run specification as JSON"),
+        ("[]", "JSON object, got list"),
+        ('{"policy": "crw"}', "Missing key 'scenario'"),
+        ('{"polcy": "crw"}', "Unknown key of a run specification 'polcy'. Did you mean 'policy'"),
+    ],
+)
+def test_texts_that_are_no_specification(text, message):
+    with pytest.raises(ConfigError, match=message):
+        RunSpec.from_json(text)
+
+
+def test_mappings_with_unknown_parts_are_refused():
+    mapping = BASE.to_mapping()
+    mapping["scenario"]["arena"]["widht_m"] = 1.0
+    with pytest.raises(ConfigError, match=r"Unknown key 'scenario\.arena\.widht_m'.* Did you mean 'width_m'"):
+        RunSpec.from_mapping(mapping)
+    for wrapper, message in (({"wrapper": "fog"}, "Unknown wrapper 'fog'"), ({"sigma": 1}, "Missing key 'wrapper'")):
+        with pytest.raises(ConfigError, match=message):
+            RunSpec.from_mapping({**BASE.to_mapping(), "wrappers": [wrapper]})
+    for part, message in (
+        ({"scenario": "warehouse_small"}, "Expected scenario to be a table of values by name, got 'warehouse_small'"),
+        ({"wrappers": "fog"}, "Expected wrappers as a list of tables, got 'fog'"),
+        ({"wrappers": ["fog"]}, "Missing key 'wrapper' .* 'fog'"),
+    ):
+        with pytest.raises(ConfigError, match=message):
+            RunSpec.from_mapping({**BASE.to_mapping(), **part})
+    with pytest.raises(ConfigError, match="Expected scenario to be a ScenarioConfig, got 'warehouse_small'"):
+        RunSpec(scenario="warehouse_small", policy="crw")
+
+
+class ForStatic:
+    caches = "static"
+
+
+class TellsLater:
+    @property
+    def caches(self):
+        return "static"
+
+
+@pytest.mark.parametrize(
+    ("asked", "policy", "of_scenario", "chosen"),
+    [
+        (None, object(), "none", "none"),
+        (None, object(), "dynamic", "dynamic"),
+        (None, ForStatic, "none", "static"),
+        (None, ForStatic(), "none", "static"),
+        (None, ForStatic, "dynamic", "static"),
+        (None, TellsLater, "dynamic", "dynamic"),
+        (None, TellsLater(), "dynamic", "static"),
+        ("none", ForStatic, "dynamic", "none"),
+        ("dynamic", ForStatic, "none", "dynamic"),
+        ("dynamic", object(), "none", "dynamic"),
+    ],
+)
+def test_caches_are_those_asked_for_or_of_the_policy_or_of_the_scenario(asked, policy, of_scenario, chosen):
+    assert chosen_caches(asked, policy, scenario("warehouse_small", caches=of_scenario)) == chosen
+
+
+@pytest.mark.parametrize("policy", policy_names())
+def test_a_planned_run_has_the_world_its_policy_is_made_for(policy):
+    made_for = getattr(policy_class(policy), "caches", "none")
+    assert plan_run(scenario("warehouse_small"), policy).scenario.caches == made_for
+    for caches in ("none", "static", "dynamic"):
+        assert plan_run(scenario("warehouse_small"), policy, caches=caches).scenario.caches == caches
+
+
+def test_a_policy_that_states_no_caches_leaves_the_scenario_alone():
+    assert plan_run(scenario("warehouse_small", caches="static"), "random").scenario.caches == "static"
+
+
+def test_planning_an_unknown_policy_suggests_the_nearest():
+    with pytest.raises(ValueError, match=r"Unknown policy 'crv'\. Did you mean 'crw'"):
+        plan_run(scenario("warehouse_small"), "crv")
+
+
+def test_describe_is_one_line():
+    text = replace(BASE, seed=7, criterion="noise", criterion_value=0.03).describe()
+    assert text == f"{text[:16]}: crw in warehouse_small, 50 robots, seed 7, noise = 0.03"
+
+
+def network_file(path, *, caches="none", seed=0):
+    """A network from compact observations to motions, with random weights."""
+    weights = np.random.default_rng(seed).normal(size=(23, 6)).astype(np.float32)
+    interface = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True)
+    network = Network((weights,), (np.zeros(6, np.float32),), NetworkAbout(interface=interface, caches=caches))
+    network.save(path)
+    return path
+
+
+def test_the_content_of_a_policy_file_is_part_of_the_runs_identity(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    world = scenario("warehouse_small")
+    network_file(tmp_path / "net.npz")
+    first = plan_run(world, "net.npz")
+    assert first == plan_run(world, str(tmp_path / "net.npz"))
+    network_file(tmp_path / "net.npz", seed=1)
+    assert plan_run(world, "net.npz").run_id != first.run_id
+
+
+def test_a_policy_file_runs_in_the_world_it_was_made_for(tmp_path):
+    path = str(network_file(tmp_path / "net.npz", caches="static"))
+    assert plan_run(scenario("warehouse_small"), path).scenario.caches == "static"
+    assert plan_run(scenario("warehouse_small"), path, caches="dynamic").scenario.caches == "dynamic"
+
+
+def test_a_missing_policy_file_is_found_before_anything_is_run(tmp_path):
+    with pytest.raises(ValueError, match=r"gone\.npz"):
+        plan_run(scenario("warehouse_small"), str(tmp_path / "gone.npz"))
+
+
+def test_a_file_that_is_pinned_already_stays_so(tmp_path):
+    """A plan of many runs opens a file once; that the file has changed since is found by the run."""
+    path, pinned = str(tmp_path / "gone.npz"), {"digest": "0"}
+    spec = plan_run(scenario("warehouse_small"), path, parameters=pinned, caches="none")
+    assert (spec.policy, spec.parameters) == (path, pinned)
+
+
+def test_a_pinned_file_is_opened_to_learn_what_caches_it_is_made_for(tmp_path):
+    path = str(network_file(tmp_path / "net.npz", caches="static"))
+    pinned = plan_run(scenario("warehouse_small"), path).parameters
+    assert plan_run(scenario("warehouse_small"), path, parameters=pinned).scenario.caches == "static"
+    network_file(tmp_path / "net.npz", seed=1)
+    with pytest.raises(ValueError, match="a file that has changed since"):
+        plan_run(scenario("warehouse_small"), path, parameters=pinned)
+
+
+def test_runs_of_a_file_open_it_once(tmp_path, monkeypatch):
+    opened = []
+    monkeypatch.setattr(model_files, "file_digest", lambda path: opened.append(path) or file_digest(path))
+    path = str(network_file(tmp_path / "net.npz"))
+    plan_runs(ScenarioOptions(scenario="warehouse_small"), [path], n_seeds=3, first_seed=5)
+    assert opened == [path, path]  # once to pin it, once to try it

@@ -1,0 +1,93 @@
+"""Ablation of quirks: which runs are planned, which are left out, and what the differences are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.store import RunStore
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, QUIRK_NAMES, Quirks
+from swarm_forage_env.studies.ablation import TASK_COLUMNS, Cell, plan_ablation, run_ablation
+from swarm_forage_env.wrappers.noise import SensorNoiseConfig
+
+WORLD = scenario("warehouse_small", n_robots=6, horizon_s=40.0, interval_s=20.0, start_margin_m=6.5)
+
+
+def test_each_quirk_is_switched_alone_in_both_readings():
+    plan = plan_ablation([WORLD], ["crw"], seeds=[3])
+    rules = {cell: specs[0].scenario.quirks for cell, specs in plan.specs.items()}
+    assert len(rules) == 2 * (1 + len(QUIRK_NAMES))
+    assert rules[Cell("warehouse_small", 6, "crw", "DESCRIBED", "")] == Quirks()
+    assert rules[Cell("warehouse_small", 6, "crw", "AUTHORS_PROGRAM", "")] == AUTHORS_PROGRAM
+    for name in QUIRK_NAMES:
+        assert rules[Cell("warehouse_small", 6, "crw", "DESCRIBED", name)] == Quirks(**{name: True})
+        off = {other: other != name for other in QUIRK_NAMES}
+        assert rules[Cell("warehouse_small", 6, "crw", "AUTHORS_PROGRAM", name)] == Quirks(**off)
+
+
+def test_a_quirk_without_effect_is_run_once_and_one_with_effect_with_every_seed(tmp_path):
+    store = RunStore(tmp_path)
+    quirks = ["nest_left_at_random", "explore_double_start"]
+    plan = plan_ablation([WORLD], ["crw"], quirks=quirks, seeds=[0, 1])
+    result = run_ablation(plan, store=store, jobs=1)
+    assert len(plan.all) == 12
+    # Nobody delivers in 40 s, so nobody leaves the nest after it; exploring starts in the first tick.
+    assert len(list(tmp_path.rglob("*.parquet"))) == 4 + 2 * 1 + 2 * 2
+    effects = {effect.cell[3:]: effect for effect in result.effects()}
+    assert effects.keys() == {(reading, quirk) for reading in ("DESCRIBED", "AUTHORS_PROGRAM") for quirk in quirks}
+    for reading in ("DESCRIBED", "AUTHORS_PROGRAM"):
+        assert effects[reading, "nest_left_at_random"].is_same
+        assert effects[reading, "nest_left_at_random"].interference.tolist() == [0.0]
+        assert not effects[reading, "explore_double_start"].is_same
+        assert len(effects[reading, "explore_double_start"].interference) == 2
+    assert result.failures == ()
+
+
+def test_differences_are_those_of_the_runs_with_the_same_seed():
+    world = scenario("warehouse_small", n_robots=20, n_objects=300, horizon_s=400.0)
+    plan = plan_ablation([world], ["stochm"], quirks=["integer_estimates"], seeds=[0, 1])
+    effect = next(e for e in run_ablation(plan, jobs=1).effects() if e.cell.reading == "DESCRIBED")
+    pairs = [[run_one(plan.specs[effect.cell._replace(quirk=quirk)][seed]) for quirk in ("", "integer_estimates")]
+             for seed in (0, 1)]  # fmt: skip
+    mean = np.mean([before.performance.sum() for before, _ in pairs])
+    for seed, (before, after) in enumerate(pairs):
+        gain = after.performance.sum() - before.performance.sum()
+        assert effect.performance[seed] == pytest.approx(gain / mean, nan_ok=True)
+        lost = after.interference_fraction.mean() - before.interference_fraction.mean()
+        assert effect.interference[seed] == pytest.approx(lost)
+        moved = [after.contributed[name].mean() - before.contributed[name].mean() for name in TASK_COLUMNS]
+        assert effect.task_shares[seed] == pytest.approx(moved)
+
+
+def test_policies_are_ordered_by_performance():
+    world = scenario("warehouse_small", n_robots=20, horizon_s=1000.0)
+    result = run_ablation(plan_ablation([world], ["random", "dpo"], quirks=[], seeds=[0]), jobs=1)
+    assert list(result.means(Cell("warehouse_small", 20, "", "DESCRIBED", ""))) == ["dpo", "random"]
+    assert result.effects() == ()
+
+
+def test_two_worlds_of_one_name_and_size_are_refused():
+    with pytest.raises(
+        ConfigError, match="differ in name or number of robots, got warehouse_small with 6 robots twice"
+    ):
+        plan_ablation([WORLD, replace(WORLD, horizon_s=60.0)], ["crw"], quirks=[])
+
+
+def test_disturbances_are_the_same_in_all_runs():
+    plan = plan_ablation([WORLD], ["crw"], quirks=["explore_double_start"], wrappers=[SensorNoiseConfig(sigma=0.01)])
+    assert {spec.wrappers for spec in plan.all} == {(SensorNoiseConfig(sigma=0.01),)}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"quirks": ["integer_estimate"]}, "Did you mean 'integer_estimates'"),
+        ({"seeds": []}, "one or more policies and seeds, got 1 and 0"),
+    ],
+)
+def test_impossible_plans_are_refused(words, message):
+    with pytest.raises(ConfigError, match=message):
+        plan_ablation([WORLD], ["crw"], **words)

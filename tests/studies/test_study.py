@@ -1,0 +1,231 @@
+"""Studies as data: cells, runs, references, identity."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
+from swarm_forage_env.studies.ladders import BUDGETS, plan_experiments, plan_specs, study_values, wrappers_at
+from swarm_forage_env.studies.study import Axis, Cell, StudySpec, study_policy
+from swarm_forage_env.wrappers.noise import ActuatorNoiseConfig, SensorNoiseConfig
+from swarm_forage_env.wrappers.population import PopulationConfig
+from swarm_forage_env.wrappers.waveform import Waveform
+
+CRW, STOCHM = study_policy("crw"), study_policy("stochm")
+
+
+def study(*axes, **changes):
+    given = {"name": "mine", "scenario": "warehouse_small", "policies": (CRW,), "seeds": (0, 1), "horizon_s": 400.0,
+             "interval_s": 200.0, "readings": ("described",)}  # fmt: skip
+    return StudySpec(axes=axes, **given | changes)
+
+
+def test_every_combination_is_a_cell_and_every_cell_has_all_seeds():
+    spec = study(
+        Axis(name="n_objects", values=(10, 20)),
+        Axis(name="population_size", values=(1, 3)),
+        policies=(CRW, STOCHM),
+        readings=("described", "program"),
+        reference=1,
+    )
+    assert len(spec.cells) == 2 * 2 * 2 * 2
+    assert spec.cells[0] == Cell("described", "crw", (10, 1))
+    assert spec.cells[1] == Cell("described", "crw", (10, 3))
+    assert spec.cells[-1] == Cell("program", "stochm", (20, 3))
+    assert (spec.n_experiments, spec.n_runs, len(spec.expand())) == (4, 32, 32)
+    assert len({run.run_id for run in spec.expand()}) == 32
+    last = spec.specs_of(spec.cells[-1])
+    assert [run.seed for run in last] == [0, 1]
+    world = last[0].scenario
+    assert (world.robots.n_robots, world.objects.n_objects, world.caches) == (3, 20, "static")
+    assert (world.quirks, world.horizon_s, world.interval_s) == (AUTHORS_PROGRAM, 400.0, 200.0)
+    assert spec.experiment(spec.cells[0]).scenario.quirks == Quirks()
+    assert spec.robot_ticks == sum(run.robot_ticks for run in spec.expand()) == 8 * 2 * (1 + 3) * 2000
+
+
+def test_the_reference_of_a_cell_differs_on_the_last_axis_only():
+    spec = study(Axis(name="population_size", values=(2, 4)), Axis(name="throttle", values=(0.0, 0.2)), reference=0.0)
+    cell = Cell("described", "crw", (4, 0.2))
+    assert spec.reference_of(cell) == Cell("described", "crw", (4, 0.0))
+    assert spec.reference_of(cell) in spec.cells
+    assert replace(spec, reference=None).reference_of(cell) is None
+
+
+def test_fields_that_hold_lists_can_vary():
+    spec = study(Axis(name="nest_size_m", values=("3.2,12.8", "3.2,6.4")))
+    sizes = [spec.experiment(cell).scenario.arena.nest_size_m for cell in spec.cells]
+    assert sizes == [(3.2, 12.8), (3.2, 6.4)]
+    assert StudySpec.from_mapping(json.loads(spec.to_json())) == spec
+    spec = study(Axis(name="own_sensors", values=("none", "nest_distance,x")))
+    assert [spec.experiment(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance", "x")]
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "words"),
+    [
+        ("own_sensors", (1, 2), "Expected lists on axis own_sensors, such as"),
+        ("nest_size_m", ("3.2,wide",), "Expected lists of numbers on axis nest_size_m, got '3.2,wide'"),
+    ],
+)
+def test_what_is_no_list_is_refused_on_an_axis_of_lists(name, values, words):
+    with pytest.raises(ConfigError, match=words):
+        study(Axis(name=name, values=values))
+
+
+@pytest.mark.parametrize("criterion", ["population_size", "throttle", "noise", "population_dynamics", "handling_cost"])
+def test_the_runs_of_one_criterion_are_those_of_a_score(criterion):
+    """One fact in one place: whoever scored a policy before finds its runs again."""
+    world = scenario("warehouse_small", horizon_s=400.0)
+    budget = replace(BUDGETS["paper"], horizon_s=400.0)
+    planned = plan_specs(plan_experiments(world, [criterion], budget), "stochm", seeds=(0, 1))
+    values = study_values(world, criterion)
+    spec = study(Axis(name=criterion, values=values if 1 in values[:1] and criterion == "population_size"
+                      else (0.0, *values)), policies=(STOCHM,))  # fmt: skip
+    assert {run.run_id for run in spec.expand()} == {run.run_id for run in planned}
+
+
+def test_sizes_of_search_and_rescue_have_the_arenas_of_its_series():
+    spec = study(Axis(name="population_size", values=(1, 12, 115)), scenario="search_and_rescue")
+    worlds = [spec.experiment(cell).scenario for cell in spec.cells]
+    assert [(w.arena.width_m, w.robots.n_robots, w.objects.n_objects) for w in worlds] == [
+        (16.0, 1, 80), (16.0, 12, 80), (48.0, 115, 368)]  # fmt: skip
+
+
+def test_a_density_holds_for_all_sizes():
+    spec = study(Axis(name="population_size", values=(1, 10, 40)), settings={"density": 0.1})
+    worlds = [spec.experiment(cell).scenario for cell in spec.cells]
+    areas = [w.arena.width_m * w.arena.height_m for w in worlds]
+    assert areas[0] == areas[1], "one robot has the smallest arena of the others"
+    assert areas[1] == pytest.approx(100.0, rel=0.1)
+    assert areas[2] == pytest.approx(400.0, rel=0.1)
+
+
+def test_values_that_the_paper_does_not_have():
+    world = scenario("warehouse_small")
+    (throttle,) = wrappers_at(world, "throttle", 0.17)
+    assert throttle.waveform == Waveform(kind="square", amplitude=0.17, offset=0.17, period_s=5000.0)
+    assert throttle.carriers
+    (cost,) = wrappers_at(world, "handling_cost", 30.0)
+    assert (cost.waveform.amplitude, cost.waveform.offset) == (30.0, 31.0)
+    assert wrappers_at(world, "noise", 0.02) == (SensorNoiseConfig(sigma=0.02), ActuatorNoiseConfig(sigma=0.02))
+    assert wrappers_at(world, "noise", 0.0) == ()
+    (population,) = wrappers_at(world, "population_dynamics", 2.5)
+    assert population.malfunction_per_tick == pytest.approx(0.0025)
+    assert population.repair_per_tick == pytest.approx(0.001022222 * 2.5)
+    (deaths,) = wrappers_at(scenario("search_and_rescue"), "population_dynamics", 0.0002)
+    assert deaths.death_per_tick == pytest.approx(0.0002)
+    assert (deaths.malfunction_per_tick, deaths.repair_per_tick) == (0.0, 0.0)
+
+
+def test_fields_of_wrappers_and_switches_of_the_scenario_are_axes_too():
+    spec = study(
+        Axis(name="integer_estimates", values=(False, True)),
+        Axis(name="caches", values=("none", "dynamic")),
+        Axis(name="sensor_noise.sigmas.position", values=(0.1,)),
+        wrappers=(SensorNoiseConfig(sigma=0.01),),
+        policies=(STOCHM,),
+    )
+    last = spec.specs_of(spec.cells[-1])[0]
+    assert last.scenario.quirks.integer_estimates
+    assert last.scenario.caches == "dynamic", "the axis goes before what the policy states"
+    assert last.wrappers == (SensorNoiseConfig(sigma=0.01, sigmas={"position": 0.1}),)
+
+
+def test_two_adversities_in_one_run_are_labelled_by_the_last():
+    spec = study(Axis(name="throttle", values=(0.2,)), Axis(name="noise", values=(0.0, 0.02)))
+    calm, noisy = (spec.experiment(cell) for cell in spec.cells)
+    assert (calm.criterion, calm.value, len(calm.wrappers)) == ("throttle", 0.2, 1)
+    assert (noisy.criterion, noisy.value, len(noisy.wrappers)) == ("noise", 0.02, 3)
+
+
+def test_a_study_survives_json_and_has_an_identity():
+    spec = study(
+        Axis(name="noise", values=(0.0, 0.02)),
+        settings={"physics": "compiled", "nest_size_m": (3.2, 6.4)},
+        wrappers=(PopulationConfig(death_per_tick=0.001),),
+        reference=0.0,
+    )
+    again = StudySpec.from_mapping(json.loads(spec.to_json()))
+    assert again.to_mapping() == spec.to_mapping()
+    assert [run.run_id for run in again.expand()] == [run.run_id for run in spec.expand()]
+    assert again.study_id == spec.study_id == replace(spec, title="another", budget="small").study_id
+    assert replace(spec, seeds=(0,)).study_id != spec.study_id
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"scenario": "warehouse_smal"}, "Did you mean 'warehouse_small'"),
+        ({"settings": {"n_object": 3}}, "Did you mean 'n_objects'"),
+        ({"settings": {"horizon_s": 3.0}}, "the budget of a study sets it"),
+        ({"settings": {"quirks": "DESCRIBED"}}, "the readings of a study set them"),
+        ({"settings": {"n_objects": 100_000}}, "Expected at most"),
+        ({"readings": ("descibed",)}, "Did you mean 'described'"),
+        ({"policies": (CRW, CRW)}, "Expected different policies"),
+        ({"policies": ()}, "one or more policies"),
+        ({"seeds": (1, 1)}, "Expected different seeds"),
+        ({"seeds": (-1,)}, "whole number >= 0"),
+        ({"reference": 3}, "among the values of the last axis"),
+        ({"interval_s": 300.0}, "whole number of intervals"),
+    ],
+)
+def test_nonsense_is_refused(changes, message):
+    with pytest.raises(ConfigError, match=message):
+        study(Axis(name="population_size", values=(1, 2)), **changes)
+
+
+@pytest.mark.parametrize(
+    ("axes", "message"),
+    [
+        ([("nois", (0.1,))], "Did you mean 'noise'"),
+        ([("horizon_s", (400.0,))], "Unknown axis"),
+        ([("sensor_nois.sigma", (0.1,))], "Did you mean 'sensor_noise'"),
+        ([("sensor_noise.sigm", (0.1,))], "Did you mean 'sigma'"),
+        ([("noise", ())], "one or more values"),
+        ([("noise", (0.1, 0.1))], "Expected different numbers"),
+        ([("noise", (0.1, "much"))], "Expected different numbers"),
+        ([("noise", ("much",))], "Expected numbers on axis noise"),
+        ([("population_size", (1.5,))], "population_size to be a whole number"),
+        ([("population_size", (2,)), ("n_robots", (2,))], "one axis for the swarm size"),
+        ([("noise", (0.1,)), ("sensor_noise.sigma", (0.1,))], "sensor_noise from one place"),
+        ([("noise", (0.1,)), ("noise", (0.2,))], "Expected different axes"),
+    ],
+)
+def test_axes_that_cannot_be_are_refused(axes, message):
+    with pytest.raises(ConfigError, match=message):
+        study(*(Axis(name=name, values=values) for name, values in axes))
+
+
+def test_unknown_keys_of_a_stored_study_are_refused():
+    mapping = study().to_mapping()
+    with pytest.raises(ConfigError, match="Did you mean 'readings'"):
+        StudySpec.from_mapping({**mapping, "reading": []})
+    del mapping["seeds"]
+    with pytest.raises(ConfigError, match="Missing key 'seeds'"):
+        StudySpec.from_mapping(mapping)
+
+
+def test_the_share_of_a_part_is_an_axis():
+    mixed = study_policy("mixed:ppo_warehouse_small=share,crw=rest", label="learned among crw")
+    spec = study(Axis(name="share", values=(0.0, 0.25, 1.0)), policies=(mixed,), reference=0.0)
+    assert StudySpec.from_mapping(json.loads(spec.to_json())) == spec
+    runs = [spec.specs_of(cell)[0] for cell in spec.cells]
+    assert [run.parameters["share"] for run in runs] == [0.0, 0.25, 1.0]
+    assert len({run.run_id for run in runs}) == 3
+    assert {run.policy for run in runs} == {"mixed:ppo_warehouse_small=share,crw=rest"}
+    assert [run.criterion for run in runs] == ["none"] * 3
+
+
+def test_a_share_that_no_part_has_is_refused():
+    with pytest.raises(ConfigError, match="mixed:dpo=share,crw=rest, got crw"):
+        study(Axis(name="share", values=(0.0, 0.5)))
+    mixed = study_policy("mixed:dpo=share,crw=rest")
+    with pytest.raises(ConfigError, match="the parameter share for"):
+        study(policies=(mixed,))
+    with pytest.raises(ConfigError, match="Expected share"):
+        study(Axis(name="share", values=(0.5, 2.0)), policies=(mixed,))
+    with pytest.raises(ConfigError, match="add up to a swarm of 3 robots"):
+        study(Axis(name="population_size", values=(3, 6)), policies=(study_policy("mixed:dpo=2,crw=4"),))

@@ -1,0 +1,272 @@
+"""Study files, and the paper's sets among them."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.policies import pretrained
+from swarm_forage_env.scenarios.kinds import RobotKind
+from swarm_forage_env.studies import study_file
+from swarm_forage_env.studies.ladders import BUDGETS
+from swarm_forage_env.studies.study import Axis, Cell, StudySpec
+from swarm_forage_env.studies.study_file import (
+    budget_names,
+    is_set_of_paper,
+    left_out,
+    left_out_words,
+    load_study,
+    set_names,
+)
+
+EXPERIMENTS = {"S1a": 8, "S1b": 10, "S1c": 7, "S1d": 7, "S1e": 8, "S1f": 8, "S1g": 8, "S1h": 8,
+               "S2a": 32, "S2b": 24, "S2c": 24, "S2d": 24}  # fmt: skip
+"""Set of the paper -> experiments per controller."""
+
+FILE = """
+name = "mine"
+scenario = "warehouse_small"
+policies = ["crw", { policy = "stochm", label = "without caches", caches = "none" }]
+readings = ["described"]
+
+[set]
+n_objects = 50
+nest_size_m = [3.2, 6.4]
+
+[wrappers.population]
+death_per_tick = 0.0001
+
+[[axis]]
+field = "walk_probability"
+values = [0.0, 0.01]
+
+[[axis]]
+criterion = "noise"
+values = [0.01, 0.02, 0.03, 0.04]
+
+[budget.tiny]
+seeds = 2
+horizon_s = 400.0
+values = { noise = 2, walk_probability = [0.01] }
+"""
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text=FILE):
+        file = tmp_path / "mine.toml"
+        file.write_text(text)
+        return file
+
+    return write
+
+
+def test_the_paper_ran_129024_times():
+    studies = {name: load_study(name, "paper", readings=["described"]) for name in set_names()}
+    assert {name: spec.n_experiments for name, spec in studies.items()} == EXPERIMENTS
+    assert sum(spec.n_experiments for spec in studies.values()) == 168
+    assert all([p.label for p in spec.policies] == ["crw", "dpo", "stochm", "stochx"] for spec in studies.values())
+    assert sum(spec.n_runs for spec in studies.values()) == 168 * 4 * 192 == 129_024
+    assert {spec.horizon_s for spec in studies.values()} == {BUDGETS["paper"].horizon_s}
+    ticks = {run.scenario.horizon_ticks for spec in studies.values() for run in spec.specs_of(spec.cells[0])}
+    assert ticks == {50_000}
+
+
+@pytest.mark.parametrize(
+    ("name", "robots", "objects", "reference"),
+    [
+        ("S1a", {1, 2, 4, 8, 16, 32, 64, 128}, {512}, 1),
+        ("S1b", {1, 2, 4, 8, 16, 32, 64, 128, 256, 512}, {2048}, 1),
+        ("S1c", {50}, {200}, 0.0),
+        ("S1f", {200}, {800}, 0.0),
+        ("S1g", {50}, {200}, 1.0),
+        ("S2a", {12, 51, 115, 204, 320, 460, 627, 819}, {80, 272, 368, 448, 544, 1248, 1408, 1568}, 12),
+        ("S2d", {12, 115, 320}, {80, 368, 544}, 0.0001),
+    ],
+)
+def test_the_worlds_of_the_sets(name, robots, objects, reference):
+    spec = load_study(name, "paper")
+    worlds = [spec.experiment(cell).scenario for cell in spec.cells]
+    assert {world.robots.n_robots for world in worlds} == robots
+    assert {world.objects.n_objects for world in worlds} == objects
+    assert {world.physics for world in worlds} == {"compiled"}
+    assert spec.reference == reference
+    assert all(spec.reference_of(cell) in spec.cells for cell in spec.cells)
+
+
+def test_the_reference_of_wandering_objects_wanders_as_much():
+    spec = load_study("S2a", "paper")
+    assert spec.reference_of(Cell("program", "dpo", (0.026, 819))) == Cell("program", "dpo", (0.026, 12))
+
+
+@pytest.mark.parametrize("name", set_names())
+def test_every_set_has_three_budgets_and_both_readings(name):
+    assert budget_names(name) == ("smoke", "reduced", "paper")
+    smoke, reduced = (load_study(name, budget) for budget in ("smoke", "reduced"))
+    assert smoke.readings == reduced.readings == ("described", "program")
+    assert smoke.robot_ticks < 50e6, "a minute or two of one core"
+    paper = load_study(name, "paper")
+    assert set(reduced.cells) <= set(paper.cells)
+    cell = reduced.cells[-1]
+    of_cell = reduced.specs_of(cell)
+    assert of_cell == paper.specs_of(cell)[: len(of_cell)], "so that a reduced study can be continued"
+
+
+def test_a_file_and_a_budget_make_a_study(written):
+    spec = load_study(written(), "tiny")
+    assert spec.to_mapping() == StudySpec.from_toml(written()).to_mapping(), "the first budget is the default"
+    assert [(axis.name, axis.values) for axis in spec.axes] == [
+        ("walk_probability", (0.01,)), ("noise", (0.0, 0.02, 0.04))]  # fmt: skip
+    assert (spec.reference, spec.seeds, spec.horizon_s, spec.interval_s) == (0.0, (0, 1), 400.0, 200.0)
+    last = spec.specs_of(Cell("described", "without caches", (0.01, 0.04)))[1]
+    assert (last.policy, last.scenario.caches, last.seed) == ("stochm", "none", 1)
+    assert last.scenario.objects.n_objects == 50
+    assert [config.name for config in last.wrappers] == ["sensor_noise", "population", "actuator_noise"]
+    assert (last.criterion, last.criterion_value) == ("noise", 0.04)
+
+
+def test_seeds_and_readings_can_be_chosen(written):
+    spec = load_study(written(), seeds=3, readings=["program"])
+    assert (spec.seeds, spec.readings) == ((0, 1, 2), ("program",))
+    assert load_study(written(FILE.replace("seeds = 2", "seeds = [7, 9]"))).seeds == (7, 9)
+
+
+def test_the_budget_of_the_paper_is_always_there(written):
+    spec = load_study(written(), "paper")
+    assert (len(spec.seeds), spec.horizon_s) == (192, 10_000.0)
+    assert spec.axes[-1].values == (0.0, 0.01, 0.02, 0.03, 0.04)
+    assert budget_names(written()) == ("tiny", "paper")
+
+
+def test_a_policy_file_lies_beside_the_study(written, tmp_path):
+
+    source = next(Path(pretrained.__file__).parent.glob("*.npz"))
+    (tmp_path / "own.npz").write_bytes(source.read_bytes())
+    spec = load_study(written(FILE.replace('"crw"', '"own.npz"')))
+    assert spec.policies[0].label == "own"
+    assert spec.policies[0].policy == str(tmp_path / "own.npz")
+    assert "digest" in spec.policies[0].parameters
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("policies", "polices", "Did you mean 'policies'"),
+        ('name = "mine"', "", "Missing key 'name'"),
+        ("n_objects", "n_object", "Did you mean 'n_objects'"),
+        ("death_per_tick", "deaths_per_tick", "Did you mean 'death_per_tick'"),
+        ("wrappers.population", "wrappers.popluation", "Did you mean 'population'"),
+        ("criterion", "criterium", "Did you mean 'criterion'"),
+        ('criterion = "noise"', 'criterion = "nois"', "Did you mean 'noise'"),
+        ('criterion = "noise"', 'criterion = "noise"\nfield = "n_objects"', "either criterion or field"),
+        ("values = [0.0, 0.01]", "", "Missing key 'values' of axis walk_probability"),
+        ("values = [0.0, 0.01]", "values = 3", "values of axis walk_probability to be a list"),
+        ("values = [0.0, 0.01]", "values = [0.0]\nreference = 0.0", "reference on the last axis only"),
+        ("seeds = 2", "seds = 2", "Did you mean 'budget.tiny.seeds'|Unknown key of a budget 'budget.tiny.seds'"),
+        ("seeds = 2", "seeds = 0", "seeds to be a whole number from 1 to 100,000"),
+        ("noise = 2", "nose = 2", "Did you mean 'noise'"),
+        ("noise = 2", "noise = [0.05]", "to be some of"),
+        ("noise = 2", "noise = 0", "whole number >= 1"),
+        ('"crw"', '"crv"', "crw"),
+        ('label =', 'lable =', "Did you mean 'label'"),
+        ('policy = "stochm", ', "", "Missing key 'policy'"),
+        ("[set]", "[set", "mine.toml"),
+        ('"described"', '"descibed"', "Did you mean 'described'"),
+    ],
+)  # fmt: skip
+def test_what_a_file_may_not_say(written, old, new, message):
+    assert old in FILE
+    with pytest.raises(ConfigError, match=message) as refusal:
+        load_study(written(FILE.replace(old, new, 1)))
+    assert "mine.toml" in str(refusal.value)
+
+
+def test_unknown_studies_and_budgets_are_refused(written):
+    with pytest.raises(ConfigError, match="Did you mean 'S1h'"):
+        load_study("S1i")
+    with pytest.raises(ConfigError, match=r"Did you mean 'tiny'\? Known: tiny, paper"):
+        load_study(written(), "tini")
+
+
+def test_an_unknown_axis_is_told_the_nearest_few_and_where_all_are():
+    with pytest.raises(ConfigError, match=r"Did you mean 'max_speed_mps'\?.* All \d+: population_size") as told:
+        Axis(name="max_sped_mps", values=(1.0,))
+    assert len(str(told.value)) < 330
+    assert "swarm-forage info warehouse_small" in str(told.value)
+    with pytest.raises(ConfigError, match="Near it: cache_forget_unit_mismatch, cache"):
+        Axis(name="cache_forget", values=(1.0,))
+
+
+def test_the_studies_of_the_page_are_some(written, tmp_path):
+    page = (Path(__file__).parents[2] / "docs/studies.md").read_text()
+    text, of_shares = re.findall(r"^```toml\n(name = .*?)^```", page, re.DOTALL | re.MULTILINE)
+    policy = next(Path(pretrained.__file__).parent.glob("*.npz"))
+    (tmp_path / "my_policy.npz").write_bytes(policy.read_bytes())
+    file = written(text)
+    assert budget_names(file) == ("first", "full", "paper")
+    first, full = load_study(file, "first"), load_study(file, "full")
+    assert (first.n_experiments, first.n_runs, full.n_runs) == (6, 48, 384)
+    assert first.reference_of(first.cells[0]) == Cell("described", "crw", (10, 0.1))
+    assert [cell.values for cell in load_study(written(of_shares)).cells] == [(0.0,), (0.1,), (0.2,), (0.5,), (1.0,)]
+
+
+def test_files_in_a_mixed_swarm_lie_beside_the_study(written, tmp_path):
+    policy = next(Path(pretrained.__file__).parent.glob("*.npz"))
+    (tmp_path / "my_policy.npz").write_bytes(policy.read_bytes())
+    file = written('name = "m"\nscenario = "warehouse_small"\npolicies = ["mixed:my_policy.npz=20%,crw=rest"]\n')
+    (found,) = load_study(file).policies
+    assert found.policy == f"mixed:{tmp_path / 'my_policy.npz'}=0.2,crw=rest"
+    assert found.label == "mixed:my_policy=0.2,crw=rest"
+
+
+def test_a_set_of_the_paper_is_known_by_more_than_its_name():
+    some = load_study("S1a", "reduced", seeds=2, readings=("program",))
+    assert is_set_of_paper(some)
+    assert is_set_of_paper(replace(some, seeds=(5, 9)))
+    assert not is_set_of_paper(replace(some, settings={"n_objects": 20}))
+    assert not is_set_of_paper(replace(some, name="mine"))
+    assert not is_set_of_paper(replace(some, budget="mine"))
+
+
+def test_no_file_is_opened_to_know_a_set_of_the_paper(monkeypatch, tmp_path):
+    mine = replace(load_study("S1a"), name="mine")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine").write_text("whatever lies here")
+    monkeypatch.setattr(study_file, "_read", lambda file: pytest.fail(f"{file} was opened"))
+    assert not is_set_of_paper(mine)
+
+
+def test_an_axis_of_lists(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        'name = "mine"\nscenario = "warehouse_small"\npolicies = ["random"]\nreadings = ["described"]\n'
+        '[[axis]]\nfield = "own_sensors"\nvalues = [[], ["nest_distance"], ["nest_distance", "x"]]\nreference = []\n'
+        '[budget.few]\nseeds = 1\nvalues = { own_sensors = [["nest_distance"]] }\n'
+    )
+    spec = load_study(file)
+    assert spec.axes[0].values == ("none", "nest_distance")
+    assert spec.reference == "none"
+    assert [spec.experiment(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance",)]
+
+
+def test_an_axis_of_kinds(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        'name = "mine"\nscenario = "warehouse_small"\npolicies = ["random"]\nreadings = ["described"]\n'
+        '[[axis]]\nfield = "robot_kinds"\nvalues = [[], [{name = "slow", share = 0.2, speed = 0.5}, {name = "rest"}]]\n'
+        "reference = []\n[budget.few]\nseeds = 1\n"
+    )
+    spec = load_study(file)
+    assert spec.axes[0].values == ("none", "slow:share=0.2,speed=0.5+rest")
+    kinds = [spec.experiment(cell).scenario.robots.robot_kinds for cell in spec.cells]
+    assert kinds == [(), (RobotKind(name="slow", share=0.2, speed=0.5), RobotKind(name="rest"))]
+
+
+def test_what_a_budget_leaves_out_of_the_paper_is_told():
+    reduced = load_study("S2a", "reduced")
+    assert left_out(reduced) == {"walk_probability": ("0.026",), "population_size": ("460", "627", "819")}
+    assert left_out_words(reduced) == "walk_probability 0.026; population_size 460, 627, 819"
+    assert left_out(load_study("S2a", "paper")) == {}
+    assert left_out(replace(reduced, name="mine")) == {}, "nobody knows what a study of one's own might have"

@@ -1,0 +1,279 @@
+"""Running a study: its folder, shards, restarts, damaged files."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import replace
+
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs.record import RecordError
+from swarm_forage_env.studies.study_file import load_study
+from swarm_forage_env.studies.study_folder import (
+    DONE,
+    FAILED,
+    MISSING,
+    StudyFolder,
+    longest_first,
+    parse_shard,
+    run_study,
+    shard,
+)
+from swarm_forage_env.studies.study_table import gather_study
+from tests.support.tiny_study import NOBODY, RANDOM, tiny_study
+
+STUDY = tiny_study()
+
+
+class Counting(Executor):
+    """Runs at once, and remembers how many runs each task had."""
+
+    def __init__(self):
+        self.tasks = []
+
+    def submit(self, fn, /, *args, **kwargs):
+        self.tasks.append(len(args[0]) if isinstance(args[0], tuple) else 1)
+        future = Future()
+        future.set_result(fn(*args, **kwargs))
+        return future
+
+
+class KilledError(Exception):
+    """What an executor reports of a task whose worker died."""
+
+
+class Killing(Counting):
+    """A cluster whose worker dies in the first task."""
+
+    def submit(self, fn, /, *args, **kwargs):
+        if self.tasks:
+            return super().submit(fn, *args, **kwargs)
+        self.tasks.append(0)
+        future = Future()
+        future.set_exception(KilledError("worker died"))
+        return future
+
+
+def test_a_study_runs_once(tmp_path):
+    folder = StudyFolder(tmp_path)
+    state = run_study(STUDY, folder, jobs=1)
+    assert (state.count(DONE), state.count(MISSING), state.count(FAILED)) == (16, 0, 0)
+    assert folder.study().to_mapping() == STUDY.to_mapping()
+    assert all(cell.is_complete for cell in folder.cell_states())
+    counting = Counting()
+    assert run_study(STUDY, folder, executor=counting).count(DONE) == 16
+    assert counting.tasks == []
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 40])
+def test_shards_are_disjoint_complete_and_equal(count):
+    specs = STUDY.expand()
+    parts = [shard(specs, index, count) for index in range(1, count + 1)]
+    ids = [run.run_id for part in parts for run in part]
+    assert len(ids) == len(set(ids)) == len(specs)
+    assert set(ids) == {run.run_id for run in specs}
+    assert max(map(len, parts)) - min(map(len, parts)) <= 1
+
+
+def test_shards_fill_one_folder(tmp_path):
+    folder = StudyFolder(tmp_path)
+    assert run_study(STUDY, folder, part=(1, 2), jobs=1).count(DONE) == 8
+    assert sum(cell.n_runs[MISSING] for cell in folder.cell_states()) == 8
+    run_study(STUDY, folder, part=(2, 2), jobs=1)
+    assert all(cell.is_complete for cell in folder.cell_states())
+
+
+@pytest.mark.parametrize("word", ["2", "a/b", "0/2", "3/2", "1/0", "1/2/3"])
+def test_a_shard_that_cannot_be(word):
+    with pytest.raises(ConfigError, match="shard"):
+        parse_shard(word)
+    assert parse_shard("2/8") == (2, 8)
+
+
+def test_long_runs_come_first():
+    sizes = [run.scenario.robots.n_robots for run in longest_first(STUDY.expand())]
+    assert sizes == [3] * 8 + [2] * 8
+
+
+def test_seeds_of_a_cell_travel_together(tmp_path):
+    counting = Counting()
+    run_study(STUDY, StudyFolder(tmp_path), executor=counting)
+    assert counting.tasks == [2] * 8
+
+
+def test_runs_of_a_killed_worker_are_made_again(tmp_path):
+    killing = Killing()
+    assert run_study(STUDY, StudyFolder(tmp_path), executor=killing).count(DONE) == 16
+    assert sorted(killing.tasks) == [0, 1, 1, *[2] * 7], "one by one, so that a deadly one would be found"
+
+
+def test_more_seeds_and_readings_are_added(tmp_path):
+    folder = StudyFolder(tmp_path)
+    run_study(replace(STUDY, seeds=(0,)), folder, jobs=1)
+    counting = Counting()
+    run_study(replace(STUDY, seeds=(1,)), folder, executor=counting)
+    assert sum(counting.tasks) == 8
+    run_study(replace(STUDY, seeds=(0,), readings=("program",)), folder, jobs=1)
+    study = folder.study()
+    assert (study.seeds, study.readings) == ((0, 1), ("described", "program"))
+    assert sum(cell.n_runs[MISSING] for cell in folder.cell_states()) == 8, "the other seed of the second reading"
+
+
+def test_another_study_in_the_folder_is_refused(tmp_path):
+    folder = StudyFolder(tmp_path)
+    folder.take(STUDY)
+    with pytest.raises(RecordError, match=r"other horizon_s\. Give another folder, or remove study\.json"):
+        run_study(replace(STUDY, horizon_s=8.0), folder, jobs=1)
+
+
+def test_failures_are_kept_and_tried_again(tmp_path):
+    folder = StudyFolder(tmp_path)
+    study = replace(STUDY, policies=(RANDOM, NOBODY))
+    state = run_study(study, folder, jobs=1)
+    assert (state.count(DONE), state.count(FAILED)) == (8, 8)
+    counting = Counting()
+    assert run_study(study, folder, executor=counting).count(FAILED) == 8
+    assert sum(counting.tasks) == 8
+
+
+@pytest.mark.parametrize("damage", ["truncated", "altered", "renamed", "empty"])
+def test_a_damaged_file_is_found_told_and_run_again(tmp_path, capsys, damage):
+    folder = StudyFolder(tmp_path)
+    run_study(STUDY, folder, jobs=1)
+    before = gather_study(folder)
+    one, other = (folder.store.path(run_id) for run_id in folder.store.run_ids()[:2])
+    content = one.read_bytes()
+    changed = {
+        "truncated": content[: len(content) // 2],
+        "altered": content.replace(b"numba", b"NUMBA"),
+        "renamed": other.read_bytes(),
+        "empty": b"",
+    }
+    assert changed[damage] != content
+    one.write_bytes(changed[damage])
+    assert sum(cell.n_runs[MISSING] for cell in folder.cell_states()) == 1
+    assert run_study(STUDY, folder, jobs=1, progress=True).count(DONE) == 16
+    told = capsys.readouterr().err
+    assert "15 of 16 runs are stored already." in told
+    assert f"Run again: {'Expected' if damage == 'renamed' else 'Cannot read'} {one}" in told
+    assert gather_study(folder).frame.equals(before.frame)
+
+
+def test_a_folder_without_a_study_is_refused(tmp_path):
+    with pytest.raises(RecordError, match=r"without study\.json"):
+        StudyFolder(tmp_path).study()
+    (tmp_path / "study.json").write_text("{}")
+    with pytest.raises(RecordError, match=r"study\.json: Missing key 'name'"):
+        StudyFolder(tmp_path).study()
+    with pytest.raises(NotADirectoryError, match="got a file"):
+        StudyFolder(tmp_path / "study.json")
+
+
+KILLED_RUN = """
+import sys, time
+sys.path.insert(0, sys.argv[2])
+from swarm_forage_env.cli.interrupts import heard
+from swarm_forage_env.studies.study_folder import StudyFolder, run_study
+from swarm_forage_env.runs.store import RunStore
+from tests.support.tiny_study import tiny_study
+
+study, write = tiny_study(seeds=tuple(range(6))), RunStore.write
+
+def never_all(store, record):
+    if len(store.run_ids()) == study.n_runs - 1:  # on a busy machine the signal may come late
+        time.sleep(600)
+    write(store, record)
+
+if __name__ == "__main__":
+    RunStore.write = never_all
+    with heard():  # as commands do: where kernels are compiled Ctrl-C alone can be lost
+        run_study(study, StudyFolder(sys.argv[1]), jobs=1)
+"""
+
+
+@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGINT])
+def test_a_kill_at_a_random_moment_changes_nothing(tmp_path, sent, request):
+    """However often and whenever a study is ended, the rest is done at restart, and the table is the same."""
+    study = tiny_study(seeds=tuple(range(6)))
+    straight = StudyFolder(tmp_path / "straight")
+    run_study(study, straight, jobs=1)
+    broken = StudyFolder(tmp_path / "broken")
+    started = subprocess.Popen([sys.executable, "-c", KILLED_RUN, str(broken.folder), str(request.config.rootpath)],
+                               stderr=subprocess.DEVNULL)  # fmt: skip
+    try:
+        while not broken.store.run_ids():
+            assert started.poll() is None, "it ended before it was killed"
+            time.sleep(0.01)
+        time.sleep(random.Random().uniform(0.0, 0.2))
+        os.kill(started.pid, sent)
+        started.wait(60)
+    finally:
+        started.kill()
+        started.wait()
+    n_kept = len(broken.store.run_ids())
+    assert 0 < n_kept < study.n_runs
+    with ThreadPoolExecutor(3) as executor:
+        run_study(study, broken, executor=executor)
+    for folder in (straight, broken):
+        gather_study(folder).write(folder.folder / "table.parquet")
+    tables = [(folder.folder / "table.parquet").read_bytes() for folder in (straight, broken)]
+    assert tables[0] == tables[1]
+
+
+KILLED_STUDY = """
+name = "tiny"
+scenario = "warehouse_small"
+policies = ["random"]
+
+[set]
+n_objects = 20
+
+[[axis]]
+criterion = "population_size"
+values = [2, 3]
+
+[budget.tiny]
+seeds = 100
+horizon_s = 4.0
+interval_s = 2.0
+"""
+N_KILLS = 10
+
+
+@pytest.mark.slow
+def test_ten_kills_of_the_command_and_its_workers_change_nothing(tmp_path):
+    """The command and its two workers get SIGKILL together, each time somewhere in the first runs that they make."""
+    (tmp_path / "tiny.toml").write_text(KILLED_STUDY)
+    study = load_study(tmp_path / "tiny.toml")
+    straight, broken = StudyFolder(tmp_path / "straight"), StudyFolder(tmp_path / "broken")
+    run_study(study, straight, jobs=1)
+    words = ("study", "run", "tiny.toml", "--workers", "2", "--out", "broken")
+    for n_before in range(N_KILLS):
+        n_kept = len(broken.store.run_ids())
+        started = subprocess.Popen([sys.executable, "-m", "swarm_forage_env.cli", *words], cwd=tmp_path,
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                   start_new_session=True)  # fmt: skip
+        while len(broken.store.run_ids()) == n_kept:
+            assert started.poll() is None, f"it ended after {n_before} kills"
+            time.sleep(0.002)
+        time.sleep(random.Random().uniform(0.0, 0.05))
+        os.killpg(started.pid, signal.SIGKILL)
+        started.wait()
+    assert N_KILLS <= len(broken.store.run_ids()) < study.n_runs
+    run_study(study, broken, jobs=1)
+    for folder in (straight, broken):
+        gather_study(folder).write(folder.folder / "table.parquet")
+    tables = [(folder.folder / "table.parquet").read_bytes() for folder in (straight, broken)]
+    assert tables[0] == tables[1]
+
+
+def test_the_study_file_of_a_folder_is_readable(tmp_path):
+    folder = StudyFolder(tmp_path)
+    folder.take(STUDY)
+    assert json.loads((tmp_path / "study.json").read_text())["seeds"] == [0, 1]

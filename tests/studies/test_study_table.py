@@ -1,0 +1,176 @@
+"""All runs of a study in one table, and in one file."""
+
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+
+from swarm_forage_env.runs.record import RecordError, RunRecord
+from swarm_forage_env.runs.run import run_one
+from swarm_forage_env.runs.runner import run_all
+from swarm_forage_env.runs.store import FAILURES
+from swarm_forage_env.studies.study import Axis, Cell
+from swarm_forage_env.studies.study_folder import MISSING, StudyFolder, longest_first, run_study
+from swarm_forage_env.studies.study_table import gather_study, read_study
+from tests.support.tiny_study import NOBODY, RANDOM, tiny_study
+
+STUDY = tiny_study()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = StudyFolder(tmp_path_factory.mktemp("study"))
+    run_study(STUDY, made, jobs=1)
+    return made
+
+
+@pytest.fixture
+def file(folder, tmp_path):
+    path = tmp_path / "tiny.parquet"
+    gather_study(folder).write(path)
+    return path
+
+
+def test_the_file_alone_gives_everything_back(folder, file):
+    table, gathered = read_study(file), gather_study(folder)
+    assert table.frame.equals(gathered.frame)
+    assert table.spec.to_mapping() == STUDY.to_mapping()
+    assert table.versions == gathered.versions
+    assert len(table.versions) == 1
+    assert read_study(folder.folder).frame.equals(table.frame)
+
+
+def test_every_interval_is_a_row_with_its_place(file):
+    frame = read_study(file).frame
+    assert frame.columns[:6] == ["study", "cell", "reading", "policy", "axis_population_size", "axis_noise"]
+    assert frame.columns[-4:] == ["state", "error", "traceback", "rerun"]
+    assert len(frame) == 16 * 2
+    assert set(RunRecord.column_names()) - set(frame.columns) == {"controller"}
+    last = frame.row(-1, named=True)
+    place = ("tiny", 7, "described", "twin", 3.0, 0.02, 3, 1, 1, "done")
+    columns = ("study", "cell", "reading", "policy", "axis_population_size", "axis_noise", "n_robots", "seed",
+               "interval", "state")  # fmt: skip
+    assert tuple(last[name] for name in columns) == place
+
+
+def test_a_cell_gives_the_curves_of_its_runs_and_of_its_reference(file):
+    table = read_study(file)
+    cell = Cell("described", "twin", (3, 0.02))
+    for one in (cell, table.spec.reference_of(cell)):
+        seeds, curves = table.curves(one, "collected", "interference_fraction", "believed_interference_fraction")
+        assert seeds == (0, 1)
+        records = run_all(STUDY.specs_of(one), jobs=1).records
+        for name, values in curves.items():
+            np.testing.assert_array_equal(values, [record.columns()[name] for record in records])
+        assert ("believed_interference_fraction" in curves) == (one == cell), "only noisy runs have that column"
+    with pytest.raises(KeyError):
+        table.curves(Cell("described", "nobody", (3, 0.02)), "collected")
+
+
+def test_one_row_per_cell(file):
+    cells = read_study(file).cells()
+    assert len(cells) == 8
+    assert cells.filter(cells["is_reference"])["axis_noise"].to_list() == [0.0] * 4
+    assert cells["n_done"].to_list() == [2] * 8
+    assert cells["n_robots"].to_list() == [2, 2, 3, 3] * 2
+
+
+def test_a_run_can_be_made_again_from_the_file(file):
+    table = read_study(file)
+    rows = table.rows(Cell("described", "twin", (2, 0.02))).filter(pl.col("seed") == 1)
+    again = run_one(table.spec_of(rows["run_id"][0]))
+    assert again.interference_ticks.tolist() == rows["interference_ticks"].to_list()
+    with pytest.raises(KeyError, match="no run 'beef'"):
+        table.spec_of("beef")
+
+
+def test_failed_and_missing_runs_are_rows(tmp_path):
+    study = replace(STUDY, policies=(RANDOM, NOBODY))
+    folder = StudyFolder(tmp_path / "mine")
+    run_study(study, folder, jobs=1)
+    gone = study.specs_of(study.cells[0])[1]
+    folder.store.path(gone.run_id).unlink()
+    gather_study(folder).write(tmp_path / "mine.parquet")
+    table = read_study(tmp_path / "mine.parquet")
+    assert [state.n_runs for state in table.cell_states()] == [
+        {"done": 1, "failed": 0, "missing": 1},
+        *[{"done": 2, "failed": 0, "missing": 0}] * 3,
+        *[{"done": 0, "failed": 2, "missing": 0}] * 4,
+    ]
+    (missing,) = table.rows(study.cells[0]).filter(pl.col("state") == MISSING).to_dicts()
+    assert (missing["run_id"], missing["seed"], missing["n_robots"], missing["interval"]) == (gone.run_id, 1, 2, None)
+    failed = table.rows(study.cells[-1]).row(0, named=True)
+    assert "nobody" in failed["error"]
+    assert "Traceback" in failed["traceback"]
+    assert failed["rerun"] == f"swarm-forage rerun runs/{FAILURES}/{failed['run_id']}.json"
+    assert (folder.folder / failed["rerun"].split()[-1]).is_file()
+    assert table.curves(study.cells[-1], "collected") == ((), {})
+    assert table.curves(study.cells[0], "collected")[0] == (0,)
+
+
+def test_a_study_without_any_run_has_a_table_too(tmp_path):
+    folder = StudyFolder(tmp_path)
+    folder.take(STUDY)
+    table = gather_study(folder)
+    assert table.frame["state"].to_list() == [MISSING] * 16
+    table.write(tmp_path / "tiny.parquet")
+    assert read_study(tmp_path / "tiny.parquet").frame.equals(table.frame)
+
+
+def test_the_order_of_the_runs_does_not_change_a_byte(folder, file, tmp_path):
+    other = StudyFolder(tmp_path / "other")
+    other.take(STUDY)
+    run_all(reversed(longest_first(STUDY.expand())), store=other.store, jobs=1)
+    gather_study(other).write(tmp_path / "other.parquet")
+    assert (tmp_path / "other.parquet").read_bytes() == file.read_bytes()
+
+
+def test_what_performance_is_may_be_an_axis(tmp_path):
+    """Its cells share the stored runs, and read them in different ways."""
+    study = tiny_study(axes=(Axis(name="performance", values=("collected", "n_active")),), policies=(RANDOM,),
+                       settings={"n_robots": 3, "n_objects": 20}, reference=None)  # fmt: skip
+    folder = StudyFolder(tmp_path)
+    run_study(study, folder, jobs=1)
+    assert len(folder.store.run_ids()) == 2
+    table = gather_study(folder)
+    assert [table.curves(cell, "performance")[1]["performance"].mean() for cell in study.cells] == [0.0, 3.0]
+    assert table.spec.reference_of(study.cells[0]) is None
+
+
+def test_files_that_are_no_study_are_refused(file, tmp_path, folder):
+    content = file.read_bytes()
+    for name, damaged, message in (
+        ("half", content[: len(content) // 2], "no Parquet file or a damaged one"),
+        ("altered", content.replace(b"warehouse_small", b"WAREHOUSE_SMALL"), "does not match its digest|damaged"),
+    ):
+        path = tmp_path / f"{name}.parquet"
+        path.write_bytes(damaged)
+        with pytest.raises(RecordError, match=message):
+            read_study(path)
+    with pytest.raises(RecordError, match="but no study"):
+        read_study(folder.store.path(folder.store.run_ids()[0]))
+    with pytest.raises(RecordError, match="No such file"):
+        read_study(tmp_path / "nothing.parquet")
+
+
+def test_a_file_of_another_layout_is_refused(file, tmp_path):
+    stamp = {key: value for key, value in pl.read_parquet_metadata(file).items() if key.startswith("swarm_forage_env")}
+    pl.read_parquet(file).write_parquet(
+        tmp_path / "new.parquet", metadata={**stamp, "swarm_forage_env.study.table_version": "9"}
+    )
+    with pytest.raises(RecordError, match="it has layout 9"):
+        read_study(tmp_path / "new.parquet")
+
+
+def test_values_that_were_changed_are_noticed(file, tmp_path):
+    stamp = {key: value for key, value in pl.read_parquet_metadata(file).items() if key.startswith("swarm_forage_env")}
+    for column in ("seed", "policy", "interference_fraction"):
+        frame = pl.read_parquet(file)
+        value = "other" if column == "policy" else 7
+        changed = frame.with_columns(pl.when(pl.int_range(len(frame)) == 3).then(pl.lit(value)).otherwise(column)
+                                     .cast(frame[column].dtype).alias(column))  # fmt: skip
+        assert not changed.equals(frame)
+        changed.write_parquet(tmp_path / "changed.parquet", metadata=stamp)
+        with pytest.raises(RecordError, match="does not match its digest"):
+            read_study(tmp_path / "changed.parquet")
