@@ -17,7 +17,7 @@ from swarm_forage_env._internal.parsing import parse_json
 
 SCRIPTS = (
     "theme.js",
-    "inflate.js",
+    "fflate.js",
     "decode.js",
     "events.js",
     "run.js",

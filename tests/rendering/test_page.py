@@ -42,6 +42,12 @@ def test_every_script_is_in_the_page():
     assert all(FOLDER.joinpath(name).read_text() in page for name in SCRIPTS)
 
 
+def test_a_page_brings_the_licence_of_what_it_borrows():
+    page = build_page("", {}, [])
+    assert "fflate" in page
+    assert "The above copyright notice and this permission notice shall be included" in page
+
+
 def test_the_page_loads_nothing():
     page = build_page("", {}, [])
     assert re.findall(r"https?:|//[\w.]+\.\w+/|\b(?:src|href)=\"(?!data:,\")|@import|url\(|\bfetch\(", page) == []

@@ -9,6 +9,21 @@ function bytesOfBase64(text) {
   return bytes;
 }
 
+/** Unpack a zlib stream that holds so many bytes. fflate leaves their checksum, Adler-32, to us. */
+function inflate(packed, size) {
+  const bytes = fflate.unzlibSync(packed, { out: new Uint8Array(size) });
+  let [low, high] = [1, 0];
+  for (let start = 0; start < size; start += 3800) { // so far, no sum leaves 32 bits
+    const end = Math.min(size, start + 3800);
+    for (let k = start; k < end; k++) high += low += bytes[k];
+    low %= 65521;
+    high %= 65521;
+  }
+  const stored = packed.subarray(-4).reduce((sum, byte) => 256 * sum + byte, 0);
+  if (bytes.length !== size || stored !== low + 65536 * high) throw new Error("its data are damaged");
+  return bytes;
+}
+
 /** Undo byte planes, zigzag and differences. The first axis of the array, of this length, is the last one here: the
  *  values of one robot lie together. */
 function undoChanges(planes, type, length) {
