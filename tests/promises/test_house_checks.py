@@ -104,3 +104,27 @@ def test_named_skips_pass_and_so_do_all_without_the_option(tmp_path, source, opt
     done = run_tests(tmp_path, source, *options)
     assert done.returncode == 0, done.stdout
     assert "forbids" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("subject", "fault"),
+    [
+        ("world: find arrays by the types of the tuple", ""),
+        ("internal: pass on what is given", ""),
+        ("ci: feed both lanes from one list", ""),
+        ("Docs: what a study shows", "no such area"),
+        ("speed up", 'no "area: imperative"'),
+        ("nowhere: add a table", "no such area"),
+        ("world: Add a table", "a large letter"),
+        ("world: adds a table", "no imperative"),
+        ("world: added a table", "no imperative"),
+        ("world: adding a table", "no imperative"),
+        ("world: merge two tables", "rebase instead"),
+        (f"world: find {'x' * 61}", "longer than 72"),
+    ],
+)
+def test_a_subject_that_breaks_the_habit_is_found(subject, fault, tmp_path):
+    (tmp_path / "message").write_text(f"{subject}\n\nWhy it is so.\n")
+    command = [ROOT / "scripts/check_subjects", "message"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, fault in done.stdout) == (int(bool(fault)), True), done.stdout
