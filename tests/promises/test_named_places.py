@@ -2,6 +2,7 @@
 
 import ast
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,17 +12,32 @@ PACKAGES = ("swarm_forage_env", "baselines", "metrics")
 SOURCES = sorted(file for package in PACKAGES for file in (ROOT / package).rglob("*.py"))
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 PAGES.remove(ROOT / "CHANGELOG.md")  # it tells of names that are no more
-CHANGELOG = (ROOT / "CHANGELOG.md").read_text()
 OBJECTS = {
-    *("env", "interface", "layout", "plan", "policy", "rng"),
-    *("robots", "spec", "state", "training", "world", "wrapper"),
+    *("action_space", "algorithm", "b", "claim", "client", "env", "forage_env", "interface", "layout", "model"),
+    *("plan", "policy", "rng", "robots", "self", "sensor_noise", "settings", "sigmas", "spec", "state", "swarm"),
+    *("training", "verdict", "world", "wrapper"),
 }
-"""Old and new modules whose names are also those of objects: of these, only classes and what has moved count."""
-FOREIGN = {"gymnasium", "pettingzoo"}
-"""Other packages of which a module of ours has the name."""
+"""What pages and docstrings call objects, whether a module has the name or not: of these, only classes count."""
+FOREIGN = {
+    *sys.stdlib_module_names,
+    *(
+        "dask_jobqueue",
+        "gymnasium",
+        "imageio",
+        "jobqueue",
+        "minari",
+        "numpy",
+        "pettingzoo",
+        "polars",
+        "python3",
+        "torch",
+    ),
+}
+"""Other packages."""
 SPELLINGS = (r"reset\((?:self, )?task\b", r"\btask\.(?:layout|n_robots)\b", r"\benv\.task\b", r"\bSwarmTask\b")
 """Old names that are no module's."""
-DOTTED = re.compile(r"`([a-z_0-9]+(?:\.[A-Za-z_0-9]+)+)")
+SUFFIXES = {"csv", "json", "md", "npz", "png", "py", "toml", "zip"}
+DOTTED = re.compile(r"`([a-z_][a-z_0-9]*(?:\.[A-Za-z_0-9]+)+)")
 PATHS = re.compile(r"`?((?:swarm_forage_env|baselines|metrics|tests|scripts|docs)/[\w/.-]+\.(?:py|md|toml|npz|json))")
 
 
@@ -38,23 +54,6 @@ def names_in(file: Path) -> set[str]:
     return names
 
 
-def old_names(changelog: str = CHANGELOG) -> set[str]:
-    """Modules and contents of modules that have moved, by the first column of the table of moves.
-
-    `` `policy`: `Task` `` gives "policy" and "policy.Task", `` `learning.plan` `` gives itself and "learning".
-    """
-    found: set[str] = set()
-    for cell in re.findall(r"^\| ([^|]*`[^|]*) \|", changelog.split("\n## 0.1.0")[0], re.MULTILINE):
-        for part in cell.split(";"):
-            module = re.match(r"`([a-z_.0-9]+)`: ", part)
-            names = re.findall(r"`([A-Za-z_.0-9]+)`", part[module.end() :] if module else part)
-            found |= {f"{module[1]}.{name}" for name in names} | {module[1]} if module else set(names)
-    return found | {name.split(".")[0] for name in found if "." in name}
-
-
-OLD = old_names()
-
-
 def inside(folder: Path, rest: list[str]) -> bool:
     """Whether `module.name` or `folder.module.name` is there, seen from a folder."""
     first, *rest = rest
@@ -67,25 +66,14 @@ def inside(folder: Path, rest: list[str]) -> bool:
 
 
 def resolves(dotted: str, file: Path) -> bool:
-    """Whether a dotted name leads somewhere from the folder of a file or from one above it.
-
-    What begins with no module, old or new, is of another package or no name of a place at all.
-    """
+    """Whether a dotted name leads somewhere from the folder of a file or from one above it."""
     first, *rest = dotted.split(".")
-    if first in FOREIGN or rest[0] in ("py", "md", "toml", "npz", "json", "zip", "csv"):
-        return True
-    if first in OBJECTS and rest[0].islower() and dotted not in OLD:
+    if first in FOREIGN or rest[0] in SUFFIXES or (first in OBJECTS and rest[0].islower()):
         return True
     folders = [folder for folder in file.parents if ROOT in (folder, *folder.parents)]
     if not any(folder.name in PACKAGES for folder in folders):
         folders = [ROOT, *(ROOT / package for package in PACKAGES)]
-    if any(inside(folder, [first, *rest]) for folder in folders):
-        return True
-    return first not in OLD and first not in NEW
-
-
-NEW = {path.stem for path in SOURCES} | {path.parent.name for path in SOURCES}
-"""Modules and folders of today."""
+    return any(inside(folder, [first, *rest]) for folder in folders)
 
 
 def stale(text: str, file: Path) -> list[str]:
@@ -108,7 +96,6 @@ def test_names_of_modules_and_files_are_those_of_today(file):
         "signals.Waveform",
         "recording.RunRecord",
         "policy.Task",
-        "env.parallel_env",
         "config.ScenarioConfig",
         "caches.found_caches",
         "scenarios.config.Gone",
