@@ -143,7 +143,7 @@ def plan_ablation(
 def run_ablation(
     plan: Ablation, *, store: RunStore | None = None, jobs: int | None = None, progress: bool = False
 ) -> AblationResult:
-    """Make the runs of a plan; arguments and errors as in `runner.run_all`.
+    """Make the runs of a plan; arguments and errors as in `runs.runner.run_all`.
 
     First both readings and the first seed of each quirk; then the other seeds of the quirks that changed something.
     """

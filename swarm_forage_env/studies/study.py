@@ -71,7 +71,7 @@ class Axis:
     """
 
     name: str
-    """A criterion (`experiments.CRITERIA`), a scenario field, a field of a wrapper ("sensor_noise.sigma",
+    """A criterion (`ladders.CRITERIA`), a scenario field, a field of a wrapper ("sensor_noise.sigma",
     "throttle.waveform.amplitude"), or `SHARE`, which policies like "mixed:ppo=share,crw=rest" have."""
     values: tuple[Value, ...]
     """Numbers, texts or truth values. Of a field that holds a list, texts with its entries between commas

@@ -35,7 +35,7 @@ TABLE_VERSION = 1
 AXIS = "axis_"
 """Prefix of the columns of axes, which may be called like columns of records: throttle, handling_cost."""
 LOSS_COLUMNS = ("state", "error", "traceback", "rerun")
-"""Last columns: one of `study_run.STATES`; for failed runs the exception in one line, its traceback, and the command
+"""Last columns: one of `study_folder.STATES`; for failed runs the exception in one line, its traceback, and the command
 that makes the run again, given in the folder of the study."""
 _PREFIX = "swarm_forage_env.study."
 _FILE_KEYS = tuple(_PREFIX + name for name in ("table_version", "study", "versions", "digest"))
