@@ -4,8 +4,7 @@ import json
 
 import pytest
 
-from scripts.update_docs import made_with
-from tests.support.golden_runs import FILE, batch_fingerprint, golden_batches, golden_specs, run_fingerprint
+from tests.support.golden_runs import AS_THEN, FILE, batch_fingerprint, golden_batches, golden_specs, run_fingerprint
 
 STORED = json.loads(FILE.read_text(encoding="utf-8"))
 SPECS = golden_specs()
@@ -15,17 +14,7 @@ CHANGED = (
     "new version of the environment ids."
 )
 
-HERE, MADE_WITH = made_with(), STORED["made_with"]
-
-pytestmark = [
-    pytest.mark.compiled,
-    pytest.mark.skipif(
-        HERE["machine"] != MADE_WITH["machine"],
-        reason=f"fingerprints of {MADE_WITH['machine']} say nothing on {HERE['machine']}",
-    ),
-    # .ci/run installs the versions of the file for this test; see tests/conftest.py.
-    pytest.mark.skipif(HERE != MADE_WITH, reason=f"fingerprints are for {MADE_WITH}, the last bits differ with others"),
-]
+pytestmark = [pytest.mark.compiled, *AS_THEN]
 
 
 def test_every_run_has_a_fingerprint():

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from scripts.update_docs import made_with
 from swarm_forage_env import AUTHORS_PROGRAM, SCENARIO_NAMES, Quirks
@@ -21,6 +22,16 @@ from swarm_forage_env.views.learner_arena import plan_arena
 from tests.support.foraging import mild_wrappers, quick_world
 
 FILE = Path(__file__).with_suffix(".json")
+_HERE, _THEN = made_with(), json.loads(FILE.read_text(encoding="utf-8"))["made_with"]
+AS_THEN = (
+    pytest.mark.skipif(
+        _HERE["machine"] != _THEN["machine"],
+        reason=f"fingerprints of {_THEN['machine']} say nothing on {_HERE['machine']}",
+    ),
+    # .ci/run installs the versions of the file for this test; see tests/conftest.py.
+    pytest.mark.skipif(_HERE != _THEN, reason=f"fingerprints are for {_THEN}, the last bits differ with others"),
+)
+"""Marks of tests whose numbers hold for the machine and the versions of the golden runs only."""
 COMPILED_POLICIES = ("crw", "stochx")
 """Those that also run with compiled bodies. The other policies do nothing with bodies that these two do not do."""
 POLICIES = ("crw", "dpo", "stochm", "stochx", "ppo_warehouse_small")

@@ -1,0 +1,346 @@
+"""What commands print and what functions of scoring answer, word by word, for tiny runs.
+
+A file in `tests/cli/texts` for each case. After a change that is meant to change words or numbers:
+
+    REMAKE_TEXTS=1 python -m pytest tests/cli/test_texts.py
+
+makes them anew; `git diff` then shows what has changed. Where only the words of a command change, change them in
+`CASES`: the files stay.
+"""
+
+import difflib
+import io
+import json
+import os
+import re
+import shlex
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from metrics import choose_policy, compare_policies, predict_policy, score_curves, score_policy
+from metrics.benchmark import load_protocol
+from metrics.benchmark.page import BEGIN, END
+from metrics.benchmark.standing import SCRIPTED
+from swarm_forage_env import cli
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.studies.study import Axis
+from tests.support.entries import TINY, made_up_entry
+from tests.support.golden_runs import AS_THEN
+from tests.support.made_tables import made_study, made_table
+from tests.support.pictures import keep_figures
+from tests.support.texts import json_lines, steady_file, steady_json, steady_text
+
+pytestmark = [pytest.mark.compiled, *AS_THEN]
+
+TEXTS = Path(__file__).with_name("texts")
+REMAKE = bool(os.environ.get("REMAKE_TEXTS"))
+
+# A room so small that robots deliver in minutes.
+SMALL = (
+    "--set physics=compiled --set n_objects=60 --set width_m=12 --set height_m=8 --set nest_centre_m=1.6,4 "
+    "--set nest_size_m=1.6,6.4"
+)
+ROOM = f"--robots 6 {SMALL} --jobs 1"
+SECONDS = "--horizon 400 --set interval_s=100"
+RUN = f"run --policy crw,dpo --seeds 2 {ROOM} {SECONDS}"
+MIXED = f"run --policy mixed:dpo=2,crw=rest --performance n_carrying --wrapper sensor_noise:sigma=0.01 {ROOM} {SECONDS}"
+SCORE = f"score --policy crw --budget quick --seeds 2 --horizon 400 {ROOM}"
+FORMS = "--variant corrected,paper,sierra --form marginal,interactive --band --measures spatial_emergence,scalability"
+CURVES = "score --curves curves.csv"
+COMPARE = f"compare --policy crw,dpo --budget quick --seeds 2 --horizon 400 {ROOM}"
+FEW = "--measures t_lost_fraction,raw_performance,adaptability"
+PREDICT = f"predict --policy crw --fit 2,4,6,8 --hold 12 --seeds 2 --jobs 1 {SMALL} {SECONDS}"
+CHOOSE = (
+    f"choose --policy crw,dpo --deliver 4 --keep 0.5 --failures 0.01 --deaths 1 --noise 0.01 --seeds 2 {ROOM} {SECONDS}"
+)
+ABLATE = (
+    f"ablate --scenario warehouse_small --robots 4,6 --policy crw,stochm --seeds 2 {SMALL} {SECONDS} --jobs 1 "
+    "--quirks explore_double_start,integer_estimates,dynamic_cache_merges_all"
+)
+STUDY = "study run S1a.toml --workers 1 --out done"
+CELLS = "--cell policy=crw,population_size=2 --cell policy=dpo,population_size=4"
+BENCHMARK = "benchmark --policy crw --name again --trained-in nothing --jobs 1"
+
+CASES = {
+    "run.txt": RUN,
+    "run.json": f"{RUN} --json",
+    "run_mixed.txt": MIXED,
+    "run_mixed.json": f"{MIXED} --json",
+    "run_plan.txt": f"{RUN} --first-seed 7 --dry-run",
+    "run_plan.json": f"{RUN} --first-seed 7 --dry-run --json",
+    "rerun.txt": "rerun record.parquet",
+    "stuck.txt": f"stuck --policy crw --window 40 --moved 1.5 {SMALL} --robots 6 {SECONDS}",
+    "score.txt": SCORE,
+    "score.json": f"{SCORE} --json",
+    "score_forms.txt": f"{SCORE} {FORMS}",
+    "score_forms.json": f"{SCORE} {FORMS} --json",
+    "score_handling.txt": f"{SCORE} --measures reactivity,adaptability --disturbance handling_cost",
+    "score_performance.txt": f"{SCORE} {FEW} --performance n_active",
+    "score_plan.txt": f"{SCORE} --horizon 800 --dry-run",
+    "score_plan.json": f"{SCORE} --horizon 800 --measures scalability --dry-run --json",
+    "score_curves.txt": CURVES,
+    "score_curves.json": f"{CURVES} --json",
+    "compare.txt": COMPARE,
+    "compare.json": f"{COMPARE} {FEW} --json",
+    "compare_band.txt": f"{COMPARE} {FEW} --band",
+    "compare_plan.txt": f"{COMPARE} --horizon 800 --dry-run",
+    "predict.txt": PREDICT,
+    "predict.json": f"{PREDICT} --json",
+    "predict_plan.txt": f"{PREDICT} --horizon 800 --dry-run",
+    "predict_curves.txt": "predict --curves law.csv --hold 32",
+    "predict_curves.json": "predict --curves law.csv --hold 32 --json",
+    "choose.txt": CHOOSE,
+    "choose.json": f"{CHOOSE} --json",
+    "choose_plan.txt": f"{CHOOSE} --horizon 800 --dry-run",
+    "ablate.txt": ABLATE,
+    "ablate.json": f"{ABLATE} --json",
+    "ablate_plan.txt": f"{ABLATE} --horizon 800 --dry-run",
+    "study_list.txt": "study list",
+    "study_list_reduced.txt": "study list --budget reduced",
+    "study_show.txt": "study show S1e --budget reduced",
+    "study_show_own.txt": "study show S1a.toml",
+    "study_run.txt": STUDY,
+    "study_run_failing.txt": "study run failing.toml --workers 1 --out failing",
+    "study_status.txt": "study status done",
+    "study_status.json": "study status done --json",
+    "study_status_lost.txt": "study status lost.parquet",
+    "study_status_failing.txt": "study status failing",
+    "study_status_failing.json": "study status failing --json",
+    "study_pack.txt": "study pack done --out packed/S1a.parquet",
+    "study_verdict.txt": "study verdict done",
+    "study_verdict_made.txt": "study verdict made.parquet noise.parquet --json verdict_made.json",
+    "study_plot.txt": "study plot done --out figures --band sd --variant corrected,sierra",
+    "study_maps.txt": f"study maps done {CELLS} --out maps",
+    "study_report.txt": "study report packed.parquet --out report.html",
+    "study_report_made.txt": "study report made.parquet noise.parquet --out report_made.html",
+    "study_diff_same.txt": "study diff done packed.parquet",
+    "study_diff.txt": "study diff made.parquet later.parquet --columns performance",
+    "study_diff.json": "study diff made.parquet later.parquet --columns performance --json",
+    "study_diff_few.txt": "study diff made.parquet lost.parquet --columns performance",
+    "benchmark.txt": BENCHMARK,
+    "benchmark.json": f"{BENCHMARK} --json",
+    "benchmark_quick.txt": "benchmark --policy random --quick --jobs 1",
+    "benchmark_plan.txt": "benchmark --policy crw --policy dpo --name two --dry-run --records none --jobs 1",
+    "benchmark_worlds.txt": "benchmark worlds",
+    "benchmark_show.txt": "benchmark show mine.json",
+    "benchmark_show.json": "benchmark show mine.json --json",
+    "benchmark_page.txt": "benchmark page mine.json --into page.md --picture page.png",
+    "availability.txt": "availability",
+    "availability.json": "availability --json",
+    "list.txt": "list",
+    "info_policy.txt": "info crw",
+    "info_scenario.txt": "info search_and_rescue",
+    "schema.txt": "schema",
+}
+"""File with what is said -> words of the command."""
+
+MADE_FILES = {
+    "study_verdict_made.txt": ("verdict_made.json",),
+    "study_plot.txt": ("figures/S1a*.csv",),
+    "study_report.txt": ("report.html",),
+    "study_report_made.txt": ("report_made.html",),
+    "benchmark.txt": ("results/benchmark/again.json",),
+    "benchmark_page.txt": ("page.md", "page_in_detail.md"),
+}
+"""Case -> files that the command writes and that are kept too."""
+
+FIRST = ("run.txt", "study_run.txt", "study_run_failing.txt")
+"""Cases whose runs others take; all of them can be carried out in any order after these."""
+
+WORLD = scenario(
+    "warehouse_small",
+    physics="compiled",
+    n_robots=6,
+    n_objects=60,
+    width_m=12.0,
+    height_m=8.0,
+    nest_centre_m=(1.6, 4.0),
+    nest_size_m=(1.6, 6.4),
+    horizon_s=400.0,
+    interval_s=100.0,
+)
+SCORED: dict[str, Any] = {"budget": "quick", "seeds": 2, "horizon_s": 400.0}
+MEASURES = ("t_lost_fraction", "scalability", "reactivity", "population_robustness")
+CALLS: dict[str, Callable[..., Any]] = {
+    "python_score": lambda **place: score_policy("crw", WORLD, **SCORED, **place),
+    "python_compare": lambda **place: compare_policies(["crw", "dpo"], WORLD, measures=MEASURES, **SCORED, **place),
+    "python_predict": lambda **place: predict_policy("crw", WORLD, fit=(2, 4, 6, 8), hold=(12,), seeds=2, **place),
+    "python_choose": lambda **place: choose_policy(
+        ["crw", "dpo"], WORLD, deliver=4.0, keep=0.5, failures=0.01, deaths=1.0, noise=0.01, seeds=2, **place
+    ),
+    "python_curves": lambda **_: score_curves("curves.csv")[0],
+}
+"""Name of two files -> what gives the answer: its text is in the .txt file, its mapping in the .json file."""
+
+SMALL_STUDY = """
+name = "S1a"
+title = "Sizes in a small room"
+scenario = "warehouse_small"
+policies = ["crw", "dpo", "stochm", "stochx"]
+readings = ["described"]
+
+[set]
+physics = "compiled"
+n_objects = 60
+width_m = 12.0
+height_m = 8.0
+nest_centre_m = [1.6, 4.0]
+nest_size_m = [1.6, 6.4]
+
+[[axis]]
+criterion = "population_size"
+values = [1, 2, 4]
+
+[budget.tiny]
+seeds = 2
+horizon_s = 400.0
+interval_s = 100.0
+"""
+
+
+class Place:
+    """A folder in which all cases are carried out; runs that several of them need are made once."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._answers: dict[str, str] = {}
+
+    def answer(self, name: str) -> str:
+        """Carry out a case, once; returns what its file should hold."""
+        if name not in self._answers:
+            code, out, err = self._said(shlex.split(CASES[name]))
+            files = {
+                file.relative_to(self.folder).as_posix(): steady_file(file, self.folder)
+                for pattern in MADE_FILES.get(name, ())
+                for file in sorted(self.folder.glob(pattern))
+            }
+            self._answers[name] = (_as_json if name.endswith(".json") else _as_text)(code, out, err, files)
+        return self._answers[name]
+
+    def _said(self, words: list[str]) -> tuple[Any, str, str]:
+        out, err = io.StringIO(), io.StringIO()
+        with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+            patch.setattr(sys, "argv", ["swarm-forage", *words])
+            with pytest.raises(SystemExit) as end:
+                cli.main()
+        notes = steady_text(err.getvalue(), self.folder)
+        return end.value.code or 0, self._steady(out.getvalue()), notes
+
+    def _steady(self, text: str) -> str:
+        try:
+            return json_lines(steady_json(json.loads(text), self.folder))
+        except ValueError:
+            return steady_text(text, self.folder)
+
+
+def _as_text(code: int, out: str, err: str, files: dict[str, str]) -> str:
+    parts = [out, *([f"--- exit code {code}"] if code else []), *([f"--- stderr\n{err}"] if err else [])]
+    return "\n".join([*parts, *(f"--- {name}\n{text}" for name, text in files.items())]) + "\n"
+
+
+def _as_json(code: int, out: str, err: str, files: dict[str, str]) -> str:
+    assert not files
+    return json_lines({"exit_code": code, "stderr": err.splitlines(), "stdout": json.loads(out)}) + "\n"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Place]:
+    """The folder of all cases, with the files that they read, and the tiny benchmark."""
+    folder = tmp_path_factory.mktemp("texts").resolve()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        keep_figures(patch)
+        _same_terminal(patch)
+        _write_benchmark(folder / "benchmark", patch)
+        _write_tables()
+        place = Place(folder)
+        for name in FIRST:
+            place.answer(name)
+        shutil.copy(min(Path("results/warehouse_small").glob("*.parquet")), "record.parquet")
+        shutil.copy("done/S1a.parquet", "packed.parquet")
+        yield place
+
+
+def _same_terminal(patch: pytest.MonkeyPatch) -> None:
+    for name in ("FORCE_COLOR", "CLICOLOR_FORCE", "TTY_COMPATIBLE", "TTY_INTERACTIVE", "PY_COLORS"):
+        patch.delenv(name, raising=False)
+    for name, value in (("NO_COLOR", "1"), ("TERM", "dumb"), ("COLUMNS", "140"), ("LINES", "50")):
+        patch.setenv(name, value)
+
+
+def _write_benchmark(folder: Path, patch: pytest.MonkeyPatch) -> None:
+    folder.mkdir()
+    (folder / "benchmark_v1.toml").write_text(TINY.read_text())
+    for k, name in enumerate(SCRIPTED):
+        made_up_entry(load_protocol(TINY), name, lambda world, k=k: 10.0 + k + world).write(folder / f"{name}.json")
+    made_up_entry(load_protocol(TINY), "mine", lambda world: 13.0 + 2.0 * world, n_policies=2).write(Path("mine.json"))
+    Path("page.md").write_text(f"# Benchmark\n\n{BEGIN}\n{END}\n\nend\n")
+    patch.setattr("metrics.benchmark.protocol.protocol_folder", lambda: folder)
+    patch.setattr("metrics.benchmark.standing.scripted_folder", lambda: folder)
+
+
+def _write_tables() -> None:
+    """Write study files, packed studies that nobody ran, and tables of curves."""
+    Path("S1a.toml").write_text(SMALL_STUDY)
+    failing = re.sub("policies = .*", 'policies = [{ policy = "crw", parameters = { speed = 3 } }]', SMALL_STUDY)
+    Path("failing.toml").write_text(failing.replace('"S1a"', '"failing"').replace("[1, 2, 4]", "[1, 2, 3, 4]"))
+    spec = made_study()
+    better = {"crw": 1.0, "dpo": 1.2, "stochm": 1.3, "stochx": 1.1}
+    later = better | {"dpo": 1.5}
+    made_table(spec, lambda cell: 10.0 * better[cell.policy] * cell.values[-1] ** 0.9).write("made.parquet")
+    made_table(spec, lambda cell: 10.0 * later[cell.policy] * cell.values[-1] ** 0.9).write("later.parquet")
+    lost = {(cell, seed) for cell in spec.cells[:2] for seed in spec.seeds[:2]}
+    made_table(spec, lambda cell: 10.0 * cell.values[-1], lost=lost).write("lost.parquet")
+    noisy = made_study("S1e", Axis(name="noise", values=(0.0, 0.01, 0.03)), reference=0.0)
+    made_table(noisy, lambda cell: 10.0 * better[cell.policy] * (1.0 - 5.0 * cell.values[-1])).write("noise.parquet")
+    rows = [(n, seed, t, n**0.8 * (1 + 0.1 * seed) + t) for n in (1, 2, 4) for seed in (0, 1, 2) for t in (0, 1)]
+    _write_curves("curves.csv", rows)
+    law = [(n, seed, 0, n / (1 + 0.05 * (n - 1)) * (5 + seed / 9)) for n in (1, 2, 4, 8, 16, 32) for seed in (0, 1)]
+    _write_curves("law.csv", law)
+
+
+def _write_curves(file: str, rows: list[tuple[int, int, int, float]]) -> None:
+    Path(file).write_text("\n".join(["n_robots,seed,interval,performance", *(",".join(map(str, row)) for row in rows)]))
+
+
+def held_against(name: str, text: str) -> None:
+    """Fail with a diff where a text is not that of its file; with REMAKE_TEXTS=1 write it instead."""
+    file = TEXTS / name
+    if REMAKE:
+        TEXTS.mkdir(exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+        return
+    stored = file.read_text(encoding="utf-8") if file.exists() else ""
+    if stored == text:
+        return
+    lines = stored.splitlines(), text.splitlines()
+    diff = difflib.unified_diff(*lines, f"tests/cli/texts/{name}", "now", lineterm="", n=2)
+    how = "If this is meant: REMAKE_TEXTS=1 python -m pytest tests/cli/test_texts.py, and look at git diff."
+    pytest.fail("\n".join([f"{name} has changed: swarm-forage {CASES.get(name, '')}", *diff, "", how]), pytrace=False)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_command_says_the_same(name: str, made: Place) -> None:
+    held_against(name, made.answer(name))
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_function_answers_the_same(name: str, made: Place) -> None:
+    answer = CALLS[name](out=made.folder / "results" / "warehouse_small", jobs=1, progress=False)
+    held_against(f"{name}.txt", f"{answer}\n")
+    held_against(f"{name}.json", json_lines(steady_json(answer.to_mapping(), made.folder)) + "\n")
+
+
+def test_every_file_has_a_case() -> None:
+    known = {*CASES, *(f"{name}{ending}" for name in CALLS for ending in (".txt", ".json"))}
+    if REMAKE:
+        for file in TEXTS.iterdir():
+            if file.name not in known:
+                file.unlink()
+    assert {file.name for file in TEXTS.iterdir()} <= known
