@@ -111,9 +111,7 @@ class Rack:
             while arena.bodies.n_pairs < most:  # there is one shape for all
                 arena.bodies.make_room()
         self._seated = [arena.parts for arena in self.arenas]
-        worlds_at = np.array([addresses(world) for world, _ in self._seated], np.intp)
-        bodies_at = np.array([addresses(bodies) for _, bodies in self._seated], np.intp)
-        self._places = (*self._seated[0], worlds_at, bodies_at)
+        self._places = self._seated[0], np.array([addresses(parts) for parts in self._seated], np.intp)
 
 
 def are_others(now: Sequence[object], noted: Sequence[object]) -> bool:

@@ -1,52 +1,69 @@
-"""The table of addresses: every array of a world stands where the compiled functions look for it."""
+"""Compiled code finds the arrays of one value of nested tuples by the types of another, in the order of the fields."""
 
-from collections.abc import Callable, Iterator
-from types import SimpleNamespace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from swarm_forage_env import scenario
-from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.world.kernels import many
+from swarm_forage_env._internal.compiling import kernel
+from swarm_forage_env.contract.types import FloatArray, IntArray
+from swarm_forage_env.world.kernels.many import alike
 from swarm_forage_env.world.rack import addresses
 
 
-def interpreted(name: str) -> Callable[..., Any]:
-    """A function of `kernels.many` as Python runs it, whether it is compiled or not."""
-    function = getattr(many, name)
-    return getattr(function, "py_func", function)
+class Inner(NamedTuple):
+    factor: float
+    rows: IntArray
+    pair: tuple[int, FloatArray]
 
 
-def leaves(value: Any) -> Iterator[Any]:
-    """What nested tuples consist of, in order."""
-    if not isinstance(value, tuple):
-        yield value
-    for part in value if isinstance(value, tuple) else ():
-        yield from leaves(part)
+class Outer(NamedTuple):
+    table: FloatArray
+    inner: Inner
+    is_there: bool
+    both: tuple[IntArray, IntArray]
 
 
-@pytest.fixture
-def placed(monkeypatch) -> None:
-    """In the place of an array `kernels.many` notes which array it is like, and the address that it was given."""
-    monkeypatch.setattr(many, "array_at", lambda like, address: SimpleNamespace(like=like, address=address))
-    for name in ("state_at", "sensors_at"):
-        monkeypatch.setattr(many, name, interpreted(name))
+def value(start: int) -> Outer:
+    """Arrays of different shapes and types that hold the numbers from `start`."""
+    whole = [np.arange(start + 10 * k, start + 10 * k + 3, dtype=np.int32) for k in range(3)]
+    real = np.arange(start + 30, start + 36, dtype=np.float64)
+    return Outer(real.reshape(2, 3), Inner(start / 8, whole[0], (start, real + 10)), start > 0, (whole[1], whole[2]))
 
 
-@pytest.mark.usefixtures("placed")
-@pytest.mark.parametrize("kind", ["world_at", "bodies_at", "payment_at"])
-def test_every_array_is_looked_for_where_its_address_stands(kind):
-    env = ForageEnv(scenario("warehouse_small", n_robots=2, n_objects=4, physics="compiled"))
-    env.reset_batch(0)
-    world, bodies = env.arena.parts
-    value = {"world_at": world, "bodies_at": bodies, "payment_at": env.reward_model.payment}[kind]
-    found = interpreted(kind)(value, addresses(value))
-    assert type(found) is type(value)
-    for given, made in zip(leaves(value), leaves(found), strict=True):
-        if isinstance(given, np.ndarray):
-            assert made.like is given
-            assert made.address == given.ctypes.data
-        else:
-            assert made == given, "constants are those of the first world"
+@kernel
+def tell(like: Outer, at: np.ndarray, told: FloatArray) -> None:
+    found = alike(like, at)
+    told[0], told[1] = found.table[0, 1], found.table[1, 2]
+    told[2], told[3], told[4] = found.inner.factor, found.inner.rows[2], found.inner.pair[0]
+    told[5], told[6] = found.inner.pair[1][5], found.is_there
+    told[7], told[8] = found.both[0][0], found.both[1][1]
+
+
+@kernel
+def overwrite(like: Outer, at: np.ndarray) -> None:
+    found = alike(like, at)
+    found.inner.rows[:] = 7
+    found.table[1, :] = 0.5
+
+
+@pytest.mark.compiled
+def test_arrays_are_those_at_the_addresses_and_constants_those_of_the_value():
+    one, other, told = value(100), value(1000), np.zeros(9)
+    tell(one, np.array(addresses(other)), told)
+    assert told.tolist() == [1031, 1035, 12.5, 1002, 100, 1045, 1, 1010, 1021]
+
+
+@pytest.mark.compiled
+def test_what_is_written_is_written_there():
+    one, other = value(100), value(1000)
+    overwrite(one, np.array(addresses(other)))
+    assert other.inner.rows.tolist() == [7, 7, 7]
+    assert other.table.tolist() == [[1030, 1031, 1032], [0.5, 0.5, 0.5]]
+    assert one.inner.rows.tolist() == [100, 101, 102]
+
+
+def test_every_array_has_an_address_in_order():
+    one = value(1)
+    arrays = [one.table, one.inner.rows, one.inner.pair[1], *one.both]
+    assert addresses(one) == [array.ctypes.data for array in arrays]
