@@ -5,8 +5,12 @@ from collections.abc import Callable
 from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
+
+from . import numba_settings  # noqa: F401  # pyright: ignore[reportUnusedImport]  (before numba)
+
+# isort: split
+from numba import njit
 
 from .checks import CurveError, check_option
 from .curves import FloatArray, Variant, as_curve, as_curves, check_broadcast

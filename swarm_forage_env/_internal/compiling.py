@@ -12,6 +12,10 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
+
+from swarm_forage_env._internal import numba_settings  # noqa: F401  (before numba)
+
+# isort: split
 from numba import njit, typeof, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 

@@ -137,6 +137,7 @@ NOT_COMPILED_IN = {
         "contract/types",  # annotations
         "contract/policy",  # a protocol and a dataclass, for the policies beside the kernels
         "scenarios/quirks",  # a dataclass; kernels are handed single switches
+        "_internal/numba_settings",  # where numba looks for settings
         "_internal/rng",  # kernels are handed the numbers
         "_internal/spelling",  # error messages
     )

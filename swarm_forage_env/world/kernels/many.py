@@ -9,6 +9,10 @@ import itertools
 from typing import Any, cast
 
 import numpy as np
+
+from swarm_forage_env._internal import numba_settings  # noqa: F401  (before numba)
+
+# isort: split
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic

@@ -1,0 +1,119 @@
+"""No file runs code because it lies in the current folder, though nobody named it."""
+
+import ast
+import json
+import os
+import pickle
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+from numba.core.caching import UserProvidedCacheLocator
+
+ROOT = Path(__file__).resolve().parents[2]
+SHORT = ("--robots", "2", "--objects", "10", "--horizon", "4", "--set", "interval_s=2")
+
+
+class Evil:
+    """Opening the pickle of it writes a file."""
+
+    def __init__(self, marker: Path) -> None:
+        self.marker = marker
+
+    def __reduce__(self):
+        return Path.touch, (self.marker,)
+
+
+def kernels() -> list[tuple[Path, str, int]]:
+    """File, name and first line of all functions that may be kept compiled."""
+    return [
+        (file, node.name, node.decorator_list[0].lineno)
+        for package in ("swarm_forage_env", "baselines", "metrics")
+        for file in (ROOT / package).rglob("*.py")
+        for node in ast.parse(file.read_text()).body
+        if isinstance(node, ast.FunctionDef) and node.decorator_list
+    ]
+
+
+@pytest.fixture
+def marker(tmp_path):
+    """A file that is there as soon as a forged one was opened."""
+    return tmp_path / "marker"
+
+
+@pytest.fixture
+def cache(tmp_path, marker):
+    """A forged cache of compiled functions."""
+    folder = tmp_path / "cache"
+    abi = f"py{sys.version_info[0]}{sys.version_info[1]}{sys.abiflags}"
+    for file, name, line in kernels():
+        place = folder / UserProvidedCacheLocator.get_suitable_cache_subpath(str(file))
+        place.mkdir(parents=True, exist_ok=True)
+        for mark in ("", "-called", "-callback"):
+            (place / f"{file.stem}.{name}-{line}.{abi}{mark}.nbi").write_bytes(pickle.dumps(Evil(marker)))
+    return folder
+
+
+@pytest.fixture
+def here(tmp_path, cache):
+    """A folder with a file that tells numba to use the forged cache; JSON is YAML, too."""
+    folder = tmp_path / "here"
+    folder.mkdir()
+    (folder / ".numba_config.yaml").write_text(
+        json.dumps({"cache_dir": str(cache), "chrome_trace": str(cache / "trace"), "boundscheck": 1})
+    )
+    return folder
+
+
+def python(here: Path, *words: str, **environ: str) -> subprocess.CompletedProcess[str]:
+    """Run Python in a folder, with PyYAML or what numba takes for it."""
+    places = [str(ROOT)]
+    if find_spec("yaml") is None:
+        places.append(str(here.parent))
+        (here.parent / "yaml.py").write_text("from json import load as safe_load\n")
+    told = {**os.environ, "PYTHONPATH": os.pathsep.join(places), **environ}
+    ended = subprocess.run([sys.executable, "-P", *words], cwd=here, env=told, capture_output=True, text=True,
+                           timeout=300, check=False)  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    return ended
+
+
+def command(here: Path, *words: str, **environ: str) -> subprocess.CompletedProcess[str]:
+    return python(here, "-m", "swarm_forage_env.cli", *words, **environ)
+
+
+@pytest.mark.compiled
+def test_a_forged_cache_that_a_file_names_is_not_opened(here, marker):
+    ended = command(here, "run", "--policy", "crw", *SHORT, "--jobs", "1")
+    assert ".numba_config.yaml in the current folder is not read" in ended.stderr
+    program = "from metrics.distance import dtw; dtw([0.0, 1.0], [1.0, 1.0])"
+    python(here, "-c", program)
+    assert not marker.exists()
+    python(here, "-c", program, NUMBA_CACHE_DIR=str(here.parent / "cache"))
+    assert marker.exists(), "the forgery is none"
+
+
+@pytest.mark.parametrize(
+    "module", ["swarm_forage_env._internal.compiling", "swarm_forage_env.world.kernels.many", "metrics.distance"]
+)
+def test_numba_has_no_settings_from_a_file(here, module):
+    """Whichever module is imported first, and whenever numba looks."""
+    look = "from numba.core import config; print(config.CACHE_DIR, config.CHROME_TRACE, config.BOUNDSCHECK)"
+    again = "config.reload_config(); print(config.CACHE_DIR, config.CHROME_TRACE, config.BOUNDSCHECK)"
+    lines = python(here, "-c", f"import {module}; {look}; {again}").stdout.splitlines()
+    assert lines == ["  None"] * 2
+
+
+def test_what_numba_has_read_before_is_undone(here):
+    program = "import numba; a = numba.config.CACHE_DIR; import metrics.distance; print(a, [numba.config.CACHE_DIR])"
+    read = python(here, "-c", program).stdout
+    assert re.fullmatch(r"/\S+ \[''\]\n", read), read
+
+
+def test_both_guards_are_the_same():
+    """Neither package may import the other."""
+    ours, metrics = (ROOT / f"{place}/numba_settings.py" for place in ("swarm_forage_env/_internal", "metrics"))
+    assert ours.read_text() == metrics.read_text()
