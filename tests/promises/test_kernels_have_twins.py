@@ -14,7 +14,7 @@ from tests.reference.twins import TWINS, WITHOUT, Twin
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("swarm_forage_env", "baselines", "metrics")
-ABOVE = ("cli", "study", "replay", "training", "sb3", "checks", "scoring", "claims")
+ABOVE = ("cli", "studies", "runs", "inspect", "replay", "training", "sb3", "checks", "scoring", "claims")
 """Folders that call environments and policies, and that no kernel's caller calls."""
 
 
