@@ -5,11 +5,11 @@
 
 This is asked for runs that need Python between the ticks: those of a learned policy and those under wrappers. (Bare
 scripted policies run without Python between the ticks; there is nothing to save.) Two things could be done once for all
-seeds: stepping the arenas (`world.rack`), and asking the policy, with the robots of all arenas in one array. Both are
-timed beside what is done now, arena by arena, on copies of the same worlds. The difference, over what whole runs take,
-is the most that could be saved: rewards, wrappers, records and the work of handing rows around would stay. All ways
-take turns. Times are microseconds of processor time per robot-tick, medians of the rounds. Shares are worked out round
-by round; the table has the median, the smallest and the largest.
+seeds: stepping the arenas (`world.lockstep`), and asking the policy, with the robots of all arenas in one array. Both
+are timed beside what is done now, arena by arena, on copies of the same worlds. The difference, over what whole runs
+take, is the most that could be saved: rewards, wrappers, records and the work of handing rows around would stay. All
+ways take turns. Times are microseconds of processor time per robot-tick, medians of the rounds. Shares are worked out
+round by round; the table has the median, the smallest and the largest.
 """
 
 import argparse
@@ -25,7 +25,7 @@ from speed_cases import WRAPPERS
 from swarm_forage_env import build_stack, load_policy, parse_wrapper, scenario
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.runs.run import LiveRun
-from swarm_forage_env.world.rack import Rack
+from swarm_forage_env.world.lockstep import Lockstep
 
 CASES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("learned", "ppo_warehouse_small", ()),
@@ -72,7 +72,7 @@ def row(label: str, policy_name: str, wrappers: Sequence[str], n_robots: int, gi
     obs = np.concatenate([arena.obs for arena in alone])
     active = np.ones(len(obs), np.bool_)
     actions = np.array(together.act(obs, active), np.float32).reshape(n_seeds, n_robots, 3)
-    rack, nobody = Rack(seated), dict.fromkeys(range(n_seeds))
+    lockstep, nobody = Lockstep(seated), dict.fromkeys(range(n_seeds))
 
     def step_each() -> None:
         for _ in range(ticks):
@@ -81,7 +81,7 @@ def row(label: str, policy_name: str, wrappers: Sequence[str], n_robots: int, gi
 
     def step_together() -> None:
         for _ in range(ticks):
-            rack.step(nobody, actions)
+            lockstep.step(nobody, actions)
 
     def ask_each() -> None:
         for _ in range(ticks):

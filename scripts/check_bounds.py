@@ -22,7 +22,7 @@ TESTS = (
     "tests/rendering/test_paint.py",
     "tests/world/test_kinds.py",
     "tests/world/test_neighbourhood.py",
-    "tests/world/test_rack.py",
+    "tests/world/test_lockstep.py",
     "tests/wrappers/test_messages.py",
     "tests/wrappers/test_noise.py",
 )
@@ -34,7 +34,7 @@ CHOICE = (
 engine; noise on wheels; neighbours, messages and kinds of robots."""
 ELSEWHERE = {
     "tick.run": "whole runs by one kernel need a compiled policy, which would be compiled, too",
-    "task_shares.add_task_shares": "a part of tick.run",
+    "counting.add_task_shares": "a part of tick.run",
 }
 """Kernel -> why these tests do not reach it."""
 

@@ -26,7 +26,7 @@ from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.world.contact import TOUCH_SLACK_M
+from swarm_forage_env.world.motion import TOUCH_SLACK_M
 
 MEASURES = {
     "deliveries": 1,

@@ -21,7 +21,7 @@ from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.world.contact import TOUCH_SLACK_M
+from swarm_forage_env.world.motion import TOUCH_SLACK_M
 
 UNRESOLVED_TICKS = 1_000
 

@@ -27,7 +27,7 @@ from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.runs.run import LiveRun
 from swarm_forage_env.world.arena import ForagingArena
-from swarm_forage_env.world.kernels import bodies, drive, floor, interact, interfere, proprioception, tick
+from swarm_forage_env.world.kernels import bodies, counting, drive, floor, interact, proprioception, tick
 
 ROUNDS, CALLS = 7, 200
 RUN_IN_TICKS = 2_000
@@ -68,7 +68,7 @@ def phases(arena: ForagingArena, policy: Policy) -> Iterator[tuple[str, Callable
     yield "looking around", bound(tick.look, world)
     seen = sensors.obs, columns.proximity, sensors.near, sensors.behind_counts, state.active, world.present
     marked = state.carried_object, world.interfering, state.counters, world.interference_sum
-    yield "interference", bound(interfere.mark, *seen, *marked)
+    yield "interference", bound(counting.mark, *seen, *marked)
     yield "pick-ups and drops", bound(interact.serve, state, world.rules, actions, now, chance)
     place = state.position, world.facing, world.present
     if sensors.reads_light:

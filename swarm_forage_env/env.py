@@ -16,8 +16,8 @@ from swarm_forage_env.contract.policy import COMMANDS, ActionError, CompiledPoli
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.world.arena import ForagingArena
-from swarm_forage_env.world.global_state import global_state
 from swarm_forage_env.world.rewards import RewardModel
+from swarm_forage_env.world.sensors import global_state
 from swarm_forage_env.world.snapshots import Origin, Snapshot, package_version, read, take
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
@@ -299,7 +299,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         """Do what comes before the arena's step, and return what the arena is to be stepped with.
 
         `begin_step`, the arena's step and `end_step` are `step_batch`; this is for arenas that are stepped together
-        (`world.rack`).
+        (`world.lockstep`).
         """
         actions = self.checked_actions(actions)
         wheel_gain = checked_gain(wheel_gain, len(actions))
@@ -461,7 +461,7 @@ class ForageEnv(ParallelEnv[str, np.ndarray, np.ndarray]):
         return {agent: {"active": active[agent]} for agent in agents}
 
     def state(self) -> np.ndarray:
-        """Global view of fixed size, (6 N + 3 M,) float32 in [-1, 1]; see `world.global_state`.
+        """Global view of fixed size, (6 N + 3 M,) float32 in [-1, 1]; see `world.sensors`.
 
         Raises:
             RuntimeError: before the first reset.

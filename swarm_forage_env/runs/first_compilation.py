@@ -25,7 +25,7 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.run import build_stack, compiled_policy_of
 from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.world.halves import compile_half, is_first, outermost
+from swarm_forage_env.world.compiled import compile_half, is_first, outermost
 from swarm_forage_env.wrappers.recorder import RunRecorder
 
 WAKE_UP_EVERY_S = 0.5

@@ -40,7 +40,7 @@ from swarm_forage_env.runs.record import RunRecord, software_versions
 from swarm_forage_env.runs.run import run_one, warm_up
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunFailure, RunStore
-from swarm_forage_env.world.halves import compile_half
+from swarm_forage_env.world.compiled import compile_half
 
 Outcome: TypeAlias = RunRecord | RunFailure
 Task: TypeAlias = tuple[RunSpec, ...]

@@ -1,7 +1,7 @@
 """Many arenas stepped as one batch of rows, one row per robot: what vector environments are made of.
 
-Row `a * N + i` is always robot i of arena a. Where a sampler draws the worlds, N is the most robots of all, and the
-last rows of an arena with fewer are *spare*: absent from the first step of the run to the last. The life of a row:
+Row `a * N + i` is always robot i of arena a. Where a sampler draws the worlds, N is the most robots of all, and spare
+rows (`LearnerArena`) are absent from the first step of the run to the last. The life of a row:
 
 * While its robot is in the world, or not yet born, the row is part of an episode.
 * When the robot dies, the row terminates once, with its last observation (zeros: it has left the world). Until its
@@ -23,12 +23,11 @@ from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.views.bookkeeping import Bookkeeping, can_book_together
 from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
-from swarm_forage_env.views.settlement import Settlement, can_settle
-from swarm_forage_env.views.spare import spare_masks, with_spare_rows
 from swarm_forage_env.world.arena import ForagingArena
-from swarm_forage_env.world.kernels.rows import book_rows
-from swarm_forage_env.world.rack import Rack, can_share_a_rack
+from swarm_forage_env.world.kernels.reward import book_rows
+from swarm_forage_env.world.lockstep import Lockstep, can_go_in_lockstep
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
 
@@ -177,7 +176,7 @@ class ArenaBatch:
         action_size = COMMANDS + plan.scenario.robots.message_size
         self._commands = np.zeros((n_arenas, self.n_robots, action_size), np.float32)
         self._rows = self._absent, self._present, self._returns, self._lengths
-        self._ways: tuple[list[ForagingArena], Rack | None, Settlement | None] | None = None
+        self._ways: tuple[list[ForagingArena], Lockstep | None, Bookkeeping | None] | None = None
         self._no_endings = _Endings().joined(self._n_columns)
 
     def reset(
@@ -199,7 +198,7 @@ class ArenaBatch:
         for number, (seed, option) in enumerate(zip(seeds, options, strict=True)):
             self._start(number, obs[number], seed, option)
         self._is_reset = True
-        return obs.reshape(self.n_rows, -1), self._active()
+        return obs.reshape(self.n_rows, -1), np.concatenate([arena.active for arena in self.arenas])
 
     def _start(
         self, number: int, out: ObsArray, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -214,11 +213,7 @@ class ArenaBatch:
         self._absent[number, n_robots:] = True
         self._returns[number] = 0.0
         self._lengths[number] = 0
-        arena.observe(out[:n_robots])
-        out[n_robots:] = 0.0
-
-    def _active(self) -> BoolArray:
-        return np.concatenate([with_spare_rows(arena.forage_env.active, self.n_robots) for arena in self.arenas])
+        arena.observe(out)
 
     def step(self, actions: np.ndarray) -> ArenaStep:
         """Step every arena by one decision.
@@ -236,13 +231,13 @@ class ArenaBatch:
         obs = np.empty((*shape, columns), np.float32)
         rewards = np.zeros(shape, np.float32)
         terminated, _, active = flags = np.zeros((3, *shape), np.bool_)
-        rack, settlement = self._chosen_ways()
+        lockstep, books = self._chosen_ways()
         actions = actions.reshape(*shape, *actions.shape[1:])
-        if rack is not None:
-            ticks = self._together(rack, settlement, actions, rewards)
+        if lockstep is not None:
+            ticks = self._together(lockstep, books, actions, rewards)
         else:
             ticks = [self._alone(number, actions[number], rewards[number]) for number in range(self.n_arenas)]
-        n_terminated = self._book(settlement, ticks, rewards, (terminated, active), obs)
+        n_terminated = self._book(books, ticks, rewards, (terminated, active), obs)
         endings: _Endings | None = None
         for number, (dead, all_dead, at_horizon) in enumerate(ticks):
             if n_terminated[number] or all_dead or at_horizon:
@@ -257,17 +252,17 @@ class ArenaBatch:
         )
 
     def _together(
-        self, rack: Rack, settlement: Settlement | None, actions: np.ndarray, rewards: np.ndarray
+        self, lockstep: Lockstep, books: Bookkeeping | None, actions: np.ndarray, rewards: np.ndarray
     ) -> list[tuple[BoolArray, bool, bool]]:
         """Carry out a decision in all arenas; returns what `LearnerArena.step` does, for each.
 
         Args:
-            rack: What steps them.
-            settlement: What works out their rewards, if it can.
+            lockstep: What steps them.
+            books: What works out their rewards, if it can.
             actions: (A, N) or (A, N, k).
             rewards: (A, N), to be added to.
         """
-        payer = settlement if settlement is not None and settlement.pays else None
+        payer = books if books is not None and books.pays else None
         ticks: list[tuple[BoolArray, bool, bool]] = [(np.zeros(0, np.bool_), False, False)] * self.n_arenas
         going = list(range(self.n_arenas))
         for _ in range(self.interface.config.decision_ticks):
@@ -277,7 +272,7 @@ class ArenaBatch:
                 gains: dict[int, FloatArray | None] = dict.fromkeys(going)
             else:
                 gains = {number: self._begin(number, actions[number]) for number in going}
-            for number, error in rack.step(gains, self._commands).items():
+            for number, error in lockstep.step(gains, self._commands).items():
                 self._note(error, number)
                 raise error
             if payer is not None:
@@ -292,7 +287,7 @@ class ArenaBatch:
 
     def _book(
         self,
-        settlement: Settlement | None,
+        books: Bookkeeping | None,
         ticks: Sequence[tuple[BoolArray, bool, bool]],
         rewards: np.ndarray,
         flags: tuple[BoolArray, BoolArray],
@@ -301,7 +296,7 @@ class ArenaBatch:
         """Book a decision of every arena, see `book_rows`, and write what learners see.
 
         Args:
-            settlement: What does it for all at once, if there is something.
+            books: What does it for all at once, if there is something.
             ticks: What the last tick of each arena has brought, see `LearnerArena.step`.
             rewards: (A, N)
             flags: terminated, active, each (A, N), are written.
@@ -310,8 +305,8 @@ class ArenaBatch:
         Returns:
             How many rows of each arena terminate.
         """
-        if settlement is not None:
-            n_terminated = settlement.book(rewards, self._rows, flags, obs)
+        if books is not None:
+            n_terminated = books.book(rewards, self._rows, flags, obs)
         else:
             n_terminated = [
                 book_rows(
@@ -322,10 +317,9 @@ class ArenaBatch:
                 )
                 for number, (arena, *rows) in enumerate(zip(self.arenas, rewards, *self._rows, *flags, strict=True))
             ]
-        if settlement is None or not settlement.copies:
+        if books is None or not books.copies:
             for arena, out in zip(self.arenas, obs, strict=True):
-                arena.observe(out[: arena.n_robots])
-                out[arena.n_robots :] = 0.0
+                arena.observe(out)
         return n_terminated
 
     def _begin(self, number: int, actions: np.ndarray) -> FloatArray | None:
@@ -353,16 +347,16 @@ class ArenaBatch:
             "stepped already; where there are others, reset before going on."
         )
 
-    def _chosen_ways(self) -> tuple[Rack | None, Settlement | None]:
-        """Return what steps all arenas together and what settles a step of all together.
+    def _chosen_ways(self) -> tuple[Lockstep | None, Bookkeeping | None]:
+        """Return what steps all arenas together and what books a step of all together.
 
         Either is None where arenas have to be taken one by one.
         """
         worlds = [arena.forage_env.arena for arena in self.arenas]
         if self._ways is None or worlds != self._ways[0]:  # by identity
             in_parts = not self._is_sampled and all(map(_steps_in_parts, self.arenas))
-            rack = Rack(worlds) if in_parts and can_share_a_rack(worlds) else None
-            self._ways = worlds, rack, Settlement(self.arenas) if in_parts and can_settle() else None
+            lockstep = Lockstep(worlds) if in_parts and can_go_in_lockstep(worlds) else None
+            self._ways = worlds, lockstep, Bookkeeping(self.arenas) if in_parts and can_book_together() else None
         elif self._ways[2] is not None:
             self._ways[2].follow()
         return self._ways[1:]
@@ -387,9 +381,7 @@ class ArenaBatch:
             self._note_endings(number, np.arange(self.n_robots), obs, endings)
             endings.outcomes.append(self._outcome(number))
             self._start(number, obs)
-            arena = self.arenas[number]
-            active[: arena.n_robots] = arena.forage_env.active
-            active[arena.n_robots :] = False
+            active[:] = self.arenas[number].active
         else:
             self._note_endings(number, np.flatnonzero(terminated), obs, endings)
             absent[: len(dead)] |= dead
@@ -422,7 +414,7 @@ class ArenaBatch:
             ValueError: the actions are continuous.
         """
         self._require_reset("action_masks")
-        return np.concatenate([spare_masks(arena.mask(), self.n_robots) for arena in self.arenas])
+        return np.concatenate([arena.mask() for arena in self.arenas])
 
     def _require_reset(self, what: str) -> None:
         if self._is_closed:

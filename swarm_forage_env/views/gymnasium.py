@@ -18,7 +18,6 @@ from swarm_forage_env.views.arenas import ArenaStep
 from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot, plan_arena
 from swarm_forage_env.views.processes import open_arenas
 from swarm_forage_env.views.sampler import ScenarioSampler
-from swarm_forage_env.views.spare import spare_masks, with_spare_rows
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_configs
 
@@ -81,9 +80,8 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         self._arena = LearnerArena(plan)
         self._is_discrete = plan.interface.actions == "discrete"
         self.render_mode = render_mode
-        self._n_rows = plan.scenario.robots.n_robots
-        self.observation_space = batch_space(self.interface.observation_space, self._n_rows)
-        self.action_space = batch_space(self.interface.action_space, self._n_rows)
+        self.observation_space = batch_space(self.interface.observation_space, self._arena.n_rows)
+        self.action_space = batch_space(self.interface.action_space, self._arena.n_rows)
 
     @property
     def interface(self) -> LearnerInterface:
@@ -106,7 +104,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         """
         super().reset(seed=seed)
         self._arena.reset(seed, options)
-        return self._observed(), self._info()
+        return self._arena.observe(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[ObsArray, float, bool, bool, dict[str, Any]]:
         """Advance by one decision.
@@ -117,15 +115,15 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         Raises:
             ActionError: wrong shape, numbers outside of `action_space`, or an active robot's action that is not finite.
         """
-        n_robots = self._arena.n_robots
+        n_robots, n_rows = self._arena.n_robots, self._arena.n_rows
         rewards = np.zeros(n_robots)  # float64: sums do not depend on the order
         chosen = np.asarray(action)
-        if n_robots < self._n_rows:
-            if chosen.shape[:1] != (self._n_rows,):
-                raise ActionError(f"Expected actions for {self._n_rows} rows, got shape {chosen.shape}.")
+        if n_robots < n_rows:
+            if chosen.shape[:1] != (n_rows,):
+                raise ActionError(f"Expected actions for {n_rows} rows, got shape {chosen.shape}.")
             chosen = chosen[:n_robots]
         _, terminated, truncated = self._arena.step(chosen, rewards)
-        return self._observed(), float(rewards.sum()), terminated, truncated, self._info()
+        return self._arena.observe(), float(rewards.sum()), terminated, truncated, self._info()
 
     def snapshot(self) -> LearnerSnapshot:
         """Return the state of the run as a value; see `ForageEnv.snapshot`."""
@@ -134,7 +132,7 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
     def restore(self, snapshot: LearnerSnapshot) -> tuple[ObsArray, dict[str, Any]]:
         """Go back to a snapshot; returns observations (N, d) and info. See `ForageEnv.restore`."""
         self._arena.restore(snapshot)
-        return self._observed(), self._info()
+        return self._arena.observe(), self._info()
 
     def render(self) -> np.ndarray | None:
         """Return a picture (height, width, 3) uint8 when created with render_mode="rgb_array", else None."""
@@ -144,13 +142,10 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
         """Close the wrapped stack."""
         self._arena.env.close()
 
-    def _observed(self) -> ObsArray:
-        return with_spare_rows(self._arena.observe(), self._n_rows)
-
     def _info(self) -> dict[str, Any]:
-        info: dict[str, Any] = {"active": with_spare_rows(self.forage_env.active, self._n_rows)}
+        info: dict[str, Any] = {"active": self._arena.active}
         if self._is_discrete:
-            info["action_mask"] = spare_masks(self._arena.mask(), self._n_rows).astype(np.int8)
+            info["action_mask"] = self._arena.mask().astype(np.int8)
         return info
 
 

@@ -13,7 +13,13 @@ from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.calls import OPTION_OF_TESTS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
-from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, LearnerInterface, chosen_interface
+from swarm_forage_env.policies.interface import (
+    MOTIONS,
+    GivenInterface,
+    InterfaceConfig,
+    LearnerInterface,
+    chosen_interface,
+)
 from swarm_forage_env.policies.kernels.sites import SiteMemory
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
 from swarm_forage_env.scenarios.overrides import field_sections, scenario_of_same_size
@@ -166,7 +172,11 @@ class LearnerSnapshot:
 class LearnerArena:
     """One arena for learning, and the sequence of its episodes.
 
+    Where a sampler draws the worlds there are as many rows as the largest has robots. The last rows of a run with fewer
+    are *spare*: nobody is at work there, observations are zeros, and the only action that makes sense is to stand.
+
     Attributes:
+        n_rows: Rows of what a learner sees, one for each robot.
         env: Environment and wrappers as one stack.
         forage_env: The ForageEnv at its bottom.
         interface: Translates for the learner; its spaces stay the same, but a reset may make a new object.
@@ -184,6 +194,7 @@ class LearnerArena:
         """
         self._plan = plan
         self._share = share
+        self.n_rows = plan.scenario.robots.n_robots
         self._overrides: dict[str, Any] = {}
         self._world: DrawnWorld | None = None
         self._seeds = np.random.default_rng()
@@ -191,7 +202,7 @@ class LearnerArena:
 
     @property
     def n_robots(self) -> int:
-        """Robots of this run; a sampler may draw fewer than there are rows for."""
+        """Robots of this run, at most as many as there are rows."""
         return self.forage_env.scenario.robots.n_robots
 
     def _built(
@@ -327,13 +338,32 @@ class LearnerArena:
         self._seeds.bit_generator.state = snapshot.seeds
         self.interface.recall(snapshot.memory)
 
+    @property
+    def active(self) -> BoolArray:
+        """Which rows are at work, (rows,): a new array."""
+        return self._with_spare_rows(self.forage_env.active)
+
     def observe(self, out: ObsArray | None = None) -> ObsArray:
-        """Return what the learner sees now, (N, d): a new array, or `out`."""
-        return self.interface.observe(self.env.last_obs, out)
+        """Return what the learner sees now, (rows, d): a new array, or `out`."""
+        if out is None:
+            out = np.empty((self.n_rows, self.interface.layout.size), np.float32)
+        self.interface.observe(self.env.last_obs, out[: self.n_robots])
+        out[self.n_robots :] = 0.0
+        return out
 
     def mask(self) -> BoolArray:
-        """Return which discrete actions make sense now, (N, number of actions); see `LearnerInterface.mask`."""
-        return self.interface.mask(self.env.last_obs)
+        """Return which discrete actions make sense now, (rows, number of actions); see `LearnerInterface.mask`.
+
+        Spare rows can stand, because algorithms with masks draw an action for each row.
+        """
+        mask = self._with_spare_rows(self.interface.mask(self.env.last_obs))
+        mask[self.n_robots :, MOTIONS.index("stand")] = True
+        return mask
+
+    def _with_spare_rows(self, rows: np.ndarray) -> np.ndarray:
+        padded = np.zeros((self.n_rows, *rows.shape[1:]), rows.dtype)
+        padded[: len(rows)] = rows
+        return padded
 
 
 _FIXED = ("interface", "wrappers")

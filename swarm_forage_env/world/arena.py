@@ -32,9 +32,14 @@ from swarm_forage_env.world.kernels.world import World
 from swarm_forage_env.world.kinds import blank_boxes
 from swarm_forage_env.world.neighbourhood import Neighbourhood
 from swarm_forage_env.world.physics import Physics
-from swarm_forage_env.world.placement import draw_source, place_all, place_objects, static_cache_centres
+from swarm_forage_env.world.placement import (
+    draw_source,
+    draw_start_poses,
+    place_all,
+    place_objects,
+    static_cache_centres,
+)
 from swarm_forage_env.world.sensors import new_sensors, read_slices
-from swarm_forage_env.world.start_poses import draw_start_poses
 from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
 
 _FUNCTIONS = ("_compiled", "_own_sensors")
@@ -307,7 +312,7 @@ class ForagingArena:
         """Whether Python is needed in every tick: for neighbours, messages or sensors of the user."""
         return self._needs_python
 
-    # For `world.rack`
+    # For `world.lockstep`
 
     @property
     def bodies(self) -> Bodies:

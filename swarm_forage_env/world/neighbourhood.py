@@ -12,8 +12,7 @@ from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOURS, ObservationLa
 from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.robots import RobotConfig
-from swarm_forage_env.world.kernels.neighbourhood import hear, say, see_neighbours
-from swarm_forage_env.world.kernels.neighbours import bin_robots
+from swarm_forage_env.world.kernels.neighbourhood import bin_robots, hear, say, see_neighbours
 from swarm_forage_env.world.state import SwarmState
 
 _CELL_SLACK = 1.0 + 1e-9

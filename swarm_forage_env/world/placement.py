@@ -1,4 +1,4 @@
-"""Where objects appear: the source of a run, the first placement, later placements; and where static caches stand.
+"""Where robots start and where objects appear: the source of a run, first and later placements; static caches.
 
 Every object lies on its own free cell: inside the distributable box, empty, neither nest, obstacle nor cache.
 """
@@ -7,19 +7,50 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.contract.types import IntArray
+from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.scenarios.regions import Box, overlap_cells, square_box
 from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.clusters import draw_clusters
-from swarm_forage_env.world.kernels.scatter import DRAWS, UNLIMITED, scatter
+from swarm_forage_env.world.kernels.placement import DRAWS, UNLIMITED, scatter
 from swarm_forage_env.world.state import ObjectState
 
 _CHUNK = 8192
 """Objects whose random numbers are held in memory at once."""
+
+_TRIALS = 1000
+"""Redraws of start positions before giving up, as in the study."""
+
+
+def draw_start_poses(config: ScenarioConfig, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Draw start positions (N, 2) m and headings (N,) rad in (-pi, pi].
+
+    Positions are uniform at least `start_margin_m` from the arena border; robots that overlap an obstacle are drawn
+    again, and of two overlapping robots the one with the higher row. Robots may start inside the nest.
+
+    Raises:
+        ConfigError: no layout without overlap was found.
+    """
+    n_robots, margin = config.robots.n_robots, config.robots.start_margin_m
+    low = np.array([margin, margin])
+    high = np.array([config.arena.width_m - margin, config.arena.height_m - margin])
+    position = rng.uniform(low, high, (n_robots, 2))
+    for _ in range(_TRIALS):
+        pairs = KDTree(position).query_pairs(2 * config.robots.radius_m, output_type="ndarray")
+        blocked = np.flatnonzero(distances_m(config.arena.obstacles, position) < config.robots.radius_m)
+        if len(pairs) == 0 and len(blocked) == 0:
+            return position, -rng.uniform(-np.pi, np.pi, n_robots)
+        again = np.union1d(pairs.max(axis=1), blocked)
+        position[again] = rng.uniform(low, high, (len(again), 2))
+    raise ConfigError(
+        f"Found no start positions without overlap for {n_robots} robots in {_TRIALS} trials; "
+        "use fewer robots, a larger arena or a smaller robots.start_margin_m."
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,6 @@
-"""What the sensors of a swarm are made of. Their models are functions in `kernels`, for all robots at once.
+"""What is seen of the world: by the sensors of a swarm, and by a central critic, which sees all of it.
+
+What sensors are made of stands here. Their models are functions in `kernels`, for all robots at once.
 
 Sensor models are those of the foot-bot as configured for the paper's study. Noise is not added here: the
 `SensorNoise` wrapper perturbs the finished observation.
@@ -9,12 +11,15 @@ from collections.abc import Collection
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, known_name
+from swarm_forage_env.contract.codes import ObjectStatus
 from swarm_forage_env.contract.layout import KIND, LIGHT_IF_CARRYING, MESSAGES, NEIGHBOURS, ObservationLayout
-from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
+from swarm_forage_env.contract.types import ObsArray
+from swarm_forage_env.scenarios.config import ArenaConfig, ScenarioConfig
+from swarm_forage_env.scenarios.units import CELL_M, WHEEL_SCALE_MPS
 from swarm_forage_env.world.kernels.world import Columns, Sensors
 from swarm_forage_env.world.kinds import blank_boxes, half_windows, kind_columns
 from swarm_forage_env.world.physics import obstacle_rows
+from swarm_forage_env.world.state import ObjectState, SwarmState
 
 PROXIMITY_RANGE_M = 0.1
 """Reach of a proximity beam beyond the body."""
@@ -80,3 +85,29 @@ def new_sensors(config: ScenarioConfig, layout: ObservationLayout, reads: Collec
         kind_start=starts.get(KIND, 0),
         blanks=blank_boxes(config.robots, layout),
     )
+
+
+def global_state(arena: ArenaConfig, swarm: SwarmState, objects: ObjectState) -> ObsArray:
+    """Return the whole world as one array of fixed size, (6 N + 3 M,) float32 in [-1, 1].
+
+    Per robot: x, y as in the observation, cos and sin of the heading, carrying, active (zeros when not present).
+    Then per object: x, y of its square (of its carrier while carried, zeros while waiting), status / 3.
+    """
+    size = np.array([arena.width_m, arena.height_m])
+    robots = np.column_stack(
+        [
+            2.0 * swarm.position / size - 1.0,
+            np.cos(swarm.heading),
+            np.sin(swarm.heading),
+            swarm.carried_object >= 0,
+            swarm.active,
+        ]
+    )
+    robots[~swarm.present] = 0.0
+    places = 2.0 * (objects.cell + 0.5) * CELL_M / size - 1.0
+    places[objects.status == ObjectStatus.WAITING] = 0.0
+    carriers = np.flatnonzero(swarm.carried_object >= 0)
+    places[swarm.carried_object[carriers]] = robots[carriers, :2]
+    things = np.column_stack([places, objects.status / 3.0])
+    flat = np.concatenate([robots.ravel(), things.ravel()])
+    return np.clip(flat, -1.0, 1.0).astype(np.float32)

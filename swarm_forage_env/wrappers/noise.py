@@ -14,9 +14,18 @@ from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, F
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.kernels.noise import NOT_NOISY, disturb, noisy_gain, shift_neighbours
-from swarm_forage_env.wrappers.sigma import Sigma, check_sigma, is_noisy, sigma_in_words, sigma_signal
-from swarm_forage_env.wrappers.waveform import Signal, Waveform, gather_waveform
+from swarm_forage_env.wrappers.kernels.gains import noisy_gain
+from swarm_forage_env.wrappers.kernels.noise import NOT_NOISY, disturb, shift_neighbours
+from swarm_forage_env.wrappers.waveform import (
+    Sigma,
+    Signal,
+    Waveform,
+    check_sigma,
+    gather_waveform,
+    is_noisy,
+    sigma_in_words,
+    sigma_signal,
+)
 
 NOISE_GROUPS = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
 """Groups of sensors that can be noisy, in the order of their columns."""

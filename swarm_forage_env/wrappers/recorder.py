@@ -11,7 +11,7 @@ from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.performance import part_column, performance_curve
-from swarm_forage_env.world.kernels.task_shares import add_task_shares
+from swarm_forage_env.world.kernels.counting import add_task_shares
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
 TOTALS: dict[str, Counter] = {

@@ -10,9 +10,9 @@ from swarm_forage_env._internal.fields import ConfigError, instance, switch
 from swarm_forage_env.contract.types import ActionArray, FloatArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import from_mapping
-from swarm_forage_env.world.actuators import drive_limits
+from swarm_forage_env.world.motion import drive_limits
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
-from swarm_forage_env.wrappers.kernels.throttle import throttle
+from swarm_forage_env.wrappers.kernels.gains import throttle
 from swarm_forage_env.wrappers.waveform import Waveform, gather_waveform
 
 IDEAL_THROTTLE = 0.10

@@ -1,7 +1,7 @@
 """Waveforms: conditions that change over the ticks of a run, as data.
 
-A waveform drives how strongly robots are throttled or how noisy their sensors are. The formulas are those of the
-study's program, evaluated in double precision as written, with the period in ticks:
+A waveform drives how strongly robots are throttled or how noisy their sensors are (`Sigma`). The formulas are those of
+the study's program, evaluated in double precision as written, with the period in ticks:
 
     constant    A
     sine        O + A sin(2 pi (t / period) + phase)
@@ -228,3 +228,29 @@ def gather_waveform(mapping: Mapping[str, Any], key: str, owner: type) -> dict[s
     elif key not in values and not values.keys().isdisjoint(wave_fields):
         raise ConfigError(f"Missing key {key!r}, the kind of the waveform: one of {', '.join(WAVEFORM_KINDS)}.")
     return values
+
+
+Sigma: TypeAlias = float | Waveform
+"""Standard deviation: constant, or by a waveform of time (no noise where it is below 0)."""
+
+
+def check_sigma(where: str, sigma: Any) -> None:
+    """Raise ConfigError unless `sigma` is a waveform, or a number of at least 0; `where` names its field."""
+    if not isinstance(sigma, Waveform):
+        number(where, sigma, at_least=0.0)
+
+
+def is_noisy(sigma: Sigma) -> bool:
+    """Whether there can be any noise."""
+    return isinstance(sigma, Waveform) or sigma > 0.0
+
+
+def sigma_signal(sigma: Sigma, dt_s: float) -> Signal:
+    """Return the standard deviation as a function of the tick, `dt_s` long; it may fall below 0."""
+    wave = sigma if isinstance(sigma, Waveform) else Waveform(kind="constant", amplitude=sigma)
+    return wave.signal(dt_s)
+
+
+def sigma_in_words(sigma: Sigma) -> str:
+    """Return it for people."""
+    return sigma.in_words("", floor=0.0) if isinstance(sigma, Waveform) else f"{sigma:g}"

@@ -105,20 +105,20 @@ TWINS = {
     "swarm_forage_env.world.kernels.floor.light": OBSERVED,
     "swarm_forage_env.world.kernels.floor.line_of_sight": OBSERVED,
     "swarm_forage_env.world.kernels.interact.serve": INTERACTIONS,
-    "swarm_forage_env.world.kernels.interfere.mark": INTERFERENCE,
+    "swarm_forage_env.world.kernels.counting.mark": INTERFERENCE,
     "swarm_forage_env.world.kernels.kinds.blank": KINDS,
     "swarm_forage_env.world.kernels.kinds.tell_kinds": KINDS,
     "swarm_forage_env.world.kernels.neighbourhood.hear": MESSAGES,
     "swarm_forage_env.world.kernels.neighbourhood.say": MESSAGES,
     "swarm_forage_env.world.kernels.neighbourhood.see_neighbours": NEIGHBOURS,
-    "swarm_forage_env.world.kernels.neighbours.bin_robots": OBSERVED,
+    "swarm_forage_env.world.kernels.neighbourhood.bin_robots": OBSERVED,
     "swarm_forage_env.world.kernels.obstacles.hold_outside": Twin(
         "bodies.held_outside", "world/test_obstacles.py", "swarm_forage_env.world.kernels.obstacles.hold_outside"
     ),
     "swarm_forage_env.world.kernels.proprioception.own_motion": OBSERVED,
     "swarm_forage_env.world.kernels.proprioception.own_status": OBSERVED,
-    "swarm_forage_env.world.kernels.scatter.scatter": Twin(
-        "object_placement.scatter_slowly", "world/test_placement.py", "swarm_forage_env.world.kernels.scatter.scatter"
+    "swarm_forage_env.world.kernels.placement.scatter": Twin(
+        "object_placement.scatter_slowly", "world/test_placement.py", "swarm_forage_env.world.kernels.placement.scatter"
     ),
     "swarm_forage_env.world.kernels.walk.walk": Twin(
         "object_walk.walk_slowly", "world/test_object_motion.py", "swarm_forage_env.world.kernels.walk.walk"
@@ -132,12 +132,12 @@ TWINS = {
         "wrappers/test_messages.py",
         "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch",
     ),
-    "swarm_forage_env.world.kernels.task_shares.add_task_shares": Twin(
+    "swarm_forage_env.world.kernels.counting.add_task_shares": Twin(
         "task_shares.task_shares",
         "wrappers/test_recorder.py",
-        "swarm_forage_env.world.kernels.task_shares.add_task_shares",
+        "swarm_forage_env.world.kernels.counting.add_task_shares",
     ),
-    "swarm_forage_env.wrappers.kernels.throttle.throttle": Twin(
+    "swarm_forage_env.wrappers.kernels.gains.throttle": Twin(
         "adversity.throttle_gain", "wrappers/test_throttle.py", "swarm_forage_env.wrappers.base.SwarmWrapper.step_batch"
     ),
 }
@@ -145,10 +145,10 @@ TWINS = {
 
 IN_ORDER = "only calls others, each with its twin; whole runs are in tests/promises/test_golden_runs.py"
 
-ONE_BY_ONE = "compared with arenas that are taken one by one in tests/world/test_rack.py"
+ONE_BY_ONE = "compared with arenas that are taken one by one in tests/world/test_lockstep.py"
 
 WITHOUT = {
-    "swarm_forage_env.world.kernels.rows.book_rows": "sums row by row; the lives of rows are told by hand in "
+    "swarm_forage_env.world.kernels.reward.book_rows": "sums row by row; the lives of rows are told by hand in "
     "tests/views/test_arenas.py",
     "swarm_forage_env.rendering.kernels.shapes.paint_share": "one product per colour; by hand in "
     "tests/rendering/test_paint.py",
@@ -157,10 +157,10 @@ WITHOUT = {
     "swarm_forage_env.world.kernels.bodies.tell_poses": "compared with `unpack_poses` in tests/world/test_bodies.py",
     "swarm_forage_env.world.kernels.interact.drop_cargo": "two rules of `interact`, which has a twin; by hand in "
     "tests/world/test_interactions_timing.py",
-    "swarm_forage_env.world.kernels.many.book_each": "`book_rows` for each world, and a copy; " + ONE_BY_ONE,
-    "swarm_forage_env.world.kernels.many.pay_each": "`rewards` for each world; " + ONE_BY_ONE,
-    "swarm_forage_env.world.kernels.many.whole_each": "`tick.whole` for each world; compared with arenas that are "
-    "stepped alone in tests/world/test_rack.py",
+    "swarm_forage_env.world.kernels.lockstep.book_each": "`book_rows` for each world, and a copy; " + ONE_BY_ONE,
+    "swarm_forage_env.world.kernels.lockstep.pay_each": "`rewards` for each world; " + ONE_BY_ONE,
+    "swarm_forage_env.world.kernels.lockstep.whole_each": "`tick.whole` for each world; compared with arenas that are "
+    "stepped alone in tests/world/test_lockstep.py",
     "swarm_forage_env.world.kernels.reward.rewards": "a weighted sum; term by term in tests/world/test_rewards.py",
     "swarm_forage_env.wrappers.kernels.gaussian.to_normal": "held against the distribution function in "
     "tests/wrappers/test_noise.py",
@@ -171,7 +171,7 @@ WITHOUT = {
     "tests/runs/test_compiled_runs.py",
     "swarm_forage_env.world.kernels.tick.set_out": IN_ORDER,
     "swarm_forage_env.world.kernels.tick.whole": IN_ORDER,
-    "swarm_forage_env.wrappers.kernels.noise.noisy_gain": "one product per wheel; by hand in "
+    "swarm_forage_env.wrappers.kernels.gains.noisy_gain": "one product per wheel; by hand in "
     "tests/wrappers/test_noise.py",
 }
 """Kernel -> why it has no twin here."""

@@ -15,7 +15,7 @@ from swarm_forage_env.runs import runner
 from swarm_forage_env.runs.first_compilation import compile_outermost, compile_run, compile_start, is_first_run
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.world.halves import compile_half, parts_of
+from swarm_forage_env.world.compiled import compile_half, parts_of
 from swarm_forage_env.world.kernels import tick
 from tests.support.foraging import quick_world
 
@@ -45,7 +45,7 @@ HALVES_THEN_THE_WHOLE = """
 import sys
 from swarm_forage_env.runs.first_compilation import compile_outermost
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.world.halves import compile_half, parts_of
+from swarm_forage_env.world.compiled import compile_half, parts_of
 spec = RunSpec.from_json(sys.stdin.read())
 parts = [function.get_overload.__self__ for half in (0, 1) for function, *_ in parts_of(spec.scenario, half)]
 for half in (0, 1):

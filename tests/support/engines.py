@@ -7,7 +7,7 @@ from swarm_forage_env.contract.layout import observation_layout
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES, ScenarioConfig
 from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.kernels.beams import proximity
-from swarm_forage_env.world.kernels.neighbours import bin_robots
+from swarm_forage_env.world.kernels.neighbourhood import bin_robots
 from swarm_forage_env.world.physics import Physics
 from swarm_forage_env.world.sensors import new_sensors
 from swarm_forage_env.world.state import SwarmState

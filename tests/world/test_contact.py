@@ -9,9 +9,9 @@ import pytest
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.world.contact import TOUCH_SLACK_M
 from swarm_forage_env.world.kernels.contact import press
 from swarm_forage_env.world.kernels.tick import look
+from swarm_forage_env.world.motion import TOUCH_SLACK_M
 from tests.reference.contact import pressed_velocities
 from tests.support.heaps import DIAMETER_M, RADIUS_M, heap
 from tests.support.stage import lay, put, stand, tidy_world

@@ -12,7 +12,7 @@ from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, Scenari
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, source_boxes
 from swarm_forage_env.scenarios.robots import RobotConfig
-from swarm_forage_env.world.kernels.scatter import DRAWS, UNLIMITED, count_objects, draw_source_cell, scatter
+from swarm_forage_env.world.kernels.placement import DRAWS, UNLIMITED, count_objects, draw_source_cell, scatter
 from swarm_forage_env.world.placement import Source, draw_source, place_all, place_objects
 from swarm_forage_env.world.state import ObjectState
 from tests.reference.object_placement import choose_cell, random_source, scatter_slowly, waiting_by_the_word

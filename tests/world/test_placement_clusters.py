@@ -21,7 +21,7 @@ from swarm_forage_env.world.clusters import (
     draw_sizes,
     footprint,
 )
-from swarm_forage_env.world.kernels.scatter import count_objects
+from swarm_forage_env.world.kernels.placement import count_objects
 from swarm_forage_env.world.placement import draw_source, place_all, static_cache_centres
 from swarm_forage_env.world.state import ObjectState
 

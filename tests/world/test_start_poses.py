@@ -8,7 +8,7 @@ from scipy.spatial.distance import pdist
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.world.start_poses import draw_start_poses
+from swarm_forage_env.world.placement import draw_start_poses
 
 DIAMETER_M = 2 * 0.085036758
 
@@ -68,7 +68,7 @@ def test_seeds_decide():
 
 
 def test_impossible_density_says_what_to_do(monkeypatch):
-    monkeypatch.setattr("swarm_forage_env.world.start_poses._TRIALS", 3)
+    monkeypatch.setattr("swarm_forage_env.world.placement._TRIALS", 3)
     config = scenario("warehouse_small", n_robots=1500, start_margin_m=4.0)
     with pytest.raises(ConfigError, match="1500 robots in 3 trials; use fewer robots"):
         draw(config)

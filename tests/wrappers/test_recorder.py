@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Counter, Task
-from swarm_forage_env.world.kernels.task_shares import add_task_shares
+from swarm_forage_env.world.kernels.counting import add_task_shares
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.recorder import TICK_MEANS, TOTALS, RunRecorder
 from tests.reference.task_shares import task_shares

@@ -8,7 +8,7 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import RING_SENSORS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray, Row
-from swarm_forage_env.world.kernels.neighbours import bin_of, cell_of
+from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of
 from swarm_forage_env.world.kernels.obstacles import is_within
 
 _BEAM_COS = np.cos(BEAM_ANGLES_RAD)

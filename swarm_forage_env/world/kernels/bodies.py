@@ -31,7 +31,7 @@ from typing import NamedTuple
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.world.kernels.drive import hold_inside
-from swarm_forage_env.world.kernels.neighbours import bin_of, cell_of
+from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of
 from swarm_forage_env.world.kernels.obstacles import hold_outside, is_within, nearest
 
 FRICTION = 0.7

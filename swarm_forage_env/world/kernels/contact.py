@@ -4,7 +4,7 @@ import math
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
-from swarm_forage_env.world.kernels.neighbours import bin_of, cell_of
+from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of
 
 LEAST_SPEED_M_S = 3e-4
 """Slowest common speed. Our choice: two robots that are equally strong would stand against each other for ever. At this

@@ -21,11 +21,10 @@ from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray
 from swarm_forage_env.world.kernels import beams, floor, kinds, proprioception
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.contact import press
+from swarm_forage_env.world.kernels.counting import add_task_shares, mark
 from swarm_forage_env.world.kernels.drive import drive
 from swarm_forage_env.world.kernels.interact import serve
-from swarm_forage_env.world.kernels.interfere import mark
-from swarm_forage_env.world.kernels.neighbours import bin_robots
-from swarm_forage_env.world.kernels.task_shares import add_task_shares
+from swarm_forage_env.world.kernels.neighbourhood import bin_robots
 from swarm_forage_env.world.kernels.walk import walk
 from swarm_forage_env.world.kernels.world import World
 

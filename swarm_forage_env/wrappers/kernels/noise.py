@@ -1,4 +1,4 @@
-"""Noise on observations, added to readings and clamped or turning the heading, and on wheels."""
+"""Noise on observations: added to readings and clamped, or turning the heading."""
 
 import math
 
@@ -144,16 +144,3 @@ def garble(obs: ObsArray, draws: ObsArray, lost: FloatArray, start: int, factor:
             continue
         for k in range(size):
             obs[i, start + k] = min(one, max(-one, obs[i, start + k] + draws[i, k] * scale))
-
-
-@kernel
-def noisy_gain(
-    draws: ObsArray, is_uniform: bool, factor: float, outer_gain: FloatArray, wheel_gain: FloatArray
-) -> None:
-    """Write outer_gain * (1 + noise * factor) into `wheel_gain`; all (N, 2). The first two as in `disturb`."""
-    if not is_uniform:
-        to_normal(draws)
-    centre = 0.5 if is_uniform else 0.0
-    for i in range(draws.shape[0]):
-        for wheel in range(2):
-            wheel_gain[i, wheel] = outer_gain[i, wheel] * (1.0 + (float(draws[i, wheel]) - centre) * factor)

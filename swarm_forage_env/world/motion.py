@@ -1,4 +1,11 @@
-"""Touching robots: driven by wheel motors of limited force, they neither stand for ever nor push at full speed.
+"""How robots move: wheels of limited speed, and what becomes of it where robots touch.
+
+The differential drive: wheel speed = limit(limit(command) x gain). Commands beyond [-1, 1] are clipped. Centre speed
+and wheel difference are limited each by clipping, before the gains of wrappers and again after them: noise makes no
+motor faster than it is, and no robot drives through a wall. Wheels of inactive robots and of robots in an interaction
+stand still. The rule is `kernels.drive`.
+
+Touching robots, driven by wheel motors of limited force, neither stand for ever nor push at full speed.
 
 For a touching pair let c_i and c_j be the commanded speeds of i and j towards each other. They press if
 c_i + c_j > 0. Then both move along the line from i to j with one common speed:
@@ -18,12 +25,21 @@ The rule is `kernels.contact`. The physics comes after that. It stops who still 
 
 import numpy as np
 
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
 from swarm_forage_env.world.kernels.world import Memory
 
 TOUCH_SLACK_M = 0.001
 """Gap within which two robots still touch: one that physics leaves when it undoes an overlap does not part a pair."""
 PARTNER_SLOTS = 8
 """Pairs remembered per robot. Six equal discs fit around one; two more are for robots that overlap."""
+
+
+def drive_limits(config: ScenarioConfig) -> FloatArray:
+    """Return the array `limits` of the drive kernels: wheel scale, centre-speed limit, difference limit, wheel base."""
+    robots = config.robots
+    return np.array([WHEEL_SCALE_MPS, robots.max_speed_mps, robots.max_wheel_difference_mps, robots.wheel_base_m])
 
 
 def new_memory(n_robots: int) -> Memory:

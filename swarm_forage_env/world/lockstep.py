@@ -10,11 +10,11 @@ from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import ActionArray, FloatArray
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.kernels.bodies import BodyState
-from swarm_forage_env.world.kernels.many import whole_each
+from swarm_forage_env.world.kernels.lockstep import whole_each
 from swarm_forage_env.world.kernels.world import World
 
 
-def can_share_a_rack(arenas: Sequence[ForagingArena]) -> bool:
+def can_go_in_lockstep(arenas: Sequence[ForagingArena]) -> bool:
     """Whether arenas can be stepped together: one scenario, compiled bodies, the same `reads`, the compiler on."""
     first = arenas[0]
     return (
@@ -24,7 +24,7 @@ def can_share_a_rack(arenas: Sequence[ForagingArena]) -> bool:
     )
 
 
-class Rack:
+class Lockstep:
     """Steps arenas together. What each does is bit for bit what it does alone.
 
     The arenas stay whole: each can be reset, be stepped alone or go back to a snapshot at any time.
@@ -34,8 +34,8 @@ class Rack:
     """
 
     def __init__(self, arenas: Sequence[ForagingArena]) -> None:
-        """Give every arena a seat; raises ValueError unless they `can_share_a_rack`."""
-        if not can_share_a_rack(arenas):
+        """Give every arena a seat; raises ValueError unless they `can_go_in_lockstep`."""
+        if not can_go_in_lockstep(arenas):
             raise ValueError(
                 'Expected arenas of one scenario with physics "compiled" that read the same slices, and a compiler '
                 "that is switched on."
@@ -62,7 +62,7 @@ class Rack:
         return {"arenas": self.arenas}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        Rack.__init__(self, state["arenas"])
+        Lockstep.__init__(self, state["arenas"])
 
     def step(self, gains: Mapping[int, FloatArray | None], actions: ActionArray) -> dict[int, ActionError]:
         """Advance arenas by one tick; their observations are in `ForagingArena.obs`.

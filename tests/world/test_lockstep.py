@@ -3,17 +3,21 @@
 import copy
 import pickle
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from swarm_forage_env import scenario
+from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.policy import ActionError
+from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
 from swarm_forage_env.views.learner_arena import ArenaPlan, plan_arena
 from swarm_forage_env.world.arena import ForagingArena
-from swarm_forage_env.world.rack import Rack, can_share_a_rack
+from swarm_forage_env.world.kernels.lockstep import alike
+from swarm_forage_env.world.lockstep import Lockstep, addresses, can_go_in_lockstep
 from swarm_forage_env.wrappers.throttle import Throttle
 
 pytestmark = pytest.mark.compiled
@@ -42,10 +46,10 @@ class OneByOne(ArenaBatch):
 
 def ways(batch: ArenaBatch) -> tuple[bool, bool, bool, bool]:
     """Whether arenas are stepped together, booked together, paid and observed without Python."""
-    rack, settlement = batch._chosen_ways()
-    if settlement is None:
-        return rack is not None, False, False, False
-    return rack is not None, True, settlement.pays, settlement.copies
+    lockstep, books = batch._chosen_ways()
+    if books is None:
+        return lockstep is not None, False, False, False
+    return lockstep is not None, True, books.pays, books.copies
 
 
 def drawn(ticks: int, n_arenas: int) -> np.ndarray:
@@ -167,12 +171,12 @@ def assert_same(one: ForagingArena, other: ForagingArena) -> None:
 
 def test_a_seat_may_stay_be_stepped_alone_begin_anew_and_go_back():
     ours, theirs = arenas(3), arenas(3)
-    rack, unit = Rack(ours), np.ones((N_ROBOTS, 2))
+    lockstep, unit = Lockstep(ours), np.ones((N_ROBOTS, 2))
     actions = drawn(40, 3).reshape(40, 3, N_ROBOTS, 3)
     kept = None
     for tick, now in enumerate(actions):
         seats = [seat for seat in range(3) if (tick + seat) % 3 or tick < 20]
-        assert not rack.step(dict.fromkeys(seats, 0.5 * unit if tick == 7 else None), now)
+        assert not lockstep.step(dict.fromkeys(seats, 0.5 * unit if tick == 7 else None), now)
         for seat in seats:
             theirs[seat].step(now[seat], wheel_gain=0.5 * unit if tick == 7 else None)
         if tick == 10:
@@ -193,7 +197,7 @@ def test_a_seat_may_stay_be_stepped_alone_begin_anew_and_go_back():
 
 def test_with_nothing_to_step_nothing_happens():
     ours, theirs = arenas(2), arenas(2)
-    assert not Rack(ours).step({}, np.zeros((2, N_ROBOTS, 3), np.float32))
+    assert not Lockstep(ours).step({}, np.zeros((2, N_ROBOTS, 3), np.float32))
     for one, other in zip(ours, theirs, strict=True):
         assert_same(one, other)
 
@@ -201,14 +205,14 @@ def test_with_nothing_to_step_nothing_happens():
 def test_more_room_in_one_seat_is_room_in_all(monkeypatch):
     monkeypatch.setattr("swarm_forage_env.world.bodies.PAIRS_PER_ROBOT", 1)
     ours, theirs = arenas(2), arenas(2)
-    rack = Rack(ours)
+    lockstep = Lockstep(ours)
     for arena in (ours[1], theirs[1]):  # everybody on one spot: more pairs than there is room for
         arena.swarm.position[:] = 4.0 + 1e-3 * np.arange(N_ROBOTS)[:, None]
         for robot, (x, y) in enumerate(arena.swarm.position.tolist()):
             arena.bodies.place(robot, x, y, 0.0)
         arena.has_changed = True
     for now in drawn(5, 2).reshape(5, 2, N_ROBOTS, 3):
-        rack.step({0: None, 1: None}, now)
+        lockstep.step({0: None, 1: None}, now)
         for arena, rows in zip(theirs, now, strict=True):
             arena.step(rows)
         for one, other in zip(ours, theirs, strict=True):
@@ -220,7 +224,7 @@ def test_a_refused_action_stops_its_own_arena_only():
     ours, theirs = arenas(3), arenas(3)
     now = drawn(1, 3).reshape(3, N_ROBOTS, 3)
     now[1, 5, 0] = np.nan
-    refused = Rack(ours).step(dict.fromkeys(range(3)), now)
+    refused = Lockstep(ours).step(dict.fromkeys(range(3)), now)
     assert list(refused) == [1]
     assert "robot_5" in str(refused[1])
     assert [arena.tick for arena in ours] == [1, 0, 1]
@@ -248,18 +252,18 @@ def test_a_copy_of_a_batch_goes_on_by_itself():
     np.testing.assert_array_equal(ours, [other.step(now).obs for now in actions[10:]])
 
 
-def test_who_may_share_a_rack():
+def test_who_may_go_in_lockstep():
     config = plan().scenario
-    assert can_share_a_rack([ForagingArena(config), ForagingArena(config)])
+    assert can_go_in_lockstep([ForagingArena(config), ForagingArena(config)])
     unlike = (
         ForagingArena(config, reads=("proximity",)),
         ForagingArena(scenario("warehouse_small", n_robots=N_ROBOTS, physics="compiled")),
     )
     for other in unlike:
-        assert not can_share_a_rack([ForagingArena(config), other])
+        assert not can_go_in_lockstep([ForagingArena(config), other])
         with pytest.raises(ValueError, match="Expected arenas of one scenario"):
-            Rack([ForagingArena(config), other])
-    assert not can_share_a_rack([ForagingArena(scenario("warehouse_small"))] * 2)
+            Lockstep([ForagingArena(config), other])
+    assert not can_go_in_lockstep([ForagingArena(scenario("warehouse_small"))] * 2)
 
 
 def test_a_stack_whose_step_was_replaced_is_stepped_by_it(monkeypatch):
@@ -280,3 +284,59 @@ def test_a_stack_whose_step_was_replaced_is_stepped_by_it(monkeypatch):
     now = drawn(1, 2)[0]
     np.testing.assert_array_equal(other.step(now).obs, batch.step(now).obs)
     assert len(calls) == 2
+
+
+class Inner(NamedTuple):
+    factor: float
+    rows: IntArray
+    pair: tuple[int, FloatArray]
+
+
+class Outer(NamedTuple):
+    table: FloatArray
+    inner: Inner
+    is_there: bool
+    both: tuple[IntArray, IntArray]
+
+
+def made_value(start: int) -> Outer:
+    """Arrays of different shapes and types that hold the numbers from `start`."""
+    whole = [np.arange(start + 10 * k, start + 10 * k + 3, dtype=np.int32) for k in range(3)]
+    real = np.arange(start + 30, start + 36, dtype=np.float64)
+    return Outer(real.reshape(2, 3), Inner(start / 8, whole[0], (start, real + 10)), start > 0, (whole[1], whole[2]))
+
+
+@kernel
+def tell(like: Outer, at: np.ndarray, told: FloatArray) -> None:
+    found = alike(like, at)
+    told[0], told[1] = found.table[0, 1], found.table[1, 2]
+    told[2], told[3], told[4] = found.inner.factor, found.inner.rows[2], found.inner.pair[0]
+    told[5], told[6] = found.inner.pair[1][5], found.is_there
+    told[7], told[8] = found.both[0][0], found.both[1][1]
+
+
+@kernel
+def overwrite(like: Outer, at: np.ndarray) -> None:
+    found = alike(like, at)
+    found.inner.rows[:] = 7
+    found.table[1, :] = 0.5
+
+
+def test_arrays_are_those_at_the_addresses_and_constants_those_of_the_value():
+    one, other, told = made_value(100), made_value(1000), np.zeros(9)
+    tell(one, np.array(addresses(other)), told)
+    assert told.tolist() == [1031, 1035, 12.5, 1002, 100, 1045, 1, 1010, 1021]
+
+
+def test_what_is_written_is_written_there():
+    one, other = made_value(100), made_value(1000)
+    overwrite(one, np.array(addresses(other)))
+    assert other.inner.rows.tolist() == [7, 7, 7]
+    assert other.table.tolist() == [[1030, 1031, 1032], [0.5, 0.5, 0.5]]
+    assert one.inner.rows.tolist() == [100, 101, 102]
+
+
+def test_every_array_has_an_address_in_order():
+    one = made_value(1)
+    arrays = [one.table, one.inner.rows, one.inner.pair[1], *one.both]
+    assert addresses(one) == [array.ctypes.data for array in arrays]

@@ -1,4 +1,4 @@
-"""The obstacle rule over a swarm, and the robot-tick counters."""
+"""What is counted in every tick: who is in interference, who is at work, and how the swarm divides over tasks."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.contract.layout import RING_SENSORS
-from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 
 _INTERFERING, _ACTIVE, _PRESENT = int(Counter.INTERFERING), int(Counter.ACTIVE), int(Counter.PRESENT)
 _CARRYING = int(Counter.CARRYING)
@@ -59,3 +59,32 @@ def mark(
     counters[_CARRYING] += n_carrying
     if n_active > 0:
         interference_sum[0] += n_interfering / n_active
+
+
+@kernel
+def add_task_shares(tasks: CodeArray, active: BoolArray, shares: FloatArray) -> bool:
+    """Add this tick's share of active robots in each task; nothing is added while no robot is active.
+
+    Args:
+        tasks: (N,) task codes.
+        active: (N,) robots that count.
+        shares: (codes,) sums, changed in place.
+
+    Returns:
+        Whether `tasks` had one code per robot, all of them within `shares`; if not, nothing was added.
+    """
+    if tasks.size != active.size:
+        return False
+    n_active = 0
+    for i in range(active.size):
+        if active[i]:
+            n_active += 1
+            if tasks[i] < 0 or tasks[i] >= shares.size:
+                return False
+    if n_active == 0:
+        return True
+    share = 1.0 / n_active
+    for i in range(active.size):
+        if active[i]:
+            shares[tasks[i]] += share
+    return True

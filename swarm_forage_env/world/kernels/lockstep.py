@@ -20,8 +20,7 @@ from numba.extending import intrinsic
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.world.kernels.bodies import BodyState
-from swarm_forage_env.world.kernels.reward import Payment, pay
-from swarm_forage_env.world.kernels.rows import Robots, book_rows
+from swarm_forage_env.world.kernels.reward import Payment, Robots, book_rows, pay
 from swarm_forage_env.world.kernels.tick import whole
 from swarm_forage_env.world.kernels.world import World
 
@@ -55,7 +54,7 @@ def _alike(typingctx: Any, like: Any, at: Any) -> Any:  # noqa: ARG001 - numba h
 
 alike: Any = intrinsic(_alike)
 """(nested tuples, addresses) -> the same tuples with the arrays that are at these addresses, a row of a table of
-`world.rack.addresses`; what is no array stays. For compiled code only."""
+`world.lockstep.addresses`; what is no array stays. For compiled code only."""
 
 
 @kernel

@@ -9,18 +9,18 @@ from swarm_forage_env._internal.compiling import direct, is_compiled
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.views.learner_arena import LearnerArena
-from swarm_forage_env.world.kernels.many import book_each, pay_each
-from swarm_forage_env.world.kernels.rows import Robots
-from swarm_forage_env.world.rack import addresses, are_others
+from swarm_forage_env.world.kernels.lockstep import book_each, pay_each
+from swarm_forage_env.world.kernels.reward import Robots
+from swarm_forage_env.world.lockstep import addresses, are_others
 from swarm_forage_env.world.rewards import RewardModel
 
 
-def can_settle() -> bool:
+def can_book_together() -> bool:
     """Whether the compiler is on: interpreted functions cannot find arrays by their addresses."""
     return is_compiled(book_each)
 
 
-class Settlement:
+class Bookkeeping:
     """Compiled calls for all arenas of a batch. What they do is bit for bit what the arenas do one by one.
 
     Attributes:
@@ -43,7 +43,7 @@ class Settlement:
         return {"arenas": self._arenas}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        Settlement.__init__(self, state["arenas"])
+        Bookkeeping.__init__(self, state["arenas"])
 
     def follow(self) -> None:
         """Find the arrays again where a reset or a snapshot has replaced them; call it before each step."""
@@ -89,7 +89,7 @@ class Settlement:
 
         Args:
             rewards: (A, N) of the step.
-            rows: absent, present, returns, lengths, each (A, N); see `world.kernels.rows.book_rows`.
+            rows: absent, present, returns, lengths, each (A, N); see `world.kernels.reward.book_rows`.
             flags: terminated, active, each (A, N), are written.
             obs: (A, N, D).
         """

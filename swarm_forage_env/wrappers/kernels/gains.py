@@ -1,8 +1,9 @@
-"""Wheel gains of throttled robots."""
+"""Wheel gains: of throttled robots, and of noisy wheels."""
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.types import ActionArray, FloatArray, IntArray
+from swarm_forage_env.contract.types import ActionArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.world.kernels.drive import limit_command
+from swarm_forage_env.wrappers.kernels.gaussian import to_normal
 
 
 @kernel
@@ -33,3 +34,16 @@ def throttle(
             factor = 1.0 - strength * (abs(left + right) / total)
             wheel_gain[i, 0] *= factor
             wheel_gain[i, 1] *= factor
+
+
+@kernel
+def noisy_gain(
+    draws: ObsArray, is_uniform: bool, factor: float, outer_gain: FloatArray, wheel_gain: FloatArray
+) -> None:
+    """Write outer_gain * (1 + noise * factor) into `wheel_gain`; all (N, 2). The first two as in `noise.disturb`."""
+    if not is_uniform:
+        to_normal(draws)
+    centre = 0.5 if is_uniform else 0.0
+    for i in range(draws.shape[0]):
+        for wheel in range(2):
+            wheel_gain[i, wheel] = outer_gain[i, wheel] * (1.0 + (float(draws[i, wheel]) - centre) * factor)
