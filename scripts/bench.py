@@ -1,370 +1,232 @@
-"""Measure speed where one version says enough: large swarms, wrappers, learning, pictures, the first run.
+"""Measure speed: runs, environments for learners, pictures, the first run. Prints a table in Markdown.
 
-    scripts/bench                   all cases
-    scripts/bench --quick           fewer repeats, shorter runs
-    scripts/bench --only wrappers   cases whose name contains "wrappers"
+    scripts/bench                             all cases; some minutes
+    scripts/bench crw-200 dpo-200 --quick     some, in shorter measurements
+    scripts/bench --against 860cf6a           in turn with another revision, or the folder of a checkout, as ratios
+    scripts/bench --peers ../peers            other packages beside ours; each is installed into a folder of that one
 
-`scripts/compare_speed.py` has the speed of runs, as ratios to another version; `scripts/tick_phases.py` has the phases
-of a tick. Bodies are compiled unless a row says otherwise.
-
-A robot-tick is one robot for one control step of 0.2 s. Times are processor time of the one measuring process, so that
-other work on the machine counts as little as possible. Machines differ: compare ratios within one table, not single
-numbers between tables.
+Times are processor time on one core, where nothing else is said. A value is the median of the rounds. A ratio is that
+of one round, so that what else the machine does counts as little as possible; the table has the median, and the
+smallest and the largest in brackets. Machines differ: compare within one table. A checkout is measured by its own
+scripts/bench_cases.py where it has that.
 """
 
 import argparse
-import importlib.util
-import itertools
-import math
 import os
-import platform
 import statistics
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO
 
-import numpy as np
+from bench_cases import CASES
+from bench_peers import PEERS
 from rich.console import Console
-from rich.table import Table
-from site_search import share_of_run
-from speed_cases import WRAPPERS, large_world
 
-from swarm_forage_env.policies.registry import load_policy
-from swarm_forage_env.runs.run import LiveRun, build_stack
-from swarm_forage_env.runs.spec import RunSpec, plan_run
-from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.scenarios.overrides import with_overrides
-from swarm_forage_env.scenarios.presets import warehouse_medium
-from swarm_forage_env.views.pettingzoo import parallel_env
-from swarm_forage_env.wrappers.base import WrapperConfig
-from swarm_forage_env.wrappers.kernels.gaussian import to_normal
-from swarm_forage_env.wrappers.registry import parse_wrapper
+ROOT = Path(__file__).resolve().parents[1]
+CASES_FILE, PEERS_FILE = (Path(__file__).with_name(f"bench_{name}.py") for name in ("cases", "peers"))
+ALONE = {
+    **dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"),
+    "JAX_PLATFORMS": "cpu",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false",
+}
+"""One thread per library."""
 
 
-@dataclass(frozen=True)
-class Row:
-    """One line of the table."""
-
-    case: str
-    value: float
-    unit: str
-    target: str
-    met: bool | None
-    note: str = ""
+class BenchError(RuntimeError):
+    """A case cannot be measured; the message is one line."""
 
 
-def run_spec(scenario: ScenarioConfig, policy: str, ticks: int) -> RunSpec:
-    """A run of `ticks` control steps in one recording interval."""
-    seconds = ticks * scenario.dt_s
-    return plan_run(with_overrides(scenario, horizon_s=seconds, interval_s=seconds), policy)
+class Subject:
+    """A process that measures cases."""
+
+    def __init__(self, python: str | Path, program: Path, folder: Path) -> None:
+        """Start it with the package of a folder, and with one thread per library."""
+        self._process = subprocess.Popen(
+            [str(python), str(program)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=folder,
+            env={**os.environ, **ALONE, "PYTHONPATH": str(folder)},
+        )
+
+    def measure(self, case: str, engine: str, effort: float) -> float:
+        """Return the value of a case; raises BenchError with the reason why there is none."""
+        print(case, engine, effort, file=_pipe(self._process.stdin), flush=True)
+        answer = _pipe(self._process.stdout).readline().strip()
+        if not answer:
+            raise BenchError(f"{case}: the process that measured it has ended with {self._process.wait()}")
+        if answer.startswith("failed"):
+            raise BenchError(f"{case}: {answer.removeprefix('failed ')}")
+        return float(answer)
+
+    def __enter__(self) -> "Subject":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.kill()
+        self._process.communicate()  # closes the pipes, too
+
+
+def _pipe(pipe: IO[str] | None) -> IO[str]:
+    assert pipe is not None, "asked for above"
+    return pipe
 
 
 @contextmanager
-def stopwatch(owner: Any, name: str, total: list[float]) -> Iterator[None]:
-    """Add the time spent in `owner.name` to total[0] while the context lasts."""
-    original: Callable[..., Any] = getattr(owner, name)
-
-    def timed(*args: Any, **options: Any) -> Any:
-        started = time.process_time()
-        result = original(*args, **options)
-        total[0] += time.process_time() - started
-        return result
-
-    setattr(owner, name, timed)
-    try:
-        yield
-    finally:
-        setattr(owner, name, original)
-
-
-def learning_rows(ticks: int, repeats: int) -> Iterator[Row]:
-    """The vector environment of stable-baselines3 with random actions, and what PPO adds around it, 50 robots."""
-    ticks //= 2
-    case = "VecEnv, N = 50, random actions"
-    if importlib.util.find_spec("stable_baselines3") is None:
-        yield Row(case, math.nan, "k robot-steps/s", "-", None, "needs the train extra")
+def checkout(against: str) -> Iterator[Path]:
+    """Give the folder of a version; a revision is checked out for as long as the context lasts."""
+    if Path(against).is_dir():
+        yield Path(against).resolve()
         return
-    import torch
-    from stable_baselines3 import PPO
-
-    from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, SwarmVecEnv
-
-    env = SwarmVecEnv("warehouse_small", physics="compiled")
-    env.seed(0)
-    env.reset()
-    drawn = np.random.default_rng(0).uniform(-1, 1, (100, env.num_envs, 3)).astype(np.float32)
-    env.step(drawn[0])
-    rates = []
-    for _ in range(repeats):
-        started = time.process_time()
-        for tick in range(ticks):
-            env.step(drawn[tick % len(drawn)])
-        rates.append(ticks * env.num_envs / (time.process_time() - started))
-    rate = statistics.median(rates)
-    yield Row(case, rate / 1e3, "k robot-steps/s", "-", None)
-
-    torch.set_num_threads(1)  # processor time of two threads would count twice
-    n_steps = max(128, ticks // 10)
-    model = PPO(
-        "MlpPolicy",
-        env,
-        n_steps=n_steps,
-        batch_size=n_steps * env.num_envs // 4,
-        n_epochs=4,
-        rollout_buffer_class=ActiveRolloutBuffer,
-        rollout_buffer_kwargs=env.rollout_buffer_kwargs,
-        device="cpu",
-    )
-    spent = [0.0]
-    with stopwatch(env, "step_wait", spent):
-        started = time.process_time()
-        model.learn(n_steps * env.num_envs)
-        total = time.process_time() - started
-    note = f"environment {spent[0] / total:.0%}, PPO itself {1 - spent[0] / total:.0%} (4 epochs, 64 x 64)"
-    yield Row("PPO on it", n_steps * env.num_envs / total / 1e3, "k robot-steps/s", "-", None, note)
+    with tempfile.TemporaryDirectory() as parent:
+        folder = Path(parent) / "other"
+        command = ["git", "-C", str(ROOT), "worktree"]
+        subprocess.run([*command, "add", "--quiet", "--detach", str(folder), against], check=True)
+        try:
+            yield folder
+        finally:
+            subprocess.run([*command, "remove", "--force", str(folder)], check=True)
 
 
-IMPORT = """
-import time
-started = time.process_time()
-import swarm_forage_env
-print(time.process_time() - started)
-"""
-FIRST_RUN = ("run", "--policy", "crw", "--robots", "50", "--horizon", "200", "--seeds", "1", "--jobs", "1")
-"""Words of the command whose first run is timed; `--jobs 1` compiles in two processes where two cores are free."""
-PEAK_MEMORY = """
-import resource, sys
-sys.path.insert(0, {scripts!r})
-from bench import run_spec
-from speed_cases import large_world
-from swarm_forage_env import run_one, scenario
-run_one(run_spec(scenario("warehouse_medium", physics="compiled", **large_world(16384)), "crw", 20))
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
-"""
+def started(folder: Path, open_things: ExitStack) -> Subject:
+    """Return what measures a checkout; raises BenchError where there is none."""
+    if not (folder / "swarm_forage_env" / "__init__.py").is_file():
+        raise BenchError(f"expected a revision or a checkout of this project, got {folder}")
+    own = folder / "scripts" / CASES_FILE.name
+    return open_things.enter_context(Subject(sys.executable, own if own.is_file() else CASES_FILE, folder))
 
 
-def in_fresh_process(program: str, **environment: str) -> float:
-    """Run a small program that prints one number, in a new interpreter."""
-    output = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True, env={**os.environ, **environment}
-    )
-    return float(output.stdout.split()[-1])
+def installed(peer: str, folder: Path) -> Path:
+    """Return the Python of a virtual environment that holds a package; raises BenchError."""
+    home = folder.resolve() / PEERS[peer].folder
+    python = home / "bin" / "python"
+    pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *PEERS[peer].requirements]
+    for command in ([] if python.exists() else [[sys.executable, "-m", "venv", str(home)]]) + [pip]:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise BenchError(f"{peer}: {(done.stderr or done.stdout or 'not installed').strip().splitlines()[-1]}")
+    return python
 
 
-def scaling_rows(ticks: int, repeats: int) -> Iterator[Row]:
-    """Cost per robot-tick of large swarms and of 200 robots, measured in turn."""
-    large = (warehouse_medium(physics="compiled", **large_world(n_robots)) for n_robots in (4096, 16_384))
-    worlds = [warehouse_medium(physics="compiled"), *large]
-    costs: dict[int, list[float]] = {200: [], 4096: [], 16_384: []}
-    for _ in range(repeats):
-        for scenario in worlds:
-            n_robots = scenario.robots.n_robots
-            costs[n_robots].append(_cost_of_a_run(scenario, max(20, ticks * 200 // n_robots)))
-    base = costs[200]
-    yield Row("CRW, N = 200, as reference", statistics.median(base), "us per robot-tick", "-", None)
-    for n_robots in (4096, 16_384):
-        ratio = statistics.median(cost / reference for cost, reference in zip(costs[n_robots], base, strict=True))
-        note = f"{statistics.median(costs[n_robots]):.2f} us per robot-tick"
-        yield Row(f"CRW, N = {n_robots:,}, cost over N = 200", ratio, "x", "<= 1.3", ratio <= 1.3, note)
-    scripts = str(Path(__file__).resolve().parent)
-    memory = in_fresh_process(PEAK_MEMORY.format(scripts=scripts))
-    yield Row("CRW, N = 16,384, peak memory", memory, "GiB", "< 2", memory < 2)
+Values = list[float]
+"""Of one case, round by round."""
 
 
-def _cost_of_a_run(scenario: ScenarioConfig, ticks: int) -> float:
-    """Microseconds per robot-tick of a run under CRW, after a short run-in."""
-    policy = load_policy("crw")
-    spec = run_spec(scenario, "crw", ticks + 20)
-    run = LiveRun(build_stack(spec.scenario, reads=getattr(policy, "reads", None)), policy, seed=0)
-    run.advance(to_tick=20)
-    started = time.process_time()
-    run.advance()
-    return (time.process_time() - started) / ticks / scenario.robots.n_robots * 1e6
+def measured(sides: Sequence[tuple[Subject, str]], engine: str, rounds: int, effort: float) -> list[Values]:
+    """Return the values of cases that take turns, given with their subjects; raises BenchError."""
+    turns = [[subject.measure(case, engine, effort) for subject, case in sides] for _ in range(rounds)]
+    return [list(values) for values in zip(*turns, strict=True)]
 
 
-def _cost_of_steps(
-    scenario: ScenarioConfig,
-    ticks: int,
-    wrappers: Sequence[WrapperConfig] = (),
-    beside: Callable[[], object] = lambda: None,
-) -> float:
-    """Microseconds per robot-tick of a stack that is stepped with CRW's actions; `beside` is called in every tick."""
-    policy = load_policy("crw")
-    stack = build_stack(run_spec(scenario, "crw", ticks + 20).scenario, wrappers)
-    policy.reset(stack.unwrapped.swarm_spec, np.random.default_rng(0))
-    obs = stack.reset_batch(0)
-    started = 0.0
-    for tick in range(ticks + 20):
-        if tick == 20:
-            started = time.process_time()
-        beside()
-        obs = stack.step_batch(policy.act(obs, stack.unwrapped.active))[0]
-    return (time.process_time() - started) / ticks / scenario.robots.n_robots * 1e6
+def short(number: float) -> str:
+    """Return a number with three digits that count: 1,637, 57.5, 0.86."""
+    return f"{number:,.{max(0, 2 - len(str(int(number))) + 1)}f}"
 
 
-def wrapper_rows(ticks: int, repeats: int) -> Iterator[Row]:
-    """What four active wrappers add for 200 robots, and how much of it are the random numbers that they draw.
-
-    The adversities are very weak: the wrappers do their full work, but the swarm behaves as without them, and so the
-    rest of the tick costs the same. The draws are measured in a run without wrappers that draws the same numbers in
-    every tick.
-    """
-    for physics in ("chipmunk", "compiled"):
-        yield from _wrapper_rows_of(warehouse_medium(physics=physics), ticks, repeats)
+def ratio(before: Values, after: Values) -> str:
+    """Return median, smallest and largest quotient of two cases, round by round: "3.06 (2.46 to 3.14)"."""
+    quotients = [one / other for one, other in zip(before, after, strict=False)]
+    middle, low, high = statistics.median(quotients), min(quotients), max(quotients)
+    return short(middle) if len(quotients) == 1 else f"{short(middle)} ({short(low)} to {short(high)})"
 
 
-def _wrapper_rows_of(scenario: ScenarioConfig, ticks: int, repeats: int) -> Iterator[Row]:
-    wrappers, rng = [parse_wrapper(text) for text in WRAPPERS], np.random.default_rng(0)
-    columns = sum(part.size for part in parallel_env(scenario).layout if part.noise_group) - 1  # heading: one angle
-    readings, wheels = np.zeros((200, columns), np.float32), np.zeros((200, 2), np.float32)
-
-    def draw() -> None:
-        for numbers in (readings, wheels):
-            rng.random(out=numbers, dtype=np.float32)
-            to_normal(numbers)
-
-    _cost_of_steps(scenario, 5, wrappers)
-    costs: list[tuple[float, float, float]] = []
-    for _ in range(repeats):
-        bare = _cost_of_steps(scenario, ticks)
-        costs.append((bare, _cost_of_steps(scenario, ticks, beside=draw), _cost_of_steps(scenario, ticks, wrappers)))
-    drawing = statistics.median(drawn / bare - 1.0 for bare, drawn, _ in costs)
-    wrapped = statistics.median(full / bare - 1.0 for bare, _, full in costs)
-    beyond = statistics.median((full - drawn) / bare for bare, drawn, full in costs)
-    note = f"{statistics.median(bare for bare, _, _ in costs):.3f} us per robot-tick without them"
-    yield Row(f"{scenario.physics}: four wrappers over none", 100 * wrapped, "%", "-", None, note)
-    yield Row(f"{scenario.physics}: their random draws alone", 100 * drawing, "%", "-", None)
-    yield Row(f"{scenario.physics}: four wrappers beyond their draws", 100 * beyond, "%", "<= 10", beyond <= 0.1)
+Rows = list[list[str]]
+"""Of a table, its headings first."""
 
 
-def site_rows(ticks: int, repeats: int) -> Iterator[Row]:
-    """What share of a run the search for cache sites takes; the run is of 10,000 s, with --quick of 2,000 s."""
-    spec = run_spec(warehouse_medium(caches="dynamic", physics="compiled"), "stochx", 5 * ticks)
-    share, note = share_of_run(spec, repeats)
-    yield Row(f"STOCHX's cache sites, {spec.scenario.horizon_s:,.0f} s", 100 * share, "%", "-", None, note)
+def rows_of_cases(names: Sequence[str], found: dict[str, list[Values]], *, against: bool) -> Rows:
+    """Return the table of our cases, with the other version where there is one."""
+    rows = [["case", "what", "value", "unit", "target", *(("other", "other : this") if against else ("beside",))]]
+    for name in names:
+        case, values = CASES[name], found.get(name, [])
+        medians = [short(statistics.median(own)) for own in values] or ["-"]
+        rows.append([name, case.about, medians[0], case.unit, case.target])
+        if against:
+            rows[-1] += [*medians[1:], ratio(values[1], values[0])] if values else ["-", "-"]
+        else:
+            told = values and case.beside in found
+            rows[-1].append(f"{ratio(values[0], found[case.beside][0])} x {case.beside}" if told else "")
+    return rows
 
 
-def start_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a case like the others; ticks are few
-    """Import, and the first run of a command after an installation; by the clock, because two processes compile."""
-    seconds = statistics.median(in_fresh_process(IMPORT) for _ in range(repeats))
-    yield Row("import swarm_forage_env", seconds, "s", "< 0.3", seconds < 0.3)
-    for physics in ("chipmunk", "compiled"):
-        with tempfile.TemporaryDirectory() as folder:
-            first = _seconds_of_first_run(physics, folder)
-            later = statistics.median(_seconds_of_first_run(physics, folder) for _ in range(3))
-        note = f"{first:.1f} s by the clock, of which {later:.1f} s are a later run"
-        yield Row(f"{physics}: compiling in the first run", first - later, "s", "< 20", first - later < 20, note)
+def rows_of_peers(names: Sequence[str], found: dict[str, list[Values]]) -> Rows:
+    """Return the table of other packages."""
+    rows = [["task of the other", "version", "ns per agent-step", "ours", "ns per agent-step", "other : ours"]]
+    for name in names:
+        peer, values = PEERS[name], found.get(name, [])
+        ours, other = [short(statistics.median(own)) for own in values] or ["-", "-"]
+        version = peer.requirements[0].partition("==")[2]
+        rows.append([peer.about, version, other, peer.ours, ours, ratio(values[1], values[0]) if values else "-"])
+    return rows
 
 
-def _seconds_of_first_run(physics: str, folder: str) -> float:
-    """Seconds by the clock of a short run whose compiled kernels are kept in a folder."""
-    command = [str(Path(sys.executable).with_name("swarm-forage")), *FIRST_RUN, "--set", f"physics={physics}"]
-    started = time.perf_counter()
-    with tempfile.TemporaryDirectory() as results:
-        kept = {**os.environ, "NUMBA_CACHE_DIR": folder}
-        subprocess.run([*command, "--out", results], check=True, capture_output=True, env=kept)
-    return time.perf_counter() - started
+def markdown(rows: Rows) -> str:
+    """Return a table in Markdown, padded."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=True)] for row in rows]
+    lines = [f"| {' | '.join(row)} |" for row in padded]
+    return "\n".join([lines[0], f"|{'|'.join('-' * (width + 2) for width in widths)}|", *lines[1:]])
 
 
-def frame_rows(ticks: int, repeats: int) -> Iterator[Row]:  # noqa: ARG001 - a case like the others; ticks are few
-    """Pictures of a large swarm that moves, and the window of a smaller one: a robot is chosen, with beams and memory.
-
-    The window's display is none, so the time in which a real one shows the picture is not in it.
-    """
-    from swarm_forage_env.inspect.watch import Watch
-    from swarm_forage_env.rendering.window import Pressed, Window
-
-    env = parallel_env("search_and_rescue", n_robots=819, physics="compiled", render_mode="rgb_array")
-    env.reset(seed=0)
-    actions = {agent: env.action_space(agent).sample() for agent in env.agents}
-    rate = pictures_per_second(env.render, 10 * repeats, before=lambda: env.step(actions))
-    yield Row("rgb_array, N = 819, 900 pixels", rate, "pictures/s", ">= 60", rate >= 60)
-
-    os.environ["SDL_VIDEODRIVER"] = "dummy"
-    for policy, caches in (("dpo", "none"), ("stochx", "dynamic")):
-        window = Window()
-        watch = Watch(warehouse_medium(physics="compiled", caches=caches), policy, speed=6.0)
-        watch.handle(Pressed("tab"))
-        for _ in range(WARM_TICKS):
-            watch.step()
-
-        def show(window: Window = window, watch: Watch = watch) -> None:
-            watch.advance(1.0 / 30.0)
-            window.show(watch.scene())
-            window.events()
-
-        rate = pictures_per_second(show, 10 * repeats)
-        window.close()
-        name = f"window, N = 200, {policy.upper()}, one tick a picture"
-        yield Row(name, rate, "pictures/s", ">= 30", rate >= 30)
+def chosen_cases(given: argparse.Namespace, parser: argparse.ArgumentParser) -> list[str]:
+    """Return the names of the cases to measure; unknown ones end in a message."""
+    known = list(PEERS if given.peers else CASES)
+    for name in given.cases:
+        if name not in known:
+            parser.error(f"expected some of {', '.join(known)}, got {name!r}")
+    return given.cases or known
 
 
-WARM_TICKS = 600
-"""Ticks before pictures are timed, so that robots have spread and remember something."""
-
-
-def pictures_per_second(
-    draw: Callable[[], object], n_pictures: int, before: Callable[[], object] = lambda: None
-) -> float:
-    """Median rate of a function that draws one picture, without its first calls; `before` each, time stands still."""
-    for _ in range(3):
-        before()
-        draw()
-    seconds = []
-    for _ in range(n_pictures):
-        before()
-        started = time.process_time()
-        draw()
-        seconds.append(time.process_time() - started)
-    return 1.0 / statistics.median(seconds)
-
-
-Case = Callable[[int, int], Iterable[Row]]
-"""Measures a case; arguments: ticks, repeats."""
-
-
-def cases() -> dict[str, Case]:
-    """Name -> what it measures, in the order of the table."""
-    return {
-        "scaling: CRW, N = 4,096 and 16,384": scaling_rows,
-        "four wrappers, N = 200": wrapper_rows,
-        "search for cache sites: STOCHX, N = 200": site_rows,
-        "learning: VecEnv and PPO": learning_rows,
-        "pictures: rgb_array and window": frame_rows,
-        "start: import and first run": start_rows,
-    }
-
-
-def main() -> None:
-    """Run the cases and print the table."""
+def main() -> int:
+    """Measure the cases and print the table; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer repeats, shorter runs")
-    parser.add_argument("--only", default="", help="cases whose name contains this text")
-    arguments = parser.parse_args()
-    only = arguments.only.lower()
-    chosen = {name: case for name, case in cases().items() if only in name.lower()}
-    if not chosen:
-        parser.error(
-            f"expected --only to be part of the name of a case, got {arguments.only!r}; the cases are:\n  "
-            + "\n  ".join(cases())
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=f"default all of: {', '.join(CASES)}")
+    parser.add_argument("--against", metavar="REVISION", help="another revision, or the folder of a checkout")
+    parser.add_argument("--peers", type=Path, metavar="FOLDER", help=f"other packages: {', '.join(PEERS)}")
+    parser.add_argument("--physics", choices=("compiled", "chipmunk"), default="compiled", help="default compiled")
+    parser.add_argument("--quick", action="store_true", help="three short rounds instead of seven whole ones")
+    given = parser.parse_args()
+    names = chosen_cases(given, parser)
+    rounds, effort = (3, 0.2) if given.quick else (7, 1.0)
+    found: dict[str, list[Values]] = {}
+    failed: list[str] = []
+    progress = Console(stderr=True)
+    with ExitStack() as open_things:
+        try:
+            subjects = [started(ROOT, open_things)]
+            if given.against:
+                subjects.append(started(open_things.enter_context(checkout(given.against)), open_things))
+        except (BenchError, subprocess.CalledProcessError) as error:
+            parser.error(str(error))
+        try:
+            for name in names:
+                try:
+                    sides = [(subject, name) for subject in subjects]
+                    if given.peers:
+                        python = installed(name, given.peers)
+                        other = open_things.enter_context(Subject(python, PEERS_FILE, ROOT / "scripts"))
+                        sides = [(subjects[0], PEERS[name].ours), (other, name)]
+                    once = name in CASES and CASES[name].once
+                    found[name] = measured(sides, given.physics, 1 if once else rounds, effort)
+                    progress.print(name, *(short(statistics.median(values)) for values in found[name]), style="dim")
+                except BenchError as error:
+                    failed.append(str(error))
+        except KeyboardInterrupt:
+            progress.print("Interrupted; these cases are done:")
+    print(
+        markdown(
+            rows_of_peers(names, found) if given.peers else rows_of_cases(names, found, against=bool(given.against))
         )
-    ticks, repeats = (2_000, 3) if arguments.quick else (10_000, 7)
-    console = Console(width=150)
-    table = Table(title=f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, one core")
-    for heading in ("case", "measured", "unit", "target", "met", "note"):
-        table.add_column(heading, justify="right" if heading in ("measured", "target") else "left")
-    for row in itertools.chain.from_iterable(case(ticks, repeats) for case in chosen.values()):
-        met = "" if row.met is None else ("yes" if row.met else "NO")
-        console.print(f"{row.case}: {row.value:.3g} {row.unit}", style="dim")
-        table.add_row(row.case, f"{row.value:.3g}", row.unit, row.target, met, row.note)
-    console.print(table)
+    )
+    if failed:
+        print("\n".join(failed), file=sys.stderr)
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
