@@ -9,15 +9,14 @@ equivalent. A difference is compiled minus Chipmunk, the mean over seeds with a 
 
 import argparse
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from arguments import whole
-from contact_conflicts import ConflictCount
 from scipy.spatial import KDTree
 
 from baselines.dpo import DPOPolicy
+from baselines.robots import ACQUIRE
 from metrics.statistics import aggregate
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.types import FloatArray
@@ -36,10 +35,19 @@ MEASURES = {
     "ticks of a contact, median": 1,
     "ticks of a contact, 90 %": 1,
     "deepest overlap, % of a diameter": 2,
+}
+"""What is measured, and with how many decimals it is written."""
+CONFLICTS = {
     "conflicts over one object": 1,
     "of these in touch": 1,
+    "ticks of a conflict in touch, median": 0,
+    "ticks of a conflict in touch, 90 %": 0,
+    "ticks of a conflict in touch, longest": 0,
+    "conflicts unresolved at the end": 1,
 }
-"""What is measured, and with how many decimals it is written; conflicts are counted for DPO alone."""
+"""The same for DPO alone."""
+UNRESOLVED_TICKS = 1_000
+"""A conflict that has been in touch so long when the run ends will not be resolved."""
 
 
 class ContactCount:
@@ -64,6 +72,44 @@ class ContactCount:
             self._since[pair] = tick
 
 
+class ConflictCount:
+    """Conflicts of one run over objects: look at it after every tick.
+
+    A conflict is a pair of robots that go to the same remembered object and are both within its slowing radius, where
+    they ignore obstacles. It is over when one goes for something else: one has the object.
+
+    Attributes:
+        found: Of each conflict, by (robot, robot, target, first tick): its ticks, its ticks in touch, its last tick in
+            touch.
+    """
+
+    def __init__(self, touch_m: float) -> None:
+        self.found: dict[tuple[int, int, int, int], list[int]] = {}
+        self._touch_m = touch_m
+        self._open_since: dict[tuple[int, int, int], tuple[int, int]] = {}
+
+    def look(self, policy: DPOPolicy, at: FloatArray, tick: int) -> None:
+        """Note who is in conflict; `at` (N, 2) is where robots are, in m."""
+        robots = policy._robots
+        goal = np.column_stack((robots["goal_x_m"], robots["goal_y_m"]))
+        there = np.hypot(*(goal - at).T) <= policy.parameters.slowing_radius_m
+        rows = np.flatnonzero(there & (robots["activity"] == ACQUIRE) & (robots["target"] >= 0))
+        rows = rows[np.argsort(robots["target"][rows], kind="stable")]
+        by_target = np.split(rows, np.flatnonzero(np.diff(robots["target"][rows])) + 1)
+        for group in by_target:
+            for i, j in itertools.combinations(group.tolist(), 2):
+                pair = (i, j, int(robots["target"][i]))
+                begun, last = self._open_since.get(pair, (tick, tick))
+                if tick - last > 1:
+                    begun = tick
+                self._open_since[pair] = begun, tick
+                conflict = self.found.setdefault((*pair, begun), [0, 0, 0])
+                conflict[0] += 1
+                if np.hypot(*(at[i] - at[j])) <= self._touch_m:
+                    conflict[1] += 1
+                    conflict[2] = tick
+
+
 def measured(world: ScenarioConfig, policy_name: str, seed: int) -> dict[str, float]:
     """The measures of one run, by name."""
     policy = load_policy(policy_name)
@@ -85,10 +131,21 @@ def measured(world: ScenarioConfig, policy_name: str, seed: int) -> dict[str, fl
         1_000 * len(contacts.durations) / (world.robots.n_robots * world.horizon_s),
         *np.percentile(durations, (50, 90)),
         100 * contacts.deepest,
-        len(conflicts.found),
-        sum(in_touch > 0 for _, in_touch, _ in conflicts.found.values()),
     ]
-    return dict(zip(MEASURES, map(float, values), strict=True))
+    told = dict(zip(MEASURES, map(float, values), strict=True))
+    return told | (of_conflicts(conflicts, env.tick) if isinstance(policy, DPOPolicy) else {})
+
+
+def of_conflicts(conflicts: ConflictCount, end: int) -> dict[str, float]:
+    """The measures of conflicts, by name."""
+    touching = [(in_touch, last) for _, in_touch, last in conflicts.found.values() if in_touch]
+    values = [
+        len(conflicts.found),
+        len(touching),
+        *np.percentile([in_touch for in_touch, _ in touching] or [0], (50, 90, 100)),
+        sum(last == end and in_touch >= UNRESOLVED_TICKS for in_touch, last in touching),
+    ]
+    return dict(zip(CONFLICTS, map(float, values), strict=True))
 
 
 def case(name: str, policy: str, n_robots: int, horizon_s: float) -> list[RunSpec]:
@@ -112,10 +169,10 @@ def rows_of_case(specs: Sequence[RunSpec], seeds: int) -> Iterator[Row]:
     """Run one case in both engines; one line of the table per measure."""
     name, policy, n_robots = specs[0].scenario.name, specs[0].policy, specs[0].scenario.robots.n_robots
     runs = [[measured(spec.scenario, policy, seed) for seed in range(seeds)] for spec in specs]
-    for measure, decimals in MEASURES.items():
-        chipmunk, compiled = (np.array([run[measure] for run in of_engine]) for of_engine in runs)
-        if measure in ("conflicts over one object", "of these in touch") and policy != "dpo":
+    for measure, decimals in {**MEASURES, **CONFLICTS}.items():
+        if measure not in runs[0][0]:
             continue
+        chipmunk, compiled = (np.array([run[measure] for run in of_engine]) for of_engine in runs)
         difference = aggregate(compiled - chipmunk)
         cells = (chipmunk.mean(), compiled.mean(), difference.mean, difference.lower, difference.upper)
         before, after, mean, low, high = (written(value, decimals) for value in cells)
@@ -134,6 +191,21 @@ def written(value: float, decimals: int) -> str:
 def words(text: str) -> list[str]:
     """Names separated by commas."""
     return text.split(",")
+
+
+def whole(*, at_least: int) -> Callable[[str], int]:
+    """Return an argparse type: whole numbers from `at_least` on."""
+
+    def read(text: str) -> int:
+        try:
+            number = int(text)
+        except ValueError:
+            number = at_least - 1
+        if number < at_least:
+            raise argparse.ArgumentTypeError(f"expected a whole number >= {at_least}, got {text!r}")
+        return number
+
+    return read
 
 
 def numbers(text: str) -> list[int]:

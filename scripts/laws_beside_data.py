@@ -1,6 +1,6 @@
 """What laws and a mean-field model say of swarms beside what they do: tables and a picture for docs/laws.md.
 
-    swarm-forage study run scripts/laws.toml --out results/laws
+    swarm-forage study run docs/laws.toml --out results/laws
     python scripts/laws_beside_data.py results/laws                 write the blocks of the page, and its picture
     python scripts/laws_beside_data.py results/laws --out FOLDER    the same in a copy of the page
 

@@ -17,6 +17,7 @@ import argparse
 import json
 import platform
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -39,6 +40,12 @@ WITH_ALL = ("crw", "dpo", "stochm", "stochx", "generalist")
 SCENARIOS = {"small": "warehouse_small", "medium": "warehouse_medium", "rescue": "search_and_rescue"}
 """Short name in blocks -> scenario."""
 COMPILED = "--set physics=compiled"
+LIKELIEST = (
+    "from dataclasses import replace as change; from swarm_forage_env.policies.network import Network; "
+    "from swarm_forage_env.policies.pretrained import network_file as file; net = Network.load(file('generalist')); "
+    "change(net, about=change(net.about, samples=False)).save('likeliest.npz')"
+)
+"""The same weights, with the likeliest action in the place of one that is drawn."""
 SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": ((f"swarm-forage run --scenario warehouse_small --policy {','.join(FIVE)} --robots 50 --seeds 4",), FIVE),
     "medium": (
@@ -83,7 +90,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     },
     "drawn": (
         (
-            f"python {ROOT}/scripts/likeliest.py generalist likeliest.npz",
+            f'python -c "{LIKELIEST}"',
             "swarm-forage run --scenario search_and_rescue --robots 64 --policy generalist,likeliest.npz --seeds 4 "
             f"{COMPILED}",
         ),
@@ -118,7 +125,7 @@ def make(name: str) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         for command in commands:
             print(f"{name}: {command}", file=sys.stderr)
-            program, *words = command.split()
+            program, *words = shlex.split(command)
             printed = subprocess.run(
                 [*PROGRAMS[program], *words], cwd=folder, stdout=subprocess.PIPE, text=True, check=True
             ).stdout

@@ -1,18 +1,15 @@
 """Scripts of measurements run: short, to see that they still fit the packages."""
 
+import importlib
 import re
 import runpy
 import sys
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from metrics.claims import CLAIMS, INTUITIONS
 from metrics.laws import ALL_LAWS
-from swarm_forage_env.policies.network import Network
-from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.runs.store import RunStore
@@ -44,27 +41,12 @@ def run(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.compiled
-def test_conflicts_over_one_object_are_counted(run):
-    code, out, _ = run("contact_conflicts", "--scenario", "warehouse_small", "--seeds", "1", "--seconds", "20")
-    assert code == 0
-    assert "unresolved" in out
-
-
-@pytest.mark.compiled
-def test_what_a_batch_of_runs_could_save_is_estimated(run):
-    code, out, _ = run("batch_gain", "--seeds", "2", "--ticks", "5")
-    assert code == 0
-    header, _, *rows = [line.split("|") for line in out.splitlines()]
-    assert [(len(row), row[2].strip()) for row in rows] == [(len(header), size) for size in ("8", "50", "8", "50")]
-
-
-@pytest.mark.compiled
 def test_two_engines_are_compared(run):
     words = ("--policy", "dpo", "--robots", "30", "--seeds", "2", "--horizon", "20", "--all")
     lines = run("compare_engines", *words)[1].splitlines()
-    assert len(lines) == 2 + 9 + 2
-    assert all(line.startswith("| warehouse_small | dpo | 30 |") for line in lines[2:11])
-    assert lines[11:] == [
+    assert len(lines) == 2 + 13 + 2
+    assert all(line.startswith("| warehouse_small | dpo | 30 |") for line in lines[2:15])
+    assert lines[15:] == [
         "1 of 1 cases have the same numbers in both engines.",
         "In 0 of the 0 rows with other numbers the interval of the difference leaves out zero.",
     ]
@@ -134,7 +116,7 @@ def test_laws_are_written_beside_the_runs_of_a_study(run):
 
 
 def test_the_study_of_the_page_on_laws_is_one_that_the_model_holds_for():
-    spec = load_study(ROOT / "scripts/laws.toml")
+    spec = load_study(ROOT / "docs/laws.toml")
     assert [world.caches for world in (spec.specs_of(cell)[0].scenario for cell in spec.cells)] == ["none"] * 8
 
 
@@ -149,40 +131,18 @@ def test_sketches_of_theory_are_those_of_the_docs(run):
 @pytest.mark.parametrize(
     ("script", "words", "fault"),
     [
-        ("noise_by_group", "--seeds 0", "argument --seeds: expected a whole number >= 1, got '0'"),
-        ("noise_by_group", "--horizon 300", "Expected a horizon of a whole number of intervals of 200 s, got 300 s"),
-        ("noise_by_group", "--sigmas -1", "Expected sensor_noise.sigma to be a finite number >= 0, got -1.0"),
-        (
-            "noise_by_group",
-            "--scenario warehouse_small --sigmas 0.1 --out taken/noise",
-            "[Errno 20] Not a directory: 'taken/noise'",
-        ),
-        ("contact_conflicts", "--seconds 0.3", "Expected horizon_s to be a whole number of ticks of 0.2 s, got 0.3"),
         ("compare_engines", "--robots 4,many", "argument --robots: expected a whole number >= 1, got 'many'"),
         ("compare_engines", "--policy crv", "Unknown policy 'crv'. Did you mean 'crw'?"),
-        ("bench", "--only nothing", "expected --only to be part of the name of a case, got 'nothing'"),
+        ("bench", "nothing", "expected some of crw-50, crw-200, "),
+        ("bench", "crw --peers venvs", "expected some of vmas-discovery, "),
+        ("bench", "--against .", "expected a revision or a checkout of this project, got /"),
     ],
 )
 def test_bad_arguments_end_in_a_message(script, words, fault, run):
-    Path("taken").touch()
     code, out, err = run(script, *words.split())
     assert code == 2, err
     assert f"{script}.py: error: {fault}" in " ".join(err.split())
     assert out == ""
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--only", "vmas"), "expected some of vmas-discovery, "),
-        (("--rounds", "0"), "expected a number above 0, got 0"),
-        ((), "required: --venvs"),
-    ],
-)
-def test_other_packages_are_refused_with_what_was_expected(words, said, run):
-    code, _, err = run("bench_peers", *words)
-    assert code == 2
-    assert said in err
 
 
 def test_kernels_that_only_kernels_call_are_seen_as_reached(monkeypatch, tmp_path):
@@ -196,34 +156,43 @@ def test_kernels_that_only_kernels_call_are_seen_as_reached(monkeypatch, tmp_pat
     assert {"tick.run", *check_bounds.ELSEWHERE} <= check_bounds.kernels()
 
 
-def test_a_package_beside_ours_has_a_row(monkeypatch):
+@pytest.fixture
+def bench(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "scripts")
-    import bench_peers
-
-    rates = {bench_peers.CHIPMUNK: 200_000.0, bench_peers.COMPILED: 400_000.0}
-    printed = bench_peers.row("rware", 1, 8, [{"rware": 4000.0, **rates}, {"rware": 100.0, **rates}])
-    cells = printed.split(" | ")
-    assert cells[0] == f"| {bench_peers.PEERS['rware'].label}"
-    assert cells[1:7] == ["50", "1", "8", "2.05", "200", "400"]
-    assert cells[7:] == ["1,025 (50.00 to 2,000)", "2,050 (100 to 4,000) |"]
+    return importlib.import_module("bench")
 
 
-def test_a_package_that_cannot_be_timed_gives_its_reason(monkeypatch):
-    monkeypatch.syspath_prepend(ROOT / "scripts")
-    import bench_peers
-
-    worker = bench_peers.Worker(sys.executable)
-    try:
-        with pytest.raises(bench_peers.PeerError, match="not run: KeyError: 'nobody'"):
-            worker.rate("nobody", 50, 1, 0.1)
-    finally:
-        worker.close()
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    "case", ["crw-50", "seeds-50", "adverse-200", "network-50", "numpy-200", "dict-200", "vec-8x50"]
+)
+def test_what_is_measured_is_still_there(case, bench):
+    assert bench.CASES[case].measure("compiled", 0.01) > 0.0
 
 
-def test_the_likeliest_action_of_a_network_that_draws_is_told_by_the_same_weights(run, tmp_path):
-    assert run("likeliest", "generalist", "likeliest.npz")[0] == 0
-    shipped, likeliest = Network.load(network_file("generalist")), Network.load(tmp_path / "likeliest.npz")
-    assert (shipped.about.samples, likeliest.about.samples) == (True, False)
-    assert replace(likeliest.about, samples=True) == shipped.about
-    layers = zip(likeliest.weights + likeliest.biases, shipped.weights + shipped.biases, strict=True)
-    assert all(np.array_equal(*pair) for pair in layers)
+def test_a_table_has_values_targets_and_ratios_of_rounds(bench):
+    cases, by_cases = (
+        ["crw-50", "seeds-50", "crw-200"],
+        {"crw-50": [[200.0, 100.0, 104.0]], "seeds-50": [[300.0, 200.0, 104.0]]},
+    )
+    rows = bench.rows_of_cases(cases, by_cases, against=False)
+    assert [(row[0], row[2], row[5]) for row in rows[1:]] == [
+        ("crw-50", "104", ""),
+        ("seeds-50", "200", "1.50 (1.00 to 2.00) x crw-50"),
+        ("crw-200", "-", ""),
+    ]
+    by_versions = {"crw-50": [[100.0, 100.0], [50.0, 1637.0]]}
+    assert bench.rows_of_cases(["crw-50"], by_versions, against=True)[1][-2:] == ["844", "8.44 (0.50 to 16.4)"]
+    peer = bench.rows_of_peers(["rware"], {"rware": [[2.0], [4.0]]})[1]
+    assert peer == ["RWARE, 38 x 22 squares", "2.0.0", "4.00", "vec-50", "2.00", "2.00"]
+    assert {of_peer.ours for of_peer in bench.PEERS.values()} <= {*bench.CASES}
+    assert {case.beside for case in bench.CASES.values()} <= {"", *bench.CASES}
+    assert bench.markdown([["a", "b"], ["long", "c"]]).splitlines()[0] == "| a    | b |"
+
+
+def test_a_case_that_cannot_be_measured_gives_its_reason(bench):
+    with (
+        bench.Subject(sys.executable, bench.CASES_FILE, ROOT) as subject,
+        pytest.raises(bench.BenchError, match="nobody: KeyError: 'nobody'"),
+    ):
+        subject.measure("nobody", "compiled", 0.1)
