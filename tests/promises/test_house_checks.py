@@ -110,11 +110,12 @@ def test_named_skips_pass_and_so_do_all_without_the_option(tmp_path, source, opt
     ("subject", "fault"),
     [
         ("world: find arrays by the types of the tuple", ""),
-        ("internal: pass on what is given", ""),
+        ("internal, world: pass on what is given", ""),
         ("ci: feed both lanes from one list", ""),
         ("Docs: what a study shows", "no such area"),
         ("speed up", 'no "area: imperative"'),
         ("nowhere: add a table", "no such area"),
+        ("world, nowhere: add a table", "no such area"),
         ("world: Add a table", "a large letter"),
         ("world: adds a table", "no imperative"),
         ("world: added a table", "no imperative"),

@@ -121,7 +121,7 @@ def book_each(
     n_terminated: np.ndarray,
     obs: ObsArray,
 ) -> None:
-    """Book a step of learners, world by world, as `rows.book_rows` does, and copy the observations.
+    """Book a step of learners, world by world, as `reward.book_rows` does, and copy the observations.
 
     Args:
         robots: Those of any of the worlds: gives types and shapes.
