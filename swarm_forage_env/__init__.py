@@ -209,7 +209,7 @@ def _register_environments() -> None:
             env_id,
             "swarm_forage_env.views.gymnasium:JointForageEnv",
             kwargs=kwargs,
-            vector_entry_point="swarm_forage_env.views.gymnasium:SwarmVectorEnv",
+            vector_entry_point="swarm_forage_env.views.gymnasium:vector_env",
         )
 
 

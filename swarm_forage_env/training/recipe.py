@@ -33,7 +33,7 @@ from swarm_forage_env.training.defaults import (
 )
 from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
 from swarm_forage_env.training.plan import SAMPLING, EvaluationPlan, Stage, TrainingPlan
-from swarm_forage_env.views.learner_arena import DEFAULT_SCENARIO
+from swarm_forage_env.views.plans import DEFAULT_SCENARIO
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_configs

@@ -24,7 +24,8 @@ from swarm_forage_env.contract.policy import COMMANDS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.views.bookkeeping import Bookkeeping, can_book_together
-from swarm_forage_env.views.learner_arena import ArenaPlan, LearnerArena
+from swarm_forage_env.views.learner_arena import LearnerArena
+from swarm_forage_env.views.plans import ArenaPlan
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.kernels.reward import book_rows
 from swarm_forage_env.world.lockstep import Lockstep, can_go_in_lockstep
@@ -136,6 +137,7 @@ class ArenaBatch:
 
     Attributes:
         n_arenas, n_robots, n_rows: Sizes; n_rows = n_arenas * n_robots, the rows of an arena.
+        render_mode: What pictures are drawn for.
         arenas: The arenas.
         interface: Spaces and layout of what learners see and do.
     """
@@ -166,6 +168,7 @@ class ArenaBatch:
         self.n_arenas = n_arenas
         self.n_robots = plan.scenario.robots.n_robots
         self.n_rows = n_arenas * self.n_robots
+        self.render_mode = plan.render_mode
         self._is_reset = self._is_closed = False
         self._is_sampled = plan.sampler is not None
         self._absent = np.zeros((n_arenas, self.n_robots), np.bool_)

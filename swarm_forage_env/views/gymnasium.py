@@ -12,24 +12,23 @@ from gymnasium.vector.utils import batch_space
 from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import BoolArray, ObsArray
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
-from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.policies.interface import LearnerInterface
 from swarm_forage_env.views.arenas import ArenaStep
-from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot, plan_arena
+from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot
+from swarm_forage_env.views.plans import constructor_takes, plan_arena
 from swarm_forage_env.views.processes import open_arenas
-from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
-from swarm_forage_env.wrappers.registry import wrapper_configs
 
 
 class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
     """One agent that sees and steers every robot: the view of single-agent algorithms and of central control.
 
     Observations are (N, d) float32 in [-1, 1], row i = robot i; the columns are those of the parallel environment
-    (`forage_env.layout`), or of the interface (`interface.layout`). Actions are (N, 3) or (N, 2) float32 in
-    [-1, 1], with further columns where robots send messages, or (N,) whole numbers where the interface has discrete
-    ones. The reward is the sum over robots and over the ticks of
-    a decision. An episode terminates when every robot is dead and is truncated at the horizon.
+    (`forage_env.layout`), or of the interface (`interface.layout`). Actions are (N, 3) or (N, 2) float32 in [-1, 1],
+    with further columns where robots send messages, or (N,) whole numbers where the interface has discrete ones. With a
+    sampler there are as many rows as the largest world has robots; those to spare are zeros, and their actions are
+    ignored. The reward is the sum over robots and over the ticks of a decision. An episode terminates when every robot
+    is dead and is truncated at the horizon.
 
     `info["active"]` is (N,) bool, the tasked swarm. With discrete actions, `info["action_mask"]` is (N, number of
     actions) int8, 1 = makes sense; `action_space.sample(mask=tuple(info["action_mask"]))` draws from these.
@@ -37,49 +36,13 @@ class JointForageEnv(gymnasium.Env[ObsArray, np.ndarray]):
 
     metadata = ForageEnv.metadata
 
-    def __init__(
-        self,
-        scenario: str | ScenarioConfig | None = None,
-        *,
-        sampler: ScenarioSampler | None = None,
-        interface: GivenInterface = None,
-        wrappers: Iterable[WrapperConfig | str] = (),
-        max_cycles: int | None = None,
-        render_mode: str | None = None,
-        snapshots: bool = False,
-        **overrides: Any,
-    ) -> None:
-        """Create the environment.
-
-        Args:
-            scenario: Name of a preset, or a complete configuration; default warehouse_small.
-            sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`. There are as many
-                rows as the largest world has robots; those to spare are zeros, and their actions are ignored.
-            interface: What is seen and done of each robot, an `InterfaceConfig` or its fields by name; default full
-                observations and continuous actions.
-            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
-                ("population:death_per_tick=0.01").
-            max_cycles: Ticks until truncation; default the scenario's horizon.
-            render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
-            snapshots: Keep what copies and snapshots need; see `ForageEnv`.
-            overrides: Scenario fields by name (`n_robots=20`).
-
-        Raises:
-            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
-        """
-        plan = plan_arena(
-            scenario,
-            overrides,
-            sampler=sampler,
-            interface=interface,
-            wrappers=wrappers,
-            max_cycles=max_cycles,
-            render_mode=render_mode,
-            snapshots=snapshots,
-        )
+    @constructor_takes(plan_arena)
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Create the environment."""
+        plan = plan_arena(*args, **options)
         self._arena = LearnerArena(plan)
         self._is_discrete = plan.interface.actions == "discrete"
-        self.render_mode = render_mode
+        self.render_mode = plan.render_mode
         self.observation_space = batch_space(self.interface.observation_space, self._arena.n_rows)
         self.action_space = batch_space(self.interface.action_space, self._arena.n_rows)
 
@@ -154,7 +117,8 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
 
     Sub-environment `a * N + i` is robot i of arena a. `views.arenas` describes how rows end, stay absent and start
     anew: an arena starts anew within the step that ends it (`AutoresetMode.SAME_STEP`), and `infos["final_obs"]` holds
-    the last observations. A dead robot terminates once and is a row of zeros until its arena starts anew.
+    the last observations. A dead robot terminates once and is a row of zeros until its arena starts anew. With a
+    sampler an arena has as many rows as the largest world has robots; those to spare in a run are absent all through.
 
     Infos are arrays over rows, with masks under the name with an underscore in front, as Gymnasium does it:
     `active` always; `final_obs` (objects, None elsewhere) and `final_info` ({}) of rows that are done; `episode`
@@ -171,59 +135,14 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
     autoreset_mode = AutoresetMode.SAME_STEP
     """As in `metadata`; some libraries ask for the attribute."""
 
-    def __init__(
-        self,
-        scenario: str | ScenarioConfig | None = None,
-        *,
-        sampler: ScenarioSampler | None = None,
-        num_envs: int = 1,
-        n_arenas: int | None = None,
-        n_processes: int = 0,
-        interface: GivenInterface = None,
-        wrappers: Iterable[WrapperConfig | str] = (),
-        swarm_wrappers: Iterable[WrapperConfig | str] = (),
-        max_cycles: int | None = None,
-        render_mode: str | None = None,
-        **overrides: Any,
-    ) -> None:
-        """Create the environment.
-
-        Args:
-            scenario: Name of a preset, or a complete configuration; default warehouse_small.
-            sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`. An arena then has
-                as many rows as the largest world has robots; those that are to spare in a run are absent all through.
-            num_envs: Robots in all arenas together, a multiple of the scenario's number. 1, the default of
-                `gymnasium.make_vec`, leaves the choice to `n_arenas`.
-            n_arenas: Arenas that run side by side; default as many as `num_envs` needs, at least one.
-            n_processes: Processes that the arenas are spread over; 0 = all in this process.
-            interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
-                observations and continuous actions.
-            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
-                ("population:death_per_tick=0.01").
-            swarm_wrappers: The same, for `gymnasium.make_vec`, which has its own argument `wrappers`.
-            max_cycles: Ticks until truncation; default the scenario's horizon.
-            render_mode: None or "rgb_array".
-            overrides: Scenario fields by name (`n_robots=20`).
-
-        Raises:
-            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
-            ValueError: num_envs and n_arenas that do not fit together, or more processes than arenas.
-        """
-        plan = plan_arena(
-            scenario,
-            overrides,
-            sampler=sampler,
-            interface=interface,
-            wrappers=(*wrapper_configs(wrappers), *wrapper_configs(swarm_wrappers)),
-            max_cycles=max_cycles,
-            render_mode=render_mode,
-        )
-        arenas = _number_of_arenas(num_envs, n_arenas, plan.scenario.robots.n_robots)
-        self._arenas = open_arenas(plan, arenas, n_processes)
+    @constructor_takes(open_arenas)
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Create the environment."""
+        self._arenas = open_arenas(*args, **options)
         self.interface = self._arenas.interface
-        self.n_arenas, self.n_robots = arenas, self._arenas.n_robots
+        self.n_arenas, self.n_robots = self._arenas.n_arenas, self._arenas.n_robots
         self.num_envs = self._arenas.n_rows
-        self.render_mode = render_mode
+        self.render_mode = self._arenas.render_mode
         self.single_observation_space = self.interface.observation_space
         self.single_action_space = self.interface.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -321,19 +240,6 @@ class SwarmVectorEnv(VectorEnv[ObsArray, np.ndarray, np.ndarray]):
         self._arenas.close()
 
 
-def _number_of_arenas(num_envs: int, n_arenas: int | None, n_robots: int) -> int:
-    if n_arenas is not None and num_envs not in (1, n_arenas * n_robots):
-        raise ValueError(
-            f"Expected num_envs = {n_arenas * n_robots} for n_arenas = {n_arenas} of n_robots = {n_robots} (one "
-            f"sub-environment per robot), got {num_envs}; leave num_envs or n_arenas away."
-        )
-    if n_arenas is not None:
-        return n_arenas
-    if num_envs == 1:
-        return 1
-    if num_envs < 1 or num_envs % n_robots:
-        raise ValueError(
-            f"Expected num_envs to be a multiple of n_robots = {n_robots} (one sub-environment per robot), got "
-            f"{num_envs}; choose another n_robots, or give n_arenas instead."
-        )
-    return num_envs // n_robots
+def vector_env(*, swarm_wrappers: Iterable[WrapperConfig | str] = (), **options: Any) -> SwarmVectorEnv:
+    """Create a `SwarmVectorEnv` for `gymnasium.make_vec`, which keeps the name `wrappers` for something else."""
+    return SwarmVectorEnv(wrappers=swarm_wrappers, **options)

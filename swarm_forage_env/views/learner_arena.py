@@ -1,153 +1,33 @@
 """One arena for learning: environment, wrappers, interface, seeds, and fields overridden for a curriculum."""
 
 import copy
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.fields import ConfigError, instance, table
+from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.calls import OPTION_OF_TESTS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.policies.interface import (
     MOTIONS,
-    GivenInterface,
     InterfaceConfig,
     LearnerInterface,
-    chosen_interface,
 )
 from swarm_forage_env.policies.kernels.sites import SiteMemory
-from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
-from swarm_forage_env.scenarios.overrides import field_sections, scenario_of_same_size
-from swarm_forage_env.scenarios.presets import chosen_scenario
-from swarm_forage_env.views.sampler import DrawnWorld, ScenarioSampler
+from swarm_forage_env.scenarios.config import SECTIONS
+from swarm_forage_env.scenarios.overrides import field_sections
+from swarm_forage_env.views.plans import ArenaPlan
+from swarm_forage_env.views.sampler import DrawnWorld
 from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
-from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
-from swarm_forage_env.wrappers.registry import wrapper_configs
+from swarm_forage_env.wrappers.base import SwarmWrapper
 
 SCENARIO_OPTION = "scenario"
 """The only reset option."""
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class ArenaPlan:
-    """Everything that an arena is made from; picklable."""
-
-    scenario: ScenarioConfig
-    """The world; with a sampler its largest one, which says how many rows and which columns there are."""
-    wrappers: tuple[WrapperConfig, ...] = ()
-    """What disturbs the swarm, in any order; with a sampler nothing beside what it draws."""
-    sampler: ScenarioSampler | None = None
-    """Where the world of each run comes from; None = it is always `scenario`."""
-    interface: InterfaceConfig = field(default_factory=InterfaceConfig)
-    """What a learner sees and does."""
-    max_cycles: int | None = None
-    """Ticks until truncation; default the scenario's horizon."""
-    render_mode: str | None = None
-    snapshots: bool = False
-    """Keep what copies and snapshots need; see `ForageEnv`."""
-
-    def build(self, overrides: Mapping[str, Any], world: DrawnWorld | None = None) -> ForageEnv | SwarmWrapper:
-        """Build the environment with its wrappers.
-
-        Args:
-            overrides: Scenario fields by name.
-            world: What the sampler has drawn; None = the scenario and wrappers of the plan.
-
-        Raises:
-            ConfigError: unknown fields, values that do not fit together, another number of robots, or more robots or
-                objects than the largest worlds of the sampler have.
-        """
-        given, wrappers = (self.scenario, self.wrappers) if world is None else world
-        scenario = scenario_of_same_size(given, overrides)
-        if self.sampler is not None:
-            self._check_room(scenario, self.sampler)
-        env = ForageEnv(
-            scenario,
-            max_cycles=self.max_cycles,
-            render_mode=self.render_mode,
-            reads=self.interface.reads,
-            snapshots=self.snapshots,
-        )
-        return wrap_in_order(env, wrappers)
-
-    @staticmethod
-    def _check_room(scenario: ScenarioConfig, sampler: ScenarioSampler) -> None:
-        """Refuse a world that has no room in the rows of the sampler's worlds."""
-        sizes = {
-            "n_robots": (scenario.robots.n_robots, sampler.n_robots),
-            "n_objects": (scenario.objects.n_objects, sampler.n_objects),
-        }
-        for name, (n_there, most) in sizes.items():
-            if n_there > most:
-                raise ConfigError(
-                    f"Expected {name} of at most {most}, for which spaces have room, got {n_there}; give the sampler "
-                    "a world with as many."
-                )
-
-
-DEFAULT_SCENARIO = "warehouse_small"
-"""The world of environments that are told nothing about it."""
-SAMPLED = "sampled"
-"""Stands for the scenario in the id swarm_forage/sampled-v1, whose worlds a sampler draws."""
-
-
-def plan_arena(
-    scenario: str | ScenarioConfig | None,
-    overrides: Mapping[str, Any],
-    *,
-    sampler: ScenarioSampler | None = None,
-    interface: GivenInterface = None,
-    wrappers: Iterable[WrapperConfig | str] = (),
-    max_cycles: int | None = None,
-    render_mode: str | None = None,
-    snapshots: bool = False,
-) -> ArenaPlan:
-    """Plan an arena from the arguments that the constructors of environments take.
-
-    Args:
-        scenario: Name of a preset, or a complete configuration; None = `DEFAULT_SCENARIO`, or what `sampler` draws.
-        overrides: Scenario fields by name.
-        sampler: Where the world of each run comes from, instead of `scenario`, `overrides` and `wrappers`.
-        interface: See `chosen_interface`.
-        wrappers: See `wrapper_configs`.
-        max_cycles: Ticks until truncation; default the scenario's horizon.
-        render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
-        snapshots: Keep what copies and snapshots need; see `ForageEnv`.
-
-    Raises:
-        ConfigError: unknown preset, field, wrapper or choice of the interface, values that do not fit together, or a
-            sampler beside what it decides.
-    """
-    disturbing = wrapper_configs(wrappers)
-    if sampler is None:
-        if scenario == SAMPLED:
-            raise ConfigError(
-                "Expected a sampler for swarm_forage/sampled-v1, got none; give sampler=ScenarioSampler(...)."
-            )
-        world = chosen_scenario(scenario or DEFAULT_SCENARIO, overrides)
-    else:
-        instance("sampler", sampler, ScenarioSampler, hint="; ScenarioSampler.from_mapping reads a table")
-        given = ["scenario"] * (scenario not in (None, SAMPLED)) + ["wrappers"] * bool(disturbing) + list(overrides)
-        if given:
-            raise ConfigError(
-                f"Expected either a sampler, which decides on the worlds, or {', '.join(given)}; got both. Write it "
-                "into the sampler, where all worlds can share it. By id, make swarm_forage/sampled-v1."
-            )
-        world = sampler.largest
-    return ArenaPlan(
-        scenario=world,
-        wrappers=disturbing,
-        sampler=sampler,
-        interface=chosen_interface(interface).for_scenario(world),
-        max_cycles=max_cycles,
-        render_mode=render_mode,
-        snapshots=snapshots,
-    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, slots=True)

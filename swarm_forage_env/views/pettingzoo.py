@@ -1,7 +1,6 @@
 """The learner's interface under the PettingZoo API: for libraries that want one agent per robot and dictionaries."""
 
-from collections.abc import Iterable
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -11,11 +10,9 @@ from pettingzoo.utils.conversions import parallel_to_aec
 from swarm_forage_env.contract.calls import is_over
 from swarm_forage_env.contract.policy import state_size
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
-from swarm_forage_env.scenarios.config import ScenarioConfig
-from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot, plan_arena
-from swarm_forage_env.views.sampler import ScenarioSampler
-from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
+from swarm_forage_env.policies.interface import LearnerInterface
+from swarm_forage_env.views.learner_arena import LearnerArena, LearnerSnapshot
+from swarm_forage_env.views.plans import constructor_takes, plan_arena, takes
 
 Infos = dict[str, dict[str, Any]]
 
@@ -24,57 +21,22 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
     """`ForageEnv` with the observations and actions of an `InterfaceConfig`; agents appear and terminate as there.
 
     `infos[agent]` holds `active` and, for discrete actions, `action_mask`: int8 (number of actions,), 1 = makes sense.
-    A step is one decision of `decision_ticks` ticks. Dictionaries take more time than the simulation itself; if a
-    library takes vector environments, `SwarmVectorEnv` is faster.
+    A step is one decision of `decision_ticks` ticks. With a sampler `possible_agents` are those of the largest world,
+    and `agents` those of the run. Trainers that need a fixed number of agents take "population:deaths=absorbing,..."
+    among the wrappers. Dictionaries take more time than the simulation itself; if a library takes vector environments,
+    `SwarmVectorEnv` is faster.
     """
 
     metadata: dict[str, Any] = {**ForageEnv.metadata, "name": "swarm_forage_learner_v1"}  # noqa: RUF012 - as PettingZoo
 
-    def __init__(
-        self,
-        scenario: str | ScenarioConfig | None = None,
-        *,
-        sampler: ScenarioSampler | None = None,
-        interface: GivenInterface = None,
-        wrappers: Iterable[WrapperConfig | str] = (),
-        max_cycles: int | None = None,
-        render_mode: str | None = None,
-        snapshots: bool = False,
-        **overrides: Any,
-    ) -> None:
-        """Create the environment.
-
-        Args:
-            scenario: Name of a preset, or a complete configuration; default warehouse_small.
-            sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`. `possible_agents`
-                are those of the largest world; `agents` are those of the run.
-            interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
-                observations and continuous actions.
-            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
-                ("population:death_per_tick=0.01"). Trainers that need a fixed number of agents take
-                "population:deaths=absorbing,...".
-            max_cycles: Ticks until truncation; default the scenario's horizon.
-            render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
-            snapshots: Keep what copies and snapshots need; see `ForageEnv`.
-            overrides: Scenario fields by name (`n_robots=20`).
-
-        Raises:
-            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
-        """
-        plan = plan_arena(
-            scenario,
-            overrides,
-            sampler=sampler,
-            interface=interface,
-            wrappers=wrappers,
-            max_cycles=max_cycles,
-            render_mode=render_mode,
-            snapshots=snapshots,
-        )
+    @constructor_takes(plan_arena)
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Create the environment."""
+        plan = plan_arena(*args, **options)
         self._is_discrete = plan.interface.actions == "discrete"
         self._arena = LearnerArena(plan)
-        self._sampler = sampler
-        self.render_mode = render_mode
+        self._sampler = plan.sampler
+        self.render_mode = plan.render_mode
         self.possible_agents = list(self._arena.forage_env.possible_agents)
         self.agents: list[str] = []
         self._row_of = {agent: row for row, agent in enumerate(self.possible_agents)}
@@ -210,80 +172,20 @@ class ParallelLearnerEnv(ParallelEnv[str, np.ndarray, Any]):
         self._arena.env.close()
 
 
-@overload
-def parallel_env(
-    scenario: str | ScenarioConfig | None = ...,
-    *,
-    sampler: None = ...,
-    interface: None = ...,
-    wrappers: tuple[()] = ...,
-    max_cycles: int | None = ...,
-    render_mode: str | None = ...,
-    snapshots: bool = ...,
-    **overrides: Any,
-) -> ForageEnv: ...
-@overload
-def parallel_env(
-    scenario: str | ScenarioConfig | None = ...,
-    *,
-    sampler: ScenarioSampler | None = ...,
-    interface: GivenInterface = ...,
-    wrappers: Iterable[WrapperConfig | str] = ...,
-    max_cycles: int | None = ...,
-    render_mode: str | None = ...,
-    snapshots: bool = ...,
-    **overrides: Any,
-) -> ForageEnv | SwarmWrapper | ParallelLearnerEnv: ...
-def parallel_env(
-    scenario: str | ScenarioConfig | None = None,
-    *,
-    sampler: ScenarioSampler | None = None,
-    interface: GivenInterface = None,
-    wrappers: Iterable[WrapperConfig | str] = (),
-    max_cycles: int | None = None,
-    render_mode: str | None = None,
-    snapshots: bool = False,
-    **overrides: Any,
-) -> ForageEnv | SwarmWrapper | ParallelLearnerEnv:
+@takes(plan_arena)
+def parallel_env(*args: Any, **options: Any) -> ForageEnv | Any:
     """Create a parallel environment; `pettingzoo.make("parallel", id, ...)` calls this function, too.
 
-    Args:
-        scenario: Name of a preset, or a complete configuration; default warehouse_small.
-        sampler: Draws the world of each run, see `ParallelLearnerEnv`.
-        interface: What a learner sees and does, see `ParallelLearnerEnv`; None = full observations and continuous
-            actions.
-        wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
-            ("population:death_per_tick=0.01").
-        max_cycles: Steps until truncation; default the scenario's horizon.
-        render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
-        snapshots: Keep what copies and snapshots need; see `ForageEnv`.
-        overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
-
-    Returns:
-        A `ForageEnv`; with wrappers the outermost of them; with an interface or a sampler a
-        `ParallelLearnerEnv` around them all.
-
-    Raises:
-        ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
+    It is a `ForageEnv`; with wrappers the outermost of them; with an interface or a sampler a `ParallelLearnerEnv`
+    around them all.
     """
-    if interface is not None or sampler is not None:
-        return ParallelLearnerEnv(
-            scenario,
-            sampler=sampler,
-            interface=interface,
-            wrappers=wrappers,
-            max_cycles=max_cycles,
-            render_mode=render_mode,
-            snapshots=snapshots,
-            **overrides,
-        )
-    plan = plan_arena(
-        scenario, overrides, wrappers=wrappers, max_cycles=max_cycles, render_mode=render_mode, snapshots=snapshots
-    )
-    return plan.build({})
+    if options.get("interface") is not None or options.get("sampler") is not None:
+        return ParallelLearnerEnv(*args, **options)
+    return plan_arena(*args, **options).build({})
 
 
-def env(scenario: str | ScenarioConfig | None = None, **options: Any) -> Any:
-    """Create the agent-by-agent (AEC) form by PettingZoo's own conversion; arguments as `parallel_env`."""
-    parallel = parallel_env(scenario, **options)
+@takes(plan_arena)
+def env(*args: Any, **options: Any) -> Any:
+    """Create the agent-by-agent (AEC) form of `parallel_env` by PettingZoo's own conversion."""
+    parallel = parallel_env(*args, **options)
     return parallel_to_aec(parallel)  # pyright: ignore[reportArgumentType] - its type asks for actions that may be None

@@ -5,7 +5,7 @@ import multiprocessing
 import pickle
 import signal
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -13,9 +13,12 @@ import numpy as np
 
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.contract.types import BoolArray, ObsArray
-from swarm_forage_env.policies.interface import LearnerInterface
+from swarm_forage_env.policies.interface import GivenInterface, LearnerInterface
+from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep, checked_rows, closed_error
-from swarm_forage_env.views.learner_arena import ArenaPlan
+from swarm_forage_env.views.plans import ArenaPlan, plan_arena
+from swarm_forage_env.views.sampler import ScenarioSampler
+from swarm_forage_env.wrappers.base import WrapperConfig
 
 _CLOSE = "close"
 _GOODBYE_S = 10.0
@@ -82,6 +85,7 @@ class ArenaProcesses:
         self.n_arenas = n_arenas
         self.n_robots = plan.scenario.robots.n_robots
         self.n_rows = n_arenas * self.n_robots
+        self.render_mode = plan.render_mode
         self.interface = LearnerInterface(plan.interface, SwarmSpec.of(plan.scenario))
         self._shares = [part.tolist() for part in np.array_split(np.arange(n_arenas), n_processes)]
         starter: Any = multiprocessing.get_context(context)  # the declared type lacks Process, but every context has it
@@ -223,17 +227,76 @@ class ArenaProcesses:
                 process.join()
 
 
-def open_arenas(plan: ArenaPlan, n_arenas: int, n_processes: int) -> ArenaBatch | ArenaProcesses:
-    """Build arenas in this process (n_processes = 0) or in n_processes others.
+def open_arenas(
+    scenario: str | ScenarioConfig | None = None,
+    *,
+    num_envs: int = 1,
+    n_arenas: int | None = None,
+    n_processes: int = 0,
+    sampler: ScenarioSampler | None = None,
+    interface: GivenInterface = None,
+    wrappers: Iterable[WrapperConfig | str] = (),
+    max_cycles: int | None = None,
+    render_mode: str | None = None,
+    snapshots: bool = False,
+    **overrides: Any,
+) -> ArenaBatch | ArenaProcesses:
+    """Build arenas in this process or in others.
+
+    Args:
+        scenario: Name of a preset, or a complete configuration; default warehouse_small.
+        num_envs: Robots in all arenas together, a multiple of the scenario's number. 1, the default of
+            `gymnasium.make_vec`, leaves the choice to `n_arenas`.
+        n_arenas: Arenas that run side by side; default as many as `num_envs` needs, at least one.
+        n_processes: Processes that the arenas are spread over; 0 = all in this process.
+        sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`.
+        interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full observations
+            and continuous actions.
+        wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+            ("population:death_per_tick=0.01").
+        max_cycles: Ticks until truncation; default the scenario's horizon.
+        render_mode: None or "rgb_array".
+        snapshots: Keep what copies and snapshots need; see `ForageEnv`.
+        overrides: Scenario fields by name (`n_robots=20`, `nest_progress=0.1`).
 
     Raises:
-        ValueError: render_mode is "human"; besides, as the classes of the arenas.
+        ConfigError: as `plan_arena`, or n_arenas below 1.
+        ValueError: num_envs and n_arenas that do not fit together, more processes than arenas, or a window.
     """
-    if plan.render_mode == "human":
+    plan = plan_arena(
+        scenario,
+        sampler=sampler,
+        interface=interface,
+        wrappers=wrappers,
+        max_cycles=max_cycles,
+        render_mode=render_mode,
+        snapshots=snapshots,
+        **overrides,
+    )
+    if render_mode == "human":
         raise ValueError(
             "Expected render_mode None or 'rgb_array' for a vector environment, got 'human'; a window shows one arena, "
             "of parallel_env or JointForageEnv."
         )
+    n_arenas = _number_of_arenas(num_envs, n_arenas, plan.scenario.robots.n_robots)
     if n_processes:
         return ArenaProcesses(plan, n_arenas, n_processes)
     return ArenaBatch(plan, n_arenas)
+
+
+def _number_of_arenas(num_envs: int, n_arenas: int | None, n_robots: int) -> int:
+    if n_arenas is not None and num_envs not in (1, n_arenas * n_robots):
+        raise ValueError(
+            f"Expected num_envs = {n_arenas * n_robots} for n_arenas = {n_arenas} of n_robots = {n_robots} (one "
+            f"sub-environment per robot), got {num_envs}; leave num_envs or n_arenas away."
+        )
+    if n_arenas is not None:
+        return n_arenas
+    if num_envs == 1:
+        return 1
+    if num_envs < 1 or num_envs % n_robots:
+        raise ValueError(
+            f"Expected num_envs to be a multiple of n_robots = {n_robots} (one sub-environment per robot), got "
+            f"{num_envs}; choose another n_robots, or give n_arenas instead."
+        )
+    return num_envs // n_robots

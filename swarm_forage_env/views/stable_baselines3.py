@@ -1,7 +1,7 @@
 """SwarmVecEnv: robots times arenas as the sub-environments of one stable-baselines3 vector environment."""
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -10,22 +10,18 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.types import BoolArray
-from swarm_forage_env.policies.interface import GivenInterface
-from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.views.arenas import ArenaStep
-from swarm_forage_env.views.learner_arena import plan_arena
+from swarm_forage_env.views.plans import constructor_takes
 from swarm_forage_env.views.processes import open_arenas
-from swarm_forage_env.views.sampler import ScenarioSampler
-from swarm_forage_env.wrappers.base import WrapperConfig
 
 
 class SwarmVecEnv(VecEnv):
     """Every robot of every arena as a sub-environment that one shared policy acts in.
 
     Sub-environment `a * N + i` is robot i of arena a. It passes arrays on and makes no per-agent dicts. `views.arenas`
-    describes how rows end, stay absent and start anew. In terms of stable-baselines3:
+    describes how rows end, stay absent and start anew. With a sampler an arena has as many rows as the largest world
+    has robots; those to spare in a run are absent all through. In terms of stable-baselines3:
 
     * `dones` is true when the observation returned is the first of a new episode, and when a robot dies.
     * `infos[row]["terminal_observation"]` is there whenever `dones[row]` is true; `"TimeLimit.truncated"` is true if
@@ -43,52 +39,11 @@ class SwarmVecEnv(VecEnv):
         active: (num_envs,) bool, robots at work in the last observation.
     """
 
-    def __init__(
-        self,
-        scenario: str | ScenarioConfig | None = None,
-        *,
-        sampler: ScenarioSampler | None = None,
-        n_arenas: int = 1,
-        n_processes: int = 0,
-        interface: GivenInterface = None,
-        wrappers: Iterable[WrapperConfig | str] = (),
-        max_cycles: int | None = None,
-        render_mode: str | None = None,
-        **overrides: Any,
-    ) -> None:
-        """Create the environment.
-
-        Args:
-            scenario: Name of a preset, or a complete configuration; default warehouse_small.
-            sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`. An arena then has
-                as many rows as the largest world has robots; those that are to spare in a run are absent all through.
-            n_arenas: Arenas that run side by side.
-            n_processes: Processes that the arenas are spread over; 0 = all in this process.
-            interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full
-                observations and continuous actions.
-            wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
-                ("population:death_per_tick=0.01").
-            max_cycles: Ticks until truncation; default the scenario's horizon.
-            render_mode: None or "rgb_array".
-            overrides: Scenario fields by name (`n_robots=20`, `nest_progress=0.1`).
-
-        Raises:
-            ConfigError: unknown preset, field, wrapper or choice of the interface, or values that do not fit together.
-            ValueError: n_arenas below 1, or more processes than arenas.
-        """
-        if "num_envs" in overrides:
-            raise ConfigError("Expected n_arenas, not num_envs: each arena gives one sub-environment per robot.")
-        plan = plan_arena(
-            scenario,
-            overrides,
-            sampler=sampler,
-            interface=interface,
-            wrappers=wrappers,
-            max_cycles=max_cycles,
-            render_mode=render_mode,
-        )
-        self._arenas = open_arenas(plan, n_arenas, n_processes)
-        self.n_arenas, self.n_robots = n_arenas, self._arenas.n_robots
+    @constructor_takes(open_arenas)
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Create the environment."""
+        self._arenas = open_arenas(*args, **options)
+        self.n_arenas, self.n_robots = self._arenas.n_arenas, self._arenas.n_robots
         self.interface = self._arenas.interface
         self._started = time.perf_counter()
         self._actions: np.ndarray | None = None

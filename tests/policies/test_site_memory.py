@@ -13,7 +13,8 @@ from swarm_forage_env.policies.kernels.sites import SiteMemory
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.scenarios.kinds import RobotKind
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.views.learner_arena import LearnerArena, plan_arena
+from swarm_forage_env.views.learner_arena import LearnerArena
+from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.reference.site_memory import RobotSites
 from tests.support.stage import cell_centre, lay, load, put, tidy_world
@@ -109,7 +110,7 @@ def test_a_robot_remembers_an_object_seen_on_its_way_home():
 
 
 def test_a_new_run_begins_without_memory_and_a_snapshot_brings_it_back():
-    plan = plan_arena("warehouse_small", {"n_robots": 2, "physics": "compiled"}, interface=INTERFACE, snapshots=True)
+    plan = plan_arena("warehouse_small", n_robots=2, physics="compiled", interface=INTERFACE, snapshots=True)
     arena = LearnerArena(plan)
     sites = slice(arena.interface.layout["pickup_site"].start, arena.interface.layout["sighting_site"].stop)
     arena.reset(0)
@@ -128,7 +129,7 @@ def test_a_policy_sees_in_a_run_what_it_saw_in_training():
     world = scenario("search_and_rescue", n_robots=8, side_m=16.0, physics="compiled", horizon_s=200.0)
     rng = np.random.default_rng(0)
     actions = np.repeat(rng.choice(6, (100, 8), p=[0, 0.6, 0.15, 0.15, 0.05, 0.05]), 2, axis=0)
-    arena = LearnerArena(plan_arena(world, {}, interface=INTERFACE))
+    arena = LearnerArena(plan_arena(world, interface=INTERFACE))
     arena.reset(5)
     trained_on, looked_at = [], []
     for chosen in actions:

@@ -18,7 +18,7 @@ from swarm_forage_env import AUTHORS_PROGRAM, SCENARIO_NAMES, Quirks
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.views.arenas import ArenaBatch
-from swarm_forage_env.views.learner_arena import plan_arena
+from swarm_forage_env.views.plans import plan_arena
 from tests.support.foraging import mild_wrappers, quick_world
 
 FILE = Path(__file__).with_suffix(".json")
@@ -92,7 +92,6 @@ def batch_fingerprint(fields: dict[str, Any], interface: dict[str, Any]) -> str:
     """Fingerprint of all that a learner meets in two arenas, deaths and new starts included."""
     plan = plan_arena(
         quick_world("warehouse_small", **fields, horizon_s=40.0, interval_s=40.0),
-        {},
         interface=interface,
         wrappers=mild_wrappers(),
     )

@@ -8,14 +8,14 @@ from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views import learner_arena
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
-from swarm_forage_env.views.learner_arena import ArenaPlan, plan_arena
+from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support import lives
 
 
 def plan(interface: InterfaceConfig | None = None, **overrides) -> ArenaPlan:
     options = {**lives.WORLD, **overrides}
-    return plan_arena(options.pop("scenario"), options, interface=interface, max_cycles=options.pop("max_cycles"))
+    return plan_arena(**options, interface=interface)
 
 
 def told_story(batch: ArenaBatch, arena: int) -> list[ArenaStep]:

@@ -9,8 +9,8 @@ from pettingzoo.test import api_test, parallel_api_test, parallel_seed_test
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.views.arenas import ArenaBatch
-from swarm_forage_env.views.learner_arena import ArenaPlan
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv, parallel_env
+from swarm_forage_env.views.plans import ArenaPlan
 from swarm_forage_env.wrappers.noise import SensorNoise
 from swarm_forage_env.wrappers.registry import parse_wrapper
 

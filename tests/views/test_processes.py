@@ -16,7 +16,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views import processes
 from swarm_forage_env.views.arenas import ArenaBatch
-from swarm_forage_env.views.learner_arena import ArenaPlan
+from swarm_forage_env.views.plans import ArenaPlan
 from swarm_forage_env.views.processes import ArenaProcessError, ArenaProcesses, open_arenas
 
 PLAN = ArenaPlan(scenario=scenario("warehouse_small", n_robots=3, n_objects=4), max_cycles=50)
@@ -132,8 +132,8 @@ def test_errors_that_cannot_travel_are_told_in_words():
 
 
 def test_arenas_are_opened_here_or_elsewhere():
-    assert isinstance(open_arenas(PLAN, 1, 0), ArenaBatch)
-    elsewhere = open_arenas(PLAN, 1, 1)
+    assert isinstance(open_arenas(PLAN.scenario), ArenaBatch)
+    elsewhere = open_arenas(PLAN.scenario, n_processes=1)
     assert isinstance(elsewhere, ArenaProcesses)
     with pytest.raises(RuntimeError, match="Call reset before step"):
         elsewhere.step(IDLE[:3])

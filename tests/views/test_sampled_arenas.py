@@ -12,15 +12,15 @@ from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.gymnasium import JointForageEnv, SwarmVectorEnv
-from swarm_forage_env.views.learner_arena import plan_arena
 from swarm_forage_env.views.pettingzoo import ParallelLearnerEnv
+from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.views.processes import ArenaProcesses
 from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
 from tests.support.sampled import sampler
 
 WORLDS = sampler()
 COMPACT = InterfaceConfig(observation="compact", actions="discrete", automatic_gripper=True, decision_ticks=5)
-PLAN = plan_arena(None, {}, sampler=WORLDS, interface=COMPACT, max_cycles=20)
+PLAN = plan_arena(sampler=WORLDS, interface=COMPACT, max_cycles=20)
 SEEDS = (3, 5, 8)
 
 
@@ -54,7 +54,7 @@ def test_each_arena_is_bit_for_bit_that_of_its_world_alone():
     rng = np.random.default_rng(0)
     alone = []
     for config, wrappers in drawn():
-        alone.append(ArenaBatch(plan_arena(config, {}, wrappers=wrappers, interface=COMPACT, max_cycles=20), 1))
+        alone.append(ArenaBatch(plan_arena(config, wrappers=wrappers, interface=COMPACT, max_cycles=20), 1))
     first = [one.reset([seed], [None])[0] for one, seed in zip(alone, SEEDS, strict=True)]
     for arena, own in enumerate(first):
         np.testing.assert_array_equal(obs.reshape(3, 6, -1)[arena, : len(own)], own)
@@ -216,7 +216,7 @@ def test_a_sampler_decides_alone():
     with pytest.raises(ConfigError, match=r"either a sampler.* or scenario, n_robots"):
         parallel_env("warehouse_small", sampler=WORLDS, n_robots=3)
     with pytest.raises(ConfigError, match=r"either a sampler.* or wrappers"):
-        SwarmVectorEnv(sampler=WORLDS, swarm_wrappers=["sensor_noise:sigma=0.1"])
+        SwarmVectorEnv(sampler=WORLDS, wrappers=["sensor_noise:sigma=0.1"])
     with pytest.raises(ConfigError, match="Expected a sampler for"):
         pettingzoo.make("parallel", "swarm_forage/sampled-v1")
     with pytest.raises(ConfigError, match="ScenarioSampler"):

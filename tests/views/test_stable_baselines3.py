@@ -191,9 +191,10 @@ def test_refuses_more_processes_than_arenas():
         SwarmVecEnv(**lives.WORLD, n_arenas=2, n_processes=3)
 
 
-def test_the_number_of_rows_is_asked_for_by_arenas():
-    with pytest.raises(ConfigError, match="Expected n_arenas, not num_envs"):
-        SwarmVecEnv(num_envs=12)
+def test_rows_are_asked_for_by_arenas_or_by_their_number():
+    assert SwarmVecEnv(n_robots=6, num_envs=12).n_arenas == 2
+    with pytest.raises(ValueError, match="num_envs to be a multiple of n_robots = 5"):
+        SwarmVecEnv(n_robots=5, num_envs=12)
 
 
 def test_takes_words_plain_values_and_lists_of_actions():

@@ -65,7 +65,7 @@ def test_make_vec_takes_what_disturbs_the_swarm_under_a_name_of_its_own():
     envs = gymnasium.make_vec("swarm_forage/warehouse_small-v1", n_robots=4, swarm_wrappers=[noise])
     clean = SwarmVectorEnv(n_robots=4)
     assert not np.array_equal(envs.reset(seed=0)[0], clean.reset(seed=0)[0])
-    both = SwarmVectorEnv(n_robots=4, wrappers=[slip], swarm_wrappers=[noise])
+    both = SwarmVectorEnv(n_robots=4, wrappers=[slip, noise])
     np.testing.assert_array_equal(both.reset(seed=0)[0], envs.reset(seed=0)[0])
 
 

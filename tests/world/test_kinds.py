@@ -14,7 +14,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.scenarios.kinds import RobotKind
 from swarm_forage_env.views.arenas import ArenaBatch
-from swarm_forage_env.views.learner_arena import plan_arena
+from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.reference import kinds as twin
 from tests.support.branches import pickled
@@ -217,7 +217,7 @@ class OneByOne(ArenaBatch):
 
 @pytest.mark.compiled
 def test_arenas_together_are_what_they_are_alone():
-    plan = plan_arena(scenario("warehouse_small", **SMALL | KINDS), {}, interface={}, max_cycles=12)
+    plan = plan_arena(scenario("warehouse_small", **SMALL | KINDS), interface={}, max_cycles=12)
     batches = ArenaBatch(plan, 2), OneByOne(plan, 2)
     np.testing.assert_array_equal(*[batch.reset([3, 4], [None, None])[0] for batch in batches])
     assert batches[0]._chosen_ways()[0] is not None

@@ -14,7 +14,7 @@ from swarm_forage_env.contract.policy import ActionError
 from swarm_forage_env.contract.types import FloatArray, IntArray
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.views.arenas import ArenaBatch, ArenaStep
-from swarm_forage_env.views.learner_arena import ArenaPlan, plan_arena
+from swarm_forage_env.views.plans import ArenaPlan, plan_arena
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.kernels.lockstep import alike
 from swarm_forage_env.world.lockstep import Lockstep, addresses, can_go_in_lockstep
@@ -34,7 +34,7 @@ COLUMNS = ("obs", "rewards", "terminated", "truncated", "active", "ended", "fina
 def plan(*wrappers: str, interface: InterfaceConfig | None = None, **fields) -> ArenaPlan:
     """A small world, 60 ticks long, so that arenas end and begin anew."""
     world = scenario("warehouse_small", **{"n_robots": N_ROBOTS, "n_objects": 60, "physics": "compiled"} | fields)
-    return plan_arena(world, {}, wrappers=wrappers, interface=interface, max_cycles=60)
+    return plan_arena(world, wrappers=wrappers, interface=interface, max_cycles=60)
 
 
 class OneByOne(ArenaBatch):

@@ -15,7 +15,7 @@ from swarm_forage_env.policies.registry import from_callable
 from swarm_forage_env.training.datasets.layout import chunk_file
 from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
 from swarm_forage_env.views.arenas import ArenaBatch
-from swarm_forage_env.views.learner_arena import plan_arena
+from swarm_forage_env.views.plans import plan_arena
 from tests.reference import neighbourhood
 from tests.support.branches import pickled
 
@@ -168,7 +168,7 @@ class OneByOne(ArenaBatch):
 )
 def test_arenas_together_are_what_they_are_alone(observation, wrappers):
     world = scenario("warehouse_small", **SMALL | BOTH)
-    plan = plan_arena(world, {}, interface={"observation": observation}, wrappers=wrappers, max_cycles=12)
+    plan = plan_arena(world, interface={"observation": observation}, wrappers=wrappers, max_cycles=12)
     batches = ArenaBatch(plan, 2), OneByOne(plan, 2)
     first = [batch.reset([3, 4], [None, None])[0] for batch in batches]
     np.testing.assert_array_equal(*first)

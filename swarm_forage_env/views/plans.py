@@ -1,0 +1,168 @@
+"""Plans of arenas: one list of options for all environments of this folder."""
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+from swarm_forage_env._internal.fields import ConfigError, instance
+from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig, chosen_interface
+from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.scenarios.overrides import scenario_of_same_size
+from swarm_forage_env.scenarios.presets import chosen_scenario
+from swarm_forage_env.views.sampler import DrawnWorld, ScenarioSampler
+from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
+from swarm_forage_env.wrappers.registry import wrapper_configs
+
+Options = ParamSpec("Options")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ArenaPlan:
+    """Everything that an arena is made from; picklable."""
+
+    scenario: ScenarioConfig
+    """The world; with a sampler its largest one, which says how many rows and which columns there are."""
+    wrappers: tuple[WrapperConfig, ...] = ()
+    """What disturbs the swarm, in any order; with a sampler nothing beside what it draws."""
+    sampler: ScenarioSampler | None = None
+    """Where the world of each run comes from; None = it is always `scenario`."""
+    interface: InterfaceConfig = field(default_factory=InterfaceConfig)
+    """What a learner sees and does."""
+    max_cycles: int | None = None
+    """Ticks until truncation; default the scenario's horizon."""
+    render_mode: str | None = None
+    snapshots: bool = False
+    """Keep what copies and snapshots need; see `ForageEnv`."""
+
+    def build(self, overrides: Mapping[str, Any], world: DrawnWorld | None = None) -> ForageEnv | SwarmWrapper:
+        """Build the environment with its wrappers.
+
+        Args:
+            overrides: Scenario fields by name.
+            world: What the sampler has drawn; None = the scenario and wrappers of the plan.
+
+        Raises:
+            ConfigError: unknown fields, values that do not fit together, another number of robots, or more robots or
+                objects than the largest worlds of the sampler have.
+        """
+        given, wrappers = (self.scenario, self.wrappers) if world is None else world
+        scenario = scenario_of_same_size(given, overrides)
+        if self.sampler is not None:
+            self._check_room(scenario, self.sampler)
+        env = ForageEnv(
+            scenario,
+            max_cycles=self.max_cycles,
+            render_mode=self.render_mode,
+            reads=self.interface.reads,
+            snapshots=self.snapshots,
+        )
+        return wrap_in_order(env, wrappers)
+
+    @staticmethod
+    def _check_room(scenario: ScenarioConfig, sampler: ScenarioSampler) -> None:
+        """Refuse a world that has no room in the rows of the sampler's worlds."""
+        sizes = {
+            "n_robots": (scenario.robots.n_robots, sampler.n_robots),
+            "n_objects": (scenario.objects.n_objects, sampler.n_objects),
+        }
+        for name, (n_there, most) in sizes.items():
+            if n_there > most:
+                raise ConfigError(
+                    f"Expected {name} of at most {most}, for which spaces have room, got {n_there}; give the sampler "
+                    "a world with as many."
+                )
+
+
+DEFAULT_SCENARIO = "warehouse_small"
+"""The world of environments that are told nothing about it."""
+SAMPLED = "sampled"
+"""Stands for the scenario in the id swarm_forage/sampled-v1, whose worlds a sampler draws."""
+
+
+def plan_arena(
+    scenario: str | ScenarioConfig | None = None,
+    *,
+    sampler: ScenarioSampler | None = None,
+    interface: GivenInterface = None,
+    wrappers: Iterable[WrapperConfig | str] = (),
+    max_cycles: int | None = None,
+    render_mode: str | None = None,
+    snapshots: bool = False,
+    **overrides: Any,
+) -> ArenaPlan:
+    """Plan an arena.
+
+    Args:
+        scenario: Name of a preset, or a complete configuration; default warehouse_small.
+        sampler: Draws the world of each run, instead of `scenario`, `wrappers` and `overrides`.
+        interface: What a learner sees and does, an `InterfaceConfig` or its fields by name; default full observations
+            and continuous actions.
+        wrappers: What disturbs the swarm, in any order: configurations, or words as on the command line
+            ("population:death_per_tick=0.01").
+        max_cycles: Ticks until truncation; default the scenario's horizon.
+        render_mode: None, "rgb_array" or "human"; see `ForageEnv`.
+        snapshots: Keep what copies and snapshots need; see `ForageEnv`.
+        overrides: Scenario fields by name (`n_robots=20`, `n_objects=100`, `caches="static"`).
+
+    Raises:
+        ConfigError: unknown preset, field, wrapper or choice of the interface, values that do not fit together, or a
+            sampler beside what it decides.
+    """
+    disturbing = wrapper_configs(wrappers)
+    if sampler is None:
+        if scenario == SAMPLED:
+            raise ConfigError(
+                "Expected a sampler for swarm_forage/sampled-v1, got none; give sampler=ScenarioSampler(...)."
+            )
+        world = chosen_scenario(scenario or DEFAULT_SCENARIO, overrides)
+    else:
+        instance("sampler", sampler, ScenarioSampler, hint="; ScenarioSampler.from_mapping reads a table")
+        given = ["scenario"] * (scenario not in (None, SAMPLED)) + ["wrappers"] * bool(disturbing) + list(overrides)
+        if given:
+            raise ConfigError(
+                f"Expected either a sampler, which decides on the worlds, or {', '.join(given)}; got both. Write it "
+                "into the sampler, where all worlds can share it. By id, make swarm_forage/sampled-v1."
+            )
+        world = sampler.largest
+    return ArenaPlan(
+        scenario=world,
+        wrappers=disturbing,
+        sampler=sampler,
+        interface=chosen_interface(interface).for_scenario(world),
+        max_cycles=max_cycles,
+        render_mode=render_mode,
+        snapshots=snapshots,
+    )
+
+
+def takes(make: Callable[Options, Any]) -> Callable[[Callable[..., Result]], Callable[Options, Result]]:
+    """Let users see a function that hands all its arguments to `make` with the parameters of `make` and their meaning.
+
+    So every option is listed and described in one place, whatever takes it.
+
+    Example:
+        @takes(plan_arena)
+        def parallel_env(*args, **options): ...  # inspect.signature and help tell of `scenario`, `sampler` and so on
+    """
+    return partial(_told_as, make)
+
+
+def constructor_takes(
+    make: Callable[Options, Any],
+) -> Callable[[Callable[..., None]], Callable[Concatenate[Any, Options], None]]:
+    """Do what `takes` does for an `__init__`."""
+    return partial(_told_as, make)
+
+
+def _told_as(make: Callable[..., Any], function: Any) -> Any:
+    own, made = inspect.signature(function), inspect.signature(make)
+    first = [parameter for parameter in own.parameters.values() if parameter.name == "self"]
+    function.__signature__ = own.replace(parameters=[*first, *made.parameters.values()])
+    if function.__doc__ and make.__doc__:  # python -OO leaves them out
+        _, _, meaning = inspect.cleandoc(make.__doc__).partition("\n\n")
+        function.__doc__ = f"{inspect.cleandoc(function.__doc__)}\n\n{meaning}"
+    return function
