@@ -9,10 +9,11 @@ equivalent. A difference is compiled minus Chipmunk, the mean over seeds with a 
 
 import argparse
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from arguments import whole
 from scipy.spatial import KDTree
 
 from baselines.dpo import DPOPolicy
@@ -191,21 +192,6 @@ def written(value: float, decimals: int) -> str:
 def words(text: str) -> list[str]:
     """Names separated by commas."""
     return text.split(",")
-
-
-def whole(*, at_least: int) -> Callable[[str], int]:
-    """Return an argparse type: whole numbers from `at_least` on."""
-
-    def read(text: str) -> int:
-        try:
-            number = int(text)
-        except ValueError:
-            number = at_least - 1
-        if number < at_least:
-            raise argparse.ArgumentTypeError(f"expected a whole number >= {at_least}, got {text!r}")
-        return number
-
-    return read
 
 
 def numbers(text: str) -> list[int]:
