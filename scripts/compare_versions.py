@@ -13,10 +13,9 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 
-from swarm_forage_env.rendering.plots import COLOURS
+from swarm_forage_env.rendering.figures import looks, saved_figure, size_axis
 from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.store import load
 
@@ -55,21 +54,18 @@ def draw(
     scenarios: list[str], before: dict[str, Curves], after: dict[str, Curves], names: tuple[str, str], path: Path
 ) -> None:
     """Draw one row per scenario: performance on the left, interference on the right; the first folder is dashed."""
-    figure, grid = plt.subplots(len(scenarios), 2, figsize=(10, 3.6 * len(scenarios)), squeeze=False)
-    for axes, scenario in zip(grid, scenarios, strict=True):
-        for version, style in ((before, "--"), (after, "-")):
-            for (controller, sizes), colour in zip(version[scenario].items(), COLOURS, strict=False):
-                for axis, column in zip(axes, zip(*sizes.values(), strict=True), strict=True):
-                    label = controller if style == "-" else None
-                    axis.plot(list(sizes), column, style, marker="o", ms=3, color=colour, label=label)
-        for axis, title in zip(axes, ("performance per 1,000 s", "share of robot time in interference"), strict=True):
-            axis.set_xscale("log", base=2)
-            axis.set_xlabel("robots")
-            axis.set_title(f"{scenario}: {title}", fontsize=10)
-            axis.grid(alpha=0.3)
-        axes[0].legend(title=f"dashed: {names[0]}, solid: {names[1]}", fontsize=8, title_fontsize=8)
-    figure.tight_layout()
-    figure.savefig(path, dpi=110)
+    titles = "performance per 1,000 s", "share of robot time in interference"
+    with saved_figure(path, (10.0, 3.6 * len(scenarios))) as figure:
+        for line, scenario in zip(figure.subplots(len(scenarios), 2, squeeze=False), scenarios, strict=True):
+            for version, dash in ((before, "--"), (after, "-")):
+                for look, sizes in zip(looks(version[scenario]), version[scenario].values(), strict=True):
+                    for panel, column in zip(line, zip(*sizes.values(), strict=True), strict=True):
+                        label = look.name if dash == "-" else None
+                        panel.plot(list(sizes), column, dash, marker=look.marker, color=look.colour, label=label)
+            for panel, title in zip(line, titles, strict=True):
+                size_axis(panel, {size for sizes in after[scenario].values() for size in sizes})
+                panel.set_title(f"{scenario}: {title}")
+            line[0].legend(title=f"dashed: {names[0]}, solid: {names[1]}", fontsize="small")
 
 
 def main() -> None:

@@ -16,15 +16,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from metrics import ForagingRates, Ladder, Summary, aggregate, fit_ladder
 from metrics.laws import LAW_WORDS, SYMBOLS
-from metrics.scoring.plots import COLOURS
 from metrics.scoring.study_models import DRAWN_LAWS, ForagingRuns, foraging_runs
 from metrics.scoring.study_tables import study_lines
+from swarm_forage_env.rendering.figures import COLOURS, Panel, legend_below, saved_figure, shade, size_axis
 from swarm_forage_env.studies.study_table import read_study
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -134,44 +133,42 @@ def law_lines(ladder: Ladder) -> Iterator[str]:
 
 def draw(found: Beside, path: Path) -> None:
     """Draw deliveries, deliveries per robot and time lost over the swarm size."""
-    from matplotlib.figure import Figure  # not pyplot: no global state, no window system
-
-    figure: Any = Figure(figsize=(12.6, 4.2), layout="constrained")
-    total, each, lost = figure.subplots(1, 3)
-    sizes, at = found.sizes, found.at
-    measured = [found.delivered(size) for size in sizes]
-    for panel, divisor, curve_divisor in ((total, np.ones(len(sizes)), np.ones(at.size)), (each, np.array(sizes), at)):
-        for name, colour in zip(DRAWN_LAWS, COLOURS[1:], strict=False):
-            law = found.ladder.laws[name].law
-            panel.plot(at, law.performance(at) / curve_divisor, "--", color=colour, linewidth=1.2, label=f"law: {name}")
-        words = f"mean field, from 1 and {found.small} robots"
-        panel.plot(at, found.model[:, 0] / curve_divisor, color=COLOURS[0], label=words)
-        low, high = found.bounds[:, :, 0] / curve_divisor
-        panel.fill_between(at, low, high, color=COLOURS[0], alpha=0.15, linewidth=0)
-        means = np.array([summary.mean for summary in measured]) / divisor
-        half = np.array([summary.upper - summary.mean for summary in measured]) / divisor
-        panel.errorbar(sizes, means, yerr=half, fmt="ko", markersize=4, capsize=2, label="runs, mean and 95 % interval")
-    seen = [found.lost(size) for size in sizes]
-    lost.plot(at, 100 * found.model[:, 1], color=COLOURS[0])
-    low, high = 100 * found.bounds[:, :, 1]
-    lost.fill_between(at, low, high, color=COLOURS[0], alpha=0.15, linewidth=0)
-    half = [100 * (summary.upper - summary.mean) for summary in seen]
-    lost.errorbar(sizes, [100 * summary.mean for summary in seen], yerr=half, fmt="ko", markersize=4, capsize=2)
-    total.set_yscale("log")
     words = (f"objects delivered in {found.runs.horizon_s:,.0f} s", "objects delivered per robot", "robot time lost, %")
-    for panel, word in zip((total, each, lost), words, strict=True):
-        panel.set_xscale("log", base=2)
-        panel.set_xticks(sizes, [str(size) for size in sizes])
-        panel.minorticks_off()
-        panel.set_xlabel("robots", fontsize=8)
-        panel.set_ylabel(word, fontsize=8)
-        panel.tick_params(labelsize=8)
-        panel.grid(alpha=0.3)
-    each.set_ylim(bottom=0.0)
-    lost.set_ylim(bottom=0.0)
-    handles, labels = total.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False, fontsize=8)
-    figure.savefig(path, dpi=150)
+    sizes, at = np.array(found.sizes), found.at
+    measured = [found.delivered(size) for size in sizes]
+    with saved_figure(path, (12.6, 4.2)) as figure:
+        total, each, lost = figure.subplots(1, 3)
+        for panel, word in zip((total, each, lost), words, strict=True):
+            size_axis(panel, sizes)
+            panel.set_ylabel(word)
+        for panel, divisor, of_curves in ((total, np.ones(sizes.size), np.ones(at.size)), (each, sizes, at)):
+            for name, colour in zip(DRAWN_LAWS, COLOURS[1:], strict=False):
+                law = found.ladder.laws[name].law
+                panel.plot(at, law.performance(at) / of_curves, "--", color=colour, linewidth=1.2, label=f"law: {name}")
+            panel.plot(
+                at,
+                found.model[:, 0] / of_curves,
+                color=COLOURS[0],
+                label=f"mean field, from 1 and {found.small} robots",
+            )
+            low, high = found.bounds[:, :, 0] / of_curves
+            shade(panel, at, low, high, COLOURS[0])
+            _draw_runs(panel, sizes, measured, 1.0 / divisor)
+        lost.plot(at, 100 * found.model[:, 1], color=COLOURS[0])
+        low, high = 100 * found.bounds[:, :, 1]
+        shade(lost, at, low, high, COLOURS[0])
+        _draw_runs(lost, sizes, [found.lost(size) for size in sizes], np.full(sizes.size, 100.0))
+        total.set_yscale("log")
+        total.yaxis.set_major_formatter("{x:g}")
+        each.set_ylim(bottom=0.0)
+        lost.set_ylim(bottom=0.0)
+        legend_below(figure)
+
+
+def _draw_runs(panel: Panel, sizes: np.ndarray, seen: list[Summary], factor: np.ndarray) -> None:
+    mean = factor * [summary.mean for summary in seen]
+    half = factor * [summary.upper - summary.mean for summary in seen]
+    panel.errorbar(sizes, mean, yerr=half, fmt="ko", label="runs, mean and 95 % interval")
 
 
 def main() -> int:

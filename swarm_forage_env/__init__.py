@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.inspect.replay.capture import record_replay
     from swarm_forage_env.inspect.replay.files import read_replays, write_replays
     from swarm_forage_env.policies.registry import RandomPolicy, from_callable, load_policy, policy_names
+    from swarm_forage_env.rendering.figures import FigureStyle
     from swarm_forage_env.runs.record import RunRecord
     from swarm_forage_env.runs.run import build_stack, run_one, run_policy
     from swarm_forage_env.runs.runner import run_all
@@ -58,6 +59,7 @@ __all__ = [
     "CheckError",
     "ConfigError",
     "Event",
+    "FigureStyle",
     "ForageEnv",
     "Grip",
     "HandlingCost",
@@ -123,6 +125,7 @@ _HOMES = {
     "CheckError": "checks",
     "ConfigError": "_internal.fields",
     "Event": "contract.codes",
+    "FigureStyle": "rendering.figures",
     "ForageEnv": "env",
     "Grip": "contract.codes",
     "HandlingCost": "wrappers.handling",

@@ -1,13 +1,19 @@
-"""The figure of the benchmark. Needs matplotlib (the optional extra "plots"), imported when something is drawn."""
+"""The figure of the benchmark. It needs matplotlib (the optional extra "plots")."""
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from metrics.scoring.plots import COLOURS, Panel
-from metrics.scoring.texts import unread
+from swarm_forage_env.rendering.figures import (
+    COLOURS,
+    SCREEN,
+    FigureStyle,
+    Panel,
+    heat_map,
+    policy_words,
+    saved_figure,
+)
 
 from .page import share, sorted_standings
 from .protocol import Protocol
@@ -15,11 +21,16 @@ from .standing import Reference, Standing, shares_of
 
 _MOST_SHADE = 2.0
 """Share of the best scripted controller from which a cell is as blue as it gets: as far from 1 as nothing is."""
-_DARK = 0.75
-"""How far from 1 a share has a cell so dark that its number is white."""
 
 
-def draw_benchmark(standings: Sequence[Standing], reference: Reference, protocol: Protocol, path: str | Path) -> None:
+def draw_benchmark(
+    standings: Sequence[Standing],
+    reference: Reference,
+    protocol: Protocol,
+    path: str | Path,
+    *,
+    style: FigureStyle = SCREEN,
+) -> None:
     """Draw all entries into a picture file: their scores, and their shares in each world.
 
     Above, the score of each entry with its interval; the line at 1 is the best scripted controller of each world.
@@ -29,21 +40,16 @@ def draw_benchmark(standings: Sequence[Standing], reference: Reference, protocol
         standings: All entries.
         reference: The best scripted controllers.
         protocol: What they are entries of.
-        path: File to write; its suffix chooses the format (.png, .svg, .pdf).
-
-    Raises:
-        ImportError: matplotlib is not installed.
+        path: File to write; as in `saved_figure`, whose errors this has.
+        style: Of the figure.
     """
-    from matplotlib.figure import Figure  # not pyplot: no global state, no window system
-
     ranked = sorted_standings(standings)
     n_worlds = len(protocol.scored)
     heights = (0.5 * len(ranked) + 0.9, 0.27 * n_worlds + 1.2)
-    figure: Any = Figure(figsize=(max(7.0, 3.6 + 1.0 * len(ranked)), sum(heights)), layout="constrained")
-    above, below = figure.subplots(2, 1, height_ratios=heights)
-    _draw_scores(above, ranked)
-    _draw_worlds(below, ranked, reference, protocol)
-    figure.savefig(path, dpi=150)
+    with saved_figure(path, (max(7.0, 3.6 + 1.0 * len(ranked)), sum(heights)), style=style) as figure:
+        above, below = figure.subplots(2, 1, height_ratios=heights)
+        _draw_scores(above, ranked)
+        _draw_worlds(below, ranked, reference, protocol)
 
 
 def _draw_scores(panel: Panel, ranked: Sequence[Standing]) -> None:
@@ -54,14 +60,12 @@ def _draw_scores(panel: Panel, ranked: Sequence[Standing]) -> None:
         panel.plot(score.value, place, "o", color=COLOURS[0], markersize=7)
         panel.plot(standing.by_policy, [place] * len(standing.by_policy), "|", color=COLOURS[1], markersize=10)
     panel.axvline(1.0, color="0.5", linewidth=0.8, zorder=0)
-    panel.set_yticks(places, [unread(standing.entry.name) for standing in ranked])
+    panel.set_yticks(places, [policy_words(standing.entry.name) for standing in ranked])
     panel.set_ylim(len(ranked) - 0.5, -0.5)
     panel.set_xlim(left=0.0)
     seeds = "; orange: each training seed" if any(standing.by_policy for standing in ranked) else ""
-    panel.set_title(
-        f"score: share of the best scripted controller, interquartile mean and 95 % interval{seeds}", fontsize=9
-    )
-    panel.grid(axis="x", alpha=0.3)
+    panel.set_title(f"score: share of the best scripted controller, interquartile mean and 95 % interval{seeds}")
+    panel.grid(visible=False, axis="y")
 
 
 def _draw_worlds(panel: Panel, ranked: Sequence[Standing], reference: Reference, protocol: Protocol) -> None:
@@ -70,11 +74,8 @@ def _draw_worlds(panel: Panel, ranked: Sequence[Standing], reference: Reference,
     worlds = protocol.scored
     shares = np.array([[shares_of(standing.entry, world, reference).mean() for standing in ranked] for world in worlds])
     colours = LinearSegmentedColormap.from_list("shares", [COLOURS[1], "white", COLOURS[0]])
-    panel.imshow(shares, cmap=colours, vmin=0.0, vmax=_MOST_SHADE, aspect="auto")
-    for (row, column), value in np.ndenumerate(shares):
-        colour = "white" if abs(value - 1.0) > _DARK else "black"
-        panel.text(column, row, share(float(value)), ha="center", va="center", fontsize=7, color=colour)
-    panel.set_yticks(np.arange(len(worlds)), [world.name for world in worlds], fontsize=7)
-    names = [unread(standing.entry.name) for standing in ranked]
-    panel.set_xticks(np.arange(len(ranked)), names, fontsize=8, rotation=20, ha="right")
-    panel.set_title("share in each held-out world, mean over runs", fontsize=9)
+    heat_map(panel, shares, share, cmap=colours, vmin=0.0, vmax=_MOST_SHADE)
+    panel.set_yticks(np.arange(len(worlds)), [world.name for world in worlds])
+    names = [policy_words(standing.entry.name) for standing in ranked]
+    panel.set_xticks(np.arange(len(ranked)), names, rotation=20, ha="right")
+    panel.set_title("share in each held-out world, mean over runs")

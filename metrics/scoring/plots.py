@@ -1,26 +1,19 @@
-"""Pictures of score tables. Needs matplotlib (the optional extra "plots"), imported when something is drawn."""
+"""Pictures of score tables. They need matplotlib (the optional extra "plots")."""
 
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
 
 from metrics.catalog import METRICS
 from metrics.claims.panel import MIN_PAIRS
 from metrics.statistics import Summary
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle, Look, Panel, looks, saved_panels, shade
 
 from .columns import NOISE, POPULATION, SIZE, THROTTLE
 from .measures import MEASURE_CRITERIA
 from .table import Score, ScoreTable
-from .texts import unread
 
-Panel: TypeAlias = Any
-"""An `Axes` of matplotlib, whose types leave too much open for strict checking."""
-
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
-"""Okabe-Ito palette: told apart by readers with any colour vision."""
-PANELS_PER_ROW = 4
 FEWEST_RUNS = MIN_PAIRS
 """Fewer runs are drawn without an interval: they decide nothing, and that of two runs reaches nine standard deviations
 to either side, which would leave nothing else to be seen."""
@@ -34,7 +27,9 @@ X_LABELS = {
 }
 
 
-def draw_scores(tables: Sequence[ScoreTable], path: str | Path, *, band: bool = False) -> None:
+def draw_scores(
+    tables: Sequence[ScoreTable], path: str | Path, *, band: bool = False, style: FigureStyle = SCREEN
+) -> None:
     """Draw score tables side by side into a picture file: one panel per measure, one line per policy.
 
     Amounts and distances have a second panel with their values relative to performance. Error bars are the intervals of
@@ -43,35 +38,25 @@ def draw_scores(tables: Sequence[ScoreTable], path: str | Path, *, band: bool = 
 
     Args:
         tables: One per policy.
-        path: File to write; its suffix chooses the format (.png, .svg, .pdf).
+        path: File to write; as in `saved_figure`, whose errors this has.
         band: Shade the mean plus and minus two standard deviations of single runs, as the paper does.
+        style: Of the figure.
 
     Raises:
-        ImportError: matplotlib is not installed.
         ValueError: no table has a score that can be drawn.
     """
-    from matplotlib.figure import Figure  # not pyplot: no global state, no window system
-
     drawn = _contents(tables)
     if not drawn:
         raise ValueError("Expected a score to draw, got tables without a finite value from runs.")
-    n_rows = math.ceil(len(drawn) / PANELS_PER_ROW)
-    n_columns = min(PANELS_PER_ROW, len(drawn))
-    figure: Any = Figure(figsize=(3.4 * n_columns + 0.6, 2.8 * n_rows + 0.8), layout="constrained")
-    panels: list[Panel] = figure.subplots(n_rows, n_columns, squeeze=False).ravel().tolist()
-    for content, panel in zip(drawn, panels, strict=False):
-        _draw_panel(panel, content, tables, band=band)
-    for panel in panels[len(drawn) :]:
-        panel.set_axis_off()
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(tables), frameon=False)
     where = next((table.scenario for table in tables if table.scenario), "")
     words = _about_bars(
         score.summary.n_used for content in drawn for table in tables for score in content.scores(table)
     )
     words += "; shaded: mean ± 2 sd of runs" if band else ""
-    figure.suptitle(f"{unread(where) + ': ' if where else ''}{words}; dotted: noise floor; hollow: misleads")
-    figure.savefig(path, dpi=150)
+    title = f"{where + ': ' if where else ''}{words}; dotted: noise floor; hollow: misleads"
+    with saved_panels(path, len(drawn), (3.4, 2.8), title=title, style=style) as panels:
+        for content, panel in zip(drawn, panels, strict=True):
+            _draw_panel(panel, content, tables, band=band)
 
 
 def _about_bars(n_runs: Iterable[int]) -> str:
@@ -121,47 +106,43 @@ def _draw_panel(panel: Panel, content: _Content, tables: Sequence[ScoreTable], *
     first = shown[0]
     about = METRICS[first.measure]
     places = sorted({score.x for score in shown})
-    for index, table in enumerate(tables):
+    for index, (table, look) in enumerate(zip(tables, looks(table.policy for table in tables), strict=True)):
         # Levels are categories, side by side, so that error bars of different policies do not cover each other.
         shift = 0.08 * (index - 0.5 * (len(tables) - 1))
         scores = content.scores(table)
         x = [places.index(score.x) + shift for score in scores]
-        _draw_policy(panel, content, scores, x, COLOURS[index % len(COLOURS)], unread(table.policy), band=band)
+        _draw_policy(panel, content, scores, x, look, band=band)
     if about.neutral is not None and not about.is_distance and first.variant == "corrected":
         panel.axhline(about.neutral, color="0.6", linewidth=0.8, zorder=0)
     arrow = "higher" if about.higher_is_better else "lower"
     title = f"{content.label}{', relative' if content.is_relative else ''} ({arrow} is better)"
-    panel.set_title(title, fontsize=9 if len(title) <= LONG_TITLE else 7)
-    panel.set_ylabel("share of performance" if content.is_relative else first.unit, fontsize=8)
-    panel.set_xlabel(X_LABELS[MEASURE_CRITERIA[first.measure]], fontsize=8)
+    panel.set_title(title, fontsize="medium" if len(title) <= LONG_TITLE else "small")
+    panel.set_ylabel("share of performance" if content.is_relative else first.unit)
+    panel.set_xlabel(X_LABELS[MEASURE_CRITERIA[first.measure]])
     panel.set_xticks(range(len(places)), [_place(place, shown) for place in places])
-    panel.tick_params(labelsize=8)
     panel.margins(x=0.15)
-    panel.grid(alpha=0.3)
 
 
 def _draw_policy(
-    panel: Panel, content: _Content, scores: Sequence[Score], x: Sequence[float], colour: str, name: str, *, band: bool
+    panel: Panel, content: _Content, scores: Sequence[Score], x: Sequence[float], look: Look, *, band: bool
 ) -> None:
     summaries = [content.summary(score) for score in scores]
     y = [summary.mean for summary in summaries]
     half = [0.0 if math.isnan(s.upper) or s.n_used < FEWEST_RUNS else s.upper - s.mean for s in summaries]
-    panel.errorbar(x, y, yerr=half, color=colour, marker="o", markersize=4, capsize=2, label=name)
+    panel.errorbar(x, y, yerr=half, color=look.colour, marker=look.marker, label=look.name)
     hollow = [(place, value) for place, value, score in zip(x, y, scores, strict=True) if score.is_doubtful]
     if hollow:
-        panel.plot(
-            *zip(*hollow, strict=True), color=colour, marker="o", markersize=4, markerfacecolor="w", linestyle=""
-        )
+        panel.plot(*zip(*hollow, strict=True), color=look.colour, marker=look.marker, markerfacecolor="w", linestyle="")
     if band:
         spread = [0.0 if math.isnan(s.std) or s.n_used < FEWEST_RUNS else 2.0 * s.std for s in summaries]
         lower = [value - width for value, width in zip(y, spread, strict=True)]
         upper = [value + width for value, width in zip(y, spread, strict=True)]
-        panel.fill_between(x, lower, upper, color=colour, alpha=0.15, linewidth=0.0)
+        shade(panel, x, lower, upper, look.colour)
     floors = [(place, floor) for place, score in zip(x, scores, strict=True) if (floor := content.floor(score))]
     if floors:
         places, heights = zip(*floors, strict=True)
-        panel.plot(places, heights, color=colour, linestyle=":", marker="_")
-        panel.fill_between(places, 0.0, heights, color=colour, alpha=0.06, linewidth=0.0)
+        panel.plot(places, heights, color=look.colour, linestyle=":", marker="_")
+        panel.fill_between(places, 0.0, heights, color=look.colour, alpha=0.06, linewidth=0.0)
 
 
 def _place(x: float, shown: Sequence[Score]) -> str:

@@ -1,4 +1,4 @@
-"""Figures of a study: a measure over what is varied, every run a dot. Needs matplotlib (the optional extra "plots")."""
+"""Figures of a study: a measure over what is varied, every run a dot. They need matplotlib (the extra "plots")."""
 
 import math
 from collections.abc import Sequence
@@ -13,12 +13,24 @@ from metrics.catalog import METRICS
 from metrics.claims import PanelName
 from metrics.curves import FloatArray
 from metrics.statistics import Summary, aggregate
+from swarm_forage_env.rendering.figures import (
+    SCREEN,
+    FigureStyle,
+    Look,
+    Panel,
+    heat_map,
+    looks,
+    policy_words,
+    saved_panels,
+    shade,
+    size_axis,
+)
 
 from .columns import SIZE
 from .figure_panels import StudyPanel, StudyPanels
 from .measures import label_of
-from .plots import COLOURS, FEWEST_RUNS, PANELS_PER_ROW, X_LABELS, Panel
-from .texts import number, unread
+from .plots import FEWEST_RUNS, X_LABELS
+from .texts import number
 
 if TYPE_CHECKING:
     import polars as pl
@@ -26,8 +38,6 @@ if TYPE_CHECKING:
 Band: TypeAlias = Literal["ci", "sd"]
 """What is shaded: the 95 % confidence interval of the mean, or the mean plus and minus two standard deviations."""
 
-MARKERS = "osD^vPX"
-"""Of the means of each policy in turn, so that lines differ without their colours, too."""
 _BANDS: dict[Band, str] = {"ci": "95 % interval of the mean", "sd": "mean ± 2 standard deviations of runs"}
 _NOTHING = Summary(mean=math.nan, std=math.nan, lower=math.nan, upper=math.nan, n_used=0, n_nan=0)
 _APART = 0.012
@@ -94,32 +104,20 @@ def study_figures(scored: StudyPanels) -> tuple[StudyFigure, ...]:
     return tuple(StudyFigure(panels=tuple(panels)) for panels in groups.values())
 
 
-def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci") -> None:
+def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci", style: FigureStyle = SCREEN) -> None:
     """Draw a figure into picture files: lines are means, dots are runs, and bands are where there are `FEWEST_RUNS`.
 
     Args:
         figure: From `study_figures`.
-        paths: Files to write; their suffixes choose the formats (.svg, .png, .pdf).
+        paths: Files to write; as in `saved_figure`, whose errors this has.
         band: What is shaded.
-
-    Raises:
-        ImportError: matplotlib is not installed.
+        style: Of the figure.
     """
-    from matplotlib.figure import Figure  # not pyplot: no global state, no window system
-
-    n_columns = columns_of(len(figure.panels))
-    n_rows = math.ceil(len(figure.panels) / n_columns)
-    picture: Any = Figure(figsize=(max(5.2, 3.6 * n_columns + 0.6), 3.2 * n_rows + 0.9), layout="constrained")
-    axes: list[Panel] = picture.subplots(n_rows, n_columns, squeeze=False, sharey=True).ravel().tolist()
-    for panel, place in zip(figure.panels, axes, strict=False):
-        _draw_panel(place, panel, band)
-    limit_height(axes[0], figure)
-    for place in axes[len(figure.panels) :]:
-        place.set_axis_off()
-    handles, labels = axes[0].get_legend_handles_labels()
-    picture.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 8), frameon=False, fontsize=9)
-    picture.suptitle(f"{unread(figure.title)}\n{caption(figure, band)}", fontsize=10)
-    save_picture(picture, figure.name, paths)
+    title = f"{figure.title}\n{caption(figure, band)}"
+    with saved_panels(paths, len(figure.panels), (3.6, 3.2), sharey=True, title=title, style=style) as places:
+        for place, panel in zip(places, figure.panels, strict=True):
+            _draw_panel(place, panel, band)
+        limit_height(places[0], figure)
 
 
 def caption(figure: StudyFigure, band: Band) -> str:
@@ -131,45 +129,35 @@ def caption(figure: StudyFigure, band: Band) -> str:
     return f"shaded: {_BANDS[band]}; dots: runs" + (lacking if any(0 < n < FEWEST_RUNS for n in n_runs) else "")
 
 
-def draw_map(figure: StudyFigure, paths: Sequence[Path]) -> None:
+def draw_map(figure: StudyFigure, paths: Sequence[Path], *, style: FigureStyle = SCREEN) -> None:
     """Draw the means of a figure as heat maps, one per policy, into picture files.
 
     Args:
         figure: One that `has_map`.
-        paths: As in `draw_figure`.
-
-    Raises:
-        ImportError: matplotlib is not installed.
+        paths: Files to write; as in `saved_figure`, whose errors this has.
+        style: Of the figure.
     """
-    from matplotlib.figure import Figure
-
     first = figure.panels[0]
-    policies = list(first.scores)
     means = {
         policy: np.array([[s.mean for s in _summaries(panel.scores[policy])] for panel in figure.panels])
-        for policy in policies
+        for policy in first.scores
     }
     known = np.concatenate([values[np.isfinite(values)] for values in means.values()])
     low, high = float(known.min()), float(known.max())
-    size = (1.0 + len(policies) * (0.9 + 0.55 * len(first.x)), 1.9 + 0.5 * len(figure.panels))
-    picture: Any = Figure(figsize=size, layout="constrained")
-    axes: list[Panel] = picture.subplots(1, len(policies), squeeze=False, sharey=True)[0].tolist()
-    image: Any = None
-    for policy, place in zip(policies, axes, strict=True):
-        image = place.imshow(means[policy], origin="lower", aspect="auto", cmap="cividis", vmin=low, vmax=high)
-        for (row, column), value in np.ndenumerate(means[policy]):
-            colour = "black" if value > (low + high) / 2.0 else "white"
-            place.text(column, row, number(value), ha="center", va="center", fontsize=6, color=colour)
-        place.set_title(unread(policy), fontsize=9)
-        place.set_xticks(range(len(first.x)), [number(value) for value in first.levels], rotation=45)
-        place.set_xlabel(_x_label(first), fontsize=8)
-        place.tick_params(labelsize=7)
     ((axis, _),) = first.others.items()
-    axes[0].set_yticks(range(len(figure.panels)), [unread(panel.words[axis]) for panel in figure.panels])
-    axes[0].set_ylabel(axis.replace("_", " "), fontsize=8)
-    picture.colorbar(image, ax=axes, label=first.unit).ax.tick_params(labelsize=7)
-    picture.suptitle(f"{unread(figure.title)}\nmeans of runs", fontsize=10)
-    save_picture(picture, f"{figure.name}_map", paths)
+    panel_in = 1.0 + 0.55 * len(first.x), 1.0 + 0.4 * len(figure.panels)
+    with saved_panels(paths, len(means), panel_in, title=f"{figure.title}\nmeans of runs", style=style) as places:
+        images = [
+            heat_map(place, values, number, origin="lower", vmin=low, vmax=high)
+            for values, place in zip(means.values(), places, strict=True)
+        ]
+        for policy, place in zip(means, places, strict=True):
+            place.set_title(policy_words(policy))
+            place.set_xticks(range(len(first.x)), [number(value) for value in first.levels], rotation=45)
+            place.set_xlabel(_x_label(first))
+            place.set_yticks(range(len(figure.panels)), [panel.words[axis] for panel in figure.panels])
+            place.set_ylabel(axis.replace("_", " "))
+        places[0].figure.colorbar(images[0], ax=places, label=first.unit)
 
 
 def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
@@ -177,36 +165,34 @@ def _draw_panel(place: Panel, panel: StudyPanel, band: Band) -> None:
     levels = np.log2(panel.levels) if is_log else panel.levels
     step = _APART * (float(np.ptp(levels)) or abs(float(levels[0])) or 1.0)
     are_many = sum(scores.size for scores in panel.scores.values()) > MANY_DOTS
-    for index, (policy, scores) in enumerate(panel.scores.items()):
-        colour = COLOURS[index % len(COLOURS)]
-        summaries = _summaries(scores)
-        mean = np.array([summary.mean for summary in summaries])
-        lower, upper = _band(panel, summaries, band)
+    for index, (look, scores) in enumerate(zip(looks(panel.scores), panel.scores.values(), strict=True)):
         beside = levels + step * (index - 0.5 * (len(panel.scores) - 1))
         dots = np.repeat(2.0**beside if is_log else beside, scores.shape[1])
-        (marks,) = place.plot(dots, scores.ravel(), ".", markersize=4, color=colour, alpha=0.35, zorder=2.5)
+        (marks,) = place.plot(dots, scores.ravel(), ".", color=look.colour, alpha=0.35, zorder=2.5)
         marks.set_rasterized(are_many)
-        marker, name = MARKERS[index % len(MARKERS)], unread(policy)
-        place.plot(panel.levels, mean, color=colour, marker=marker, markersize=4, linewidth=1.6, label=name, zorder=3)
-        place.fill_between(panel.levels, lower, upper, color=colour, alpha=0.2, linewidth=0.0, zorder=2)
-        equal = np.where(lower == upper, mean, np.nan)  # all runs are equal: a band without height would not be seen
-        place.plot(panel.levels, equal, color=colour, linewidth=5.0, alpha=0.2, zorder=2)
-        alone = _alone(np.isfinite(lower))  # a band without neighbours has no width
-        place.vlines(panel.levels[alone], lower[alone], upper[alone], color=colour, linewidth=3.0, alpha=0.4, zorder=2)
+        _draw_policy(place, panel, _summaries(scores), look, band)
     neutral = METRICS[panel.measure].neutral
     if neutral is not None and panel.variant == "corrected":
         place.axhline(neutral, color="0.5", linewidth=0.8, zorder=0)
     if is_log:
-        place.set_xscale("log", base=2)
-        place.set_xticks(panel.levels, [f"{size:g}" for size in panel.levels])
-        place.minorticks_off()
+        size_axis(place, panel.levels)
     if panel.others:
         words = ", ".join(f"{name.replace('_', ' ')} {word}" for name, word in panel.words.items())
-        place.set_title(unread(words), fontsize=9)
-    place.set_xlabel(_x_label(panel), fontsize=8)
-    place.set_ylabel(panel.unit, fontsize=8)
-    place.tick_params(labelsize=8)
-    place.grid(alpha=0.25)
+        place.set_title(words)
+    place.set_xlabel(_x_label(panel))
+    place.set_ylabel(panel.unit)
+
+
+def _draw_policy(place: Panel, panel: StudyPanel, summaries: Sequence[Summary], look: Look, band: Band) -> None:
+    """Draw the means of a policy with their bands."""
+    mean = np.array([summary.mean for summary in summaries])
+    lower, upper = _band(panel, summaries, band)
+    place.plot(panel.levels, mean, color=look.colour, marker=look.marker, label=look.name, zorder=3)
+    shade(place, panel.levels, lower, upper, look.colour)
+    equal = np.where(lower == upper, mean, np.nan)  # all runs are equal: a band without height would not be seen
+    place.plot(panel.levels, equal, color=look.colour, linewidth=5.0, alpha=0.2, zorder=2)
+    alone = _alone(np.isfinite(lower))  # a band without neighbours has no width
+    place.vlines(panel.levels[alone], lower[alone], upper[alone], color=look.colour, linewidth=3.0, alpha=0.4, zorder=2)
 
 
 def limit_height(place: Panel, figure: StudyFigure) -> None:
@@ -252,18 +238,3 @@ def _alone(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _summaries(scores: FloatArray) -> list[Summary]:
     """Return the mean of the runs at each level, with its interval; runs without a finite score are left out."""
     return [aggregate(known) if known.size else _NOTHING for known in (runs[np.isfinite(runs)] for runs in scores)]
-
-
-def columns_of(n_panels: int) -> int:
-    """Return how many panels stand side by side: two can be read on a phone, many would be a tower."""
-    return min(n_panels, 2 if n_panels <= 2 * PANELS_PER_ROW else PANELS_PER_ROW)
-
-
-def save_picture(picture: Any, name: str, paths: Sequence[Path]) -> None:
-    """Write a picture; the same numbers give the same bytes."""
-    from matplotlib import rc_context  # pyright: ignore[reportUnknownVariableType]  (its own types leave it open)
-
-    with rc_context({"svg.hashsalt": name}):
-        for path in paths:
-            dated = {"metadata": {"Date": None}} if path.suffix == ".svg" else {}
-            picture.savefig(path, dpi=150, **dated)

@@ -26,12 +26,6 @@ def counted(count: int, noun: str) -> str:
     return f"{count:,} {noun}" + ("" if count == 1 else "s")
 
 
-def unread(text: str) -> str:
-    """Return a text that matplotlib shows as it is: without it, dollar signs in a name would begin a formula."""
-    # The twin of `swarm_forage_env.rendering.plots._unread`: measures import no rendering.
-    return text.replace("$", r"\$")
-
-
 def number(value: float) -> str:
     """Return a number with about four digits; a dash where there is none."""
     if math.isnan(value):

@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from swarm_forage_env.cli.options import NO_PICTURE, AsJson
+from swarm_forage_env.cli.options import AsJson
 
 if TYPE_CHECKING:
     from rich.table import Table
-
-_FORMATS = (".png", ".svg", ".pdf")
 
 
 def availability(
@@ -28,12 +26,13 @@ def availability(
     from swarm_forage_env.cli.scenario_options import split_numbers
     from swarm_forage_env.cli.terminal import notes, output
     from swarm_forage_env.cli.theory import availability_figure, draw_theory
+    from swarm_forage_env.rendering.figures import check_picture
 
     sizes = split_numbers("--robots", robots, int)
     means = split_numbers("--teams", teams, float)
     demands = split_numbers("--needed", needed, int)
-    if out is not None and out.suffix not in _FORMATS:
-        raise ConfigError(f"Expected --out as a file ending in {', '.join(_FORMATS)}, got {str(out)!r}.")
+    if out is not None:
+        check_picture(out)
     try:
         rows = [
             {"robots": n, "team": team, "at_work": _mean_at_work(n, team), "needed": demands, "availability": curve}
@@ -48,11 +47,7 @@ def availability(
     else:
         output().print(_table(rows, demands))
     if out is not None and figure is not None:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            draw_theory(figure, [out])
-        except ImportError as error:
-            raise ImportError(NO_PICTURE) from error
+        draw_theory(figure, [out])
         notes().print(f"picture {out}")
 
 

@@ -21,7 +21,6 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.printable import printable
 from swarm_forage_env.cli.interrupts import resumable
-from swarm_forage_env.cli.options import NO_PICTURE
 from swarm_forage_env.cli.report import estimate, estimated_seconds
 from swarm_forage_env.policies.mixture import is_mixture, mixture_of, mixture_parts
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_label
@@ -118,11 +117,7 @@ def write_page(paths: Sequence[Path], page: Path, picture: Path) -> tuple[Path, 
     link = Path(os.path.relpath(picture, page.parent)).as_posix()
     details = page.with_name(f"{page.stem}_in_detail{page.suffix}")
     text = with_block(text, page_block(standings, protocol, link, details.name), str(page))
-    try:
-        with replacing(picture, ending=picture.suffix) as draft:
-            draw_benchmark(standings, reference, protocol, draft)
-    except ImportError as error:
-        raise ImportError(NO_PICTURE) from error
+    draw_benchmark(standings, reference, protocol, picture)
     for file, content in ((details, details_page(standings, reference, protocol, page.name)), (page, text)):
         with replacing(file) as draft:
             draft.write_text(content, encoding="utf-8")

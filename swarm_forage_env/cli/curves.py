@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, Jobs, complain, no_picture
+from swarm_forage_env.cli.options import EXIT_FAILURE, Jobs, complain, no_picture
 from swarm_forage_env.cli.terminal import output
 from swarm_forage_env.training.defaults import SCRIPTED
 
@@ -36,9 +36,9 @@ def curves(
     The others make the runs of the trainings' evaluations: same world, same seeds, the caches that they are made for.
     """
     from swarm_forage_env._internal.fields import ConfigError
-    from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.cli.scenario_options import split_names
     from swarm_forage_env.cli.training_report import counted_in, place_of, points_of, stage_ends
+    from swarm_forage_env.rendering.figures import check_picture
     from swarm_forage_env.rendering.plots import draw_trainings
 
     found = _told_apart(folders)
@@ -50,11 +50,10 @@ def curves(
                 "plans differ in scenario, wrappers or evaluation; draw them one by one."
             )
     picture = out or folders[0] / PICTURE_FILE
-    check_file(picture)
+    check_picture(picture)
     levels = _levels(found[0], () if beside == "none" else split_names(beside), jobs)
     output().print(_table(found, levels, counted_in(plan) if plan.evaluation.worlds else "per 1,000 s"))
     try:
-        picture.parent.mkdir(parents=True, exist_ok=True)
         draw_trainings(
             picture,
             {one.label: points_of(one.evaluations) for one in found},
@@ -63,8 +62,8 @@ def curves(
             title=place_of(plan),
             ylabel=counted_in(plan),
         )
-    except ImportError:
-        raise typer.Exit(complain(NO_PICTURE, EXIT_FAILURE)) from None
+    except ImportError as error:
+        raise typer.Exit(complain(str(error), EXIT_FAILURE)) from None
     except OSError as error:  # the table was shown, but a picture was asked for
         raise typer.Exit(complain(no_picture(picture, error), EXIT_FAILURE)) from None
     typer.echo(f"wrote {picture}")

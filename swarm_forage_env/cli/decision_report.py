@@ -20,7 +20,7 @@ from metrics.scoring.prediction import (
 from metrics.scoring.prediction_plots import draw_predictions
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.interrupts import resumable
-from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, complain, no_picture
+from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture
 from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
 from swarm_forage_env.cli.score_report import plan_json, plan_text
 from swarm_forage_env.runs.runner import available_cores
@@ -148,12 +148,11 @@ def _show_predictions(tables: Sequence[PredictionTable], folder: Path | None, *,
     picture = None
     if folder is not None:
         picture = folder / _PICTURE
-        folder.mkdir(parents=True, exist_ok=True)
         try:
             draw_predictions(tables, picture)
-        except ImportError:
+        except ImportError as error:
             picture = None
-            typer.echo(NO_PICTURE, err=True)
+            typer.echo(error, err=True)
         except OSError as error:  # the predictions are worth more than their picture
             typer.echo(no_picture(picture, error), err=True)
             picture = None

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-from swarm_forage_env.cli.options import NO_PICTURE
 from swarm_forage_env.cli.terminal import notes
 
 if TYPE_CHECKING:
@@ -32,10 +31,10 @@ def maps(
     go to .npz files beside the picture.
     """
     from metrics.scoring.texts import counted
-    from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.inspect.maps import floor_maps
     from swarm_forage_env.inspect.replay.files import read_replays
     from swarm_forage_env.inspect.replay.frames import ReplayError
+    from swarm_forage_env.rendering.figures import check_picture
 
     if page.suffix == ".parquet":
         raise typer.BadParameter(
@@ -47,7 +46,7 @@ def maps(
     except ReplayError as error:
         raise typer.BadParameter(str(error)) from error
     picture = out or page.with_suffix(".maps.png")
-    check_file(picture)
+    check_picture(picture)
     write_maps(with_differences(found), picture, own_scales=own_scales)
     typer.echo(f"wrote maps of {counted(len(found), 'run')} to {picture} and .npz files beside it")
 
@@ -70,12 +69,11 @@ def write_maps(every: "Sequence[FloorMaps]", picture: Path, *, per: str = "", ow
     from swarm_forage_env.inspect.maps import MEANINGS
     from swarm_forage_env.rendering.plots import draw_maps
 
-    picture.parent.mkdir(parents=True, exist_ok=True)
     for one in every:
         one.write(picture.with_suffix(f".{as_file_name(one.label)}.npz"))
     columns = {name: (what, f"{unit}, per {per}" if per else unit) for name, (what, unit) in MEANINGS.items()}
     rows = [(one.label, one.arrays, one.is_difference, one.size_m, one.obstacles_m) for one in every]
     try:
         draw_maps(picture, rows, columns, own_scales=own_scales)
-    except ImportError:
-        notes().print(NO_PICTURE)
+    except ImportError as error:
+        notes().print(str(error))

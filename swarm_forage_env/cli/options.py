@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.printable import printable
 
 EXIT_FAILURE = 1
@@ -17,8 +16,6 @@ EXIT_INTERRUPTED = 130
 """Exit code that shells report for a program ended by Ctrl-C."""
 EXIT_TERMINATED = 143
 """Exit code that shells report for a program ended by SIGTERM, as batch systems and containers send it."""
-
-NO_PICTURE = f"No picture without matplotlib: {install_command('plots')}."
 
 Scenario = Annotated[str, typer.Option("--scenario", help="Preset; see 'swarm-forage list'.")]
 Robots = Annotated[int | None, typer.Option("--robots", min=1, help="Swarm size.")]

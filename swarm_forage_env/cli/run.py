@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, AsJson, DryRun, Jobs, Out, Performance, no_picture
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, Jobs, Out, Performance, no_picture
 from swarm_forage_env.cli.terminal import notes, output
 from swarm_forage_env.cli.world_options import World, takes_world
 
@@ -88,9 +88,9 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
         plot = store.folder / "performance.png"
         try:
             draw_performance(specs, result.records, plot)
-        except ImportError:
+        except ImportError as error:
             plot = None
-            aside.print(NO_PICTURE)
+            aside.print(str(error))
         except OSError as error:  # the table is worth more than its picture
             aside.print(no_picture(plot, error))
             plot = None

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import NO_PICTURE, no_picture
+from swarm_forage_env.cli.options import no_picture
 from swarm_forage_env.cli.terminal import notes, output
 from swarm_forage_env.cli.world_options import World, takes_world
 
@@ -30,25 +30,24 @@ def saliency(
 
     A robot gets, for example, the light readings of another robot. How often does it then decide otherwise?
     """
-    from swarm_forage_env._internal.files import check_file
     from swarm_forage_env.cli.scenario_options import plan_runs
     from swarm_forage_env.inspect.saliency import GROUPS, open_network_of
     from swarm_forage_env.inspect.saliency import saliency as measured
+    from swarm_forage_env.rendering.figures import check_picture
     from swarm_forage_env.rendering.plots import draw_saliency
 
     network = open_network_of(policy)
     (spec,) = plan_runs(described, (policy,), n_seeds=1, first_seed=seed)
     picture = out or Path("results", f"{spec.scenario.name}_{Path(policy).stem}.saliency.png")
-    check_file(picture)
+    check_picture(picture)
     found = measured(network, spec, seconds=seconds)
     title = f"{Path(policy).stem} in {spec.scenario.name}, {spec.scenario.robots.n_robots} robots, seed {seed}"
     output().print(_table(found, title))
     bars = {group: found.changed[group] for group in GROUPS[1:] if found.n_rows[group]}
     try:
-        picture.parent.mkdir(parents=True, exist_ok=True)
         draw_saliency(picture, found.slices, bars, title=title, xlabel=_axis_words(found))
-    except ImportError:
-        notes().print(NO_PICTURE)
+    except ImportError as error:
+        notes().print(str(error))
         return
     except OSError as error:  # the table is worth more than its picture
         notes().print(no_picture(picture, error))

@@ -13,7 +13,7 @@ from metrics.scoring.plots import draw_scores
 from metrics.scoring.table import ScoreTable
 from metrics.scoring.texts import aligned, counted
 from swarm_forage_env.cli.interrupts import resumable
-from swarm_forage_env.cli.options import EXIT_FAILURE, NO_PICTURE, no_picture
+from swarm_forage_env.cli.options import EXIT_FAILURE, no_picture
 from swarm_forage_env.cli.report import estimate, estimated_seconds
 from swarm_forage_env.runs.runner import available_cores
 from swarm_forage_env.runs.store import RunStore
@@ -84,8 +84,8 @@ def show_scores(tables: Sequence[ScoreTable], picture: Path | None, *, as_json: 
     if picture is not None:
         try:
             drawn = _draw(tables, picture, band=band)
-        except ImportError:
-            typer.echo(NO_PICTURE, err=True)
+        except ImportError as error:
+            typer.echo(error, err=True)
         except OSError as error:  # the scores are worth more than their picture
             typer.echo(no_picture(picture, error), err=True)
     if as_json:
@@ -155,6 +155,5 @@ def _draw(tables: Sequence[ScoreTable], path: Path, *, band: bool) -> Path | Non
     """
     if not any(score.per_seed for table in tables for score in table.scores):
         return None
-    path.parent.mkdir(parents=True, exist_ok=True)
     draw_scores(tables, path, band=band)
     return path

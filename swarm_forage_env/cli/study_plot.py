@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from swarm_forage_env.cli.options import NO_PICTURE, Variants
+from swarm_forage_env.cli.options import Variants
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -156,12 +156,8 @@ def snapshot_written(spec: "StudySpec", file: Path) -> Path:
 
 
 def _written(name: str, folder: Path, draw: "Draw", tables: "Mapping[str, pl.DataFrame]") -> list[Path]:
-    folder.mkdir(parents=True, exist_ok=True)
     pictures = [folder / f"{name}{suffix}" for suffix in FORMATS]
-    try:
-        draw(pictures)
-    except ImportError as error:
-        raise ImportError(NO_PICTURE) from error
+    draw(pictures)
     for file, frame in tables.items():
         frame.write_csv(folder / file)
     return [*pictures, *(folder / file for file in tables)]

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from metrics.scoring.texts import counted
-from swarm_forage_env.cli.options import EXIT_INTERRUPTED, NO_PICTURE, complain, no_picture
+from swarm_forage_env.cli.options import EXIT_INTERRUPTED, complain, no_picture
 from swarm_forage_env.rendering.plots import draw_trainings
 from swarm_forage_env.runs.progress import duration
 from swarm_forage_env.scenarios.performance import quantity
@@ -76,8 +76,8 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
             title=f"{plan.algorithm} in {place_of(plan)}",
             ylabel=counted_in(plan),
         )
-    except ImportError:
-        console.print(NO_PICTURE)
+    except ImportError as error:
+        console.print(str(error))
         return None
     except OSError as error:  # the training is worth more than its picture
         console.print(no_picture(path, error))

@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-import metrics.scoring.plots
-import swarm_forage_env.rendering.plots
 from metrics import waveform
 from metrics.scoring.columns import CRITERIA, CURVE_COLUMNS, UNDISTURBED
 from metrics.scoring.curves_table import study_curves
@@ -42,10 +40,6 @@ def test_criteria_have_the_same_names():
     assert {*experiments.CRITERIA, experiments.UNDISTURBED} == set(CRITERIA)
     assert experiments.UNDISTURBED == UNDISTURBED
     assert set(MEASURE_CRITERIA.values()) <= set(experiments.CRITERIA)
-
-
-def test_pictures_have_the_same_colours():
-    assert metrics.scoring.plots.COLOURS == swarm_forage_env.rendering.plots.COLOURS
 
 
 @pytest.fixture(scope="module")

@@ -36,7 +36,7 @@ FOREIGN = {
 """Other packages."""
 SPELLINGS = (r"reset\((?:self, )?task\b", r"\btask\.(?:layout|n_robots)\b", r"\benv\.task\b", r"\bSwarmTask\b")
 """Old names that are no module's."""
-SUFFIXES = {"csv", "json", "md", "npz", "png", "py", "toml", "zip"}
+SUFFIXES = {"csv", "json", "md", "mplstyle", "npz", "png", "py", "toml", "zip"}
 DOTTED = re.compile(r"`([a-z_][a-z_0-9]*(?:\.[A-Za-z_0-9]+)+)")
 PATHS = re.compile(r"`?((?:swarm_forage_env|baselines|metrics|tests|scripts|docs)/[\w/.-]+\.(?:py|md|toml|npz|json))")
 

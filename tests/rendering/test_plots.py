@@ -5,17 +5,15 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from matplotlib.figure import Figure
-
 from swarm_forage_env.rendering.plots import draw_maps, draw_trainings
+from tests.support.pictures import keep_figures
 
 
 @pytest.fixture
-def drawn(monkeypatch):
-    """Figures in the order in which they would be written."""
-    figures: list[Figure] = []
-    monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: figures.append(figure))
-    return figures
+def drawn(monkeypatch, tmp_path):
+    """Figures in the order in which they would be painted."""
+    monkeypatch.chdir(tmp_path)
+    return keep_figures(monkeypatch)
 
 
 def draw(stage_ends):
@@ -41,7 +39,7 @@ def test_the_legend_of_trainings_stands_beside_the_axes(drawn):
     (figure,) = drawn
     figure.draw_without_rendering()
     (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == ["mine", "crw"]
+    assert [text.get_text() for text in legend.get_texts()] == ["mine", "CRW"]
     assert not any(legend.get_window_extent().overlaps(axes.get_window_extent()) for axes in figure.axes)
 
 

@@ -1,12 +1,18 @@
-"""Figures that are saved without being painted: painting takes most of the time of a short command that draws."""
+"""Words in pictures, and figures that are saved unpainted: painting takes most of the time of a short command."""
 
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import pytest
 
 PNG = b"\x89PNG"
+
+
+def words_in(path: Path) -> list[str]:
+    """The lines of text in an SVG picture."""
+    return ["".join(text.itertext()) for text in ET.parse(path).iter("{http://www.w3.org/2000/svg}text")]
 
 
 def keep_figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:

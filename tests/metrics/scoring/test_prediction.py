@@ -276,4 +276,4 @@ def test_the_picture_shows_runs_law_interval_and_critical_size(tmp_path, monkeyp
     assert lines["held-back runs"].get_xdata().tolist() == [32, 32, 64, 64]
     assert "critical size" not in [line.get_label() for line in second.get_lines()]
     draw_predictions([*mine, *linear] * 2 + [*mine], tmp_path / "five.png")
-    assert [axes.axison for axes in figures[1].axes] == [True] * 5 + [False] * 3
+    assert [axes.axison for axes in figures[1].axes] == [True] * 5 + [False]
