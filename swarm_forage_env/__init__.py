@@ -25,10 +25,13 @@ if TYPE_CHECKING:
     from swarm_forage_env.inspect.replay.files import read_replays, write_replays
     from swarm_forage_env.policies.registry import RandomPolicy, from_callable, load_policy, policy_names
     from swarm_forage_env.rendering.figures import FigureStyle
+    from swarm_forage_env.runs.plan import Condition, Plan
+    from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec, policy_specs
     from swarm_forage_env.runs.record import RunRecord
     from swarm_forage_env.runs.run import build_stack, run_one, run_policy
-    from swarm_forage_env.runs.runner import run_all
+    from swarm_forage_env.runs.runner import run_plan, run_specs
     from swarm_forage_env.runs.spec import RunSpec, plan_run
+    from swarm_forage_env.runs.table import Table
     from swarm_forage_env.scenarios.config import ScenarioConfig
     from swarm_forage_env.scenarios.kinds import RobotKind
     from swarm_forage_env.scenarios.overrides import with_overrides
@@ -48,6 +51,7 @@ if TYPE_CHECKING:
     from swarm_forage_env.wrappers.registry import parse_wrapper
     from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
     from swarm_forage_env.wrappers.waveform import Waveform
+    from swarm_forage_env.wrappers.world import World
 
     __version__: str
 
@@ -55,6 +59,13 @@ __all__ = [
     "AUTHORS_PROGRAM",
     "SCENARIO_NAMES",
     "ActuatorNoise",
+    "Condition",
+    "Plan",
+    "PolicySpec",
+    "Table",
+    "World",
+    "policy_spec",
+    "policy_specs",
     "ActuatorNoiseConfig",
     "CheckError",
     "ConfigError",
@@ -109,7 +120,8 @@ __all__ = [
     "record_run",
     "register_reward",
     "register_sensor",
-    "run_all",
+    "run_plan",
+    "run_specs",
     "run_one",
     "run_policy",
     "run_study",
@@ -175,7 +187,15 @@ _HOMES = {
     "record_run": "inspect.film",
     "register_reward": "contract.own",
     "register_sensor": "contract.own",
-    "run_all": "runs.runner",
+    "run_plan": "runs.runner",
+    "run_specs": "runs.runner",
+    "World": "wrappers.world",
+    "Plan": "runs.plan",
+    "Condition": "runs.plan",
+    "Table": "runs.table",
+    "PolicySpec": "runs.policy_spec",
+    "policy_spec": "runs.policy_spec",
+    "policy_specs": "runs.policy_spec",
     "run_one": "runs.run",
     "run_policy": "runs.run",
     "run_study": "studies.study_folder",

@@ -4,12 +4,13 @@ from .entry import Entry, Training, read_entry
 from .figure import draw_benchmark
 from .page import details_page, page_block
 from .protocol import BenchmarkError, Protocol, load_protocol
-from .running import benchmark_specs, run_benchmark
+from .running import BenchmarkQuestion, benchmark_question, run_benchmark
 from .standing import Standing, reference_of, scripted_entries, standing_of
 
 __all__ = [
     "run_benchmark",
-    "benchmark_specs",
+    "benchmark_question",
+    "BenchmarkQuestion",
     "load_protocol",
     "read_entry",
     "scripted_entries",

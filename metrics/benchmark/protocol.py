@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from metrics.scoring.columns import SIZE, UNDISTURBED
+from swarm_forage_env.studies.ladders import wrappers_at
+from swarm_forage_env.wrappers.registry import wrappers_from_mapping
+from swarm_forage_env.wrappers.world import SIZE, World
 
 if TYPE_CHECKING:
     from swarm_forage_env.scenarios.config import ScenarioConfig
-    from swarm_forage_env.studies.ladders import Experiment
     from swarm_forage_env.wrappers.base import WrapperConfig
 
 LATEST = 1
@@ -32,17 +33,20 @@ class BenchmarkError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class World:
-    """A place where every policy is run, once per seed."""
+class ProtocolWorld:
+    """A world where every policy is run once per seed, and what its runs are for."""
 
-    name: str
-    """Unique: "small warehouse, 8 robots", "small warehouse, noise 0.03"."""
+    world: World
+    """With a unique name: "small warehouse, 8 robots", "small warehouse, noise 0.03"."""
     group: str
     """The group of worlds it belongs to; empty for a world to train in."""
-    scenario: "ScenarioConfig"
-    wrappers: "tuple[WrapperConfig, ...]" = ()
     is_scored: bool = True
     """Whether its performance counts; if not, measures use it as their reference."""
+
+    @property
+    def name(self) -> str:
+        """Name of the world."""
+        return self.world.name
 
     @property
     def is_held_out(self) -> bool:
@@ -52,7 +56,7 @@ class World:
     @property
     def is_disturbed(self) -> bool:
         """Whether something disturbs the swarm."""
-        return bool(self.wrappers)
+        return bool(self.world.wrappers)
 
     @property
     def counts(self) -> bool:
@@ -65,8 +69,9 @@ class Group:
     """Worlds that measures compare with each other: one scenario at several sizes, undisturbed and disturbed."""
 
     name: str
-    roles: "tuple[tuple[str, Experiment], ...]"
-    """Name of a world, and what it is to the measures. A world can have two roles: a swarm size, and undisturbed."""
+    roles: tuple[tuple[str, World], ...]
+    """Name of a world of the protocol, and that world as it is to the measures, with criterion and value. A world can
+    have two roles: a swarm size, and undisturbed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,12 +85,12 @@ class Protocol:
     horizon_s: float
     interval_s: float
     seeds: tuple[int, ...]
-    worlds: tuple[World, ...]
+    worlds: tuple[ProtocolWorld, ...]
     """The worlds to train in first."""
     groups: tuple[Group, ...]
 
     @property
-    def scored(self) -> tuple[World, ...]:
+    def scored(self) -> tuple[ProtocolWorld, ...]:
         """The held-out worlds whose performance counts."""
         return tuple(world for world in self.worlds if world.counts)
 
@@ -132,10 +137,11 @@ def _protocol(content: Mapping[str, Any], *, quick: bool) -> Protocol:
         known_keys(content["quick"], _QUICK_KEYS, prefix="quick.")
         chosen |= content["quick"]
     seeds = tuple(chosen.pop("seeds"))
-    worlds: list[World] = []
+    worlds: list[ProtocolWorld] = []
     for entry in content.get("training", []):
         known_keys(entry, _TRAINING_KEYS, prefix="training.")
-        worlds.append(World(name=f"training: {entry['name']}", group="", scenario=_scenario(entry, chosen)))
+        world = World(_scenario(entry, chosen), name=f"training: {entry['name']}")
+        worlds.append(ProtocolWorld(world=world, group=""))
     groups: list[Group] = []
     for entry in content["group"]:
         known_keys(entry, _GROUP_KEYS, prefix="group.")
@@ -162,58 +168,52 @@ def _scenario(entry: Mapping[str, Any], of_all: Mapping[str, Any]) -> "ScenarioC
     return scenario(entry["scenario"], **plain_settings(entry.get("set", {})), **of_all)
 
 
-def _group(entry: Mapping[str, Any], base: "ScenarioConfig") -> tuple[Group, list[World]]:
+def _group(entry: Mapping[str, Any], base: "ScenarioConfig") -> tuple[Group, list[ProtocolWorld]]:
     """The worlds of a group, and what they are to the measures."""
-    from swarm_forage_env.studies.ladders import Experiment
-    from swarm_forage_env.wrappers.registry import wrappers_from_mapping
-
     name: str = entry["name"]
-    worlds: dict[str, World] = {}
-    roles: list[tuple[str, Experiment]] = []
+    worlds: dict[str, ProtocolWorld] = {}
+    roles: list[tuple[str, World]] = []
 
     def add(what: str, scenario: "ScenarioConfig", wrappers: "tuple[WrapperConfig, ...]" = (), **told: bool) -> str:
-        world = World(name=f"{name}, {what}", group=name, scenario=scenario, wrappers=wrappers, **told)
+        world = World(scenario, wrappers, name=f"{name}, {what}")
         if world.name in worlds:
             raise BenchmarkError(f"Expected worlds of different names, got {world.name!r} twice.")
-        worlds[world.name] = world
+        worlds[world.name] = ProtocolWorld(world=world, group=name, **told)
         return world.name
 
     for size in entry["sizes"]:
         sized = replace(base, robots=replace(base.robots, n_robots=size))
         place = add(f"{size} robot{'s' if size > 1 else ''}", sized, is_scored=size > 1)
-        roles.append((place, Experiment(criterion=SIZE, value=size, scenario=sized)))
+        roles.append((place, World(sized, criterion=SIZE, value=size)))
         if size == base.robots.n_robots:
-            roles.append((place, Experiment(criterion=UNDISTURBED, value=0.0, scenario=sized)))
-    for what, experiment, is_reference in _disturbances(entry.get("levels", {}), base):
-        place = add(what, base, experiment.wrappers, is_scored=not is_reference)
-        roles.append((place, experiment))
+            roles.append((place, World(sized)))
+    for what, role, is_reference in _disturbances(entry.get("levels", {}), base):
+        place = add(what, base, role.wrappers, is_scored=not is_reference)
+        roles.append((place, role))
     for what, tables in entry.get("disturbed", {}).items():
         add(what, base, wrappers_from_mapping(tables))
     return Group(name=name, roles=tuple(roles)), list(worlds.values())
 
 
-def _disturbances(levels: Mapping[str, Any], base: "ScenarioConfig") -> "Iterator[tuple[str, Experiment, bool]]":
-    """Yield the name, the experiment and whether it is only a reference, of each level of each criterion."""
-    from swarm_forage_env.studies.ladders import Experiment, wrappers_at
-
+def _disturbances(levels: Mapping[str, Any], base: "ScenarioConfig") -> Iterator[tuple[str, World, bool]]:
+    """Yield the name, the world and whether it is only a reference, of each level of each criterion."""
     for criterion, values in levels.items():
         # Only what varies over time has a reference of its own; others are held against the undisturbed run.
         own_reference = [0.0] if wrappers_at(base, criterion, 0.0) else []
         for value in (*own_reference, *values):
-            wrappers = wrappers_at(base, criterion, value)
-            experiment = Experiment(criterion=criterion, value=value, scenario=base, wrappers=wrappers)
-            is_deadly = experiment.population is not None and experiment.population.death_per_tick > 0.0
+            role = World(base, wrappers_at(base, criterion, value), criterion=criterion, value=value)
+            is_deadly = role.population is not None and role.population.death_per_tick > 0.0
             word = "deaths" if is_deadly else _LEVEL_WORDS.get(criterion, criterion)
-            yield f"{word} {value:g}", experiment, value == 0.0
+            yield f"{word} {value:g}", role, value == 0.0
 
 
-def scenario_fields(world: World) -> dict[str, Any]:
+def scenario_fields(world: ProtocolWorld) -> dict[str, Any]:
     """Return what people want to know of a world: its scenario, robots, objects and arena."""
-    scenario = world.scenario
+    scenario = world.world.scenario
     return {
         "scenario": scenario.name,
         "robots": scenario.robots.n_robots,
         "objects": scenario.objects.n_objects,
         "arena": f"{scenario.arena.width_m:g} x {scenario.arena.height_m:g} m",
-        "disturbed by": ", ".join(config.name for config in world.wrappers),
+        "disturbed by": ", ".join(config.name for config in world.world.wrappers),
     }

@@ -1,42 +1,103 @@
 """From policies to an entry: the runs of the protocol, and the measures that they allow."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from metrics.scoring.contestants import Contestant, contestants_of
-from metrics.scoring.runs import rates_of
-from metrics.scoring.studies import RunCurves, StudyCurves
+from metrics.scoring.columns import INTERVAL_COLUMNS
+from metrics.scoring.question import Question, ask
+from metrics.scoring.runs import run_curves, study_curves
+from metrics.scoring.studies import StudyCurves
 from metrics.scoring.study_scores import score_study
 from metrics.scoring.table import Score
+from swarm_forage_env.policies.registry import policy_label
+from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.policy_spec import policy_specs
+from swarm_forage_env.runs.record import RunRecord, software_versions
+from swarm_forage_env.runs.table import Table
+from swarm_forage_env.scenarios.performance import quantity
 
 from .entry import Entry, EntryMeasure, EntryPolicy, Training, rounded, six_digits
 from .protocol import BenchmarkError, Group, Protocol, load_protocol
 
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
 
-    from swarm_forage_env.runs.record import RunRecord
-    from swarm_forage_env.runs.spec import RunSpec
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BenchmarkQuestion(Question[Entry]):
+    """Runs of some policies in all worlds of a protocol; several are training seeds of one method, and one entry."""
 
-_Records = Mapping[tuple[str, int], "RunRecord"]
-"""World and seed -> the run."""
+    name: str
+    """Name of the entry in tables."""
+    protocol: Protocol
+    command: str = ""
+    """What the page tells people to type to make the entry again."""
+    training: Training = field(default_factory=Training)
+    training_seeds: tuple[int, ...] = ()
+    """One per policy; empty = what network files tell."""
+
+    def answer(self, table: Table) -> Entry:
+        """Return the entry.
+
+        Raises:
+            BenchmarkError: runs failed.
+        """
+        if table.failures:
+            first = next(iter(table.failures.values()))
+            raise BenchmarkError(
+                f"Expected all {len(self.plan.specs)} runs to finish, {len(table.failures)} failed; the first, "
+                f"{first.spec.describe()}: {first.error}"
+            )
+        policies = self.plan.policies
+        told = [_told_by_file(policy.policy) for policy in policies]
+        return Entry(
+            version=self.protocol.version,
+            identity=self.protocol.identity,
+            is_quick=self.protocol.is_quick,
+            name=self.name,
+            command=self.command,
+            policies=tuple(
+                EntryPolicy(
+                    name=policy_label(policy.policy),
+                    digest=about["digest"],
+                    training_seed=self.training_seeds[k] if self.training_seeds else about["seed"],
+                )
+                for k, (policy, about) in enumerate(zip(policies, told, strict=True))
+            ),
+            runs=_runs(self.protocol, table),
+            measures=_measures(self.protocol, table),
+            training=self.training,
+            core_hours=_core_hours(table.records.values()),
+            versions={package: version for package, version in software_versions().items() if version},
+        )
 
 
-def benchmark_specs(policy: str, protocol: Protocol) -> "tuple[RunSpec, ...]":
-    """Return the runs of one policy, seed by seed, in each the worlds in their order.
-
-    Args:
-        policy: Registered name, or path of a policy file.
-        protocol: What is run.
-
-    Raises:
-        ValueError: no installed policy has that name, or a file that cannot be opened.
-    """
-    return tuple(_planned(_contestants([policy], protocol)[0], protocol).values())
+def benchmark_question(
+    policies: Sequence[str],
+    *,
+    name: str,
+    protocol: Protocol | None = None,
+    command: str = "",
+    training: Training | None = None,
+    training_seeds: Sequence[int] = (),
+) -> BenchmarkQuestion:
+    """Return what `run_benchmark` asks; arguments and errors as there."""
+    chosen = protocol or load_protocol()
+    if training_seeds and len(training_seeds) != len(policies):
+        raise BenchmarkError(
+            f"Expected one training seed per policy, got {len(training_seeds)} for {len(policies)} policies."
+        )
+    return BenchmarkQuestion(
+        plan=Plan.product(policy_specs(policies), [each.world for each in chosen.worlds], chosen.seeds),
+        name=name,
+        protocol=chosen,
+        command=command,
+        training=training or Training(),
+        training_seeds=tuple(training_seeds),
+    )
 
 
 def run_benchmark(
@@ -49,7 +110,7 @@ def run_benchmark(
     training_seeds: Sequence[int] = (),
     out: str | Path | None = None,
     jobs: int | None = None,
-    executor: "Executor | None" = None,
+    executor: Executor | None = None,
     progress: bool = True,
 ) -> Entry:
     """Run policies in all worlds of a protocol and return the entry.
@@ -69,77 +130,20 @@ def run_benchmark(
     Raises:
         BenchmarkError: runs failed, or there is not one training seed per policy.
         ValueError: an unknown policy, or a file that cannot be opened.
-        swarm_forage_env.runs.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
+        swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
     """
-    from swarm_forage_env.policies.registry import policy_label
-    from swarm_forage_env.runs.record import software_versions
-    from swarm_forage_env.runs.runner import run_all
-    from swarm_forage_env.runs.store import RunStore
-
-    chosen = protocol or load_protocol()
-    if training_seeds and len(training_seeds) != len(policies):
-        raise BenchmarkError(
-            f"Expected one training seed per policy, got {len(training_seeds)} for {len(policies)} policies."
-        )
-    contestants = _contestants(policies, chosen)
-    planned = [_planned(contestant, chosen) for contestant in contestants]
-    specs = [spec for of_policy in planned for spec in of_policy.values()]
-    store = None if out is None else RunStore(out)
-    result = run_all(specs, store=store, jobs=jobs, executor=executor, progress=progress)
-    if result.failures:
-        first = result.failures[0]
-        raise BenchmarkError(
-            f"Expected all {len(specs)} runs to finish, {len(result.failures)} failed; the first, "
-            f"{first.spec.describe()}: {first.error}"
-        )
-    found = {record.run_id: record for record in result.records}
-    records = [{place: found[spec.run_id] for place, spec in of_policy.items()} for of_policy in planned]
-    told = [_told_by_file(policy) for policy in policies]
-    return Entry(
-        version=chosen.version,
-        identity=chosen.identity,
-        is_quick=chosen.is_quick,
+    question = benchmark_question(
+        policies,
         name=name,
+        protocol=protocol,
         command=command,
-        policies=tuple(
-            EntryPolicy(
-                name=policy_label(policy),
-                digest=about["digest"],
-                training_seed=training_seeds[k] if training_seeds else about["seed"],
-            )
-            for k, (policy, about) in enumerate(zip(policies, told, strict=True))
-        ),
-        runs=_runs(chosen, records),
-        measures=_measures(chosen, [contestant.label for contestant in contestants], records),
-        training=training or Training(),
-        core_hours=_core_hours(result.records),
-        versions={package: version for package, version in software_versions().items() if version},
+        training=training,
+        training_seeds=training_seeds,
     )
+    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)
 
 
-def _contestants(policies: Sequence[str], protocol: Protocol) -> tuple[Contestant, ...]:
-    return contestants_of(list(policies), {}, protocol.worlds[0].scenario, None)
-
-
-def _planned(contestant: Contestant, protocol: Protocol) -> "dict[tuple[str, int], RunSpec]":
-    """World and seed -> the run."""
-    from swarm_forage_env.runs.spec import plan_run
-
-    return {
-        (world.name, seed): plan_run(
-            world.scenario,
-            contestant.policy,
-            caches=contestant.caches,
-            parameters=contestant.parameters,
-            wrappers=world.wrappers,
-            seed=seed,
-        )
-        for seed in protocol.seeds
-        for world in protocol.worlds
-    }
-
-
-def _core_hours(records: "Sequence[RunRecord]") -> float | None:
+def _core_hours(records: Iterable[RunRecord]) -> float | None:
     """What runs took, of those whose records tell it; three digits, as time is never the same twice."""
     known = [record.cpu_time_s for record in records if math.isfinite(record.cpu_time_s)]
     return float(f"{sum(known) / 3600.0:.3g}") if known else None
@@ -165,16 +169,17 @@ def _told_by_file(policy: str) -> dict[str, Any]:
     return {"digest": file_digest(file), "seed": seed if isinstance(seed, int) else None}
 
 
-def _runs(protocol: Protocol, records: Sequence[_Records]) -> dict[str, dict[str, list[list[float]]]]:
+def _runs(protocol: Protocol, table: Table) -> dict[str, dict[str, list[list[float]]]]:
     """World -> performance and interference of all policies and seeds."""
 
-    def of_all(world: str, value: "Callable[[RunRecord], float]") -> list[list[float]]:
-        return [[six_digits(value(of_policy[world, seed])) for seed in protocol.seeds] for of_policy in records]
+    def of_all(world: str, value: Callable[[RunRecord], float]) -> list[list[float]]:
+        conditions = [condition for condition in table.plan.conditions if condition.world.name == world]
+        return [[six_digits(value(record)) for record in table.of(condition)] for condition in conditions]
 
-    def performance(record: "RunRecord") -> float:
+    def performance(record: RunRecord) -> float:
         return record.rate_per_1000_s("performance")
 
-    def interference(record: "RunRecord") -> float:
+    def interference(record: RunRecord) -> float:
         return float(record.interference_fraction.mean())
 
     return {
@@ -183,46 +188,27 @@ def _runs(protocol: Protocol, records: Sequence[_Records]) -> dict[str, dict[str
     }
 
 
-def _measures(protocol: Protocol, labels: Sequence[str], records: Sequence[_Records]) -> tuple[EntryMeasure, ...]:
+def _measures(protocol: Protocol, table: Table) -> tuple[EntryMeasure, ...]:
     """All measures of all groups; a measure for which a group has no runs is left out."""
     found: list[EntryMeasure] = []
     for group in protocol.groups:
-        scores = [
-            score_study(_study(protocol, group, label, of_policy))[0]
-            for label, of_policy in zip(labels, records, strict=True)
-        ]
+        scores = [score_study(_study(group, table, policy.label))[0] for policy in table.plan.policies]
         found += [_measure(group, of_all, protocol.seeds) for of_all in zip(*scores, strict=True)]
     return tuple(measure for measure in found if any(value is not None for row in measure.values for value in row))
 
 
-def _study(protocol: Protocol, group: Group, label: str, records: _Records) -> StudyCurves:
+def _study(group: Group, table: Table, policy: str) -> StudyCurves:
     """The runs of a group as measures take them."""
-    from swarm_forage_env.scenarios.performance import quantity
-
-    experiments: list[RunCurves] = []
-    for world, role in group.roles:
-        columns = [records[world, seed].columns() for seed in protocol.seeds]
-        names = columns[0].keys() - {"interval"}
-        experiments.append(
-            RunCurves(
-                criterion=role.criterion,
-                value=role.value,
-                n_robots=role.scenario.robots.n_robots,
-                seeds=protocol.seeds,
-                curves={name: np.stack([run[name] for run in columns]).astype(np.float64) for name in names},
-                rates=rates_of(role),
-                n_planned=len(protocol.seeds),
-            )
-        )
-    read_as = quantity(group.roles[0][1].scenario.performance)
-    n_intervals = round(protocol.horizon_s / protocol.interval_s)
-    return StudyCurves(
-        controller=label,
-        experiments=tuple(experiments),
-        t_end_s=protocol.interval_s * np.arange(1.0, n_intervals + 1.0),
-        amount=read_as.amount,
-        is_total=read_as.is_total,
-        adds_up=read_as.adds_up,
+    conditions = {condition.world.name: condition for condition in table.plan.of_policy(policy)}
+    world = group.roles[0][1]
+    return study_curves(
+        [
+            run_curves(role, table.curves(conditions[name], *INTERVAL_COLUMNS), len(table.plan.seeds))
+            for name, role in group.roles
+        ],
+        world,
+        controller=policy,
+        read_as=quantity(world.scenario.performance),
         where=f"the group {group.name}",
     )
 

@@ -16,7 +16,7 @@ from metrics.distributions import interquartile_mean, probability_of_improvement
 from metrics.statistics import Estimate
 
 from .entry import Entry, EntryMeasure, read_entry
-from .protocol import BenchmarkError, Protocol, World
+from .protocol import BenchmarkError, Protocol, ProtocolWorld
 
 SCRIPTED = ("crw", "dpo", "stochm", "stochx")
 """The controllers that all others are held against; their entries come with the package."""
@@ -29,9 +29,9 @@ class Reference:
     """The best scripted controller of each world that counts or is trained in."""
 
     best: dict[str, str]
-    """World -> name of the controller with the highest mean."""
+    """ProtocolWorld -> name of the controller with the highest mean."""
     runs: dict[str, FloatArray]
-    """World -> performance of its runs, per 1,000 s, (runs,)."""
+    """ProtocolWorld -> performance of its runs, per 1,000 s, (runs,)."""
 
     def mean(self, world: str) -> float:
         """Return the mean performance of the best scripted controller in a world, per 1,000 s."""
@@ -105,7 +105,7 @@ def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Stand
     """Return what an entry is worth; a quick one is held against full runs, whose rates are those of longer runs."""
     shares = {world.name: shares_of(entry, world, reference) for world in _judged(protocol)}
 
-    def middle(chosen: Callable[[World], bool]) -> float:
+    def middle(chosen: Callable[[ProtocolWorld], bool]) -> float:
         picked = [shares[world.name].ravel() for world in _judged(protocol) if chosen(world)]
         return interquartile_mean(picked, seed=_SEED).value if picked else float("nan")
 
@@ -134,7 +134,7 @@ def standing_of(entry: Entry, reference: Reference, protocol: Protocol) -> Stand
     )
 
 
-def shares_of(entry: Entry, world: World, reference: Reference) -> FloatArray:
+def shares_of(entry: Entry, world: ProtocolWorld, reference: Reference) -> FloatArray:
     """Return the performance of an entry's runs over the best scripted mean in a world, (policies, seeds)."""
     return entry.performance(world.name) / reference.mean(world.name)
 
@@ -164,5 +164,5 @@ def measure_mean(measure: EntryMeasure) -> float:
     return float(np.mean(known)) if known else float("nan")
 
 
-def _judged(protocol: Protocol) -> tuple[World, ...]:
+def _judged(protocol: Protocol) -> tuple[ProtocolWorld, ...]:
     return tuple(world for world in protocol.worlds if world.is_scored)

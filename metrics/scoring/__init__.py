@@ -6,11 +6,11 @@ from .figure_panels import StudyPanel, StudyPanels, study_panels
 from .front_door import compare_policies, score_curves, score_policy
 from .measures import ScoreForms
 from .performance import Performance
-from .plan import ScoringPlan, plan_scores
 from .plots import draw_scores
 from .prediction import PredictionTable, predict_curves, predict_policy
 from .prediction_plots import draw_predictions
-from .runs import run_scores
+from .question import Question, ask
+from .score_question import ScoreQuestion, score_question
 from .study_diff import StudyDiff, diff_studies
 from .study_plots import StudyFigure, draw_figure, draw_map, study_figures
 from .study_tables import StudyLine, study_lines
@@ -22,8 +22,8 @@ __all__ = [
     "compare_policies",
     "score_curves",
     "compare_tables",
-    "plan_scores",
-    "run_scores",
+    "ask",
+    "score_question",
     "study_lines",
     "study_panels",
     "study_figures",
@@ -40,7 +40,8 @@ __all__ = [
     "ScoreTable",
     "ScoreForms",
     "Comparison",
-    "ScoringPlan",
+    "Question",
+    "ScoreQuestion",
     "StudyLine",
     "StudyPanel",
     "StudyPanels",

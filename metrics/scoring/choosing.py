@@ -12,18 +12,22 @@ from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (sci
 from metrics.checks import CurveError
 from metrics.significance import paired_p
 from metrics.statistics import Summary, aggregate
+from swarm_forage_env.runs.policy_spec import PolicyLike
+from swarm_forage_env.runs.table import Table
+from swarm_forage_env.scenarios.performance import quantity
+from swarm_forage_env.studies.ladders import joined_wrappers, repairs_per_tick
+from swarm_forage_env.wrappers.base import WrapperConfig
+from swarm_forage_env.wrappers.noise import noise_levels
+from swarm_forage_env.wrappers.population import PopulationConfig
+from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
-from .columns import NOISE, POPULATION, UNDISTURBED
-from .contestants import PolicyLike
-from .plan import ScoringPlan
+from .columns import NOISE, POPULATION
+from .question import Question, ask, failure_lines
 from .texts import aligned, bounds, counted, interval, number, paragraph, percent, plain
-from .totals import PolicyTotals, plan_conditions, run_totals, unit_text
+from .totals import plan_totals, run_totals, unit_text
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
-
-    from swarm_forage_env.scenarios.config import ScenarioConfig
-    from swarm_forage_env.studies.ladders import Experiment
 
 MET, NOT_MET, UNDECIDED = "met", "not met", "undecided"
 """Verdicts: the whole 95 % interval of mean performance reaches the demand, stays below it, or contains it."""
@@ -229,17 +233,38 @@ class Choice:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ChoicePlan:
-    """The runs of a choice, and what each experiment demands."""
+class ChoiceQuestion(Question[Choice]):
+    """The runs of a choice, and what is demanded in each world."""
 
-    runs: ScoringPlan
     constraints: tuple[Constraint, ...]
-    """One per experiment of `runs`, in its order."""
+    """One per world of the plan, in its order, the undisturbed one first."""
+
+    def answer(self, table: Table) -> Choice:
+        """Return the policies, those first that meet most constraints, then miss fewest, then do best undisturbed."""
+        candidates = [self._candidate(table, policy.label) for policy in self.plan.policies]
+        scenario = self.plan.conditions[0].world.scenario
+        return Choice(
+            candidates=tuple(sorted(candidates, key=lambda candidate: candidate.order)),
+            scenario=scenario.name,
+            n_robots=scenario.robots.n_robots,
+            horizon_s=scenario.horizon_s,
+            unit=unit_text(quantity(scenario.performance)),
+        )
+
+    def _candidate(self, table: Table, policy: str) -> Candidate:
+        return Candidate(
+            policy=policy,
+            evidence=tuple(
+                Evidence(constraint=constraint, per_seed=run_totals(table, condition))
+                for constraint, condition in zip(self.constraints, self.plan.of_policy(policy), strict=True)
+            ),
+            failures=failure_lines(table, policy),
+        )
 
 
 def choose_policy(
     policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
-    scenario: "str | ScenarioConfig" = "warehouse_small",
+    world: WorldLike = "warehouse_small",
     *,
     deliver: float,
     keep: float = 1.0,
@@ -261,8 +286,8 @@ def choose_policy(
 
     Args:
         policies: As in `compare_policies`, one or more.
-        scenario: Name of a preset, or a complete configuration: it says how many robots there are, how long a run is,
-            and what performance is.
+        world: Name of a preset, a complete configuration, or a world with wrappers, which are then in all runs: it says
+            how many robots there are, how long a run is, and what performance is.
         deliver: Performance that an undisturbed run must reach, summed over its intervals, more than 0.
         keep: Share of `deliver` that is still demanded under each disturbance.
         failures: Malfunctions per tick of the whole swarm. Robots stop where they are and are repaired one after the
@@ -280,11 +305,11 @@ def choose_policy(
         CurveError: a demand or a disturbance that is no number above 0, more deaths than robots, or fewer than two
             seeds.
         ValueError: an unknown policy or scenario.
-        swarm_forage_env.runs.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
+        swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
     """
-    plan = plan_choice(
+    question = choice_question(
         policies,
-        scenario,
+        world,
         deliver=deliver,
         keep=keep,
         failures=failures,
@@ -293,12 +318,12 @@ def choose_policy(
         seeds=seeds,
         caches=caches,
     )
-    return run_choice(plan, out=out, jobs=jobs, executor=executor, progress=progress)
+    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)
 
 
-def plan_choice(
+def choice_question(
     policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
-    scenario: "str | ScenarioConfig" = "warehouse_small",
+    world: WorldLike = "warehouse_small",
     *,
     deliver: float,
     keep: float = 1.0,
@@ -307,75 +332,27 @@ def plan_choice(
     noise: float | None = None,
     seeds: int | Sequence[int] = 4,
     caches: str | None = None,
-) -> ChoicePlan:
-    """Return the runs that `choose_policy` makes; arguments and errors as there."""
-    from swarm_forage_env.scenarios.presets import scenario as preset
-    from swarm_forage_env.studies.ladders import Experiment
-
-    chosen = preset(scenario) if isinstance(scenario, str) else scenario
+) -> ChoiceQuestion:
+    """Return what `choose_policy` asks; arguments and errors as there."""
+    chosen = world_of(world)
     given = {"deliver": deliver, "keep": keep, "failures": failures, "deaths": deaths, "noise": noise}
     for name, value in given.items():
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise CurveError(f"Expected {name} as a number above 0, got {value:g}.")
-    if deaths is not None and deaths > chosen.robots.n_robots:
+    if deaths is not None and deaths > chosen.n_robots:
         raise CurveError(
-            f"Expected at most {chosen.robots.n_robots} deaths, one for each robot, got {deaths:g}; "
+            f"Expected at most {chosen.n_robots} deaths, one for each robot, got {deaths:g}; "
             "ask for fewer deaths or more robots."
         )
-    experiments = [Experiment(criterion=UNDISTURBED, value=0.0, scenario=chosen)]
+    worlds = [chosen]
     constraints = [Constraint(condition="undisturbed", demand=deliver)]
     disturbances = {"failures": (failures, _failing), "deaths": (deaths, _dying), "noise": (noise, _noisy)}
-    for name, (strength, experiment) in disturbances.items():
+    for name, (strength, disturbed) in disturbances.items():
         if strength is not None:
-            experiments.append(experiment(chosen, float(strength)))
+            worlds.append(disturbed(chosen, float(strength)))
             constraints.append(Constraint(condition=f"{name} {strength:g}", demand=keep * deliver))
-    runs = plan_conditions(policies, chosen, experiments, seeds=seeds, caches=caches)
-    return ChoicePlan(runs=runs, constraints=tuple(constraints))
-
-
-def run_choice(
-    plan: ChoicePlan,
-    *,
-    out: str | Path | None = None,
-    jobs: int | None = None,
-    executor: "Executor | None" = None,
-    progress: bool = True,
-) -> Choice:
-    """Carry out a plan of `plan_choice`; arguments and errors as in `choose_policy`."""
-    found = run_totals(plan.runs, out=out, jobs=jobs, executor=executor, progress=progress)
-    return rank_policies(found, plan.constraints, plan.runs.scenario)
-
-
-def rank_policies(
-    found: Sequence[PolicyTotals], constraints: Sequence[Constraint], scenario: "ScenarioConfig"
-) -> Choice:
-    """Return the policies in order: most constraints met, then fewest not met, then best undisturbed performance.
-
-    Args:
-        found: Runs of each policy, one condition per constraint.
-        constraints: The undisturbed one first.
-        scenario: Where the runs were made.
-    """
-    from swarm_forage_env.scenarios.performance import quantity
-
-    candidates = [
-        Candidate(
-            policy=one.policy,
-            evidence=tuple(
-                Evidence(constraint=constraint, per_seed=per_seed)
-                for constraint, per_seed in zip(constraints, one.totals, strict=True)
-            ),
-            failures=one.failures,
-        )
-        for one in found
-    ]
-    return Choice(
-        candidates=tuple(sorted(candidates, key=lambda candidate: candidate.order)),
-        scenario=scenario.name,
-        n_robots=scenario.robots.n_robots,
-        horizon_s=scenario.horizon_s,
-        unit=unit_text(quantity(scenario.performance)),
-    )
+    plan = plan_totals(policies, worlds, seeds=seeds, caches=caches)
+    return ChoiceQuestion(plan=plan, constraints=tuple(constraints))
 
 
 def _probability(value: float) -> str:
@@ -395,31 +372,23 @@ def _missing(candidate: Candidate) -> str:
     return f" ({'; '.join(told)})" if told else ""
 
 
-def _failing(scenario: "ScenarioConfig", rate: float) -> "Experiment":
+def _failing(world: World, rate: float) -> World:
     """Malfunctions per tick, and repairs as in the study."""
-    from swarm_forage_env.studies.ladders import Experiment, repairs_per_tick
-    from swarm_forage_env.wrappers.population import PopulationConfig
-
-    repair = repairs_per_tick(rate, scenario.robots.n_robots)
-    config = PopulationConfig(malfunction_per_tick=rate, repair_per_tick=repair)
-    return Experiment(criterion=POPULATION, value=rate, scenario=scenario, wrappers=(config,))
+    repair = repairs_per_tick(rate, world.n_robots)
+    return _with(world, POPULATION, rate, PopulationConfig(malfunction_per_tick=rate, repair_per_tick=repair))
 
 
-def _dying(scenario: "ScenarioConfig", count: float) -> "Experiment":
+def _dying(world: World, count: float) -> World:
     """Deaths per tick, so many that `count` are expected in a run."""
-    from swarm_forage_env.studies.ladders import Experiment
-    from swarm_forage_env.wrappers.population import PopulationConfig
-
-    rate = count / scenario.horizon_ticks
-    return Experiment(
-        criterion=POPULATION, value=rate, scenario=scenario, wrappers=(PopulationConfig(death_per_tick=rate),)
-    )
+    rate = count / world.scenario.horizon_ticks
+    return _with(world, POPULATION, rate, PopulationConfig(death_per_tick=rate))
 
 
-def _noisy(scenario: "ScenarioConfig", sigma: float) -> "Experiment":
+def _noisy(world: World, sigma: float) -> World:
     """Noise of all sensors and wheels, as in scores."""
-    from swarm_forage_env.studies.ladders import Experiment
-    from swarm_forage_env.wrappers.noise import noise_levels
-
     _, noisy = noise_levels(sigma, n_levels=2)
-    return Experiment(criterion=NOISE, value=sigma, scenario=scenario, wrappers=noisy)
+    return _with(world, NOISE, sigma, *noisy)
+
+
+def _with(world: World, criterion: str, value: float, *wrappers: WrapperConfig) -> World:
+    return World(world.scenario, joined_wrappers(world.wrappers, wrappers, criterion), criterion=criterion, value=value)

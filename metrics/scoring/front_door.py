@@ -1,7 +1,6 @@
 """The public functions of scoring: score a policy in a scenario, compare policies, or score curves from a file."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,26 +8,26 @@ from metrics.checks import CurveError
 
 from .columns import THROTTLE
 from .comparison import Comparison, compare_tables
-from .contestants import PolicyLike
 from .curves_file import read_curves
 from .forecast import forecast_population
 from .measures import ScoreForms, check_measures
 from .performance import PerformanceLike, own_performance
-from .plan import plan_scores
-from .runs import run_scores
+from .question import ask
+from .score_question import score_question
 from .study_scores import score_study
 from .table import ScoreTable
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from swarm_forage_env.scenarios.config import ScenarioConfig
+    from swarm_forage_env.runs.policy_spec import PolicyLike
     from swarm_forage_env.studies.ladders import Budget
+    from swarm_forage_env.wrappers.world import WorldLike
 
 
 def score_policy(
-    policy: PolicyLike,
-    scenario: "str | ScenarioConfig" = "warehouse_small",
+    policy: "PolicyLike",
+    world: "WorldLike" = "warehouse_small",
     *,
     measures: Sequence[str] | None = None,
     budget: "str | Budget" = "standard",
@@ -51,7 +50,8 @@ def score_policy(
     Args:
         policy: See `PolicyLike`. Objects, classes and functions are run in this process, one run at a time; objects
             are copied for each run.
-        scenario: Name of a preset, or a complete configuration; its horizon and interval are those of the budget.
+        world: Name of a preset, a complete configuration, or a world with wrappers, which are then in all runs; horizon
+            and interval are those of the budget.
         measures: Names out of `MEASURE_CRITERIA`; default all.
         budget: "quick", "standard", "paper" (`swarm_forage_env.studies.ladders.BUDGETS`), or one of your own.
         seeds: How many, or which; default those of the budget. Experiments share them, so runs are paired.
@@ -80,11 +80,11 @@ def score_policy(
         CurveError: unknown measures, or a performance that is negative or no number.
         ValueError: an unknown policy, performance, scenario, budget, or values that describe no run.
         ImportError: the policy is a model, and stable-baselines3 is not installed.
-        swarm_forage_env.runs.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
+        swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
     """
-    plan = plan_scores(
+    question = score_question(
         {name: policy} if name else [policy],
-        scenario,
+        world,
         measures=measures,
         budget=budget,
         seeds=seeds,
@@ -94,14 +94,14 @@ def score_policy(
         caches=caches,
         density=density,
         disturbance=disturbance,
+        forms=forms,
     )
-    plan = replace(plan, forms=forms or ScoreForms())
-    return run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress)[0]
+    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)[0]
 
 
 def compare_policies(
-    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
-    scenario: "str | ScenarioConfig" = "warehouse_small",
+    policies: "Sequence[PolicyLike] | Mapping[str, PolicyLike]",
+    world: "WorldLike" = "warehouse_small",
     *,
     measures: Sequence[str] | None = None,
     budget: "str | Budget" = "standard",
@@ -121,9 +121,9 @@ def compare_policies(
 
     Args and errors as in `score_policy`; `policies` are two or more, or a mapping from names to policies.
     """
-    plan = plan_scores(
+    question = score_question(
         policies,
-        scenario,
+        world,
         measures=measures,
         budget=budget,
         seeds=seeds,
@@ -132,9 +132,9 @@ def compare_policies(
         caches=caches,
         density=density,
         disturbance=disturbance,
+        forms=forms,
     )
-    plan = replace(plan, forms=forms or ScoreForms())
-    return compare_tables(run_scores(plan, out=out, jobs=jobs, executor=executor, progress=progress))
+    return compare_tables(ask(question, out=out, jobs=jobs, executor=executor, progress=progress))
 
 
 def score_curves(

@@ -12,14 +12,20 @@ from metrics.checks import CurveError
 from metrics.laws import LAWS, MIN_SIZES, SizeLaw
 from metrics.prediction import SizePrediction, predict_performance
 from metrics.statistics import Summary, aggregate
+from swarm_forage_env.runs.policy_spec import PolicyLike
+from swarm_forage_env.runs.table import Table
+from swarm_forage_env.scenarios.performance import quantity
+from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, search_and_rescue
+from swarm_forage_env.scenarios.presets import scenario as preset
+from swarm_forage_env.studies.ladders import SIZE_SWEEP_OBJECTS, size_ladder
+from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 from .columns import SIZE
-from .contestants import PolicyLike
 from .curves_file import read_curves
 from .performance import PerformanceLike
-from .plan import ScoringPlan
+from .question import Question, ask, failure_lines
 from .texts import aligned, bounds, counted, number, paragraph, percent, plain
-from .totals import PolicyTotals, plan_conditions, run_totals, unit_text
+from .totals import plan_totals, run_totals, unit_text
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -175,18 +181,49 @@ class PredictionTable:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PredictionPlan:
-    """The runs of a prediction, and what becomes of each size."""
+class PredictionQuestion(Question[tuple[PredictionTable, ...]]):
+    """The runs of a prediction, one world per size, and what becomes of each size; the answer is a table per policy."""
 
-    runs: ScoringPlan
-    """One experiment per size, those of `fit` and then those of `hold`."""
+    world: World
+    """What the worlds of the plan are variants of."""
     fit: tuple[int, ...]
     hold: tuple[int, ...]
+
+    def answer(self, table: Table) -> tuple[PredictionTable, ...]:
+        """Return one prediction per policy."""
+        return tuple(self._prediction(table, policy.label) for policy in self.plan.policies)
+
+    def _prediction(self, table: Table, policy: str) -> PredictionTable:
+        totals = {
+            condition.world.n_robots: tuple(run_totals(table, condition).values())
+            for condition in self.plan.of_policy(policy)
+        }
+        failures = failure_lines(table, policy)
+        usable = tuple(size for size in self.fit if len(totals[size]) > 1)
+        if len(usable) < MIN_SIZES:
+            raise CurveError(
+                f"Expected two or more finished runs at {MIN_SIZES} or more sizes for {policy}, got them at "
+                f"{len(usable)}; the first failure: {failures[0]}"
+            )
+        scenario = self.world.scenario
+        read_as = quantity(scenario.performance)
+        return _table(
+            policy=policy,
+            scenario=scenario.name,
+            horizon_s=scenario.horizon_s,
+            totals=totals,
+            fit=usable,
+            hold=self.hold,
+            unit=unit_text(read_as, scenario.horizon_s),
+            adds_up=read_as.adds_up,
+            left_out=tuple(size for size in self.fit if size not in usable),
+            failures=failures,
+        )
 
 
 def predict_policy(
     policy: PolicyLike,
-    scenario: "str | ScenarioConfig" = "warehouse_small",
+    world: WorldLike = "warehouse_small",
     *,
     fit: Sequence[int] | None = None,
     hold: Sequence[int] = (),
@@ -203,8 +240,9 @@ def predict_policy(
 
     Args:
         policy: See `PolicyLike`.
-        scenario: Name of a preset, or a complete configuration. As in scores, warehouses have enough objects for the
-            largest swarm, and the arena of search and rescue grows with the swarm. It names the performance, too.
+        world: Name of a preset, a complete configuration, or a world with wrappers, which are then in all runs. As in
+            scores, warehouses have enough objects for the largest swarm, and the arena of search and rescue grows with
+            the swarm. It names the performance, too.
         fit: Swarm sizes that are fitted, `MIN_SIZES` or more; default see `fit_sizes`.
         hold: Larger sizes that are run, too, and not fitted.
         seeds: How many, at least two, or which.
@@ -219,41 +257,39 @@ def predict_policy(
     Raises:
         CurveError: too few sizes, sizes that are not rising or do not exist, too few runs that did not fail.
         ValueError: an unknown policy or scenario.
-        swarm_forage_env.runs.runner.StudyInterrupted: Ctrl-C; finished runs are in `out`.
+        swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
     """
-    plan = plan_prediction(
+    question = prediction_question(
         {name: policy} if name else [policy],
-        scenario,
+        world,
         fit=fit,
         hold=hold,
         seeds=seeds,
         parameters=parameters,
         caches=caches,
     )
-    return run_predictions(plan, out=out, jobs=jobs, executor=executor, progress=progress)[0]
+    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)[0]
 
 
-def plan_prediction(
+def prediction_question(
     policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
-    scenario: "str | ScenarioConfig" = "warehouse_small",
+    world: WorldLike = "warehouse_small",
     *,
     fit: Sequence[int] | None = None,
     hold: Sequence[int] = (),
     seeds: int | Sequence[int] = 4,
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
-) -> PredictionPlan:
-    """Return the runs that `predict_policy` makes; arguments and errors as there."""
-    from swarm_forage_env.scenarios.presets import scenario as preset
-    from swarm_forage_env.studies.ladders import Experiment
-
-    chosen = preset(scenario) if isinstance(scenario, str) else scenario
-    fitted, held = _checked_sizes(fit_sizes(chosen) if fit is None else fit, hold)
-    experiments = [
-        Experiment(criterion=SIZE, value=size, scenario=_with_robots(chosen, size)) for size in (*fitted, *held)
+) -> PredictionQuestion:
+    """Return what `predict_policy` asks; arguments and errors as there."""
+    chosen = world_of(world)
+    fitted, held = _checked_sizes(fit_sizes(chosen.scenario) if fit is None else fit, hold)
+    worlds = [
+        World(_with_robots(chosen.scenario, size), chosen.wrappers, criterion=SIZE, value=size)
+        for size in (*fitted, *held)
     ]
-    runs = plan_conditions(policies, chosen, experiments, seeds=seeds, parameters=parameters, caches=caches)
-    return PredictionPlan(runs=runs, fit=fitted, hold=held)
+    plan = plan_totals(policies, worlds, seeds=seeds, parameters=parameters, caches=caches)
+    return PredictionQuestion(plan=plan, world=chosen, fit=fitted, hold=held)
 
 
 def fit_sizes(scenario: "ScenarioConfig") -> tuple[int, ...]:
@@ -264,19 +300,6 @@ def fit_sizes(scenario: "ScenarioConfig") -> tuple[int, ...]:
     if scenario.objects.placement != "power_law":
         return FIT_SIZES
     return tuple(size for size in sorted(_growing_worlds(scenario)) if size > 1)[:N_ARENAS]
-
-
-def run_predictions(
-    plan: PredictionPlan,
-    *,
-    out: str | Path | None = None,
-    jobs: int | None = None,
-    executor: "Executor | None" = None,
-    progress: bool = True,
-) -> tuple[PredictionTable, ...]:
-    """Carry out a plan of `plan_prediction` and return one table per policy; arguments and errors as there."""
-    found = run_totals(plan.runs, out=out, jobs=jobs, executor=executor, progress=progress)
-    return tuple(_table_of_runs(plan, totals) for totals in found)
 
 
 def predict_curves(
@@ -365,9 +388,6 @@ def _with_robots(scenario: "ScenarioConfig", n_robots: int) -> "ScenarioConfig":
                 f"{', '.join(map(str, sorted(worlds)))}, got {n_robots}."
             )
         return worlds[n_robots]
-    from swarm_forage_env.scenarios.presets import scenario as preset
-    from swarm_forage_env.studies.ladders import SIZE_SWEEP_OBJECTS
-
     objects = scenario.objects
     enough = SIZE_SWEEP_OBJECTS.get(scenario.name)
     if enough is not None and objects.n_objects == preset(scenario.name).objects.n_objects:
@@ -377,9 +397,6 @@ def _with_robots(scenario: "ScenarioConfig", n_robots: int) -> "ScenarioConfig":
 
 def _growing_worlds(scenario: "ScenarioConfig") -> "dict[int, ScenarioConfig]":
     """Return the worlds of power-law clusters by swarm size: one robot in the smallest arena, and all arenas filled."""
-    from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, search_and_rescue
-    from swarm_forage_env.studies.ladders import size_ladder
-
     series = [search_and_rescue(side_m=float(side)) for side in SEARCH_AND_RESCUE_OBJECTS]
     if (scenario.arena, scenario.objects.n_objects) not in [(each.arena, each.objects.n_objects) for each in series]:
         raise CurveError(
@@ -389,30 +406,6 @@ def _growing_worlds(scenario: "ScenarioConfig") -> "dict[int, ScenarioConfig]":
     # The ladder goes by the name of the preset, not by the placement.
     ladder = size_ladder(replace(scenario, name="search_and_rescue"), None)
     return {world.robots.n_robots: replace(world, name=scenario.name) for world in ladder}
-
-
-def _table_of_runs(plan: PredictionPlan, found: PolicyTotals) -> PredictionTable:
-    sizes = (*plan.fit, *plan.hold)
-    totals = {size: tuple(of_seeds.values()) for size, of_seeds in zip(sizes, found.totals, strict=True)}
-    usable = tuple(size for size in plan.fit if len(totals[size]) > 1)
-    if len(usable) < MIN_SIZES:
-        raise CurveError(
-            f"Expected two or more finished runs at {MIN_SIZES} or more sizes for {found.policy}, got them at "
-            f"{len(usable)}; the first failure: {found.failures[0]}"
-        )
-    scenario = plan.runs.scenario
-    return _table(
-        policy=found.policy,
-        scenario=scenario.name,
-        horizon_s=scenario.horizon_s,
-        totals=totals,
-        fit=usable,
-        hold=plan.hold,
-        unit=unit_text(plan.runs.read_as, scenario.horizon_s),
-        adds_up=plan.runs.read_as.adds_up,
-        left_out=tuple(size for size in plan.fit if size not in usable),
-        failures=found.failures,
-    )
 
 
 def _table(

@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
+from swarm_forage_env.scenarios.performance import PERFORMANCE_COLUMNS, performance_curve, quantity
+from swarm_forage_env.studies.study import value_words
 
 from .columns import INTERVAL_COLUMNS, SIZE
-from .runs import rates_of
+from .runs import run_curves, study_curves
 from .studies import RunCurves, StudyCurves
 
 if TYPE_CHECKING:
@@ -47,9 +48,6 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
     Raises:
         ValueError: no such performance.
     """
-    from swarm_forage_env.scenarios.performance import quantity
-    from swarm_forage_env.studies.study import value_words
-
     spec = table.spec
     names = [axis.name for axis in spec.axes[:-1]]
     words = [value_words(axis.values) for axis in spec.axes[:-1]]
@@ -59,9 +57,8 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
     lines: list[StudyLine] = []
     for cells in cells_of.values():
         first = cells[0]
-        read_as = quantity(performance or spec.experiment(first).scenario.performance)
+        read_as = quantity(performance or spec.world(first).scenario.performance)
         experiments = tuple(_runs(table, cell, performance) for cell in cells)
-        n_intervals = round(spec.horizon_s / spec.interval_s)
         lines.append(
             StudyLine(
                 reading=first.reading,
@@ -69,13 +66,11 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
                 others=dict(zip(names, first.values, strict=False)),
                 words={name: of[value] for name, of, value in zip(names, words, first.values, strict=False)},
                 cells=tuple(cells),
-                curves=StudyCurves(
+                curves=study_curves(
+                    experiments,
+                    spec.world(first),
                     controller=first.policy,
-                    experiments=experiments,
-                    t_end_s=spec.interval_s * np.arange(1.0, n_intervals + 1.0),
-                    amount=read_as.amount,
-                    is_total=read_as.is_total,
-                    adds_up=read_as.adds_up,
+                    read_as=read_as,
                     reference_value=_reference_value(table, cells),
                     where=f"study {spec.name}",
                 ),
@@ -86,27 +81,15 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
 
 def _runs(table: "StudyTable", cell: "Cell", performance: str | None) -> RunCurves:
     """The finished runs of a cell."""
-    from swarm_forage_env.scenarios.performance import PERFORMANCE_COLUMNS, performance_curve
-
-    experiment = table.spec.experiment(cell)
     seeds, columns = table.curves(cell, *{*INTERVAL_COLUMNS, *PERFORMANCE_COLUMNS})
-    curves = {name: curve for name, curve in columns.items() if name in INTERVAL_COLUMNS}
     if performance is not None and seeds:
-        curves["performance"] = performance_curve(performance, columns)
-    return RunCurves(
-        criterion=experiment.criterion,
-        value=experiment.value,
-        n_robots=experiment.scenario.robots.n_robots,
-        seeds=seeds,
-        curves=curves,
-        rates=rates_of(experiment),
-        n_planned=len(table.spec.seeds),
-    )
+        columns["performance"] = performance_curve(performance, columns)
+    return run_curves(table.spec.world(cell), (seeds, columns), len(table.spec.seeds))
 
 
 def _reference_value(table: "StudyTable", cells: "list[Cell]") -> float:
     """Value of the criterion at the reference of a line; sizes have no other reference than each other."""
     reference = table.spec.reference_of(cells[0])
-    if reference is None or table.spec.experiment(reference).criterion == SIZE:
+    if reference is None or table.spec.world(reference).criterion == SIZE:
         return 0.0
-    return table.spec.experiment(reference).value
+    return table.spec.world(reference).value

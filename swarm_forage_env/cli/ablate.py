@@ -63,32 +63,22 @@ def ablate(
 def _plan(
     described: Sequence[World], policies: Sequence[str], quirks: str, seeds: int, caches: str | None
 ) -> "Ablation":
-    from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.cli.scenario_options import described_world, split_names
     from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
     from swarm_forage_env.studies.ablation import plan_ablation
+    from swarm_forage_env.wrappers.world import World
 
-    worlds = [described_world(one) for one in described]
+    worlds = [World(scenario, wrappers) for scenario, _, wrappers in map(described_world, described)]
     every = {"all": QUIRK_NAMES, "none": ()}
     switched = every[quirks] if quirks in every else split_names(quirks)
-    try:
-        return plan_ablation(
-            [world for world, _, _ in worlds],
-            policies,
-            quirks=switched,
-            seeds=range(seeds),
-            caches=caches,
-            wrappers=worlds[0][2],
-        )
-    except ValueError as error:  # of a policy
-        raise ConfigError(str(error)) from error
+    return plan_ablation(worlds, policies, quirks=switched, seeds=range(seeds), caches=caches)
 
 
 def _show_plan(plan: "Ablation", store: "RunStore", seeds: int, jobs: int | None) -> None:
     from swarm_forage_env.cli.report import estimated_seconds, plan_note
     from swarm_forage_env.runs.runner import available_cores
 
-    todo = [spec for spec in plan.all if spec.run_id not in store]
+    todo = [spec for spec in plan.specs if spec.run_id not in store]
     processes = jobs or available_cores()
     note = plan_note(todo, estimated_seconds(todo, processes), processes)
     typer.echo(f"At most {note} A quirk that changes nothing needs one run instead of {seeds}.")
@@ -103,7 +93,7 @@ def _run(plan: "Ablation", store: "RunStore", jobs: int | None, *, as_json: bool
     with resumable(store.folder):
         result = run_ablation(plan, store=store, jobs=jobs, progress=True)
     show = ablation_json if as_json else ablation_pages
-    typer.echo(show(result, quantity(plan.all[0].scenario.performance)))
+    typer.echo(show(result, quantity(plan.specs[0].scenario.performance)))
     for failure in result.failures:
         typer.echo(f"failed: {failure.spec.describe()}: {failure.error}", err=True)
     if result.failures:

@@ -14,7 +14,7 @@ from swarm_forage_env.cli.report import performance_number, span
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.performance import Quantity
 from swarm_forage_env.scenarios.quirks import READINGS
-from swarm_forage_env.studies.ablation import TASK_COLUMNS, AblationResult, Cell, Effect
+from swarm_forage_env.studies.ablation import TASK_COLUMNS, AblationResult, Effect, Switch
 
 CLOSE = 0.05
 """Policies whose means differ by a smaller share count as equal in an order (our choice)."""
@@ -31,23 +31,23 @@ def ablation_pages(result: AblationResult, performance: Quantity) -> str:
     """Return all tables as Markdown: the two readings side by side, then what each quirk moves."""
     effects = result.effects()
     parts = [_readings(result, performance), *([_NOTES] if effects else [])]
-    for scenario in dict.fromkeys(cell.scenario for cell in result.records):
+    for scenario in dict.fromkeys(switch.scenario for switch in result.records):
         for reading in READINGS:
-            own = [e for e in effects if (e.cell.scenario, e.cell.reading) == (scenario, reading)]
+            own = [e for e in effects if (e.switch.scenario, e.switch.reading) == (scenario, reading)]
             moving = [effect for effect in own if not effect.is_same]
             if own and not moving:
                 parts.append(f"**{scenario}: each quirk {_SWITCHED[reading]}**\n\nNone changes a first run.")
             if moving:
-                parts += _tables(result, own, {effect.cell.quirk for effect in moving})
+                parts += _tables(result, own, {effect.switch.quirk for effect in moving})
     return "\n\n".join(parts)
 
 
 def ablation_json(result: AblationResult, performance: Quantity) -> str:
     """Return readings, effects and failures as a JSON document."""
     readings = [
-        {**cell._asdict(), "n_runs": len(records), **dict(zip(("performance", "interference"), numbers, strict=True))}
-        for cell, records in result.records.items()
-        if not cell.quirk
+        {**switch._asdict(), "n_runs": len(records), **dict(zip(("performance", "interference"), numbers, strict=True))}
+        for switch, records in result.records.items()
+        if not switch.quirk
         for numbers in [_numbers(records, performance)]
     ]
     failures = [{"run": failure.spec.describe(), "error": failure.error} for failure in result.failures]
@@ -71,7 +71,7 @@ def _plain(effect: Effect) -> dict[str, Any]:
         for name, values in rows.items()
         for summary in [aggregate(values)]
     }
-    return {**effect.cell._asdict(), "is_same": effect.is_same, "n_runs": len(effect.performance), **numbers}
+    return {**effect.switch._asdict(), "is_same": effect.is_same, "n_runs": len(effect.performance), **numbers}
 
 
 def _numbers(records: Sequence[Any], performance: Quantity) -> tuple[float, float]:
@@ -85,13 +85,13 @@ def _readings(result: AblationResult, performance: Quantity) -> str:
         "| world | robots | policy | described: performance | program | described: interference | program |",
         "|---|--:|---|--:|--:|--:|--:|",
     ]
-    for cell, records in result.records.items():
-        twin = result.records.get(cell._replace(reading="AUTHORS_PROGRAM"))
-        if cell.quirk or cell.reading != "DESCRIBED" or twin is None:
+    for switch, records in result.records.items():
+        twin = result.records.get(switch._replace(reading="AUTHORS_PROGRAM"))
+        if switch.quirk or switch.reading != "DESCRIBED" or twin is None:
             continue
         (done, lost), (done_there, lost_there) = (_numbers(own, performance) for own in (records, twin))
         numbers = f"{done:.1f} | {done_there:.1f} | {lost:.3f} | {lost_there:.3f}"
-        lines.append(f"| {cell.scenario} | {cell.n_robots} | {cell.policy} | {numbers} |")
+        lines.append(f"| {switch.scenario} | {switch.n_robots} | {switch.policy} | {numbers} |")
     title = (
         f"**Both readings.** {performance.title.capitalize()} {span(performance)}, share of robot time in interference"
     )
@@ -100,8 +100,8 @@ def _readings(result: AblationResult, performance: Quantity) -> str:
 
 def _tables(result: AblationResult, effects: Sequence[Effect], moving: set[str]) -> list[str]:
     """Tables of one world and reading: performance with orders, interference, tasks."""
-    some = effects[0].cell
-    sizes = sorted({effect.cell.n_robots for effect in effects})
+    some = effects[0].switch
+    sizes = sorted({effect.switch.n_robots for effect in effects})
     order = [f"order at {size}: {_order(result, some._replace(n_robots=size, quirk=''))}" for size in sizes]
     head = f"{some.scenario}, each quirk {_SWITCHED[some.reading]}"
     orders = {
@@ -110,7 +110,7 @@ def _tables(result: AblationResult, effects: Sequence[Effect], moving: set[str])
         }
         for size in sizes
     }
-    own = [effect for effect in effects if effect.cell.quirk in moving]
+    own = [effect for effect in effects if effect.switch.quirk in moving]
     tables = [
         f"**{head}: performance, % of the reading's** ({'; '.join(order)})\n\n"
         + _table(own, _starred(own, "performance"), orders),
@@ -123,26 +123,26 @@ def _tables(result: AblationResult, effects: Sequence[Effect], moving: set[str])
 
 def _table(effects: Sequence[Effect], text: Callable[[Effect], str], more: dict[str, dict[str, str]]) -> str:
     """One row per quirk, one column per size and policy, and further columns by quirk."""
-    policies = list(dict.fromkeys(e.cell.policy for e in effects))
-    columns = [(size, policy) for size in sorted({e.cell.n_robots for e in effects}) for policy in policies]
+    policies = list(dict.fromkeys(e.switch.policy for e in effects))
+    columns = [(size, policy) for size in sorted({e.switch.n_robots for e in effects}) for policy in policies]
     rows = [["quirk", *(f"{policy} {size}" for size, policy in columns), *more]]
     rows.append(["---", *("--:" for _ in columns), *("---" for _ in more)])
-    texts = {(e.cell.quirk, e.cell.n_robots, e.cell.policy): text(e) for e in effects}
-    for quirk in dict.fromkeys(e.cell.quirk for e in effects):
+    texts = {(e.switch.quirk, e.switch.n_robots, e.switch.policy): text(e) for e in effects}
+    for quirk in dict.fromkeys(e.switch.quirk for e in effects):
         cells = [texts.get((quirk, *column), "-") for column in columns]
         rows.append([f"`{quirk}`", *cells, *(column[quirk] for column in more.values())])
     return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
 
-def _order(result: AblationResult, cell: Cell) -> str:
+def _order(result: AblationResult, switch: Switch) -> str:
     """Policies, best first; those with close means are joined by "~"."""
-    means = result.means(cell)
+    means = result.means(switch)
     joints = [" ~ " if worse >= (1.0 - CLOSE) * better else " > " for better, worse in pairwise(means.values())]
     return "".join(name + joint for name, joint in zip(means, [*joints, ""], strict=True))
 
 
-def _changed_order(result: AblationResult, cell: Cell) -> str:
-    order, before = _order(result, cell), _order(result, cell._replace(quirk=""))
+def _changed_order(result: AblationResult, switch: Switch) -> str:
+    order, before = _order(result, switch), _order(result, switch._replace(quirk=""))
     return "as before" if order == before else order
 
 
@@ -151,8 +151,8 @@ def _starred(effects: Sequence[Effect], quantity: str) -> Callable[[Effect], str
     columns: dict[tuple[int, str], list[Effect]] = {}
     for effect in effects:
         if not effect.is_same:
-            columns.setdefault((effect.cell.n_robots, effect.cell.policy), []).append(effect)
-    cells = [effect.cell for column in columns.values() for effect in column]
+            columns.setdefault((effect.switch.n_robots, effect.switch.policy), []).append(effect)
+    cells = [effect.switch for column in columns.values() for effect in column]
     p_values = [pooled_p(np.array([getattr(effect, quantity) for effect in column])) for column in columns.values()]
     adjusted = dict(zip(cells, holm(np.concatenate(p_values)) if p_values else (), strict=True))
 
@@ -160,7 +160,7 @@ def _starred(effects: Sequence[Effect], quantity: str) -> Callable[[Effect], str
         mean = float(getattr(effect, quantity).mean())
         if effect.is_same or np.isnan(mean):
             return "=" if effect.is_same else "-"
-        return f"{100.0 * mean:+.1f}" + ("*" if adjusted[effect.cell] <= ALPHA else "")
+        return f"{100.0 * mean:+.1f}" + ("*" if adjusted[effect.switch] <= ALPHA else "")
 
     return text
 

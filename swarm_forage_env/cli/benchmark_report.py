@@ -14,10 +14,10 @@ import typer
 from metrics.benchmark.entry import Entry, Training, read_entry
 from metrics.benchmark.page import BOARD_HEADER, board_rows, details_page, page_block, sorted_standings, with_block
 from metrics.benchmark.protocol import BenchmarkError, Protocol, load_protocol, scenario_fields
-from metrics.benchmark.running import benchmark_specs, run_benchmark
+from metrics.benchmark.running import BenchmarkQuestion, benchmark_question
 from metrics.benchmark.standing import SCRIPTED, Reference, Standing, reference_of, scripted_entries, standing_of
+from metrics.scoring.question import ask
 from metrics.scoring.texts import aligned, counted, plain
-from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.printable import printable
 from swarm_forage_env.cli.interrupts import resumable
@@ -25,7 +25,6 @@ from swarm_forage_env.cli.report import estimate, estimated_seconds
 from swarm_forage_env.policies.mixture import is_mixture, mixture_of, mixture_parts
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_label
 from swarm_forage_env.runs.runner import available_cores
-from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunStore
 
 
@@ -69,26 +68,11 @@ def run_and_show(wanted: Wanted, file: Path | None, records: Path, jobs: int | N
         BenchmarkError: runs failed, the name is that of a scripted controller, or one of their entries is missing.
     """
     protocol = load_protocol(quick=wanted.quick)
-    _planned(wanted, protocol)  # refuses what cannot be run, before anything is
+    question = _question(wanted, protocol)  # refuses what cannot be run, before anything is
     if not wanted.is_scripted:
         scripted_entries(load_protocol())  # what it will be shown beside
-    training = Training(
-        worlds=wanted.trained_in,
-        command=wanted.training,
-        library=wanted.library,
-        core_hours=wanted.training_hours,
-    )
     with resumable(records):
-        entry = run_benchmark(
-            wanted.policies,
-            name=wanted.name,
-            protocol=protocol,
-            command=wanted.command,
-            training=training,
-            training_seeds=wanted.training_seeds,
-            out=records,
-            jobs=jobs,
-        )
+        entry = ask(question, out=records, jobs=jobs)
     if file is not None:
         entry.write(file)
         typer.echo(f"entry {file}", err=True)
@@ -138,7 +122,7 @@ def plan_text(wanted: Wanted, records: Path, jobs: int | None) -> str:
     """
     protocol = load_protocol(quick=wanted.quick)
     store = RunStore(records)
-    specs = _planned(wanted, protocol)
+    specs = _question(wanted, protocol).plan.specs
     todo = [spec for spec in specs if spec.run_id not in store]
     processes = jobs or available_cores()
     seconds = estimated_seconds(todo, processes)
@@ -151,8 +135,8 @@ def plan_text(wanted: Wanted, records: Path, jobs: int | None) -> str:
     )
 
 
-def _planned(wanted: Wanted, protocol: Protocol) -> list[RunSpec]:
-    """Return all runs.
+def _question(wanted: Wanted, protocol: Protocol) -> BenchmarkQuestion:
+    """Return what is asked.
 
     Raises:
         ConfigError: an unknown policy, or a file that cannot be opened.
@@ -163,10 +147,19 @@ def _planned(wanted: Wanted, protocol: Protocol) -> list[RunSpec]:
             f"Expected another name than {wanted.name!r}, which is that of an entry that comes with the package; "
             "choose one with --name."
         )
-    try:
-        return [spec for policy in wanted.policies for spec in benchmark_specs(policy, protocol)]
-    except ValueError as error:  # of a policy or its file
-        raise ConfigError(str(error)) from error
+    return benchmark_question(
+        wanted.policies,
+        name=wanted.name,
+        protocol=protocol,
+        command=wanted.command,
+        training=Training(
+            worlds=wanted.trained_in,
+            command=wanted.training,
+            library=wanted.library,
+            core_hours=wanted.training_hours,
+        ),
+        training_seeds=wanted.training_seeds,
+    )
 
 
 def worlds_text() -> str:

@@ -45,7 +45,7 @@ def compare(
 ) -> None:
     """Score policies in the same experiments, seed by seed, and say which differences are significant."""
     from swarm_forage_env.cli.scenario_options import default_folder
-    from swarm_forage_env.cli.score_options import ScoreOptions, build_plan
+    from swarm_forage_env.cli.score_options import ScoreOptions, build_question
     from swarm_forage_env.cli.score_report import run_and_show
 
     options = ScoreOptions(
@@ -58,6 +58,6 @@ def compare(
         horizon=horizon,
         disturbance=disturbance,
     )
-    plan = build_plan(described, options, at_least=2)
+    question = build_question(described, options, at_least=2)
     folder = out or default_folder(described.scenario)
-    run_and_show(plan, folder, "comparison.png", jobs, as_json=as_json, dry_run=dry_run, band=band)
+    run_and_show(question, folder, "comparison.png", jobs, as_json=as_json, dry_run=dry_run, band=band)

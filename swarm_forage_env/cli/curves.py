@@ -106,7 +106,7 @@ def _levels(curve: "TrainingCurve", names: Sequence[str], jobs: int | None) -> d
     import numpy as np
 
     from swarm_forage_env._internal.fields import ConfigError
-    from swarm_forage_env.runs.runner import run_all
+    from swarm_forage_env.runs.runner import run_specs
     from swarm_forage_env.runs.spec import plan_run
 
     judged = curve.plan.judging_runs("policy")
@@ -117,10 +117,11 @@ def _levels(curve: "TrainingCurve", names: Sequence[str], jobs: int | None) -> d
         }
     except ValueError as error:  # an unknown policy, or a file that cannot be opened
         raise ConfigError(str(error)) from error
-    result = run_all([spec for specs in planned.values() for spec in specs], jobs=jobs, progress=bool(names))
+    result = run_specs([spec for specs in planned.values() for spec in specs], jobs=jobs, progress=bool(names))
     if result.failures:
-        raise ConfigError(f"Expected runs of {', '.join(names)} beside the training, got {result.failures[0].error}")
-    records = {record.run_id: record for record in result.records}
+        first = next(iter(result.failures.values()))
+        raise ConfigError(f"Expected runs of {', '.join(names)} beside the training, got {first.error}")
+    records = result.records
     rates = {
         name: [records[spec.run_id].rate_per_1000_s("performance") for spec in specs] for name, specs in planned.items()
     }

@@ -8,21 +8,21 @@ from typing import TypeVar
 
 import typer
 
-from metrics.scoring import ScoringPlan
-from metrics.scoring.choosing import plan_choice, run_choice
+from metrics.scoring.choosing import choice_question
 from metrics.scoring.prediction import (
     PredictionTable,
     counted_inside,
-    plan_prediction,
     predict_curves,
-    run_predictions,
+    prediction_question,
 )
 from metrics.scoring.prediction_plots import draw_predictions
+from metrics.scoring.question import ask
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.interrupts import resumable
 from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture
 from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
 from swarm_forage_env.cli.score_report import plan_json, plan_text
+from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.runner import available_cores
 from swarm_forage_env.runs.store import RunStore
 
@@ -63,13 +63,13 @@ def predict_runs(
         raise ConfigError("Expected no --set n_robots=..., because sizes are varied; give them by --fit and --hold.")
     scenario, caches = build_scenario(described)
     try:
-        plan = plan_prediction(split_names(policies), scenario, fit=fit, hold=hold, seeds=seeds, caches=caches)
+        question = prediction_question(split_names(policies), scenario, fit=fit, hold=hold, seeds=seeds, caches=caches)
     except ValueError as error:  # of a policy or a size
         raise ConfigError(str(error)) from error
     if dry_run:
-        _show_plan(plan.runs, folder, jobs, as_json=as_json)
+        _show_plan(question.plan, question.world.scenario.name, folder, jobs, as_json=as_json)
         return
-    tables = _carried_out(lambda: run_predictions(plan, out=folder, jobs=jobs), folder)
+    tables = _carried_out(lambda: ask(question, out=folder, jobs=jobs), folder)
     _show_predictions(tables, folder, as_json=as_json)
     if any(table.failures for table in tables):
         raise typer.Exit(EXIT_FAILURE)
@@ -115,21 +115,24 @@ def choose_runs(
     """
     scenario, caches = build_scenario(described)
     try:
-        plan = plan_choice(split_names(policies), scenario, seeds=seeds, caches=caches, **asdict(demands))
+        question = choice_question(split_names(policies), scenario, seeds=seeds, caches=caches, **asdict(demands))
     except ValueError as error:  # of a policy or a demand
         raise ConfigError(str(error)) from error
     if dry_run:
-        _show_plan(plan.runs, folder, jobs, as_json=as_json)
+        _show_plan(question.plan, scenario.name, folder, jobs, as_json=as_json)
         return
-    choice = _carried_out(lambda: run_choice(plan, out=folder, jobs=jobs), folder)
+    choice = _carried_out(lambda: ask(question, out=folder, jobs=jobs), folder)
     typer.echo(json.dumps(choice.to_mapping(), indent=1) if as_json else str(choice))
     if any(candidate.failures for candidate in choice.candidates):
         raise typer.Exit(EXIT_FAILURE)
 
 
-def _show_plan(plan: ScoringPlan, folder: Path, jobs: int | None, *, as_json: bool) -> None:
-    show = plan_json if as_json else plan_text
-    typer.echo(show(plan, RunStore(folder), jobs or available_cores()))
+def _show_plan(plan: Plan, scenario: str, folder: Path, jobs: int | None, *, as_json: bool) -> None:
+    store, processes = RunStore(folder), jobs or available_cores()
+    if as_json:
+        typer.echo(plan_json(plan, ("raw_performance",), store, processes))
+    else:
+        typer.echo(plan_text(plan, scenario, "", store, processes))
 
 
 def _carried_out(run: Callable[[], _Result], folder: Path) -> _Result:

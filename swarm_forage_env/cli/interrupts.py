@@ -12,7 +12,7 @@ from typing import Any
 import typer
 
 from swarm_forage_env.cli.options import EXIT_INTERRUPTED, complain
-from swarm_forage_env.runs.runner import StudyInterrupted
+from swarm_forage_env.runs.runner import RunsInterrupted
 
 AGAIN_S = 0.2
 """When an interrupt that was lost is sent again; our choice: soon, and late enough to be elsewhere."""
@@ -68,6 +68,6 @@ def resumable(folder: Path) -> Iterator[None]:
     """Turn Ctrl-C in a study into one line that says where its runs are, and the exit code of an interrupt."""
     try:
         yield
-    except StudyInterrupted as interrupt:
+    except RunsInterrupted as interrupt:
         complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
         raise typer.Exit(EXIT_INTERRUPTED) from None

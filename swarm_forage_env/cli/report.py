@@ -18,7 +18,7 @@ from swarm_forage_env.policies.registry import part_labels
 from swarm_forage_env.rendering.plots import Curve, draw_curves
 from swarm_forage_env.runs.progress import duration
 from swarm_forage_env.runs.record import RunRecord
-from swarm_forage_env.runs.runner import StudyResult
+from swarm_forage_env.runs.runner import Outcomes
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.scenarios.kinds import kind_sizes
@@ -211,7 +211,7 @@ def plan_json(specs: Sequence[RunSpec], store: RunStore, seconds: float) -> str:
     return json.dumps({"out": str(store.folder), "estimated_wall_s": seconds, "runs": runs}, indent=1)
 
 
-def results_json(specs: Sequence[RunSpec], result: StudyResult, store: RunStore, plot: Path | None) -> str:
+def results_json(specs: Sequence[RunSpec], result: Outcomes, store: RunStore, plot: Path | None) -> str:
     """Return the results as a JSON document; numbers that do not exist are null."""
     read_as = quantity(specs[0].scenario.performance)
     runs = [
@@ -224,18 +224,18 @@ def results_json(specs: Sequence[RunSpec], result: StudyResult, store: RunStore,
             "wall_time_s": record.wall_time_s,
             "file": str(store.path(record.run_id)),
         }
-        for record in result.records
+        for record in result.records.values()
     ]
     failures = [
         {"run_id": failure.run_id, "error": failure.error, "file": str(store.failure_path(failure.run_id))}
-        for failure in result.failures
+        for failure in result.failures.values()
     ]
     document = {
         "scenario": specs[0].scenario.name,
         "performance": {"name": read_as.name, "unit": read_as.unit, "is_per_1000_s": read_as.is_total},
         "out": str(store.folder),
         "plot": None if plot is None else str(plot),
-        "controllers": [asdict(summary) for summary in summarize(specs, result.records)],
+        "controllers": [asdict(summary) for summary in summarize(specs, [*result.records.values()])],
         "runs": runs,
         "failures": failures,
     }

@@ -10,7 +10,7 @@ from swarm_forage_env.cli.terminal import notes, output
 from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
-    from swarm_forage_env.runs.runner import StudyResult
+    from swarm_forage_env.runs.runner import Outcomes
     from swarm_forage_env.runs.spec import RunSpec
     from swarm_forage_env.runs.store import RunStore
 
@@ -70,15 +70,15 @@ def _show_plan(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None
         console.print(plan_note(todo, seconds, processes))
 
 
-def _run_specs(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None) -> "StudyResult":
+def _run_specs(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None) -> "Outcomes":
     from swarm_forage_env.cli.interrupts import resumable
-    from swarm_forage_env.runs.runner import run_all
+    from swarm_forage_env.runs.runner import run_specs
 
     with resumable(store.folder):
-        return run_all(specs, store=store, jobs=jobs, progress=True)
+        return run_specs(specs, store=store, jobs=jobs, progress=True)
 
 
-def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "RunStore", *, as_json: bool) -> None:
+def _show_results(specs: "tuple[RunSpec, ...]", result: "Outcomes", store: "RunStore", *, as_json: bool) -> None:
     from metrics.scoring.texts import counted
     from swarm_forage_env.cli.report import draw_performance, results_json, results_table, summarize
 
@@ -87,7 +87,7 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
     if result.records:
         plot = store.folder / "performance.png"
         try:
-            draw_performance(specs, result.records, plot)
+            draw_performance(specs, [*result.records.values()], plot)
         except ImportError as error:
             plot = None
             aside.print(str(error))
@@ -97,11 +97,11 @@ def _show_results(specs: "tuple[RunSpec, ...]", result: "StudyResult", store: "R
     if as_json:
         typer.echo(results_json(specs, result, store, plot))
     elif result.records:
-        output().print(results_table(specs, summarize(specs, result.records)))
+        output().print(results_table(specs, summarize(specs, [*result.records.values()])))
         aside.print(
             f"{counted(len(result.records), 'record')} in {store.folder}" + (f", picture {plot}" if plot else "")
         )
-    for failure in result.failures:
+    for failure in result.failures.values():
         aside.print(f"failed: {failure.spec.describe()}: {failure.error}")
         aside.print(f"  again, alone: swarm-forage rerun {store.failure_path(failure.run_id)}")
     if result.failures:

@@ -53,7 +53,7 @@ def score(
     the folder holds already are not repeated.
     """
     from swarm_forage_env.cli.scenario_options import default_folder
-    from swarm_forage_env.cli.score_options import ScoreOptions, build_plan, score_forms, tables_of_file
+    from swarm_forage_env.cli.score_options import ScoreOptions, build_question, score_forms, tables_of_file
     from swarm_forage_env.cli.score_report import run_and_show, show_scores
 
     if (policy is None) == (curves is None):
@@ -74,5 +74,5 @@ def score(
         disturbance=disturbance,
     )
     folder = out or default_folder(described.scenario)
-    plan = build_plan(described, options, at_most=1)
-    run_and_show(plan, folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run, band=band)
+    question = build_question(described, options, at_most=1)
+    run_and_show(question, folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run, band=band)

@@ -1,10 +1,10 @@
 """From the words after `score` and `compare` to a plan."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from metrics.scoring import ScoreForms, ScoringPlan, plan_scores, score_curves
+from metrics.scoring import ScoreForms, ScoreQuestion, score_curves, score_question
 from metrics.scoring.table import ScoreTable
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, parsed_density, split_names
@@ -27,10 +27,10 @@ class ScoreOptions:
     disturbance: str = "throttle"
 
 
-def build_plan(
+def build_question(
     described: ScenarioOptions, options: ScoreOptions, *, at_least: int = 1, at_most: int | None = None
-) -> ScoringPlan:
-    """Return the plan that the options describe.
+) -> ScoreQuestion:
+    """Return the question that the options describe.
 
     Args:
         described: Options of the scenario; its horizon is that of the budget.
@@ -53,7 +53,7 @@ def build_plan(
     scenario, caches = build_scenario(described)
     forms = score_forms(options.variants, options.forms)
     try:
-        plan = plan_scores(
+        return score_question(
             names,
             scenario,
             measures=None if options.measures is None else split_names(options.measures),
@@ -63,10 +63,10 @@ def build_plan(
             caches=caches,
             density=parsed_density(described.density),
             disturbance=options.disturbance,
+            forms=forms,
         )
     except ValueError as error:  # of a policy, a measure, a budget or a file
         raise ConfigError(str(error)) from error
-    return replace(plan, forms=forms)
 
 
 def score_forms(variants: str, forms: str) -> ScoreForms:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 
-from metrics.scoring import ScoringPlan, run_scores
+from metrics.scoring import ScoreQuestion, ask
 from metrics.scoring.comparison import Comparison, compare_tables
 from metrics.scoring.plots import draw_scores
 from metrics.scoring.table import ScoreTable
@@ -15,12 +15,13 @@ from metrics.scoring.texts import aligned, counted
 from swarm_forage_env.cli.interrupts import resumable
 from swarm_forage_env.cli.options import EXIT_FAILURE, no_picture
 from swarm_forage_env.cli.report import estimate, estimated_seconds
+from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.runner import available_cores
 from swarm_forage_env.runs.store import RunStore
 
 
 def run_and_show(
-    plan: ScoringPlan,
+    question: ScoreQuestion,
     folder: Path,
     picture: str,
     jobs: int | None,
@@ -32,7 +33,7 @@ def run_and_show(
     """Run a plan and show the scores; with `dry_run`, only show the plan.
 
     Args:
-        plan: What to run.
+        question: What is asked.
         folder: Where the records and the picture go.
         picture: Name of the picture.
         jobs: Processes; None = one per core.
@@ -43,21 +44,25 @@ def run_and_show(
     Raises:
         typer.Exit: Ctrl-C, or runs have failed.
     """
-    remark = _missing_kinds(plan)
+    remark = _missing_kinds(question.plan)
     if remark:
         typer.echo(remark, err=True)
     if dry_run:
-        show = plan_json if as_json else plan_text
-        typer.echo(show(plan, RunStore(folder), jobs or available_cores()))
+        store, processes = RunStore(folder), jobs or available_cores()
+        if as_json:
+            typer.echo(plan_json(question.plan, question.measures, store, processes))
+        else:
+            name = question.world.scenario.name
+            typer.echo(plan_text(question.plan, name, f"budget {question.budget}, ", store, processes))
         return
     with resumable(folder):
-        tables = run_scores(plan, out=folder, jobs=jobs, progress=True)
+        tables = ask(question, out=folder, jobs=jobs)
     show_scores(tables, folder / picture, as_json=as_json, band=band)
     if any(table.failures for table in tables):
         raise typer.Exit(EXIT_FAILURE)
 
 
-def _missing_kinds(plan: ScoringPlan) -> str:
+def _missing_kinds(plan: Plan) -> str:
     """Say which swarms are too small for some kind of robots; empty where all have all kinds."""
     swarms = {spec.scenario.robots.n_robots: spec.scenario.robots for spec in plan.specs}
     missing: dict[str, list[int]] = {}
@@ -96,30 +101,36 @@ def show_scores(tables: Sequence[ScoreTable], picture: Path | None, *, as_json: 
         typer.echo(f"picture {drawn}", err=True)
 
 
-def plan_text(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
-    """Return the planned experiments as a table with an estimate."""
+def plan_text(plan: Plan, scenario: str, budget: str, store: RunStore, jobs: int) -> str:
+    """Return the planned worlds as a table with an estimate.
+
+    Args:
+        plan: The runs.
+        scenario: Name of the scenario, for the first line.
+        budget: Name of the budget as it stands there, empty for none.
+        store: Where records go.
+        jobs: Processes.
+    """
     todo = [spec for spec in plan.specs if spec.run_id not in store]
-    left = Counter((spec.criterion, spec.criterion_value, spec.scenario.robots.n_robots) for spec in todo)
+    left = Counter((spec.world.criterion, spec.world.value, spec.world.n_robots) for spec in todo)
     rows: list[Sequence[str]] = [("varied", "value", "robots", "objects", "seconds", "runs", "to do")]
-    for experiment in plan.experiments:
-        scenario = experiment.scenario
-        n_robots = scenario.robots.n_robots
+    for condition in plan.of_policy(plan.policies[0].label):
+        world = condition.world
         rows.append(
             (
-                experiment.criterion,
-                f"{experiment.value:g}",
-                str(n_robots),
-                str(scenario.objects.n_objects),
-                f"{scenario.horizon_s:g}",
-                str(len(plan.seeds) * len(plan.contestants)),
-                str(left[experiment.criterion, experiment.value, n_robots]),
+                world.criterion,
+                f"{world.value:g}",
+                str(world.n_robots),
+                str(world.scenario.objects.n_objects),
+                f"{world.scenario.horizon_s:g}",
+                str(len(plan.seeds) * len(plan.policies)),
+                str(left[world.criterion, world.value, world.n_robots]),
             )
         )
     seconds = estimated_seconds(todo, jobs)
-    budget = f"budget {plan.budget_name}, " if plan.budget_name else ""
     return "\n".join(
         [
-            f"{', '.join(contestant.label for contestant in plan.contestants)} in {plan.scenario.name}, {budget}"
+            f"{', '.join(policy.label for policy in plan.policies)} in {scenario}, {budget}"
             f"{counted(len(plan.seeds), 'seed')}, records go to {store.folder}",
             *aligned(rows),
             f"{counted(len(plan.specs), 'run')}, {len(todo):,} to do" + estimate(seconds, jobs, any_left=bool(todo)),
@@ -127,13 +138,13 @@ def plan_text(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
     )
 
 
-def plan_json(plan: ScoringPlan, store: RunStore, jobs: int) -> str:
+def plan_json(plan: Plan, measures: Sequence[str], store: RunStore, jobs: int) -> str:
     """Return the planned runs as a JSON document."""
     todo = [spec for spec in plan.specs if spec.run_id not in store]
     runs = [{"run_id": spec.run_id, "stored": spec.run_id in store, "spec": spec.to_mapping()} for spec in plan.specs]
     document = {
-        "policies": [contestant.label for contestant in plan.contestants],
-        "measures": list(plan.measures),
+        "policies": [policy.label for policy in plan.policies],
+        "measures": list(measures),
         "out": str(store.folder),
         "estimated_wall_s": estimated_seconds(todo, jobs),
         "runs": runs,

@@ -343,7 +343,7 @@ def _claims_about(
 
 def _cost(table: "StudyTable") -> list[str | int | float]:
     """Return a row about what a study took."""
-    from swarm_forage_env.studies.study_folder import DONE
+    from swarm_forage_env.runs.store import DONE
 
     spec = table.spec
     n_done = sum(state.n_runs[DONE] for state in table.cell_states())

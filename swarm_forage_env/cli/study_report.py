@@ -9,10 +9,12 @@ from metrics.scoring.texts import aligned, counted
 from swarm_forage_env.cli.terminal import notes
 from swarm_forage_env.runs.cost import calibrate, kind_of
 from swarm_forage_env.runs.progress import duration
+from swarm_forage_env.runs.runner import Outcomes
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import DONE, FAILED, MISSING, STATES
 from swarm_forage_env.studies.study import StudySpec, value_words
 from swarm_forage_env.studies.study_file import PAPER, left_out_words, load_study, set_names
-from swarm_forage_env.studies.study_folder import DONE, FAILED, MISSING, STATES, StudyFolder, StudyState, shard
+from swarm_forage_env.studies.study_folder import StudyFolder, shard
 from swarm_forage_env.studies.study_table import StudyTable
 
 FAILURES_SHOWN = 10
@@ -74,8 +76,8 @@ def described(spec: StudySpec) -> str:
 
 def plan_report(spec: StudySpec, folder: StudyFolder, part: tuple[int, int], workers: int) -> str:
     """Return what is left to run and how long it takes, measured here for a moment."""
-    planned = {run.run_id: run for run in shard(spec.expand(), *part)}
-    states = folder.state(planned).states
+    planned = {run.run_id: run for run in shard(spec.plan.specs, *part)}
+    states = folder.store.look_up(planned.values(), keep=False).states
     todo = {run_id: run for run_id, run in planned.items() if states[run_id] != DONE}
     aside = notes()
     costs = calibrate(todo.values(), tell=aside.print)
@@ -108,7 +110,7 @@ def _hours(seconds: float) -> str:
     return f"{hours:,.2f}" if hours >= 0.01 or seconds == 0.0 else "<0.01"
 
 
-def state_report(state: StudyState, folder: StudyFolder) -> str:
+def state_report(state: Outcomes, folder: StudyFolder) -> str:
     """Return what came of the runs; failed ones with the command that makes each again."""
     lines = [f"{_counts([state.count(name) for name in STATES])}, in {folder.folder}"]
     failed = [run_id for run_id, found in state.states.items() if found == FAILED]

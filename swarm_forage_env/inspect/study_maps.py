@@ -8,8 +8,8 @@ from swarm_forage_env._internal.fields import ConfigError, known_keys, whole
 from swarm_forage_env.inspect.maps import FloorMaps, floor_maps, mean_maps, same_proportions
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import DONE
 from swarm_forage_env.studies.study import Cell, StudySpec, Value, value_words
-from swarm_forage_env.studies.study_folder import DONE
 from swarm_forage_env.studies.study_table import StudyTable
 
 MOST_CELLS = 8
@@ -74,7 +74,7 @@ def maps_of_cells(
     if n_seeds is not None:
         whole("the number of seeds", n_seeds, at_least=1, at_most=len(spec.seeds))
     n_seeds = n_seeds or min(DEFAULT_SEEDS, len(spec.seeds))
-    arenas = [spec.experiment(cell).scenario.arena for cell in cells]
+    arenas = [spec.world(cell).scenario.arena for cell in cells]
     sizes_m = [(arena.width_m, arena.height_m) for arena in arenas]
     if not all(same_proportions(size_m, sizes_m[0]) for size_m in sizes_m):
         raise ConfigError(f"Expected cells whose arenas have one shape, got {sorted({*sizes_m})} m; choose others.")

@@ -1,9 +1,14 @@
-"""What a study costs: each policy steps swarms of a few sizes for a moment, and the rest follows in proportion."""
+"""How long runs take: measured per policy and world, never assumed.
+
+`calibrate` measures before anything is run: each policy steps swarms of a few sizes for a moment, and the rest follows
+in proportion. `MeasuredCost` learns from runs as they finish.
+"""
 
 import time
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -25,6 +30,12 @@ Kind: TypeAlias = tuple[str | bool | Quirks, ...]
 policy and wrappers."""
 
 
+_PLACE_OF_POLICY = 5
+"""Where the policy stands in a `Kind`."""
+_ALL = ""
+"""Stands for all kinds together; no policy has this name."""
+
+
 @dataclass(frozen=True, eq=False)
 class Cost:
     """What runs of one kind take, by swarm size."""
@@ -41,6 +52,38 @@ class Cost:
         n_robots = spec.scenario.robots.n_robots
         start_s, tick_s = (float(np.interp(n_robots, self.n_robots, part)) for part in (self.start_s, self.tick_s))
         return start_s + tick_s * spec.scenario.horizon_ticks
+
+
+class MeasuredCost:
+    """How long runs take, from those that have finished.
+
+    A kind of which no run has finished takes what its policy takes elsewhere, per robot-tick; a policy of which none
+    has finished what all others take.
+    """
+
+    def __init__(self) -> None:
+        self._seconds: defaultdict[Any, float] = defaultdict(float)
+        self._robot_ticks: defaultdict[Any, int] = defaultdict(int)
+
+    def add(self, spec: RunSpec, seconds: float) -> None:
+        """Learn how long a run took."""
+        for key in (kind_of(spec), spec.policy, _ALL):
+            self._seconds[key] += seconds
+            self._robot_ticks[key] += spec.robot_ticks
+
+    def seconds(self, specs: Iterable[RunSpec]) -> float | None:
+        """Return how long runs will take together, one after the other; None if no run has finished."""
+        if not self._robot_ticks[_ALL]:
+            return None
+        work: Counter[Kind] = Counter()
+        for spec in specs:
+            work[kind_of(spec)] += spec.robot_ticks
+        return sum(robot_ticks * self._per_robot_tick(kind) for kind, robot_ticks in work.items())
+
+    def _per_robot_tick(self, kind: Kind) -> float:
+        policy = kind[_PLACE_OF_POLICY]
+        known = next(key for key in (kind, policy, _ALL) if self._robot_ticks[key])
+        return self._seconds[known] / self._robot_ticks[known]
 
 
 def calibrate(specs: Iterable[RunSpec], *, tell: Callable[[str], None] | None = None) -> Mapping[Kind, Cost]:

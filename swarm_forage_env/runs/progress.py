@@ -1,15 +1,20 @@
 """How many runs are done and how long the rest will take, on stderr.
 
-The estimate is made from how long finished runs took themselves. What comes before the first run, such as starting
-processes and compiling, is not in it: a few short runs would seem to take minutes.
+The estimate is made from how long finished runs of each policy took themselves. What comes before the first run, such
+as starting processes and compiling, is not in it: a few short runs would seem to take minutes.
 """
 
+import math
 import time
 from collections.abc import Sequence
 from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from swarm_forage_env.runs.cost import MeasuredCost
+from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.spec import RunSpec
 
 DAMAGED_SHOWN = 5
 """Damaged files that are named; more are only counted."""
@@ -22,38 +27,38 @@ class RunProgress:
 
     def __init__(
         self,
+        todo: Sequence[RunSpec],
         *,
-        total: int,
-        done: int = 0,
-        foreign: int = 0,
+        n_stored: int = 0,
+        n_foreign: int = 0,
         damaged: Sequence[str] = (),
-        work: float = 0.0,
         n_processes: int | None = None,
     ) -> None:
         """Count runs.
 
         Args:
-            total: How many there are.
-            done: How many of them are stored already.
-            foreign: How many of these other versions made.
+            todo: The runs that are to be made.
+            n_stored: How many more are stored already.
+            n_foreign: How many of these other versions made.
             damaged: Why files of others cannot be used; they are run again.
-            work: What the rest of the runs takes in any unit, for the estimate; 0 = all runs take as long.
             n_processes: How many make runs at a time, 1 = this one; None = it is not known.
         """
-        self._total = total
+        self._left = {spec.run_id: spec for spec in todo}
+        self._total = n_stored + len(self._left)
         self._damaged = damaged
-        self._work = work
-        self._work_done = 0.0
         self._n_processes = n_processes
+        self._cost = MeasuredCost()
         self._measured_s = 0.0
-        self._measured_work = 0.0
         self._first_start: float | None = None
-        self._stored = done
-        self._foreign = foreign
-        self._done = done
+        self._stored = n_stored
+        self._foreign = n_foreign
         self._failed = 0
         self._console = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
         self._bar: Progress | None = None
+
+    @property
+    def _done(self) -> int:
+        return self._total - len(self._left)
 
     def __enter__(self) -> "RunProgress":
         """Start the clock."""
@@ -71,7 +76,7 @@ class RunProgress:
             self._console.print(f"Run again: {reason}")
         if len(self._damaged) > DAMAGED_SHOWN:
             self._console.print(f"Run again: {len(self._damaged) - DAMAGED_SHOWN} more files like these.")
-        if self._done == self._total:
+        if not self._left:
             return self
         if not self._console.is_terminal:
             self._console.print(f"{self._done}/{self._total} runs, {self._remaining()}")
@@ -89,39 +94,36 @@ class RunProgress:
         if self._bar is not None:
             self._bar.stop()
 
-    def advance(self, *, failed: bool, work: float = 0.0, took_s: float | None = None) -> None:
+    def advance(self, spec: RunSpec, record: RunRecord | None) -> None:
         """Count one more run.
 
         Args:
-            failed: Whether it failed.
-            work: The work it was.
-            took_s: How many seconds it took itself; None = nobody knows, then the estimate does without it.
+            spec: The run.
+            record: What it was; None = it failed, and the estimate does without it.
         """
-        self._done += 1
-        self._work_done += work
-        self._failed += failed
+        del self._left[spec.run_id]
         now = time.monotonic()
-        if took_s is not None:
+        if record is None:
+            self._failed += 1
+        elif not math.isnan(took_s := record.wall_time_s):
+            self._cost.add(spec, took_s)
             self._measured_s += took_s
-            self._measured_work += work if self._work else 1.0
             self._first_start = min(now - took_s, now if self._first_start is None else self._first_start)
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=self._done, description=self._remaining())
-        elif now - self._last_line >= PLAIN_LINE_EVERY_S or self._done == self._total:
+        elif now - self._last_line >= PLAIN_LINE_EVERY_S or not self._left:
             self._last_line = now
             self._console.print(f"{self._done}/{self._total} runs, {self._remaining()}")
 
     def _remaining(self) -> str:
         failures = f", {self._failed} failed" if self._failed else ""
-        left = self._total - self._done
-        if not left:
+        if not self._left:
             return "all done" + failures
-        if self._first_start is None:
+        seconds = self._cost.seconds(self._left.values())
+        if seconds is None or self._first_start is None:
             return self._beginning() + failures
         at_a_time = self._n_processes or self._measured_s / max(time.monotonic() - self._first_start, 1e-9)
-        work_left = self._work - self._work_done if self._work else left
-        seconds = self._measured_s / self._measured_work * work_left / min(at_a_time, left)
-        return f"about {duration(seconds)} left{failures}"
+        return f"about {duration(seconds / min(at_a_time, len(self._left)))} left{failures}"
 
     def _beginning(self) -> str:
         """Return what happens before the first run has ended."""

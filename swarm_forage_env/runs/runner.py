@@ -9,7 +9,7 @@ import signal
 import threading
 import traceback
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -28,6 +28,7 @@ from typing import Any, TypeAlias
 from swarm_forage_env._internal.compiling import tell_of_first_run
 from swarm_forage_env._internal.fields import as_whole
 from swarm_forage_env._internal.files import check_folder
+from swarm_forage_env.policies.registry import local_policy
 from swarm_forage_env.runs.first_compilation import (
     WAKE_UP_EVERY_S,
     compile_outermost,
@@ -35,11 +36,13 @@ from swarm_forage_env.runs.first_compilation import (
     compile_start,
     is_first_run,
 )
+from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.progress import RunProgress
-from swarm_forage_env.runs.record import RunRecord, software_versions
+from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.run import run_one, warm_up
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import RunFailure, RunStore
+from swarm_forage_env.runs.store import DONE, FAILED, MISSING, RunFailure, RunStore, StoredRuns
+from swarm_forage_env.runs.table import Table
 from swarm_forage_env.world.compiled import compile_half
 
 Outcome: TypeAlias = RunRecord | RunFailure
@@ -56,6 +59,8 @@ THREAD_SETTINGS = (
 """Environment variables set to 1 for workers: runs are parallel, the libraries inside a run are not."""
 QUEUED_PER_WORKER = 2
 """Runs given to the pool per worker: enough that no worker waits, few enough that a crash loses little."""
+BATCH_ROBOT_TICKS = 20_000_000
+"""How much an executor of several machines gets as one task: ten seconds or more, much longer than sending it takes."""
 QUEUED_ELSEWHERE = 4096
 """Tasks given to the executor of the caller at a time: enough for the workers that may join it, few enough to watch."""
 KILLED = (
@@ -69,86 +74,149 @@ class WorkerError(RuntimeError):
     """Worker processes could not be started at all."""
 
 
-class StudyInterrupted(KeyboardInterrupt):
-    """Ctrl-C during `run_all`; `result` holds what had finished by then."""
+class RunsInterrupted(KeyboardInterrupt):
+    """Ctrl-C during `run_specs` or `run_plan`; `result` holds what had finished by then."""
 
-    def __init__(self, result: "StudyResult", n_planned: int) -> None:
+    def __init__(self, result: "Outcomes", n_planned: int) -> None:
         """Remember what was kept of `n_planned` runs."""
-        super().__init__(f"Interrupted: {len(result.records)} of {n_planned} runs are finished and kept.")
+        super().__init__(f"Interrupted: {result.count(DONE)} of {n_planned} runs are finished and kept.")
         self.result = result
 
 
 @dataclass(frozen=True, slots=True)
-class StudyResult:
-    """Outcomes in the order of the specifications they belong to."""
+class Outcomes:
+    """What became of planned runs, in their order."""
 
-    records: tuple[RunRecord, ...]
-    failures: tuple[RunFailure, ...]
-    n_stored: int
-    """How many of the records had been stored before and were not run again."""
+    states: Mapping[str, str]
+    """run_id -> one of `store.STATES`, of every planned run."""
+    records: Mapping[str, RunRecord]
+    """run_id -> record of the runs that finished; empty where they are kept in a store alone."""
+    failures: Mapping[str, RunFailure]
+    """run_id -> why a run failed just now."""
+    n_stored: int = 0
+    """How many finished runs had been stored before and were not run again."""
+
+    def count(self, state: str) -> int:
+        """Return how many runs are in a state."""
+        return sum(found == state for found in self.states.values())
 
 
-def run_all(
+def run_plan(
+    plan: Plan,
+    *,
+    store: RunStore | None = None,
+    executor: Executor | None = None,
+    jobs: int | None = None,
+    progress: bool = False,
+) -> Table:
+    """Make the runs of a plan and return them as a table.
+
+    Args:
+        plan: What to run. Policies that only this process can build run here, after all others.
+        store: As in `run_specs`, and so are all further arguments.
+        executor: Runs the work; default a pool of local processes.
+        jobs: Processes of the default pool.
+        progress: Show progress and an estimate on stderr.
+
+    Raises:
+        ValueError: a store, and a policy without a name by which its runs are found again.
+        RunsInterrupted: Ctrl-C; finished runs are kept, the others cancelled.
+        OSError: see `run_specs`, and so for WorkerError.
+    """
+    unnamed = [policy.label for policy in plan.policies if not policy.is_named]
+    if store is not None and unnamed:
+        raise ValueError(
+            f"Expected name= for the policy {unnamed[0]}, by which its runs in {store.folder} are found again."
+        )
+    by_policy: dict[str, list[RunSpec]] = {}
+    for condition in plan.conditions:
+        made_here = condition.policy.label if condition.policy.factory is not None else ""
+        by_policy.setdefault(made_here, []).extend(plan.specs_of(condition))
+    factories = {policy.label: policy for policy in plan.policies}
+    found: list[Outcomes] = []
+    for label in sorted(by_policy, key=bool):  # those that are found by name first
+        policy = factories.get(label)
+        here = nullcontext() if policy is None or policy.factory is None else local_policy(label, policy.factory)
+        with here:
+            elsewhere, processes = (None, 1) if label else (executor, jobs)
+            specs = by_policy[label]
+            found.append(run_specs(specs, store=store, executor=elsewhere, jobs=processes, progress=progress))
+    return Table(
+        plan=plan,
+        records={run_id: record for one in found for run_id, record in one.records.items()},
+        failures={run_id: failure for one in found for run_id, failure in one.failures.items()},
+        n_stored=sum(one.n_stored for one in found),
+        folder=None if store is None else store.folder,
+    )
+
+
+def run_specs(
     specs: Iterable[RunSpec],
     *,
     store: RunStore | None = None,
     executor: Executor | None = None,
     jobs: int | None = None,
     progress: bool = False,
-) -> StudyResult:
-    """Run every specification once and return all outcomes.
+    keep: bool = True,
+) -> Outcomes:
+    """Run every specification once, the longest first, and return what became of them.
 
     Args:
         specs: What to run; equal ones count once. So do those that differ in performance alone, read as the last asks.
         store: Where records and failures go as they happen. Runs it already holds are read, not repeated, and have
-            the performance that their specification asks for; failed ones are tried again.
+            the performance that their specification asks for; failed ones are tried again, and so are those whose file
+            is damaged, which is put aside.
         executor: Runs the work; default a pool of local processes. It is not shut down.
         jobs: Processes of the default pool, default one per available core; 1 = in this process.
-        progress: Show progress and an estimate on stderr.
+        progress: Show progress, an estimate and damaged files on stderr.
+        keep: Return the records, too; without it they are in the store alone, for studies larger than memory.
 
     Raises:
         OSError: the store cannot be written to; then nothing has been run, or what was stored before is kept.
-        RecordError: a stored record is damaged or belongs to something else; then nothing has been run.
-        StudyInterrupted: Ctrl-C; finished runs are kept, the others cancelled.
+        RunsInterrupted: Ctrl-C; finished runs are kept, the others cancelled.
         WorkerError: no worker process could be started.
     """
     planned = {spec.run_id: spec for spec in specs}
-    outcomes: dict[str, Outcome] = {}
-    if store is not None:
-        stored = {run_id: spec for run_id, spec in planned.items() if run_id in store}
-        outcomes |= {run_id: store.read(run_id).read_as(spec.scenario.performance) for run_id, spec in stored.items()}
-    n_stored = len(outcomes)
-    todo = [spec for run_id, spec in planned.items() if run_id not in outcomes]
-    versions = software_versions()
-    n_foreign = sum(
-        1 for outcome in outcomes.values() if isinstance(outcome, RunRecord) and not outcome.made_by(versions)
-    )
-    display = (
-        RunProgress(
-            total=len(planned),
-            done=n_stored,
-            foreign=n_foreign,
-            work=sum(spec.robot_ticks for spec in todo),
-            n_processes=None if executor is not None else processes_of(len(todo), jobs),
-        )
-        if progress
-        else nullcontext()
+    stored = StoredRuns() if store is None else store.look_up(planned.values(), keep=keep)
+    states = {run_id: stored.states.get(run_id, MISSING) for run_id in planned}
+    records, failures = dict(stored.records), dict[str, RunFailure]()
+    todo = longest_first(spec for run_id, spec in planned.items() if states[run_id] != DONE)
+    n_stored = len(planned) - len(todo)
+
+    def result() -> Outcomes:
+        in_order = {run_id: records[run_id] for run_id in planned if run_id in records}
+        return Outcomes(states=states, records=in_order, failures=failures, n_stored=n_stored)
+
+    for run_id in stored.damaged:
+        assert store is not None, "only a store has files"
+        store.put_aside(run_id)
+    shown = RunProgress(
+        todo,
+        n_stored=n_stored,
+        n_foreign=stored.n_foreign,
+        damaged=tuple(stored.damaged.values()),
+        n_processes=None if executor is not None else processes_of(len(todo), jobs),
     )
     try:
         # Closing ends the workers at once, wherever the interrupt came.
         fresh = run_each(todo, store=store, executor=executor, jobs=jobs)
-        with display as shown, closing(fresh):
+        with shown if progress else nullcontext(), closing(fresh):
             for outcome in fresh:
-                outcomes[outcome.run_id] = outcome
-                if shown is not None:
-                    shown.advance(
-                        failed=isinstance(outcome, RunFailure),
-                        work=planned[outcome.run_id].robot_ticks,
-                        took_s=seconds_of(outcome),
-                    )
+                states[outcome.run_id] = FAILED if isinstance(outcome, RunFailure) else DONE
+                if isinstance(outcome, RunFailure):
+                    failures[outcome.run_id] = outcome
+                elif keep:
+                    records[outcome.run_id] = outcome
+                if progress:
+                    shown.advance(planned[outcome.run_id], None if isinstance(outcome, RunFailure) else outcome)
     except KeyboardInterrupt:
-        raise StudyInterrupted(_result(planned, outcomes, n_stored), len(planned)) from None
-    return _result(planned, outcomes, n_stored)
+        raise RunsInterrupted(result(), len(planned)) from None
+    return result()
+
+
+def longest_first(specs: Iterable[RunSpec]) -> tuple[RunSpec, ...]:
+    """Return the runs with the most robot-ticks first, so that no long run is left alone at the end."""
+    return tuple(sorted(specs, key=lambda spec: -spec.robot_ticks))
 
 
 def run_each(
@@ -157,20 +225,16 @@ def run_each(
     store: RunStore | None = None,
     executor: Executor | None = None,
     jobs: int | None = None,
-    batch_robot_ticks: int = 0,
 ) -> Generator[Outcome]:
     """Run specifications and yield each outcome as it finishes, already stored.
 
-    This is for studies whose records should not all be in memory. Unlike `run_all`, it also runs specifications that
-    are stored already. Closing the iterator, also by Ctrl-C, cancels the runs that have not finished.
+    It also runs what is stored already. Closing the iterator, also by Ctrl-C, cancels the runs that have not finished.
 
     Args:
-        specs: What to run.
+        specs: What to run. Neighbours that differ in the seed alone go to `executor` as one task.
         store: Where records and failures go.
         executor: Runs the work; default a pool of local processes.
         jobs: Processes of the default pool, default one per available core; 1 = in this process.
-        batch_robot_ticks: Neighbours among `specs` that differ in the seed alone go to `executor` as one task, until
-            it has so many robot-ticks; 0 = every run is a task of its own.
 
     Raises:
         OSError: the store cannot be written to; then nothing has been run.
@@ -182,7 +246,7 @@ def run_each(
     if jobs is not None:
         jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
     if executor is not None:
-        outcomes = _run_elsewhere(executor, _batches(todo, batch_robot_ticks))
+        outcomes = _run_elsewhere(executor, _batches(todo, BATCH_ROBOT_TICKS))
     elif jobs == 1 or len(todo) == 1:
         outcomes = _run_here(todo)
     else:
@@ -210,20 +274,6 @@ def available_cores() -> int:
 def processes_of(n_runs: int, jobs: int | None) -> int:
     """Return how many local processes make so many runs, if `jobs` are asked for; None = one per available core."""
     return min(jobs or available_cores(), max(1, n_runs))
-
-
-def seconds_of(outcome: Outcome) -> float | None:
-    """Return how long a run took itself; None of one that failed."""
-    return outcome.wall_time_s if isinstance(outcome, RunRecord) else None
-
-
-def _result(planned: dict[str, RunSpec], outcomes: dict[str, Outcome], n_stored: int) -> StudyResult:
-    ordered = [outcomes[run_id] for run_id in planned if run_id in outcomes]
-    return StudyResult(
-        records=tuple(outcome for outcome in ordered if isinstance(outcome, RunRecord)),
-        failures=tuple(outcome for outcome in ordered if isinstance(outcome, RunFailure)),
-        n_stored=n_stored,
-    )
 
 
 def run_several(specs: Task) -> tuple[Outcome, ...]:

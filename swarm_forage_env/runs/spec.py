@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, number, table, text, whole
+from swarm_forage_env._internal.fields import ConfigError, instance, known_keys, table, text, whole
 from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.policies import trust
 from swarm_forage_env.policies.mixed import agreed_caches
@@ -24,6 +24,7 @@ from swarm_forage_env.policies.registry import (
 )
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping, whole_intervals
 from swarm_forage_env.wrappers.registry import wrapper_config_class
+from swarm_forage_env.wrappers.world import UNDISTURBED, World, WorldLike, world_of
 
 if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import WrapperConfig
@@ -44,50 +45,45 @@ _KEYS = ("scenario", "policy", "parameters", "wrappers", "criterion", "criterion
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RunSpec:
-    """One run as data: the scenario, who controls the swarm, what disturbs it, and the seed.
+    """One run as data: the world, who controls the swarm, and the seed.
 
-    The scenario is taken as it is; `plan_run` also looks at the caches that the policy states.
+    The world is taken as it is; `plan_run` also looks at the caches that the policy states.
 
     Raises:
-        ConfigError: `scenario` is no ScenarioConfig, parameters that JSON cannot hold, two wrappers of one kind, a bad
-            seed, parts of a mixed swarm that do not add up to it, or a horizon that is not a whole number of recording
-            intervals.
+        ConfigError: `world` is no World, parameters that JSON cannot hold, a bad seed, parts of a mixed swarm that do
+            not add up to it, or a horizon that is not a whole number of recording intervals.
     """
 
-    scenario: ScenarioConfig
+    world: World
     policy: str
     """Registered name, path of a policy file, or the name under which the runs of a policy object are stored."""
     parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
     """Keyword arguments of the policy, plain JSON values; tuples become lists."""
-    wrappers: "tuple[WrapperConfig, ...]" = ()
-    """Wrappers between recorder and environment, in any order; stored in the documented stack order."""
-    criterion: str = "none"
-    """What a study varies."""
-    criterion_value: float = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:
         whole("seed", self.seed, at_least=0, at_most=_MAX_SEED)
-        instance("scenario", self.scenario, ScenarioConfig)
+        instance("world", self.world, World)
         text("policy", self.policy)
-        text("criterion", self.criterion)
-        number("criterion_value", self.criterion_value)
         table("parameters", self.parameters)
         if is_mixture(self.policy):
-            part_sizes(self.policy, self.scenario.robots.n_robots, self.parameters.get("share"))
+            part_sizes(self.policy, self.world.n_robots, self.parameters.get("share"))
         whole_intervals(self.scenario)
         try:
             plain = json.loads(json.dumps(dict(self.parameters), allow_nan=False))
         except (TypeError, ValueError) as error:
             raise ConfigError(f"Expected policy parameters to be plain JSON values: {error}.") from error
         object.__setattr__(self, "parameters", plain)
-        object.__setattr__(self, "criterion_value", float(self.criterion_value))
-        ordered = tuple(sorted(self.wrappers, key=lambda config: config.stack_position))
-        positions = [config.stack_position for config in ordered]
-        if len(set(positions)) < len(positions):
-            names = ", ".join(config.name for config in ordered)
-            raise ConfigError(f"Expected each wrapper at most once, got {names}.")
-        object.__setattr__(self, "wrappers", ordered)
+
+    @property
+    def scenario(self) -> ScenarioConfig:
+        """The scenario of the world."""
+        return self.world.scenario
+
+    @property
+    def wrappers(self) -> "tuple[WrapperConfig, ...]":
+        """What disturbs the swarm."""
+        return self.world.wrappers
 
     @property
     def run_id(self) -> str:
@@ -107,9 +103,11 @@ class RunSpec:
 
     def describe(self) -> str:
         """Return one line for people."""
-        varied = "" if self.criterion == "none" else f", {self.criterion} = {self.criterion_value:g}"
-        robots = self.scenario.robots.n_robots
-        return f"{self.run_id}: {self.policy} in {self.scenario.name}, {robots} robots, seed {self.seed}{varied}"
+        world = self.world
+        varied = "" if world.criterion == UNDISTURBED else f", {world.criterion} = {world.value:g}"
+        return (
+            f"{self.run_id}: {self.policy} in {self.scenario.name}, {world.n_robots} robots, seed {self.seed}{varied}"
+        )
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the specification as nested plain values."""
@@ -121,8 +119,8 @@ class RunSpec:
             "policy": self.policy,
             "parameters": dict(self.parameters),
             "wrappers": wrappers_to_list(self.wrappers),
-            "criterion": self.criterion,
-            "criterion_value": self.criterion_value,
+            "criterion": self.world.criterion,
+            "criterion_value": self.world.value,
             "seed": self.seed,
         }
 
@@ -138,9 +136,13 @@ class RunSpec:
         if missing:
             raise ConfigError(f"Missing key {missing[0]!r} in a run specification.")
         values = dict(mapping)
-        values["scenario"] = from_mapping(ScenarioConfig, values["scenario"], where="scenario.")
-        values["wrappers"] = wrappers_from_list(values.get("wrappers", ()))
-        return cls(**values)
+        world = World(
+            from_mapping(ScenarioConfig, values.pop("scenario"), where="scenario."),
+            wrappers_from_list(values.pop("wrappers", ())),
+            criterion=values.pop("criterion", UNDISTURBED),
+            value=values.pop("criterion_value", 0.0),
+        )
+        return cls(world=world, **values)
 
     def to_json(self) -> str:
         """Return the specification as one line of JSON."""
@@ -202,34 +204,39 @@ def stated_caches(policy: object) -> str | None:
 
 
 def plan_run(
-    scenario: ScenarioConfig,
+    world: WorldLike,
     policy: str,
     *,
+    wrappers: "Iterable[WrapperConfig]" = (),
     parameters: Mapping[str, Any] | None = None,
     caches: str | None = None,
-    **fields: Any,
+    seed: int = 0,
 ) -> RunSpec:
     """Plan a run of a policy.
 
     Args:
-        scenario: The scenario; its caches are those of `chosen_caches`.
+        world: The world, or a scenario; its caches are those of `chosen_caches`.
         policy: Registered name, or path of a policy file.
+        wrappers: What disturbs the swarm besides the wrappers of the world.
         parameters: Keyword arguments of the policy, plain values. A "digest" says that a file was checked before.
         caches: Which caches there are; default see `chosen_caches`.
-        fields: Further fields of `RunSpec`.
+        seed: Seed of the run.
 
     Raises:
-        ConfigError: see `RunSpec`.
+        ConfigError: see `RunSpec` and `World`.
         ValueError: no installed policy has that name, or a file that cannot be opened.
     """
+    given = world_of(world)
     chosen = dict(parameters or {})
     stating: object = None
     # A study plans thousands of runs of a policy that was looked up before, so it is not looked up again.
     is_unpinned = (is_policy_file(policy) and "digest" not in chosen) or (is_mixture(policy) and "parts" not in chosen)
     if caches is None or is_unpinned:
         policy, chosen, stating = pin_policy(policy, chosen)
-    planned = replace(scenario, caches=chosen_caches(caches, stating, scenario))
-    return RunSpec(scenario=planned, policy=policy, parameters=chosen, **fields)
+    more = tuple(wrappers)
+    disturbed = replace(given, wrappers=(*given.wrappers, *more), name="") if more else given
+    planned = disturbed.with_caches(chosen_caches(caches, stating, given.scenario))
+    return RunSpec(world=planned, policy=policy, parameters=chosen, seed=seed)
 
 
 def pin_policy(policy: str | Path, parameters: Mapping[str, Any]) -> tuple[str, dict[str, Any], object]:

@@ -9,18 +9,23 @@ Every file appears whole or not at all, and only the driver of a study writes, s
 import errno
 import json
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json
-from swarm_forage_env.runs.record import RecordError, RunRecord
+from swarm_forage_env.runs.record import RecordError, RunRecord, software_versions
 from swarm_forage_env.runs.spec import RunSpec
 
+DONE, FAILED, MISSING = "done", "failed", "missing"
+STATES = (DONE, FAILED, MISSING)
+"""What a planned run is: recorded; tried in vain; not there, or its file is damaged."""
 FAILURES = "failures"
 """Name of the sub-folder for failed runs."""
+DAMAGED = ".damaged"
+"""What is added to the name of a file that cannot be used when its run is made again."""
 _WAY_OUT = "Move the file away, and its run will be made again."
 
 
@@ -37,6 +42,20 @@ class RunFailure:
     def run_id(self) -> str:
         """Identity of the run that failed."""
         return self.spec.run_id
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StoredRuns:
+    """What a store holds of planned runs."""
+
+    states: Mapping[str, str] = field(default_factory=dict[str, str])
+    """run_id -> one of `STATES`, of every planned run."""
+    records: Mapping[str, RunRecord] = field(default_factory=dict[str, RunRecord])
+    """run_id -> record, read with the performance that its specification asks for."""
+    damaged: Mapping[str, str] = field(default_factory=dict[str, str])
+    """run_id of a run whose file cannot be used -> why; it counts as missing."""
+    n_foreign: int = 0
+    """Runs that another version or commit of the packages made."""
 
 
 class RunStore:
@@ -84,11 +103,45 @@ class RunStore:
             )
         return record
 
+    def look_up(self, planned: Iterable[RunSpec], *, keep: bool = True) -> StoredRuns:
+        """Read the files of planned runs and say what is there.
+
+        Args:
+            planned: The runs.
+            keep: Return the records, too.
+        """
+        states: dict[str, str] = {}
+        records: dict[str, RunRecord] = {}
+        damaged: dict[str, str] = {}
+        n_foreign = 0
+        versions = software_versions()
+        for spec in planned:
+            run_id = spec.run_id
+            states[run_id] = MISSING
+            if run_id in self:
+                try:
+                    record = self.read(run_id)
+                except RecordError as error:
+                    damaged[run_id] = str(error)
+                    continue
+                states[run_id] = DONE
+                n_foreign += not record.made_by(versions)
+                if keep:
+                    records[run_id] = record.read_as(spec.scenario.performance)
+            elif self.failure_path(run_id).exists():
+                states[run_id] = FAILED
+        return StoredRuns(states=states, records=records, damaged=damaged, n_foreign=n_foreign)
+
     def write(self, record: RunRecord) -> None:
         """Store a record; an earlier failure of the same run is removed."""
         self.folder.mkdir(parents=True, exist_ok=True)
         record.write(self.path(record.run_id))
         self.failure_path(record.run_id).unlink(missing_ok=True)
+
+    def put_aside(self, run_id: str) -> None:
+        """Rename a damaged file, so that nothing is lost by making its run again."""
+        path = self.path(run_id)
+        path.replace(path.with_suffix(f"{path.suffix}{DAMAGED}"))
 
     def write_failure(self, failure: RunFailure) -> None:
         """Store why a run failed, with the command that runs it again."""

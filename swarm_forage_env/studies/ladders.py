@@ -1,7 +1,7 @@
-"""The experiments behind the measures: ladders of swarm sizes and of adversity, at three budgets.
+"""The worlds behind the measures: ladders of swarm sizes and of adversity, at three budgets.
 
-An experiment is a run with one criterion at one value; every experiment is run once per seed. The criteria, the value
-that each of them varies, and its reference run:
+A rung of a ladder is a world with one criterion at one value. The criteria, the value that each of them varies, and its
+reference world:
 
     population_size       number of robots; reference: one robot
     throttle              amplitude of the waveform by which robots lose speed; reference: value 0, ideal throttle
@@ -11,12 +11,11 @@ that each of them varies, and its reference run:
     none                  the undisturbed run itself
 """
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeVar
 
 from swarm_forage_env._internal.fields import ConfigError, known_name, whole
-from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import DENSITY, SEARCH_AND_RESCUE_OBJECTS, at_density, search_and_rescue
 from swarm_forage_env.scenarios.presets import scenario as preset_scenario
@@ -26,10 +25,9 @@ from swarm_forage_env.wrappers.handling import HandlingCostConfig, square_costs
 from swarm_forage_env.wrappers.noise import noise_levels
 from swarm_forage_env.wrappers.population import PopulationConfig, death_levels, malfunction_levels
 from swarm_forage_env.wrappers.throttle import ThrottleConfig, sine_throttles, square_throttles
+from swarm_forage_env.wrappers.world import SIZE, World, WorldLike, world_of
 
 CRITERIA = ("population_size", "throttle", "handling_cost", "noise", "population_dynamics")
-UNDISTURBED = "none"
-"""Criterion of the runs in which nothing is varied."""
 STUDY_HORIZON_S = 10_000.0
 """Length of the study's runs, for which the periods of its throttle waveforms are chosen."""
 SIZE_SWEEP_OBJECTS = {
@@ -95,97 +93,58 @@ def budget(name: str) -> Budget:
     return BUDGETS[name]
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Experiment:
-    """What is run once per seed."""
-
-    criterion: str
-    """One of `CRITERIA`, or `UNDISTURBED`."""
-    value: float
-    scenario: ScenarioConfig
-    wrappers: tuple[WrapperConfig, ...] = ()
-
-    @property
-    def population(self) -> PopulationConfig | None:
-        """Rates of the population dynamics, if there are any."""
-        return next((config for config in self.wrappers if isinstance(config, PopulationConfig)), None)
-
-
-def plan_experiments(
-    base: ScenarioConfig, criteria: Collection[str], budget: Budget, *, density: float | None = None
-) -> tuple[Experiment, ...]:
-    """Return the experiments of `criteria`, reference runs included, none of them twice.
+def plan_worlds(
+    base: WorldLike, criteria: Collection[str], budget: Budget, *, density: float | None = None
+) -> tuple[World, ...]:
+    """Return the worlds of `criteria`, reference worlds included, none of them twice.
 
     Args:
-        base: The scenario; its horizon and recording interval are replaced by those of the budget.
+        base: The world; its horizon and recording interval are replaced by those of the budget, and its wrappers are in
+            all worlds.
         criteria: Some of `CRITERIA`.
         budget: How many sizes and levels, and how long a run is.
         density: Robots per m^2 that all swarm sizes keep, see `size_ladder`; None = all sizes in the scenario's arena.
 
     Raises:
-        ConfigError: an unknown criterion, a swarm of one robot when sizes are varied, or a size for which the arena has
-            no room.
+        ConfigError: an unknown criterion, a swarm of one robot when sizes are varied, a size for which the arena has no
+            room, or a wrapper of `base` that a criterion varies, too.
     """
     for name in criteria:
         known_name("criterion", name, CRITERIA)
-    scenario = replace(base, horizon_s=budget.horizon_s, interval_s=budget.interval_s)
-    experiments: list[Experiment] = []
-    if "population_size" in criteria:
-        experiments += [
-            Experiment(criterion="population_size", value=sized.robots.n_robots, scenario=sized)
+    given = world_of(base)
+    scenario = replace(given.scenario, horizon_s=budget.horizon_s, interval_s=budget.interval_s)
+    always = given.wrappers
+    worlds: list[World] = []
+    if SIZE in criteria:
+        worlds += [
+            World(sized, always, criterion=SIZE, value=sized.robots.n_robots)
             for sized in size_ladder(scenario, budget.n_sizes, density)
         ]
     if "noise" in criteria or "population_dynamics" in criteria:
-        experiments.append(Experiment(criterion=UNDISTURBED, value=0.0, scenario=scenario))
+        worlds.append(World(scenario, always))
     for criterion, adversity in _ADVERSITIES.items():
         if criterion in criteria:
             reference, disturbed = adversity.levels(scenario)
             chosen = spread(disturbed, budget.n_levels)
-            experiments += [
-                Experiment(criterion=criterion, value=value, scenario=scenario, wrappers=wrappers)
+            worlds += [
+                World(scenario, joined_wrappers(always, wrappers, criterion), criterion=criterion, value=value)
                 for value, wrappers in (*reference, *chosen)
             ]
-    return tuple(experiments)
+    return tuple(worlds)
 
 
-def plan_specs(
-    experiments: Sequence[Experiment],
-    policy: str,
-    *,
-    seeds: Sequence[int],
-    parameters: Mapping[str, Any] | None = None,
-    caches: str | None = None,
-) -> tuple[RunSpec, ...]:
-    """Return one specification per experiment and seed, seed by seed.
-
-    In this order an interrupted study has complete sets of experiments, and the estimate of the remaining time is soon
-    stable.
-
-    Args:
-        experiments: What to run.
-        policy: Registered name.
-        seeds: Seeds of the runs; all experiments share them, so their runs are paired.
-        parameters: Keyword arguments of the policy.
-        caches: Which caches there are; default see `runs.spec.chosen_caches`.
+def joined_wrappers(
+    always: Sequence[WrapperConfig], varied: Sequence[WrapperConfig], criterion: str
+) -> tuple[WrapperConfig, ...]:
+    """Return the wrappers of all worlds with those of a level.
 
     Raises:
-        ConfigError: see `runs.spec.RunSpec`.
-        ValueError: no installed policy has that name.
+        ConfigError: both have one of a kind.
     """
-    return tuple(
-        plan_run(
-            experiment.scenario,
-            policy,
-            caches=caches,
-            parameters=parameters or {},
-            wrappers=experiment.wrappers,
-            criterion=experiment.criterion,
-            criterion_value=experiment.value,
-            seed=seed,
-        )
-        for seed in seeds
-        for experiment in experiments
-    )
+    taken = sorted({config.name for config in always} & {config.name for config in varied})
+    if taken:
+        raise ConfigError(f"Expected {taken[0]} from one place, got it from axis {criterion} and another.")
+    return (*always, *varied)
 
 
 def spread(levels: Sequence[_T], count: int | None) -> tuple[_T, ...]:

@@ -24,21 +24,16 @@ from swarm_forage_env._internal.fields import (
     whole,
 )
 from swarm_forage_env.policies.mixture import SHARE, has_open_share
-from swarm_forage_env.policies.registry import policy_label
-from swarm_forage_env.runs.spec import (
-    RunSpec,
-    identity_of,
-    pin_policy,
-    stated_caches,
-    wrappers_from_list,
-    wrappers_to_list,
-)
+from swarm_forage_env.runs.plan import Condition, Plan
+from swarm_forage_env.runs.policy_spec import PolicySpec
+from swarm_forage_env.runs.spec import RunSpec, identity_of, wrappers_from_list, wrappers_to_list
 from swarm_forage_env.scenarios.kinds import words_of_kind
 from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import READINGS
-from swarm_forage_env.studies.ladders import CRITERIA, UNDISTURBED, Experiment, swarms_of_sizes, wrappers_at
+from swarm_forage_env.studies.ladders import CRITERIA, swarms_of_sizes, wrappers_at
 from swarm_forage_env.wrappers.registry import wrapper_config_class
+from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World
 
 if TYPE_CHECKING:
     from swarm_forage_env.scenarios.config import ScenarioConfig
@@ -47,7 +42,8 @@ if TYPE_CHECKING:
 Value: TypeAlias = float | str | bool
 """Place on an axis."""
 
-SIZE = "population_size"
+POLICY_KEYS = ("label", "policy", "parameters", "caches")
+"""What a study file says of a policy: fields of `PolicySpec`."""
 READING_NAMES = {"described": "DESCRIBED", "program": "AUTHORS_PROGRAM"}
 """Word of studies -> name of the reading in `scenarios.quirks.READINGS`."""
 SCENARIO_FIELDS = (*field_sections(), "density", "side_m")
@@ -140,46 +136,6 @@ def _field_value(name: str, value: Value) -> Any:
         raise ConfigError(f"Expected lists of numbers on axis {name}, got {value!r}.") from error
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class StudyPolicy:
-    """A policy of a study."""
-
-    label: str
-    """Name in tables."""
-    policy: str
-    """Registered name, or path of a policy file."""
-    parameters: Mapping[str, Any] = field(default_factory=dict, hash=False)
-    """Keyword arguments of the policy; of a file with its digest."""
-    caches: str | None = None
-    """Which caches its runs have; None = those of the scenario."""
-
-
-def study_policy(
-    policy: str, *, label: str = "", parameters: Mapping[str, Any] | None = None, caches: str | None = None
-) -> StudyPolicy:
-    """Look a policy up and return it as a study runs it.
-
-    Args:
-        policy: Registered name, or path of a policy file.
-        label: Name in tables; default the registered name, of a file its name without the ending.
-        parameters: Keyword arguments of the policy.
-        caches: Which caches its runs have; default those that it states, else those of the scenario.
-
-    Raises:
-        ConfigError: there is no such policy, or its file cannot be opened.
-    """
-    try:
-        found, pinned, stating = pin_policy(policy, parameters or {})
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
-    return StudyPolicy(
-        label=label or policy_label(found),
-        policy=found,
-        parameters=pinned,
-        caches=caches or stated_caches(stating),
-    )
-
-
 class Cell(NamedTuple):
     """One place of a study."""
 
@@ -207,7 +163,7 @@ class StudySpec:
     """Scenario fields that differ from the preset, by name."""
     wrappers: "tuple[WrapperConfig, ...]" = ()
     """In all runs; an axis may vary a field of them."""
-    policies: tuple[StudyPolicy, ...]
+    policies: tuple[PolicySpec, ...]
     axes: tuple[Axis, ...]
     reference: Value | None = None
     """Value on the last axis at which the reference cells are; None = the study has none."""
@@ -253,7 +209,7 @@ class StudySpec:
                         f"mixed:dpo={SHARE},crw=rest, got {policy.label}. At the share 0 or 1 they have one part."
                     )
         for cell in self.cells:
-            self._planned(cell)  # refuses what scenarios, wrappers and runs refuse
+            self.specs_of(cell)  # refuses what scenarios, wrappers and runs refuse
 
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
@@ -284,7 +240,7 @@ class StudySpec:
     @property
     def robot_ticks(self) -> int:
         """Robots times ticks of all runs."""
-        return sum(self._planned(cell).robot_ticks for cell in self.cells) * len(self.seeds)
+        return self.plan.robot_ticks
 
     def reference_of(self, cell: Cell) -> Cell | None:
         """Return the cell that a cell is compared with, the same but for the last axis; None = the study has none."""
@@ -294,18 +250,32 @@ class StudySpec:
         value = self.axes[-1].values[self.axes[-1].values.index(self.reference)]
         return cell._replace(values=(*cell.values[:-1], value))
 
-    def experiment(self, cell: Cell) -> Experiment:
-        """Return scenario and wrappers of a cell, and the criterion that its runs are labelled with."""
-        return self._experiments[cell.reading, cell.values]
+    def world(self, cell: Cell) -> World:
+        """Return the world of a cell, with the criterion that its runs are labelled with."""
+        return self._worlds[cell.reading, cell.values]
+
+    def condition(self, cell: Cell) -> Condition:
+        """Return what is run in a cell."""
+        policy, world = self._policies[cell.policy], self.world(cell)
+        shares = {axis.name: value for axis, value in zip(self.axes, cell.values, strict=True) if axis.name == SHARE}
+        has_caches = "caches" in (*self.settings, *(axis.name for axis in self.axes))
+        return Condition(
+            replace(
+                policy,
+                parameters={**policy.parameters, **shares},
+                caches=None if has_caches else policy.caches,
+            ),
+            world,
+        )
+
+    @cached_property
+    def plan(self) -> Plan:
+        """All runs, in the order of the cells."""
+        return Plan(conditions=tuple(map(self.condition, self.cells)), seeds=self.seeds)
 
     def specs_of(self, cell: Cell) -> tuple[RunSpec, ...]:
         """Return the runs of a cell, one per seed."""
-        planned = self._planned(cell)
-        return tuple(replace(planned, seed=seed) for seed in self.seeds)
-
-    def expand(self) -> tuple[RunSpec, ...]:
-        """Return all runs, cell by cell and seed by seed."""
-        return tuple(spec for cell in self.cells for spec in self.specs_of(cell))
+        return self.plan.specs_of(self.condition(cell))
 
     @property
     def study_id(self) -> str:
@@ -361,10 +331,10 @@ class StudySpec:
         if missing:
             raise ConfigError(f"Missing key {missing[0]!r} of a study.")
         values: dict[str, Any] = dict(mapping)
-        for name, kind in (("policies", StudyPolicy), ("axes", Axis)):
+        for name, kind, keys in (("policies", PolicySpec, POLICY_KEYS), ("axes", Axis, ("name", "values"))):
             entries = [{**table(name, entry)} for entry in values[name]]
             for entry in entries:
-                known_keys(entry, [item.name for item in fields(kind)], f"key of {name}")
+                known_keys(entry, keys, f"key of {name}")
                 if "values" in entry:
                     entry["values"] = tuple(entry["values"])
             values[name] = tuple(kind(**entry) for entry in entries)
@@ -379,18 +349,18 @@ class StudySpec:
         return json.dumps(self.to_mapping(), sort_keys=True)
 
     @cached_property
-    def _policies(self) -> dict[str, StudyPolicy]:
+    def _policies(self) -> dict[str, PolicySpec]:
         return {policy.label: policy for policy in self.policies}
 
     @cached_property
-    def _experiments(self) -> dict[tuple[str, tuple[Value, ...]], Experiment]:
+    def _worlds(self) -> dict[tuple[str, tuple[Value, ...]], World]:
         return {
-            (reading, values): self._experiment(values, world)
+            (reading, values): self._world(values, sized)
             for reading in self.readings
-            for values, world in self._worlds(reading)
+            for values, sized in self._scenarios(reading)
         }
 
-    def _worlds(self, reading: str) -> "Iterator[tuple[tuple[Value, ...], ScenarioConfig]]":
+    def _scenarios(self, reading: str) -> "Iterator[tuple[tuple[Value, ...], ScenarioConfig]]":
         """Every combination of values with its scenario: fields first, then the size of the swarm."""
         fixed: dict[str, Any] = {"horizon_s": self.horizon_s, "interval_s": self.interval_s, **self.settings}
         names = [axis.name for axis in self.axes]
@@ -409,7 +379,7 @@ class StudySpec:
             for size, sized in swarms_of_sizes(world, sizes, density).items():
                 yield (*values[:place], size, *values[place:]), sized
 
-    def _experiment(self, values: tuple[Value, ...], sized: "ScenarioConfig") -> Experiment:
+    def _world(self, values: tuple[Value, ...], sized: "ScenarioConfig") -> World:
         """Add what disturbs the swarm to its scenario, and name the criterion."""
         configs = {config.name: config.to_mapping() for config in self.wrappers}
         criterion, criterion_value = UNDISTURBED, 0.0
@@ -432,24 +402,7 @@ class StudySpec:
         if not adversities and any(axis.name == SIZE for axis, _ in here):
             criterion, criterion_value = SIZE, float(sized.robots.n_robots)
         wrappers = wrappers_from_list([{"wrapper": name, **values} for name, values in configs.items()])
-        return Experiment(criterion=criterion, value=criterion_value, scenario=sized, wrappers=wrappers)
-
-    def _planned(self, cell: Cell) -> RunSpec:
-        """The run of a cell with the first seed."""
-        experiment, policy = self.experiment(cell), self._policies[cell.policy]
-        asked = any(name == "caches" for name in (*self.settings, *(axis.name for axis in self.axes)))
-        world = experiment.scenario
-        here = zip((axis.name for axis in self.axes), cell.values, strict=True)
-        shares = {name: value for name, value in here if name == SHARE}
-        return RunSpec(
-            scenario=world if asked or policy.caches is None else replace(world, caches=policy.caches),
-            policy=policy.policy,
-            parameters={**policy.parameters, **shares},
-            wrappers=experiment.wrappers,
-            criterion=experiment.criterion,
-            criterion_value=experiment.value,
-            seed=self.seeds[0],
-        )
+        return World(sized, wrappers, criterion=criterion, value=criterion_value)
 
 
 def value_words(values: Iterable[Value]) -> dict[Value, str]:
@@ -477,8 +430,8 @@ def plain_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
     return {name: as_tuples(value) for name, value in settings.items()}
 
 
-def _plain(policy: StudyPolicy) -> dict[str, Any]:
-    return {item.name: getattr(policy, item.name) for item in fields(policy)} | {"parameters": dict(policy.parameters)}
+def _plain(policy: PolicySpec) -> dict[str, Any]:
+    return {name: getattr(policy, name) for name in POLICY_KEYS} | {"parameters": dict(policy.parameters)}
 
 
 def _as_number(name: str, value: Value) -> float:

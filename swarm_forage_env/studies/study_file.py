@@ -27,7 +27,7 @@ The files of the paper's sets are in the folder `sets`.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -36,20 +36,20 @@ from swarm_forage_env._internal.parsing import parse_toml
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts
 from swarm_forage_env.policies.registry import is_policy_file
+from swarm_forage_env.runs.policy_spec import PolicySpec, policy_spec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.ladders import BUDGETS, CRITERIA, spread, study_values
 from swarm_forage_env.studies.study import (
-    SIZE,
+    POLICY_KEYS,
     Axis,
-    StudyPolicy,
     StudySpec,
     Value,
     list_word,
     plain_settings,
-    study_policy,
     value_words,
 )
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
+from swarm_forage_env.wrappers.world import SIZE
 
 SETS = Path(__file__).parent / "sets"
 """Folder of the paper's sets."""
@@ -218,14 +218,14 @@ def _seeds(given: Any) -> tuple[int, ...]:
     return tuple(range(given))
 
 
-def _policy(entry: Any, folder: Path) -> StudyPolicy:
+def _policy(entry: Any, folder: Path) -> PolicySpec:
     """A policy from its name or its table; the path of a policy file starts at the study file."""
     keys: dict[str, Any] = {"policy": entry} if isinstance(entry, str) else dict(table("a policy", entry))
-    known_keys(keys, [item.name for item in fields(StudyPolicy)], "key of a policy")
+    known_keys(keys, POLICY_KEYS, "key of a policy")
     word = keys.pop("policy", None)
     if not isinstance(word, str):
         raise ConfigError(f"Missing key 'policy', a name or a file, in {entry!r}.")
-    return study_policy(_beside(word, folder), **keys)
+    return policy_spec(_beside(word, folder), **keys)
 
 
 def _beside(word: str, folder: Path) -> str:

@@ -12,25 +12,17 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import closing, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from swarm_forage_env._internal.fields import ConfigError, whole
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json
-from swarm_forage_env.runs.progress import RunProgress
-from swarm_forage_env.runs.record import RecordError, software_versions
-from swarm_forage_env.runs.runner import processes_of, run_each, seconds_of
+from swarm_forage_env.runs.record import RecordError
+from swarm_forage_env.runs.runner import Outcomes, longest_first, run_specs
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import RunFailure, RunStore
+from swarm_forage_env.runs.store import FAILED, MISSING, STATES, RunStore
 from swarm_forage_env.studies.study import READING_NAMES, Cell, StudySpec
-
-DONE, FAILED, MISSING = "done", "failed", "missing"
-STATES = (DONE, FAILED, MISSING)
-"""What a planned run is: recorded; tried in vain; not there, or its file is damaged."""
-BATCH_ROBOT_TICKS = 20_000_000
-"""How much an executor of several machines gets as one task: ten seconds or more, much longer than sending it takes."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -45,22 +37,6 @@ class CellState:
     def is_complete(self) -> bool:
         """Whether every run of the cell is recorded."""
         return not (self.n_runs[FAILED] or self.n_runs[MISSING])
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class StudyState:
-    """What is there of the runs of a study."""
-
-    states: Mapping[str, str]
-    """run_id -> one of `STATES`, of every planned run."""
-    damaged: Mapping[str, str]
-    """run_id of a run whose file cannot be used -> why; it counts as missing."""
-    n_foreign: int = 0
-    """Runs that another version or commit of the packages made."""
-
-    def count(self, state: str) -> int:
-        """Return how many runs are in a state."""
-        return sum(1 for found in self.states.values() if found == state)
 
 
 class StudyFolder:
@@ -123,45 +99,18 @@ class StudyFolder:
             draft.write_text(json.dumps(kept.to_mapping(), indent=1), encoding="utf-8")
         return kept
 
-    def state(self, planned: Iterable[str]) -> StudyState:
-        """Read every file of the planned runs and say what is there.
-
-        Args:
-            planned: Their run_ids.
-        """
-        states: dict[str, str] = {}
-        damaged: dict[str, str] = {}
-        n_foreign = 0
-        versions = software_versions()
-        for run_id in planned:
-            states[run_id] = MISSING
-            if run_id in self.store:
-                try:
-                    n_foreign += not self.store.read(run_id).made_by(versions)
-                    states[run_id] = DONE
-                except RecordError as error:
-                    damaged[run_id] = str(error)
-            elif self.store.failure_path(run_id).exists():
-                states[run_id] = FAILED
-        return StudyState(states=states, damaged=damaged, n_foreign=n_foreign)
-
     def cell_states(self) -> tuple[CellState, ...]:
         """Return how far each cell of the study is."""
         spec = self.study()
-        run_ids = {cell: [run.run_id for run in spec.specs_of(cell)] for cell in spec.cells}
-        states = self.state(run_id for ids in run_ids.values() for run_id in ids).states
-        return tuple(cell_state(cell, (states[run_id] for run_id in ids)) for cell, ids in run_ids.items())
+        runs = {cell: spec.specs_of(cell) for cell in spec.cells}
+        states = self.store.look_up((run for of in runs.values() for run in of), keep=False).states
+        return tuple(cell_state(cell, (states[run.run_id] for run in of)) for cell, of in runs.items())
 
 
 def cell_state(cell: Cell, states: Iterable[str]) -> CellState:
     """Count the states of a cell's runs."""
     counted = Counter(states)
     return CellState(cell=cell, n_runs={state: counted[state] for state in STATES})
-
-
-def longest_first(specs: Iterable[RunSpec]) -> tuple[RunSpec, ...]:
-    """Return the runs with the most robot-ticks first, so that no long run is left alone at the end."""
-    return tuple(sorted(specs, key=lambda spec: -spec.robot_ticks))
 
 
 def shard(specs: Sequence[RunSpec], index: int, count: int) -> tuple[RunSpec, ...]:
@@ -188,8 +137,8 @@ def run_study(
     jobs: int | None = None,
     executor: Executor | None = None,
     progress: bool = False,
-) -> StudyState:
-    """Run what is missing of a study, long runs first; every finished run is stored at once.
+) -> Outcomes:
+    """Run what is missing of a study; its records are in the folder alone.
 
     Runs that are there are read, and skipped if they are whole; damaged and failed ones are made again. Ctrl-C ends the
     runs under way and leaves all others stored, so that the same call does the rest.
@@ -198,45 +147,22 @@ def run_study(
         spec: The study.
         folder: Where it goes.
         part: Index from 1 and number of shards; only the runs of this shard are made.
-        jobs: Local processes; default one per available core, 1 = in this process.
+        jobs: As in `runs.runner.run_specs`, and so are all further arguments.
         executor: Runs the work instead; it is not shut down.
         progress: Show progress, an estimate and damaged files on stderr.
 
     Returns:
-        What is there of the shard's runs now.
+        What became of the shard's runs.
 
     Raises:
         ConfigError: no such shard.
         RecordError: the folder holds another study.
+        RunsInterrupted: Ctrl-C.
         WorkerError: no worker process could be started.
     """
-    planned = {run.run_id: run for run in shard(spec.expand(), *part)}
+    planned = shard(spec.plan.specs, *part)
     folder.take(spec)
-    before = folder.state(planned)
-    states = dict(before.states)
-    todo = [run for run_id, run in planned.items() if states[run_id] != DONE]
-    n_done = len(planned) - len(todo)
-    display = (
-        RunProgress(
-            total=len(planned),
-            done=n_done,
-            foreign=before.n_foreign,
-            damaged=tuple(before.damaged.values()),
-            work=sum(run.robot_ticks for run in todo),
-            n_processes=None if executor is not None else processes_of(len(todo), jobs),
-        )
-        if progress
-        else nullcontext()
-    )
-    outcomes = run_each(todo, store=folder.store, executor=executor, jobs=jobs, batch_robot_ticks=BATCH_ROBOT_TICKS)
-    with display as shown, closing(outcomes):
-        for outcome in outcomes:
-            is_failure = isinstance(outcome, RunFailure)
-            states[outcome.run_id] = FAILED if is_failure else DONE
-            if shown is not None:
-                work = planned[outcome.run_id].robot_ticks
-                shown.advance(failed=is_failure, work=work, took_s=seconds_of(outcome))
-    return StudyState(states=states, damaged={}, n_foreign=before.n_foreign)
+    return run_specs(planned, store=folder.store, jobs=jobs, executor=executor, progress=progress, keep=False)
 
 
 def parse_shard(word: str) -> tuple[int, int]:

@@ -23,9 +23,9 @@ from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.runs.record import PACKAGES, RecordError, RunRecord
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import FAILURES, RunStore, read_failure
+from swarm_forage_env.runs.store import DONE, FAILED, FAILURES, MISSING, RunStore, read_failure
 from swarm_forage_env.studies.study import Cell, StudySpec
-from swarm_forage_env.studies.study_folder import DONE, FAILED, MISSING, CellState, StudyFolder, cell_state
+from swarm_forage_env.studies.study_folder import CellState, StudyFolder, cell_state
 
 if TYPE_CHECKING:
     import polars as pl
@@ -117,7 +117,7 @@ class StudyTable:
             {
                 **place(self.spec, state.cell),
                 "is_reference": self.spec.reference_of(state.cell) == state.cell,
-                "n_robots": self.spec.experiment(state.cell).scenario.robots.n_robots,
+                "n_robots": self.spec.world(state.cell).n_robots,
                 **{f"n_{name}": count for name, count in state.n_runs.items()},
             }
             for state in self.cell_states()
@@ -234,8 +234,8 @@ def _loss(store: RunStore, run: RunSpec) -> dict[str, Any]:
         "run_id": run.run_id,
         "scenario": run.scenario.name,
         "n_robots": run.scenario.robots.n_robots,
-        "criterion": run.criterion,
-        "criterion_value": run.criterion_value,
+        "criterion": run.world.criterion,
+        "criterion_value": run.world.value,
         "seed": run.seed,
         "state": MISSING,
     }

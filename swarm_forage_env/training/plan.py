@@ -31,6 +31,7 @@ from swarm_forage_env.training.evaluation_worlds import CHOSEN_BY, COUNTED, Eval
 from swarm_forage_env.views.sampler import ScenarioSampler, columns_of
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
+from swarm_forage_env.wrappers.world import World
 
 ALGORITHMS = ("ppo", "a2c", "dqn", "sac")
 """Algorithms of stable-baselines3 that train; the first two on rollouts, the others from replay."""
@@ -138,7 +139,7 @@ class EvaluationPlan:
         """
         whole_run = scenario if self.horizon_s is None else with_overrides(scenario, horizon_s=self.horizon_s)
         seeds = range(self.first_seed, self.first_seed + self.n_runs)
-        return tuple(RunSpec(scenario=whole_run, policy=policy, wrappers=wrappers, seed=seed) for seed in seeds)
+        return tuple(RunSpec(world=World(whole_run, wrappers), policy=policy, seed=seed) for seed in seeds)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the plan as plain values, with what is about worlds only where there are some."""

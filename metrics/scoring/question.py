@@ -1,0 +1,61 @@
+"""A question: which runs it needs, and how their table answers it. Everything that is asked of policies is one.
+
+    question = score_question(["crw"], "warehouse_small", budget="quick")
+    table = ask(question, out="results")          # makes the runs, or reads those that are there
+
+A new question is a dataclass with `plan` and `answer`, and a function that writes the plan.
+"""
+
+from abc import ABC, abstractmethod
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.runner import run_plan
+from swarm_forage_env.runs.store import RunStore
+from swarm_forage_env.runs.table import Table
+
+Answer = TypeVar("Answer")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Question(ABC, Generic[Answer]):
+    """Runs, and what they answer."""
+
+    plan: Plan
+
+    @abstractmethod
+    def answer(self, table: Table) -> Answer:
+        """Return the answer that the runs give; it says which failed."""
+
+
+def ask(
+    question: Question[Answer],
+    *,
+    out: str | Path | None = None,
+    jobs: int | None = None,
+    executor: Executor | None = None,
+    progress: bool = True,
+) -> Answer:
+    """Make the runs of a question and return its answer.
+
+    Args:
+        question: What is asked.
+        out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
+        jobs: Processes; default one per core.
+        executor: Runs the work instead, for example Dask's `client.get_executor()`.
+        progress: Show progress and an estimate on stderr.
+
+    Raises:
+        swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
+    """
+    store = None if out is None else RunStore(out)
+    return question.answer(run_plan(question.plan, store=store, jobs=jobs, executor=executor, progress=progress))
+
+
+def failure_lines(table: Table, policy: str) -> tuple[str, ...]:
+    """Return the runs of a policy that failed, one line each."""
+    failed = [failure for condition in table.plan.of_policy(policy) for failure in table.failures_of(condition)]
+    return tuple(f"{failure.spec.describe()}: {failure.error}" for failure in failed)

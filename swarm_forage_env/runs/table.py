@@ -1,0 +1,78 @@
+"""Table: what the runs of a plan were, condition by condition. Every question is a function of it.
+
+seeds, curves = table.curves(condition, "performance", "interference_fraction")     # (R,), name -> (R, T)
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.runs.plan import Condition, Plan
+from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.store import RunFailure
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Curves = tuple[tuple[int, ...], dict[str, FloatArray]]
+"""Seeds of the R finished runs, and for each column its values in T intervals, (R, T)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Table:
+    """The runs of a plan."""
+
+    plan: Plan
+    records: Mapping[str, RunRecord]
+    """run_id -> record, of the runs that finished."""
+    failures: Mapping[str, RunFailure] = field(default_factory=dict[str, RunFailure])
+    """run_id -> why a run failed."""
+    n_stored: int = 0
+    """How many of the records had been stored before and were not run again."""
+    folder: Path | None = None
+    """Where the records are, None where they are not stored."""
+
+    def of(self, condition: Condition) -> tuple[RunRecord, ...]:
+        """Return the records of a condition, in the order of the seeds; runs that failed are left out."""
+        ids = (spec.run_id for spec in self.plan.specs_of(condition))
+        return tuple(self.records[run_id] for run_id in ids if run_id in self.records)
+
+    def failures_of(self, condition: Condition) -> tuple[RunFailure, ...]:
+        """Return the runs of a condition that failed."""
+        ids = (spec.run_id for spec in self.plan.specs_of(condition))
+        return tuple(self.failures[run_id] for run_id in ids if run_id in self.failures)
+
+    def curves(self, condition: Condition, *columns: str) -> Curves:
+        """Return the finished runs of a condition as arrays.
+
+        Args:
+            condition: One of the plan.
+            columns: Columns of records; those that its runs do not have are left out. Default all.
+        """
+        records = self.of(condition)
+        if not records:
+            return (), {}
+        found = [record.columns() for record in records]
+        names = [name for name in columns or found[0] if all(name in one for one in found)]
+        return (
+            tuple(record.seed for record in records),
+            {name: np.stack([one[name] for one in found]).astype(np.float64) for name in names},
+        )
+
+    def frame(self) -> "pl.DataFrame":
+        """Return all records below each other, one row per interval, with the name of the world and the policy."""
+        import polars as pl
+
+        return pl.concat(list(self._frames()), how="diagonal") if self.records else pl.DataFrame()
+
+    def _frames(self) -> "Iterator[pl.DataFrame]":
+        import polars as pl
+
+        for condition in self.plan.conditions:
+            for record in self.of(condition):
+                told = {"policy": condition.policy.label, "world": condition.world.name}
+                yield record.to_frame().select(*(pl.lit(word).alias(name) for name, word in told.items()), pl.all())
