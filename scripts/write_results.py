@@ -38,7 +38,7 @@ from swarm_forage_env.studies.study_file import (
     load_study,
     set_names,
 )
-from swarm_forage_env.studies.study_folder import DONE
+from swarm_forage_env.runs.store import DONE
 from swarm_forage_env.studies.study_table import StudyTable
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
