@@ -27,7 +27,7 @@ def test_held_out_worlds_differ_from_those_to_train_in(protocol):
     same = [
         world.name
         for world in protocol.scored
-        if not world.is_disturbed and any(world.scenario == known.scenario for known in given)
+        if not world.is_disturbed and any(world.world.scenario == known.world.scenario for known in given)
     ]
     assert same == []
 
@@ -35,23 +35,23 @@ def test_held_out_worlds_differ_from_those_to_train_in(protocol):
 @pytest.mark.parametrize("policy", ["stochm", "stochx"])
 def test_controllers_with_caches_fit_into_every_world(protocol, policy):
     """Those are the worlds that can refuse a controller: caches need room."""
-    calm = {world.group: world.scenario for world in protocol.worlds if not world.wrappers}
+    calm = {world.group: world.world for world in protocol.worlds if not world.is_disturbed}
     assert len(calm) > 5
-    for config in calm.values():
-        ForageEnv(plan_run(config, policy).scenario)
+    for world in calm.values():
+        ForageEnv(plan_run(world, policy).scenario)
 
 
 def test_the_protocol_has_what_it_promises(protocol):
     """Sizes from 8 to 512, every kind of placement, all disturbances."""
-    sizes = [world.scenario.robots.n_robots for world in protocol.scored]
+    sizes = [world.world.n_robots for world in protocol.scored]
     assert (min(sizes), max(sizes)) == (8, 512)
-    assert {world.scenario.name for world in protocol.scored} == set(SCENARIO_NAMES)
-    disturbances = {config.name for world in protocol.scored for config in world.wrappers}
+    assert {world.world.scenario.name for world in protocol.scored} == set(SCENARIO_NAMES)
+    disturbances = {config.name for world in protocol.scored for config in world.world.wrappers}
     assert disturbances == {"throttle", "handling_cost", "sensor_noise", "actuator_noise", "population"}
-    rates = [config for world in protocol.scored for config in world.wrappers if config.name == "population"]
+    rates = [config for world in protocol.scored for config in world.world.wrappers if config.name == "population"]
     assert any(config.repair_per_tick > 0.0 for config in rates)
     assert any(config.death_per_tick > 0.0 for config in rates)
-    assert {world.scenario.physics for world in protocol.worlds} == {"compiled"}
+    assert {world.world.scenario.physics for world in protocol.worlds} == {"compiled"}
 
 
 def test_a_swarm_of_one_and_ideal_throttles_are_references_only():
@@ -81,7 +81,7 @@ def test_quick_is_shorter_and_another_identity():
     full, quick = load_protocol(TINY), load_protocol(TINY, quick=True)
     assert [world.name for world in quick.worlds] == [world.name for world in full.worlds]
     assert (quick.horizon_s, quick.seeds) == (100.0, (1,))
-    assert quick.worlds[0].scenario.horizon_s == 100.0
+    assert quick.worlds[0].world.scenario.horizon_s == 100.0
     assert quick.identity != full.identity
 
 

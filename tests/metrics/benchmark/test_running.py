@@ -3,13 +3,17 @@
 import math
 import shutil
 
+import numpy as np
 import pytest
 
-from metrics.benchmark import BenchmarkError, Training, benchmark_specs, load_protocol, read_entry, run_benchmark
+from metrics.benchmark import BenchmarkError, Training, benchmark_question, load_protocol, read_entry, run_benchmark
+from metrics.scoring import ask
 from metrics.scoring.measures import MEASURE_CRITERIA
 from swarm_forage_env import run_one
 from swarm_forage_env.policies.model_files import file_digest
 from swarm_forage_env.policies.pretrained import network_file
+from swarm_forage_env.policies.registry import RandomPolicy
+from swarm_forage_env.runs import runner
 from swarm_forage_env.runs.record import RunRecord
 from tests.support.entries import TINY
 
@@ -37,7 +41,8 @@ def entry(protocol, folder):
 
 
 def test_an_entry_has_the_runs_of_all_policies(entry, protocol):
-    spec = next(s for s in benchmark_specs("crw", protocol) if s.seed == 2 and s.scenario.robots.n_robots == 2)
+    planned = benchmark_question(["crw"], name="one", protocol=protocol).plan.specs
+    spec = next(spec for spec in planned if spec.seed == 2 and spec.world.n_robots == 2)
     record = run_one(spec)
     row = entry.performance("room, 2 robots")[0]
     assert row[1] == pytest.approx(record.performance.sum() / 0.2)  # per 1,000 s, of 200 s
@@ -86,7 +91,37 @@ def test_training_seeds_are_one_per_policy(protocol):
 
 def test_an_unknown_policy_is_refused(protocol):
     with pytest.raises(ValueError, match="Unknown policy 'cwr'"):
-        benchmark_specs("cwr", protocol)
+        benchmark_question(["cwr"], name="one", protocol=protocol)
+
+
+def test_a_question_has_every_policy_in_every_world(protocol):
+    plan = benchmark_question(["crw", "dpo"], name="two", protocol=protocol).plan
+    assert plan.seeds == protocol.seeds
+    for policy in ("crw", "dpo"):
+        conditions = plan.of_policy(policy)
+        assert [condition.world.name for condition in conditions] == [world.name for world in protocol.worlds]
+        assert [condition.world.wrappers for condition in conditions] == [w.world.wrappers for w in protocol.worlds]
+
+
+def test_asked_again_the_stored_runs_answer(entry, protocol, folder, monkeypatch):
+    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+    question = benchmark_question(["crw", "ppo_warehouse_small"], name="both", protocol=protocol)
+    assert ask(question, out=folder, jobs=1, progress=False).runs == entry.runs
+
+
+def test_no_entry_is_made_of_failed_runs(tmp_path, monkeypatch):
+    def act(self, obs, active):
+        assert len(obs) != 2, "no pairs"
+        return np.zeros((len(obs), 3), np.float32)
+
+    monkeypatch.setattr(RandomPolicy, "act", act)
+    quick = load_protocol(TINY, quick=True)
+    n_runs = len(quick.worlds)
+    told = rf"all {n_runs} runs to finish, 1 failed; the first, .*random in .*, 2 robots, seed 1: .*no pairs"
+    with pytest.raises(BenchmarkError, match=told):
+        run_benchmark(["random"], name="broken", protocol=quick, out=tmp_path, jobs=1, progress=False)
+    # The others are kept.
+    assert len(list(tmp_path.glob("*.parquet"))) == n_runs - 1
 
 
 def test_an_entry_of_a_mixed_swarm_keeps_its_name_and_the_digest_of_its_file(tmp_path, monkeypatch):
