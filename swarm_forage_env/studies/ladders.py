@@ -143,7 +143,9 @@ def joined_wrappers(
     """
     taken = sorted({config.name for config in always} & {config.name for config in varied})
     if taken:
-        raise ConfigError(f"Expected {taken[0]} from one place, got it from axis {criterion} and another.")
+        raise ConfigError(
+            f"Expected no wrapper {taken[0]} in a world where {criterion} is varied, which sets it; leave out one of the two."
+        )
     return (*always, *varied)
 
 
