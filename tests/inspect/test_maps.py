@@ -11,6 +11,7 @@ from swarm_forage_env.inspect.maps import MEANINGS, floor_maps, mean_maps
 from swarm_forage_env.inspect.replay.frames import Replay, Status
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.world import World
 
 WORLD = scenario("warehouse_small", n_robots=2, n_objects=1, horizon_s=200.0)
 
@@ -29,7 +30,7 @@ def replay() -> Replay:
         (2, 0, ObjectStatus.FREE, 120, 30),
     ]
     return Replay(
-        spec=RunSpec(scenario=WORLD, policy="by hand"),
+        spec=RunSpec(world=World(WORLD), policy="by hand"),
         label="by hand",
         frame_ticks=250,
         end_tick=750,

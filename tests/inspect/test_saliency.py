@@ -10,6 +10,7 @@ from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network, NetworkAbout
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.world import World
 
 LAYOUT = layout_of(
     [("light", (1.0, 1.0), "", "left and right"), ("carrying", (1.0,), "", "load"), ("noise", (1.0,), "", "nothing")]
@@ -65,7 +66,7 @@ def test_continuous_commands_move():
 @pytest.mark.compiled
 def test_observations_are_those_of_a_run():
     world = scenario("warehouse_small", n_robots=3, n_objects=20, horizon_s=20.0, interval_s=10.0)
-    spec = RunSpec(scenario=world, policy="ppo_warehouse_small", seed=1)
+    spec = RunSpec(world=World(world), policy="ppo_warehouse_small", seed=1)
     told = []
     found = saliency(open_network_of("ppo_warehouse_small"), spec, progress=lambda *news: told.append(news))
     assert found.n_rows["all"] == 3 * 20, "three robots decide once a second"

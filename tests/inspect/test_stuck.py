@@ -14,6 +14,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.kernels.interact import FLOOR_PICKUP
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig
 from swarm_forage_env.wrappers.population import PopulationConfig
+from swarm_forage_env.wrappers.world import World
 
 FAST = 0.5
 """A wheel command of 10 cm/s."""
@@ -54,9 +55,9 @@ class TalkingPuppets(Puppets):
         return f"puppet {row}"
 
 
-def spec_of(n_robots: int, seconds: float = 200.0, **fields) -> RunSpec:
+def spec_of(n_robots: int, seconds: float = 200.0, wrappers=(), **fields) -> RunSpec:
     world = scenario("warehouse_small", n_robots=n_robots, n_objects=8, horizon_s=seconds)
-    return RunSpec(scenario=world, policy="puppets", **fields)
+    return RunSpec(world=World(world, wrappers), policy="puppets", **fields)
 
 
 def circle(robot: int = 0) -> tuple[float, float, float]:
@@ -141,7 +142,7 @@ def test_robots_that_the_world_keeps_waiting_are_not_stuck():
 def test_shipped_policies_tell_their_state():
     world = scenario("warehouse_small", n_robots=4, n_objects=8, horizon_s=200.0, caches="dynamic")
     for policy in ("crw", "dpo", "stochx"):
-        found = find_stuck(RunSpec(scenario=world, policy=policy), window_s=10.0, moved_m=50.0)
+        found = find_stuck(RunSpec(world=World(world), policy=policy), window_s=10.0, moved_m=50.0)
         assert len(found) == 4, "nobody gets out of the arena"
         assert all(one.state.startswith("acquire") for one in found)
         assert {bool(one.task) for one in found} == {policy == "stochx"}

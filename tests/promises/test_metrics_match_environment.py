@@ -11,10 +11,12 @@ from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.studies import ladders as experiments
+from swarm_forage_env.studies import ladders
+from swarm_forage_env.wrappers import world as worlds
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
+from swarm_forage_env.wrappers.world import World
 
 TICKS = np.arange(1, 50_001)
 DT_S = 0.2
@@ -37,9 +39,9 @@ def test_constant_waveforms_agree():
 
 
 def test_criteria_have_the_same_names():
-    assert {*experiments.CRITERIA, experiments.UNDISTURBED} == set(CRITERIA)
-    assert experiments.UNDISTURBED == UNDISTURBED
-    assert set(MEASURE_CRITERIA.values()) <= set(experiments.CRITERIA)
+    assert {*ladders.CRITERIA, worlds.UNDISTURBED} == set(CRITERIA)
+    assert worlds.UNDISTURBED == UNDISTURBED
+    assert set(MEASURE_CRITERIA.values()) <= set(ladders.CRITERIA)
 
 
 @pytest.fixture(scope="module")
@@ -48,16 +50,8 @@ def record() -> RunRecord:
     wave = Waveform(kind="square", amplitude=0.2, offset=0.2, period_s=4.0)
     population = PopulationConfig(death_per_tick=0.02, malfunction_per_tick=0.3, repair_per_tick=0.3)
     world = scenario("warehouse_small", n_robots=4, n_objects=20, horizon_s=12.0, interval_s=3.0)
-    return run_one(
-        RunSpec(
-            scenario=world,
-            policy="random",
-            wrappers=(ThrottleConfig(waveform=wave), population),
-            criterion="throttle",
-            criterion_value=0.2,
-            seed=3,
-        )
-    )
+    disturbed = World(world, (ThrottleConfig(waveform=wave), population), criterion="throttle", value=0.2)
+    return run_one(RunSpec(world=disturbed, policy="random", seed=3))
 
 
 def test_arrays_hold_what_the_record_holds(record):

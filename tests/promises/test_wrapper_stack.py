@@ -27,6 +27,7 @@ from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.registry import WRAPPERS, parse_wrapper, wrapper_config_class, wrappers_from_mapping
 from swarm_forage_env.wrappers.throttle import Throttle, ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
+from swarm_forage_env.wrappers.world import World
 from tests.support.busy import BusyPolicy
 from tests.support.stage import assert_conserved
 from tests.support.wrapper_configs import OuterConfig
@@ -268,7 +269,7 @@ def test_every_difference_between_wrappers_is_another_run():
         (ThrottleConfig(waveform=Waveform(kind="constant", amplitude=0.1), carriers=True),),
         tuple(ACTIVE.values()),
     ]
-    assert len({replace(base, wrappers=wrappers).run_id for wrappers in variants}) == len(variants)
+    assert len({replace(base, world=World(world_config(), wrappers)).run_id for wrappers in variants}) == len(variants)
 
 
 @pytest.mark.parametrize(

@@ -17,12 +17,13 @@ from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.world.compiled import compile_half, parts_of
 from swarm_forage_env.world.kernels import tick
+from swarm_forage_env.wrappers.world import World
 from tests.support.foraging import quick_world
 
 
 def run_of(physics: str, policy: str = "crw") -> RunSpec:
     world = quick_world("warehouse_small", physics=physics, n_robots=2, horizon_s=2.0, interval_s=2.0)
-    return RunSpec(scenario=world, policy=policy)
+    return RunSpec(world=World(world), policy=policy)
 
 
 compiled_only = pytest.mark.skipif(not is_compiled(tick.run), reason="needs the compiler")

@@ -13,6 +13,7 @@ from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_m
 from swarm_forage_env.scenarios.obstacles import MAX_OBSTACLES, blocked_cells, covered_area_m2, distances_m
 from swarm_forage_env.scenarios.presets import at_density, scenario
 from swarm_forage_env.studies.study_file import load_study
+from swarm_forage_env.wrappers.world import World
 
 WALL = (14.0, 4.0, 14.4, 12.0)
 PILLAR = (18.0, 7.5, 19.0, 8.5)
@@ -78,15 +79,16 @@ def test_obstacles_come_from_the_command_line_and_from_files(tmp_path):
 def test_obstacles_come_back_from_json_and_make_another_run():
     bare, walled = scenario("warehouse_small"), scenario("warehouse_small", obstacles=(WALL, PILLAR))
     assert from_mapping(ScenarioConfig, json.loads(json.dumps(to_mapping(walled)))) == walled
-    one, other = RunSpec(scenario=bare, policy="crw"), RunSpec(scenario=walled, policy="crw")
+    one, other = RunSpec(world=World(bare), policy="crw"), RunSpec(world=World(walled), policy="crw")
     assert one.run_id != other.run_id
     assert RunSpec.from_json(other.to_json()) == other
 
 
 def test_runs_without_obstacles_keep_the_identity_of_before():
-    mapping = RunSpec(scenario=scenario("warehouse_small"), policy="crw").to_mapping()
+    spec = RunSpec(world=World(scenario("warehouse_small")), policy="crw")
+    mapping = spec.to_mapping()
     del mapping["scenario"]["arena"]["obstacles"], mapping["scenario"]["objects"]["object_positions_m"]
-    assert RunSpec.from_mapping(mapping).run_id == RunSpec(scenario=scenario("warehouse_small"), policy="crw").run_id
+    assert RunSpec.from_mapping(mapping).run_id == spec.run_id
 
 
 def test_obstacles_are_an_axis_of_a_study(tmp_path):
@@ -99,7 +101,7 @@ def test_obstacles_are_an_axis_of_a_study(tmp_path):
     )
     study = load_study(file, "smoke")
     assert study.axes[0].values == ("none", "14.0,4.0,14.4,12.0", "14.0,4.0,14.4,12.0+18.0,7.5,19.0,8.5")
-    assert [spec.scenario.arena.obstacles for spec in study.expand()] == [(), (WALL,), (WALL, PILLAR)]
+    assert [spec.scenario.arena.obstacles for spec in study.plan.specs] == [(), (WALL,), (WALL, PILLAR)]
 
 
 def test_obstacles_keep_their_share_of_an_arena_at_another_density():

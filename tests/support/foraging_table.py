@@ -3,12 +3,13 @@
 import polars as pl
 
 from metrics.foraging_model import ForagingRates, mean_field
-from swarm_forage_env.studies.study import Axis, StudyPolicy
+from swarm_forage_env.runs.policy_spec import PolicySpec
+from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_table import StudyTable
 from tests.support.made_tables import made_study
 
 SIZES = (1, 2, 4, 8)
-ONE = (StudyPolicy(label="crw", policy="random"),)
+ONE = (PolicySpec(label="crw", policy="random"),)
 RATES = ForagingRates(finding=1e-4, homing_s=100.0, encounters=2e-4, walls=0.01, avoidance_s=1.0, n_objects=512.0)
 HORIZON_S, N_INTERVALS = 4000.0, 8
 

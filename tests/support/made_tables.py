@@ -3,7 +3,8 @@
 import numpy as np
 import polars as pl
 
-from swarm_forage_env.studies.study import Axis, StudyPolicy, StudySpec
+from swarm_forage_env.runs.policy_spec import PolicySpec
+from swarm_forage_env.studies.study import Axis, StudySpec
 from swarm_forage_env.studies.study_table import StudyTable
 
 FOUR = ("crw", "dpo", "stochm", "stochx")
@@ -12,7 +13,7 @@ N_INTERVALS = 4
 
 def four_policies():
     """The policies of the paper by label; whatever stands behind them, it is not run."""
-    return tuple(StudyPolicy(label=label, policy="random") for label in FOUR)
+    return tuple(PolicySpec(label=label, policy="random") for label in FOUR)
 
 
 def made_study(name="S1a", *axes, **changes):

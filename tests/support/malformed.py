@@ -33,8 +33,6 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.pretrained import network_file, plan_file
 from swarm_forage_env.runs import run, runner
-from swarm_forage_env.studies import ablation
-from swarm_forage_env.studies import study_folder as study_run
 from swarm_forage_env.studies.study_file import find_study
 
 EXIT_CODES = (0, EXIT_FAILURE, EXIT_USAGE, EXIT_INTERRUPTED)
@@ -269,8 +267,9 @@ def _stored(random: Random, folder: Path) -> Path:
         return _table(random, folder)
     from swarm_forage_env.runs.spec import RunSpec
     from swarm_forage_env.scenarios.presets import scenario
+    from swarm_forage_env.wrappers.world import World
 
-    spec = RunSpec(scenario=scenario("warehouse_small", n_robots=3, n_objects=20), policy="random").to_mapping()
+    spec = RunSpec(world=World(scenario("warehouse_small", n_robots=3, n_objects=20)), policy="random").to_mapping()
     content: dict[str, Any] = {"run": "x", "error": "e", "traceback": ["t"], "spec": spec}
     _break(random, random.choice((content, spec, spec["scenario"], spec["scenario"]["arena"])))
     return _written(random, folder, ".json", json.dumps(content))
@@ -383,9 +382,6 @@ def _beginnings_only(*, trains: bool) -> Iterator[None]:
                 raise RefusedLaterError(str(error)) from error
         raise Started(0)
 
-    def first_of_study(spec: Any, *_: Any, **__: Any) -> None:
-        first_of(spec.expand())
-
     def stop(*_: Any, **__: Any) -> None:
         raise Started(0)
 
@@ -393,9 +389,7 @@ def _beginnings_only(*, trains: bool) -> Iterator[None]:
         for owner, name, stub in (
             (ForageEnv, "__init__", build_small),
             (run.LiveRun, "__init__", begin_and_stop),
-            (runner, "run_all", first_of),
-            (ablation, "run_all", first_of),
-            (study_run, "run_study", first_of_study),
+            (runner, "run_each", first_of),
         ):
             stack.enter_context(mock.patch.object(owner, name, stub))
         if trains and find_spec("stable_baselines3"):

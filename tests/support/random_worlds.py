@@ -26,6 +26,7 @@ from swarm_forage_env.views.gymnasium import SwarmVectorEnv
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.recorder import RunRecorder
+from swarm_forage_env.wrappers.world import World
 from tests.support.busy import BusyPolicy
 from tests.support.drivers import Beyond, Corners, Driven, Driver, Uniform, Wall
 from tests.support.invariants import look_at, look_at_record
@@ -186,7 +187,7 @@ def _walk(world: RandomWorld, seen: Visit, *, by_dicts: bool, is_disturbed: bool
 
 
 def _spec(world: RandomWorld) -> RunSpec:
-    return RunSpec(scenario=world.scenario, wrappers=world.wrappers, policy="random", seed=world.seed)
+    return RunSpec(world=World(world.scenario, world.wrappers), policy="random", seed=world.seed)
 
 
 def _driver(name: str) -> Driver:

@@ -1,10 +1,11 @@
 """A study of two policies, two axes and two readings whose runs take a moment."""
 
-from swarm_forage_env.studies.study import Axis, StudyPolicy, StudySpec
+from swarm_forage_env.runs.policy_spec import PolicySpec
+from swarm_forage_env.studies.study import Axis, StudySpec
 
-RANDOM = StudyPolicy(label="random", policy="random")
-TWIN = StudyPolicy(label="twin", policy="random", caches="static")
-NOBODY = StudyPolicy(label="nobody", policy="nobody")
+RANDOM = PolicySpec(label="random", policy="random")
+TWIN = PolicySpec(label="twin", policy="random", caches="static")
+NOBODY = PolicySpec(label="nobody", policy="nobody")
 """No installed policy has this name, so its runs fail."""
 
 
