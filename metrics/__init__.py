@@ -66,7 +66,11 @@ if TYPE_CHECKING:
     from .significance import paired_tests
     from .statistics import Estimate, Summary, aggregate, bootstrap_measure, normalize
 
+PAPER_POLICIES = ("crw", "dpo", "stochm", "stochx")
+"""The paper's four controllers, by the names under which they are registered."""
+
 __all__ = [
+    "PAPER_POLICIES",
     # from policies and files of curves to tables of scores
     "score_policy",
     "compare_policies",

@@ -29,6 +29,7 @@ from metrics.scoring.verdicts import VARIANTS
 from swarm_forage_env import read_study
 from swarm_forage_env.cli.study_page import command_of
 from swarm_forage_env.cli.study_verdict import scored_studies, waiting_lines
+from swarm_forage_env.runs.store import DONE
 from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_file import (
     PAPER,
@@ -38,7 +39,6 @@ from swarm_forage_env.studies.study_file import (
     load_study,
     set_names,
 )
-from swarm_forage_env.runs.store import DONE
 from swarm_forage_env.studies.study_table import StudyTable
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"

@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from metrics.curves import FloatArray
-
+from ..curves import FloatArray
 from .protocol import BenchmarkError, Protocol
 
 TRAINED_IN = ("given", "other", "nothing", "unknown")

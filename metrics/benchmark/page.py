@@ -7,12 +7,12 @@ import math
 import re
 from collections.abc import Sequence
 
-from metrics.scoring.texts import number, percent
-from metrics.statistics import Estimate
-
+from .. import PAPER_POLICIES
+from ..scoring.texts import number, percent
+from ..statistics import Estimate
 from .entry import Entry, EntryMeasure
 from .protocol import BenchmarkError, Protocol, scenario_fields
-from .standing import SCRIPTED, Reference, Standing, improvements, measure_mean
+from .standing import Reference, Standing, improvements, measure_mean
 
 BEGIN = "<!-- generated: swarm-forage benchmark page -->"
 END = "<!-- end of entries -->"
@@ -194,7 +194,7 @@ def _groups(ranked: Sequence[Standing], protocol: Protocol) -> tuple[tuple[str, 
 
 
 def _matched(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    scripted = [entry for entry in entries if entry.name in SCRIPTED]
+    scripted = [entry for entry in entries if entry.name in PAPER_POLICIES]
     best: dict[tuple[str, str, str], float] = {}
     for entry in scripted:
         for measure in entry.measures:

@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from metrics.scoring.columns import INTERVAL_COLUMNS
-from metrics.scoring.question import Question, ask
-from metrics.scoring.runs import run_curves, study_curves
-from metrics.scoring.studies import StudyCurves
-from metrics.scoring.study_scores import score_study
-from metrics.scoring.table import Score
 from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import policy_specs
 from swarm_forage_env.runs.record import RunRecord, software_versions
 from swarm_forage_env.runs.table import Table
-from swarm_forage_env.scenarios.performance import quantity
+from swarm_forage_env.scenarios.performance import performance_of
 
+from ..scoring.columns import INTERVAL_COLUMNS
+from ..scoring.question import Question, ask
+from ..scoring.runs import run_curves, study_curves
+from ..scoring.studies import StudyCurves
+from ..scoring.study_scores import score_study
+from ..scoring.table import Score
 from .entry import Entry, EntryMeasure, EntryPolicy, Training, rounded, six_digits
 from .protocol import BenchmarkError, Group, Protocol, load_protocol
 
@@ -208,7 +208,7 @@ def _study(group: Group, table: Table, policy: str) -> StudyCurves:
         ],
         world,
         controller=policy,
-        read_as=quantity(world.scenario.performance),
+        read_as=performance_of(world.scenario.performance),
         where=f"the group {group.name}",
     )
 

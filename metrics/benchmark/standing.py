@@ -11,15 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from metrics.curves import FloatArray
-from metrics.distributions import interquartile_mean, probability_of_improvement
-from metrics.statistics import Estimate
-
+from .. import PAPER_POLICIES
+from ..curves import FloatArray
+from ..distributions import interquartile_mean, probability_of_improvement
+from ..statistics import Estimate
 from .entry import Entry, EntryMeasure, read_entry
 from .protocol import BenchmarkError, Protocol, ProtocolWorld
 
-SCRIPTED = ("crw", "dpo", "stochm", "stochx")
-"""The controllers that all others are held against; their entries come with the package."""
 _SEED = 1
 """Of the bootstrap; fixed, so that the same entries give the same page."""
 
@@ -29,9 +27,9 @@ class Reference:
     """The best scripted controller of each world that counts or is trained in."""
 
     best: dict[str, str]
-    """ProtocolWorld -> name of the controller with the highest mean."""
+    """World -> name of the controller with the highest mean."""
     runs: dict[str, FloatArray]
-    """ProtocolWorld -> performance of its runs, per 1,000 s, (runs,)."""
+    """World -> performance of its runs, per 1,000 s, (runs,)."""
 
     def mean(self, world: str) -> float:
         """Return the mean performance of the best scripted controller in a world, per 1,000 s."""
@@ -78,7 +76,7 @@ def scripted_entries(protocol: Protocol, folder: Path | None = None) -> tuple[En
     Raises:
         BenchmarkError: one is missing, or is no entry of this protocol.
     """
-    return tuple(read_entry((folder or scripted_folder()) / f"{name}.json", protocol) for name in SCRIPTED)
+    return tuple(read_entry((folder or scripted_folder()) / f"{name}.json", protocol) for name in PAPER_POLICIES)
 
 
 def reference_of(scripted: Sequence[Entry], protocol: Protocol) -> Reference:

@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple, TypeAlias
 
-from metrics.curves import Form
-
+from ..curves import Form
 from .outcomes import Answer, Outcome, all_of, most_of, without_scores
 from .panel import Panel, Rule
 

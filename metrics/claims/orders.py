@@ -10,9 +10,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from metrics.checks import check_option
-from metrics.curves import FloatArray
-
+from ..checks import check_option
+from ..curves import FloatArray
 from .outcomes import Answer, Outcome, scored_levels
 from .panel import MANY, Panel, Rule, bounds, resampled_means, signs
 from .predicates import every_pair

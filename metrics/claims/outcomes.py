@@ -7,9 +7,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.checks import check_option
-from metrics.curves import FloatArray
-
+from ..checks import check_option
+from ..curves import FloatArray
 from .panel import LEAST_RUNS, MANY, Panel, Rule, bounds
 
 Answer: TypeAlias = Literal["supported", "contradicted", "undecided", "no scores"]

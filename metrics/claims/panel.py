@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, ndtri, stdtrit  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from metrics.checks import CurveError, check_option
-from metrics.curves import FloatArray
+from ..checks import CurveError, check_option
+from ..curves import FloatArray
 
 Rule: TypeAlias = Literal["intervals", "bands"]
 """`bands`, the paper's: two curves differ where their bands of the mean plus and minus two standard deviations of

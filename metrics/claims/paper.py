@@ -11,8 +11,7 @@ had been seen: see docs/metrics.md, "Rules that changed after runs were seen".
 
 import numpy as np
 
-from metrics.population import availability, ratio_for_team
-
+from ..population import availability, ratio_for_team
 from .checking import Claim, Place, Statement
 from .experiments import LARGER, ONSET
 from .orders import opposite_order, same_order, unrelated

@@ -11,8 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from metrics.curves import FloatArray
-
+from ..curves import FloatArray
 from .outcomes import (
     Answer,
     BoolArray,

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from metrics.checks import CurveError
-from metrics.curves import FloatArray
-
+from ..checks import CurveError
+from ..curves import FloatArray
 from .outcomes import Answer, Outcome, all_of, where_scored
 from .panel import CONFIDENCE, TIE, Panel, Rule, bounds, mean_over_runs, resampled_means, std_over_runs
 

@@ -3,14 +3,13 @@
 from collections.abc import Callable
 from typing import Any
 
-from metrics.curves import Form
-
+from .. import PAPER_POLICIES as POLICIES
+from ..curves import Form
 from .checking import Place, Statement, named
 from .outcomes import Outcome
 from .panel import Panel
 from .predicates import every_pair, is_higher
 
-POLICIES = ("crw", "dpo", "stochm", "stochx")
 SIMPLE, COMPLEX = ("crw", "dpo"), ("stochm", "stochx")
 STEADY, UNSTEADY = ("crw", "stochx"), ("dpo", "stochm")
 E_S, E_T, C, P = "spatial_emergence", "task_emergence", "scalability", "raw_performance"

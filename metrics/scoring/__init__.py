@@ -1,11 +1,12 @@
 """From policies, runs and files of curves to tables of scores, with notes that help to read them."""
 
+from swarm_forage_env.scenarios.performance import Performance
+
 from .choosing import Choice, choose_policy
 from .comparison import Comparison, compare_tables
 from .figure_panels import StudyPanel, StudyPanels, study_panels
 from .front_door import compare_policies, score_curves, score_policy
 from .measures import ScoreForms
-from .performance import Performance
 from .plots import draw_scores
 from .prediction import PredictionTable, predict_curves, predict_policy
 from .prediction_plots import draw_predictions

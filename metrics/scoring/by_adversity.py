@@ -6,22 +6,21 @@ from functools import partial
 
 import numpy as np
 
-from metrics.checks import PopulationError
-from metrics.curves import FloatArray, Form, Variant
-from metrics.distance import noise_floor
-from metrics.environment import environment_distance
-from metrics.flexibility import adaptability, reactivity
-from metrics.population import (
+from ..checks import PopulationError
+from ..curves import FloatArray, Form, Variant
+from ..distance import noise_floor
+from ..environment import environment_distance
+from ..flexibility import adaptability, reactivity
+from ..population import (
     PopulationWeight,
     availability,
     population_robustness,
     population_weight,
     recorded_population_robustness,
 )
-from metrics.queues import PopulationRates
-from metrics.robustness import mean_signed_difference, noise_robustness
-from metrics.statistics import Summary
-
+from ..queues import PopulationRates
+from ..robustness import mean_signed_difference, noise_robustness
+from ..statistics import Summary
 from .columns import HANDLING, NOISE, POPULATION, THROTTLE
 from .draft import ScoreDraft, Uncomputable
 from .measures import DISTURBANCES, MEASURE_CRITERIA

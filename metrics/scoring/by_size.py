@@ -4,11 +4,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
-from metrics.curves import FloatArray, Form, Variant
-from metrics.emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
-from metrics.interference import performance_lost
-from metrics.scaling import efficiency, raw_performance, scalability
-
+from ..curves import FloatArray, Form, Variant
+from ..emergence import interference_gain, spatial_emergence, task_emergence, time_emergence, undisturbed_gain
+from ..interference import performance_lost
+from ..scaling import efficiency, raw_performance, scalability
 from .columns import SIZE
 from .draft import ScoreDraft, Uncomputable, Values
 from .measures import MEASURE_VARIANTS

@@ -6,11 +6,10 @@ Near its critical size a swarm has two phases, near the best or broken down, and
 import math
 from typing import TYPE_CHECKING, Any
 
-from metrics.breakdown import breakdown_probability, find_breakdowns, time_to_breakdown
-from metrics.checks import CurveError
-from metrics.curves import FloatArray
-from metrics.distributions import interquartile_mean
-
+from ..breakdown import breakdown_probability, find_breakdowns, time_to_breakdown
+from ..checks import CurveError
+from ..curves import FloatArray
+from ..distributions import interquartile_mean
 from .columns import SIZE
 from .studies import RunCurves
 from .study_tables import StudyLine, study_lines

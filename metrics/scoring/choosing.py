@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from metrics.checks import CurveError
-from metrics.significance import paired_p
-from metrics.statistics import Summary, aggregate
 from swarm_forage_env.runs.policy_spec import PolicyLike
 from swarm_forage_env.runs.table import Table
-from swarm_forage_env.scenarios.performance import quantity
+from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.studies.ladders import joined_wrappers, repairs_per_tick
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.noise import noise_levels
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
+from ..checks import CurveError
+from ..significance import paired_p
+from ..statistics import Summary, aggregate
 from .columns import NOISE, POPULATION
 from .question import Question, ask, failure_lines
 from .texts import aligned, bounds, counted, interval, number, paragraph, percent, plain
@@ -248,7 +248,7 @@ class ChoiceQuestion(Question[Choice]):
             scenario=scenario.name,
             n_robots=scenario.robots.n_robots,
             horizon_s=scenario.horizon_s,
-            unit=unit_text(quantity(scenario.performance)),
+            unit=unit_text(performance_of(scenario.performance)),
         )
 
     def _candidate(self, table: Table, policy: str) -> Candidate:

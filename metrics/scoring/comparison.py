@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from metrics.checks import CurveError
-from metrics.curves import FloatArray
-from metrics.significance import holm, paired_p
-from metrics.statistics import Summary, aggregate
-
+from ..checks import CurveError
+from ..curves import FloatArray
+from ..significance import holm, paired_p
+from ..statistics import Summary, aggregate
 from .table import DOUBTFUL, Score, ScoreTable, forecast_lines, title
 from .texts import aligned, limits, paragraph, percent, plain, spread
 

@@ -4,8 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from metrics.checks import CurveError
-
+from ..checks import CurveError
 from .columns import HANDLING, NOISE, POPULATION, THROTTLE
 from .curves_table import study_curves
 from .performance import PerformanceLike, with_performance

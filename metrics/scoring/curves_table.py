@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from metrics.checks import CurveError
-from metrics.curves import FRACTION_TOLERANCE, FloatArray
-from metrics.queues import PopulationRates
-
+from ..checks import CurveError
+from ..curves import FRACTION_TOLERANCE, FloatArray
+from ..queues import PopulationRates
 from .columns import CRITERIA, CURVE_COLUMNS, INTERVAL_COLUMNS, RATE_COLUMNS, SIZE
 from .studies import RunCurves, StudyCurves
 

@@ -8,9 +8,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metrics.curves import FloatArray, Form, Variant
-from metrics.statistics import Summary, aggregate, bootstrap_measure
-
+from ..curves import FloatArray, Form, Variant
+from ..statistics import Summary, aggregate, bootstrap_measure
 from .studies import RunCurves, common_runs
 from .table import Score
 

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from metrics.catalog import METRICS
-from metrics.checks import CurveError
-from metrics.claims import Panel, PanelName
-from metrics.curves import FloatArray, Form, Variant
-
+from ..catalog import METRICS
+from ..checks import CurveError
+from ..claims import Panel, PanelName
+from ..curves import FloatArray, Form, Variant
 from .columns import THROTTLE
 from .measures import DISTURBANCES, MEASURE_CRITERIA, MEASURE_VARIANTS, ScoreForms, label_of
 from .studies import StudyCurves

@@ -4,9 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from metrics.queues import PopulationRates, mean_away, queue_statistics
-from metrics.statistics import Summary, aggregate
-
+from ..queues import PopulationRates, mean_away, queue_statistics
+from ..statistics import Summary, aggregate
 from .columns import POPULATION
 from .studies import RunCurves, StudyCurves
 from .texts import plain

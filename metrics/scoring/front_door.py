@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from metrics.checks import CurveError
-
+from ..checks import CurveError
 from .columns import THROTTLE
 from .comparison import Comparison, compare_tables
 from .curves_file import read_curves

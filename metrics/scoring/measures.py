@@ -5,10 +5,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import get_args
 
-from metrics.catalog import METRICS
-from metrics.checks import CurveError
-from metrics.curves import Form, Variant
-
+from ..catalog import METRICS
+from ..checks import CurveError
+from ..curves import Form, Variant
 from .columns import HANDLING, NOISE, POPULATION, SIZE, THROTTLE
 
 MEASURE_CRITERIA: dict[str, str] = {

@@ -2,15 +2,15 @@
 
 import difflib
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metrics.checks import CurveError
-from metrics.curves import FloatArray
+from swarm_forage_env.scenarios.performance import INVERTED, Performance
 
+from ..checks import CurveError
+from ..curves import FloatArray
 from .columns import CURVE_COLUMNS
 
 if TYPE_CHECKING:
@@ -18,46 +18,6 @@ if TYPE_CHECKING:
 
 RUN_KEYS = ("controller", "criterion", "criterion_value", "n_robots", "seed")
 """Columns that tell the runs of a table apart, where it has them."""
-INVERTED = "1/"
-"""What stands before a column of which less is better: 1/x in each interval, where 1/0 is 0."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Performance:
-    """What P(N, t) is, computed from the record of a run.
-
-    Example: `Performance(function=lambda record: record["n_active"], name="at work", unit="robots")`.
-    """
-
-    function: "Callable[[pl.DataFrame], ArrayLike]"
-    """Takes the record of one run, a table with one row per interval (its columns: `swarm-forage schema`). Returns (T,)
-    numbers >= 0, larger is better; turn round what should be small, 1/x with 1/0 = 0."""
-    name: str
-    unit: str = "1"
-    is_total: bool = False
-    """Whether a number is a total over its interval, like deliveries; else it is a mean, a ratio, a share."""
-
-    adds_up: bool = True
-    """Whether a swarm has what its robots have together, so that twice the swarm could have twice of it. False for
-    shares and ratios; measures that compare with growth in proportion then have a note."""
-
-    @property
-    def amount(self) -> str:
-        """What there is so and so much of, in tables: the unit, or the name where the unit is 1."""
-        return self.name if self.unit == "1" else self.unit
-
-    def curve(self, frame: "pl.DataFrame", where: str) -> FloatArray:
-        """Return the performance of one run, (T,).
-
-        Args:
-            frame: Record of the run.
-            where: Name of the run in error messages.
-
-        Raises:
-            CurveError: the function returns something else than (T,) finite numbers >= 0.
-        """
-        return checked_performance(self.function(frame), self.name, len(frame), where)
-
 
 PerformanceLike: TypeAlias = str | Performance | Callable[[Any], ArrayLike]
 """A recorded column by name ("n_carrying", "1/interference_fraction"), or a function as in `Performance`."""
@@ -77,7 +37,22 @@ def own_performance(given: PerformanceLike | None) -> Performance | None:
         raise CurveError(
             f"Expected performance to be the name of a recorded column, or a function of a record, got {given!r}."
         )
-    return Performance(function=given, name=getattr(given, "__name__", type(given).__name__))
+    return Performance(getattr(given, "__name__", type(given).__name__), function=given)
+
+
+def own_curve(performance: Performance, frame: "pl.DataFrame", where: str) -> FloatArray:
+    """Return the performance of one run by its function, (T,).
+
+    Args:
+        performance: One with a function.
+        frame: Record of the run.
+        where: Name of the run in error messages.
+
+    Raises:
+        CurveError: the function returns something else than (T,) finite numbers >= 0.
+    """
+    assert performance.function is not None, "others are columns"
+    return checked_performance(performance.function(frame), performance.name, len(frame), where)
 
 
 def checked_performance(values: ArrayLike, name: str, n_intervals: int, where: str) -> FloatArray:
@@ -137,7 +112,7 @@ def with_performance(
     ordered = frame.with_row_index(_ROW).sort("interval") if "interval" in frame.columns else frame.with_row_index(_ROW)
     parts = ordered.partition_by(keys, maintain_order=True) if keys else [ordered]
     runs = [
-        part.with_columns(pl.Series("performance", own.curve(part.drop(_ROW), _run(part, keys, where))))
+        part.with_columns(pl.Series("performance", own_curve(own, part.drop(_ROW), _run(part, keys, where))))
         for part in parts
     ]
     told = {"amount": own.amount, "is_total": own.is_total, "adds_up": own.adds_up}

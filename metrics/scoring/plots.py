@@ -5,9 +5,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from metrics.catalog import METRICS
-from metrics.claims.panel import MIN_PAIRS
-from metrics.statistics import Summary
+from ..catalog import METRICS
+from ..claims.panel import MIN_PAIRS
+from ..statistics import Summary
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle, Look, Panel, looks, saved_panels, shade
 
 from .columns import NOISE, POPULATION, SIZE, THROTTLE

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from metrics.curves import FloatArray
-from metrics.distributions import probability_of_improvement
-from metrics.significance import holm, paired_p
-from metrics.statistics import Estimate
-
+from ..curves import FloatArray
+from ..distributions import probability_of_improvement
+from ..significance import holm, paired_p
+from ..statistics import Estimate
 from .figure_panels import StudyPanel
 
 if TYPE_CHECKING:

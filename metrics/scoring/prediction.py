@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from metrics.checks import CurveError
-from metrics.laws import LAWS, MIN_SIZES, SizeLaw
-from metrics.prediction import SizePrediction, predict_performance
-from metrics.statistics import Summary, aggregate
 from swarm_forage_env.runs.policy_spec import PolicyLike
 from swarm_forage_env.runs.table import Table
-from swarm_forage_env.scenarios.performance import quantity
+from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, search_and_rescue
 from swarm_forage_env.scenarios.presets import scenario as preset
 from swarm_forage_env.studies.ladders import SIZE_SWEEP_OBJECTS, size_ladder
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
+from ..checks import CurveError
+from ..laws import LAWS, MIN_SIZES, SizeLaw
+from ..prediction import SizePrediction, predict_performance
+from ..statistics import Summary, aggregate
 from .columns import SIZE
 from .curves_file import read_curves
 from .performance import PerformanceLike
@@ -206,7 +206,7 @@ class PredictionQuestion(Question[tuple[PredictionTable, ...]]):
                 f"{len(usable)}; the first failure: {failures[0]}"
             )
         scenario = self.world.scenario
-        read_as = quantity(scenario.performance)
+        read_as = performance_of(scenario.performance)
         return _table(
             policy=policy,
             scenario=scenario.name,

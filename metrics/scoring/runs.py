@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from metrics.curves import FloatArray
-from metrics.queues import PopulationRates
 from swarm_forage_env.runs.plan import Condition
 from swarm_forage_env.runs.table import Curves, Table
-from swarm_forage_env.scenarios.performance import Quantity, quantity
+from swarm_forage_env.scenarios.performance import Performance, performance_of
 from swarm_forage_env.wrappers.world import World
 
+from ..curves import FloatArray
+from ..queues import PopulationRates
 from .columns import INTERVAL_COLUMNS
-from .performance import Performance, checked_performance
+from .performance import checked_performance, own_curve
 from .studies import RunCurves, StudyCurves
 
 
@@ -38,7 +38,7 @@ def run_curves(world: World, curves: Curves, n_planned: int) -> RunCurves:
 
 
 def study_curves(
-    experiments: Sequence[RunCurves], world: World, *, controller: str, read_as: Quantity | Performance, **told: Any
+    experiments: Sequence[RunCurves], world: World, *, controller: str, read_as: Performance | Performance, **told: Any
 ) -> StudyCurves:
     """Return the runs of a policy in several worlds.
 
@@ -57,7 +57,7 @@ def study_curves(
         t_end_s=scenario.interval_s * np.arange(1.0, n_intervals + 1.0),
         amount=read_as.amount,
         is_total=read_as.is_total,
-        adds_up=read_as.adds_up,
+        adds_up=bool(read_as.adds_up),
         **told,
     )
 
@@ -75,7 +75,7 @@ def policy_curves(table: Table, policy: str, performance: Performance | None = N
     """
     conditions = table.plan.of_policy(policy)
     world = conditions[0].world
-    read_as = performance or quantity(world.scenario.performance)
+    read_as = performance or performance_of(world.scenario.performance)
     experiments = [
         run_curves(condition.world, _curves(table, condition, performance), len(table.plan.seeds))
         for condition in conditions
@@ -91,10 +91,10 @@ def _curves(table: Table, condition: Condition, performance: Performance | None)
     for record in records:
         where = f"run {record.run_id}"
         if performance is None:
-            name = quantity(condition.world.scenario.performance).name
+            name = performance_of(condition.world.scenario.performance).name
             checked.append(checked_performance(record.performance, name, record.n_intervals, where))
         else:
-            checked.append(performance.curve(record.to_frame(), where))
+            checked.append(own_curve(performance, record.to_frame(), where))
     if checked:
         columns["performance"] = np.stack(checked)
     return seeds, columns

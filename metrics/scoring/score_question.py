@@ -4,19 +4,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from metrics.checks import chosen_seeds
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
 from swarm_forage_env.runs.table import Table
-from swarm_forage_env.scenarios.performance import Quantity, quantity
+from swarm_forage_env.scenarios.performance import Performance, performance_of
 from swarm_forage_env.studies import ladders
 from swarm_forage_env.studies.ladders import Budget
 from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
+from ..checks import chosen_seeds
 from .columns import THROTTLE
 from .forecast import forecast_population
 from .measures import ScoreForms, check_measures, criteria_of
-from .performance import Performance, PerformanceLike, own_performance
+from .performance import PerformanceLike, own_performance
 from .question import Question, failure_lines
 from .runs import policy_curves
 from .study_scores import score_study
@@ -37,9 +37,9 @@ class ScoreQuestion(Question[tuple[ScoreTable, ...]]):
     forms: ScoreForms = field(default_factory=ScoreForms)
 
     @property
-    def read_as(self) -> Quantity | Performance:
+    def read_as(self) -> Performance:
         """What the performance is: its name and unit, and whether it is a total and adds up over robots."""
-        return self.performance or quantity(self.world.scenario.performance)
+        return self.performance or performance_of(self.world.scenario.performance)
 
     def answer(self, table: Table) -> tuple[ScoreTable, ...]:
         """Return one table of scores per policy."""

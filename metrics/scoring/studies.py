@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from metrics.checks import CurveError
-from metrics.curves import FloatArray
-from metrics.queues import PopulationRates
-
+from ..checks import CurveError
+from ..curves import FloatArray
+from ..queues import PopulationRates
 from .columns import SIZE, UNDISTURBED
 
 

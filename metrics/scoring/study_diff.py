@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from scipy.special import stdtr, stdtrit  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from metrics.checks import CurveError
-from metrics.curves import FloatArray
-from metrics.significance import ROUNDING, holm
-
+from ..checks import CurveError
+from ..curves import FloatArray
+from ..significance import ROUNDING, holm
 from .texts import plain
 
 if TYPE_CHECKING:

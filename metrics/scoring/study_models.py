@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from metrics.checks import CurveError
-from metrics.curves import FloatArray
-from metrics.foraging_model import ForagingRates, estimate_rates, mean_field
-from metrics.ladder import Ladder, fit_ladder
-from metrics.queues import PopulationComparison, compare_population
-from metrics.statistics import aggregate
-
+from ..checks import CurveError
+from ..curves import FloatArray
+from ..foraging_model import ForagingRates, estimate_rates, mean_field
+from ..ladder import Ladder, fit_ladder
+from ..queues import PopulationComparison, compare_population
+from ..statistics import aggregate
 from .columns import SIZE
 from .studies import RunCurves
 from .study_tables import StudyLine, study_lines

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.catalog import METRICS
-from metrics.claims import PanelName
-from metrics.curves import FloatArray
-from metrics.statistics import Summary, aggregate
+from ..catalog import METRICS
+from ..claims import PanelName
+from ..curves import FloatArray
+from ..statistics import Summary, aggregate
 from swarm_forage_env.rendering.figures import (
     SCREEN,
     FigureStyle,

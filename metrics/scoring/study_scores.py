@@ -4,8 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from metrics.catalog import METRICS
-
+from ..catalog import METRICS
 from .by_adversity import BY_ADVERSITY
 from .by_size import BY_SIZE
 from .draft import Uncomputable

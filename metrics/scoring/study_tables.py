@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from swarm_forage_env.scenarios.performance import PERFORMANCE_COLUMNS, performance_curve, quantity
+from swarm_forage_env.scenarios.performance import PERFORMANCE_COLUMNS, performance_curve, performance_of
 from swarm_forage_env.studies.study import value_words
 
 from .columns import INTERVAL_COLUMNS, SIZE
@@ -57,7 +57,7 @@ def study_lines(table: "StudyTable", performance: str | None = None) -> tuple[St
     lines: list[StudyLine] = []
     for cells in cells_of.values():
         first = cells[0]
-        read_as = quantity(performance or spec.world(first).scenario.performance)
+        read_as = performance_of(performance or spec.world(first).scenario.performance)
         experiments = tuple(_runs(table, cell, performance) for cell in cells)
         lines.append(
             StudyLine(

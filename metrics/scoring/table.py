@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from metrics.catalog import METRICS
-from metrics.curves import Form, Variant
-from metrics.statistics import Summary, aggregate
-
+from ..catalog import METRICS
+from ..curves import Form, Variant
+from ..statistics import Summary, aggregate
 from .forecast import FORECAST_HEADER, FORECAST_TITLE, PopulationForecast
 from .measures import label_of
 from .texts import aligned, bounds, counted, interval, limits, number, paragraph, percent, plain

@@ -3,8 +3,8 @@
 import math
 from collections.abc import Sequence
 
-from metrics.significance import ROUNDING
-from metrics.statistics import Summary
+from ..significance import ROUNDING
+from ..statistics import Summary
 
 _NO_AMOUNT = 1e-12
 """Smaller amounts are rounding errors and are shown as zero."""

@@ -3,11 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-from metrics.checks import CurveError, chosen_seeds
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.wrappers.world import World
+
+from ..checks import CurveError, chosen_seeds
 
 
 class ReadAs(Protocol):

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from metrics.checks import CurveError
-from metrics.claims import CLAIMS, Claim, PanelName, Verdict, check_claim
-from metrics.claims.stating import POLICIES
-from metrics.curves import Variant
-
+from ..checks import CurveError
+from ..claims import CLAIMS, Claim, PanelName, Verdict, check_claim
+from ..claims.stating import POLICIES
+from ..curves import Variant
 from .figure_panels import StudyPanel, StudyPanels
 from .measures import MEASURE_VARIANTS, label_of
 from .texts import plain

@@ -87,13 +87,13 @@ def _show_plan(plan: "Ablation", store: "RunStore", seeds: int, jobs: int | None
 def _run(plan: "Ablation", store: "RunStore", jobs: int | None, *, as_json: bool) -> None:
     from swarm_forage_env.cli.ablation_report import ablation_json, ablation_pages
     from swarm_forage_env.cli.interrupts import resumable
-    from swarm_forage_env.scenarios.performance import quantity
+    from swarm_forage_env.scenarios.performance import performance_of
     from swarm_forage_env.studies.ablation import run_ablation
 
     with resumable(store.folder):
         result = run_ablation(plan, store=store, jobs=jobs, progress=True)
     show = ablation_json if as_json else ablation_pages
-    typer.echo(show(result, quantity(plan.specs[0].scenario.performance)))
+    typer.echo(show(result, performance_of(plan.specs[0].scenario.performance)))
     for failure in result.failures:
         typer.echo(f"failed: {failure.spec.describe()}: {failure.error}", err=True)
     if result.failures:

@@ -12,7 +12,7 @@ from metrics.significance import holm, pooled_p
 from metrics.statistics import aggregate
 from swarm_forage_env.cli.report import performance_number, span
 from swarm_forage_env.contract.types import FloatArray
-from swarm_forage_env.scenarios.performance import Quantity
+from swarm_forage_env.scenarios.performance import Performance
 from swarm_forage_env.scenarios.quirks import READINGS
 from swarm_forage_env.studies.ablation import TASK_COLUMNS, AblationResult, Effect, Switch
 
@@ -27,7 +27,7 @@ _NOTES = (
 )
 
 
-def ablation_pages(result: AblationResult, performance: Quantity) -> str:
+def ablation_pages(result: AblationResult, performance: Performance) -> str:
     """Return all tables as Markdown: the two readings side by side, then what each quirk moves."""
     effects = result.effects()
     parts = [_readings(result, performance), *([_NOTES] if effects else [])]
@@ -42,7 +42,7 @@ def ablation_pages(result: AblationResult, performance: Quantity) -> str:
     return "\n\n".join(parts)
 
 
-def ablation_json(result: AblationResult, performance: Quantity) -> str:
+def ablation_json(result: AblationResult, performance: Performance) -> str:
     """Return readings, effects and failures as a JSON document."""
     readings = [
         {**switch._asdict(), "n_runs": len(records), **dict(zip(("performance", "interference"), numbers, strict=True))}
@@ -74,12 +74,12 @@ def _plain(effect: Effect) -> dict[str, Any]:
     return {**effect.switch._asdict(), "is_same": effect.is_same, "n_runs": len(effect.performance), **numbers}
 
 
-def _numbers(records: Sequence[Any], performance: Quantity) -> tuple[float, float]:
+def _numbers(records: Sequence[Any], performance: Performance) -> tuple[float, float]:
     done = float(np.mean([performance_number(record, performance) for record in records]))
     return done, float(np.mean([record.interference_fraction.mean() for record in records]))
 
 
-def _readings(result: AblationResult, performance: Quantity) -> str:
+def _readings(result: AblationResult, performance: Performance) -> str:
     """Return a table of performance and interference under both readings."""
     lines = [
         "| world | robots | policy | described: performance | program | described: interference | program |",

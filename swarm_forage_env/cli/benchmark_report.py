@@ -11,11 +11,12 @@ from typing import Any
 
 import typer
 
+from metrics import PAPER_POLICIES
 from metrics.benchmark.entry import Entry, Training, read_entry
 from metrics.benchmark.page import BOARD_HEADER, board_rows, details_page, page_block, sorted_standings, with_block
 from metrics.benchmark.protocol import BenchmarkError, Protocol, load_protocol, scenario_fields
 from metrics.benchmark.running import BenchmarkQuestion, benchmark_question
-from metrics.benchmark.standing import SCRIPTED, Reference, Standing, reference_of, scripted_entries, standing_of
+from metrics.benchmark.standing import Reference, Standing, reference_of, scripted_entries, standing_of
 from metrics.scoring.question import ask
 from metrics.scoring.texts import aligned, counted, plain
 from swarm_forage_env._internal.files import replacing
@@ -50,13 +51,13 @@ class Wanted:
     @property
     def is_scripted(self) -> bool:
         """Whether this makes the entry of a scripted controller again, which comes with the package."""
-        return self.name in SCRIPTED and self.policies == (self.name,) and not self.quick
+        return self.name in PAPER_POLICIES and self.policies == (self.name,) and not self.quick
 
 
 def default_name(policy: str, *, quick: bool) -> str:
     """Return the name of an entry of one policy; a quick look at a scripted controller is not the shipped entry."""
     label = policy_label(policy)
-    return f"{label}, quick" if quick and label in SCRIPTED else label
+    return f"{label}, quick" if quick and label in PAPER_POLICIES else label
 
 
 def run_and_show(wanted: Wanted, file: Path | None, records: Path, jobs: int | None, *, as_json: bool) -> None:
@@ -142,7 +143,7 @@ def _question(wanted: Wanted, protocol: Protocol) -> BenchmarkQuestion:
         ConfigError: an unknown policy, or a file that cannot be opened.
         BenchmarkError: the name is that of a scripted controller.
     """
-    if wanted.name in SCRIPTED and not wanted.is_scripted:
+    if wanted.name in PAPER_POLICIES and not wanted.is_scripted:
         raise BenchmarkError(
             f"Expected another name than {wanted.name!r}, which is that of an entry that comes with the package; "
             "choose one with --name."
@@ -197,7 +198,7 @@ def _standings(entries: Sequence[Entry], protocol: Protocol) -> tuple[list[Stand
     twice = [name for name, count in counts.items() if count > 1]
     if twice:
         raise BenchmarkError(f"Expected entries of different names, got {twice[0]!r} twice.")
-    foreign = [entry.name for entry in added if entry.name in SCRIPTED and not _is_scripted(entry)]
+    foreign = [entry.name for entry in added if entry.name in PAPER_POLICIES and not _is_scripted(entry)]
     if foreign:
         raise BenchmarkError(
             f"Expected entries with names of their own, got one of another policy with the name {foreign[0]!r} of a "

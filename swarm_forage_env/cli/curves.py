@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from metrics import PAPER_POLICIES
 from swarm_forage_env.cli.options import EXIT_FAILURE, Jobs, complain, no_picture
 from swarm_forage_env.cli.terminal import output
-from swarm_forage_env.training.defaults import SCRIPTED
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -25,7 +25,7 @@ def curves(
     folders: Annotated[list[Path], typer.Argument(metavar="DIR ...", help="Folders of trainings in one scenario.")],
     beside: Annotated[
         str, typer.Option("--beside", help="Policies to compare with, separated by commas; none for no others.")
-    ] = ",".join(SCRIPTED),
+    ] = ",".join(PAPER_POLICIES),
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help=f"Picture; default {PICTURE_FILE} in the first folder.")
     ] = None,

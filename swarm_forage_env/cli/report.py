@@ -22,7 +22,7 @@ from swarm_forage_env.runs.runner import Outcomes
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.scenarios.kinds import kind_sizes
-from swarm_forage_env.scenarios.performance import Quantity, part_column, performance_curve, quantity
+from swarm_forage_env.scenarios.performance import Performance, part_column, performance_curve, performance_of
 
 LEVEL = 0.95
 """Confidence level of all intervals."""
@@ -88,7 +88,7 @@ class ControllerSummary:
 def summarize(specs: Sequence[RunSpec], records: Sequence[RunRecord]) -> tuple[ControllerSummary, ...]:
     """Return one summary per controller that has a record, in the order of `specs`."""
     caches = {spec.policy: spec.scenario.caches for spec in specs}
-    read_as = quantity(specs[0].scenario.performance)
+    read_as = performance_of(specs[0].scenario.performance)
     summaries = []
     for controller, kind in caches.items():
         own = [record for record in records if record.controller == controller]
@@ -163,7 +163,7 @@ def results_table(specs: Sequence[RunSpec], summaries: Sequence[ControllerSummar
         caption=f"{interval}; interference: share of active robot time",
     )
     # Deliveries are always there; what else the scenario calls performance stands before them.
-    other = None if first.performance == "collected" else quantity(first.performance)
+    other = None if first.performance == "collected" else performance_of(first.performance)
     for name in ("controller", "caches"):
         table.add_column(name)
     numbers = ["runs", *([f"{other.title}\n{span(other)}"] if other else []), "deliveries\nper 1,000 s"]
@@ -213,7 +213,7 @@ def plan_json(specs: Sequence[RunSpec], store: RunStore, seconds: float) -> str:
 
 def results_json(specs: Sequence[RunSpec], result: Outcomes, store: RunStore, plot: Path | None) -> str:
     """Return the results as a JSON document; numbers that do not exist are null."""
-    read_as = quantity(specs[0].scenario.performance)
+    read_as = performance_of(specs[0].scenario.performance)
     runs = [
         {
             **record.keys(),
@@ -257,7 +257,7 @@ def draw_performance(specs: Sequence[RunSpec], records: Sequence[RunRecord], pat
         if len(runs) < FEWEST_RUNS:
             low = high = np.full_like(mean, np.nan)
         curves.append(Curve(shown(controller), mean, low, high))
-    read_as = quantity(scenario.performance)
+    read_as = performance_of(scenario.performance)
     draw_curves(
         path,
         records[0].t_end_s,
@@ -300,12 +300,12 @@ def estimate(seconds: float, jobs: int, *, any_left: bool) -> str:
     )
 
 
-def performance_number(record: RunRecord, read_as: Quantity) -> float:
+def performance_number(record: RunRecord, read_as: Performance) -> float:
     """Return the performance of a run as one number: per 1,000 s for totals, else the mean over intervals."""
     return record.rate_per_1000_s("performance") if read_as.is_total else float(record.performance.mean())
 
 
-def span(read_as: Quantity) -> str:
+def span(read_as: Performance) -> str:
     """Return what `performance_number` counts, in words."""
     return "per 1,000 s" if read_as.is_total else "mean"
 

@@ -14,7 +14,7 @@ from metrics.scoring.texts import counted
 from swarm_forage_env.cli.options import EXIT_INTERRUPTED, complain, no_picture
 from swarm_forage_env.rendering.plots import draw_trainings
 from swarm_forage_env.runs.progress import duration
-from swarm_forage_env.scenarios.performance import quantity
+from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.training.evaluation_worlds import ALL_WORLDS
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.training.status import Evaluation, TrainingStatus
@@ -96,7 +96,7 @@ def counted_in(plan: TrainingPlan) -> str:
     """Say what the numbers of a plan's evaluations are."""
     if plan.evaluation.worlds:
         return f"{plan.evaluation.chosen_by} ratio to the baselines"
-    return f"{quantity(plan.scenario.performance).title} per 1,000 s"
+    return f"{performance_of(plan.scenario.performance).title} per 1,000 s"
 
 
 def baseline_of(plan: TrainingPlan) -> str:

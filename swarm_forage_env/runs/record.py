@@ -151,7 +151,7 @@ class RunRecord:
         """Return the same run with another performance; column and specification say so, the identity stays.
 
         Args:
-            performance: As in `swarm_forage_env.scenarios.performance.quantity`.
+            performance: As in `swarm_forage_env.scenarios.performance.performance_of`.
 
         Raises:
             ConfigError: there is no such performance.

@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.obstacles import Rectangle, blocked_cells, check_obstacles, covered_area_m2
-from swarm_forage_env.scenarios.performance import quantity
+from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.regions import (
     PLACEMENTS,
@@ -253,7 +253,7 @@ class ScenarioConfig:
             fields.switch(f"quirks.{name}", value)
         fields.one_of("caches", self.caches, CACHE_KINDS)
         fields.one_of("physics", self.physics, PHYSICS_ENGINES)
-        quantity(self.performance)  # refuses unknown names
+        performance_of(self.performance)  # refuses unknown names
         for name in ("dt_s", "horizon_s", "interval_s"):
             fields.number(f"scenario.{name}", getattr(self, name), above=0.0)
         fields.shares("scenario.physics_substeps", self.physics_substeps)

@@ -12,13 +12,17 @@ run. The paper proposes such measures beside deliveries in its discussion.
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
+
+if TYPE_CHECKING:
+    import polars as pl
 
 Curve = NDArray[np.float64]
 Columns = Mapping[str, np.ndarray]
@@ -30,15 +34,31 @@ _COUNTS = ("objects", "robots", "caches", "cells", "robot-ticks")
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
-    """What the numbers of a performance are."""
+class Performance:
+    """What P(N, t) is: a column of the record of a run, or a function of the record.
+
+    Example: `Performance("at work", "robots", function=lambda record: record["n_active"])`.
+    """
 
     name: str
-    unit: str
+    unit: str = "1"
     is_total: bool = False
-    """Whether a number is a total over its interval, which can be told as a rate; else it is a mean or a ratio."""
+    """Whether a number is a total over its interval, like deliveries, which can be told as a rate; else it is a mean, a
+    ratio, a share."""
     words: str = ""
     """Name for people; empty = the name itself."""
+    adds_up: bool | None = None
+    """Whether a swarm has what its robots have together, so that twice the swarm could have twice of it. False for
+    shares and ratios; measures that compare with growth in proportion then have a note. None = as the unit says: counts
+    do; a function does."""
+    function: "Callable[[pl.DataFrame], ArrayLike] | None" = field(default=None, compare=False)
+    """Takes the record of one run, a table with one row per interval (its columns: `swarm-forage schema`). Returns (T,)
+    numbers >= 0, larger is better; turn round what should be small, 1/x with 1/0 = 0. None = `performance_curve` of the
+    name."""
+
+    def __post_init__(self) -> None:
+        if self.adds_up is None:
+            object.__setattr__(self, "adds_up", self.function is not None or self.unit in _COUNTS)
 
     @property
     def amount(self) -> str:
@@ -46,60 +66,55 @@ class Quantity:
         return self.name if self.unit == "1" else self.unit
 
     @property
-    def adds_up(self) -> bool:
-        """Whether a swarm has what its robots have together, so that twice the swarm could have twice of it."""
-        return self.unit in _COUNTS
-
-    @property
     def title(self) -> str:
         """Name for people."""
         return self.words or self.name.replace("_", " ")
 
 
-_QUANTITIES = (
-    Quantity("collected", "objects", is_total=True, words="deliveries"),
-    Quantity("first_picked", "objects", is_total=True, words="first pick-ups"),
-    Quantity("free_pickups", "objects", is_total=True, words="pick-ups from the floor"),
-    Quantity("cache_pickups", "objects", is_total=True, words="pick-ups from caches"),
-    Quantity("cache_drops", "objects", is_total=True, words="drops into caches"),
-    Quantity("floor_drops", "objects", is_total=True, words="drops on the floor"),
-    Quantity("displaced_drops", "objects", is_total=True),
-    Quantity("objects_moved", "cells", is_total=True),
-    Quantity("caches_created", "caches", is_total=True),
-    Quantity("caches_depleted", "caches", is_total=True),
-    Quantity("interference_ticks", "robot-ticks", is_total=True),
-    Quantity("interference_fraction", "1"),
-    Quantity("believed_interference_fraction", "1"),
-    Quantity("n_active", "robots", words="robots at work"),
-    Quantity("n_present", "robots", words="robots present"),
-    Quantity("n_carrying", "robots", words="robots carrying"),
-    Quantity("n_caches", "caches", words="caches"),
-    Quantity("n_objects_cached", "objects", words="objects in caches"),
-    Quantity("adversity", "1 or ticks"),
-    Quantity("task_share_none", "1"),
-    Quantity("task_share_generalist", "1"),
-    Quantity("task_share_harvester", "1"),
-    Quantity("task_share_collector", "1"),
-    Quantity("task_share_starter", "1"),
-    Quantity("task_share_finisher", "1"),
-    Quantity("task_share_transferer", "1"),
-    Quantity("task_share_cache_collector", "1"),
-    Quantity("throttle", "1"),
-    Quantity("throttle_mean", "1"),
-    Quantity("handling_cost", "ticks"),
-    Quantity("handling_cost_mean", "ticks"),
-    Quantity("deaths", "robots", is_total=True),
-    Quantity("births", "robots", is_total=True),
-    Quantity("malfunctions", "robots", is_total=True),
-    Quantity("repairs", "robots", is_total=True),
-    Quantity("n_in_repair", "robots", words="robots in repair"),
-    Quantity("time_at_work_s", "s"),
-    Quantity("time_in_repair_s", "s"),
+_RECORDED = (
+    Performance("collected", "objects", is_total=True, words="deliveries"),
+    Performance("first_picked", "objects", is_total=True, words="first pick-ups"),
+    Performance("free_pickups", "objects", is_total=True, words="pick-ups from the floor"),
+    Performance("cache_pickups", "objects", is_total=True, words="pick-ups from caches"),
+    Performance("cache_drops", "objects", is_total=True, words="drops into caches"),
+    Performance("floor_drops", "objects", is_total=True, words="drops on the floor"),
+    Performance("displaced_drops", "objects", is_total=True),
+    Performance("objects_moved", "cells", is_total=True),
+    Performance("caches_created", "caches", is_total=True),
+    Performance("caches_depleted", "caches", is_total=True),
+    Performance("interference_ticks", "robot-ticks", is_total=True),
+    Performance("interference_fraction", "1"),
+    Performance("believed_interference_fraction", "1"),
+    Performance("n_active", "robots", words="robots at work"),
+    Performance("n_present", "robots", words="robots present"),
+    Performance("n_carrying", "robots", words="robots carrying"),
+    Performance("n_caches", "caches", words="caches"),
+    Performance("n_objects_cached", "objects", words="objects in caches"),
+    Performance("adversity", "1 or ticks"),
+    Performance("task_share_none", "1"),
+    Performance("task_share_generalist", "1"),
+    Performance("task_share_harvester", "1"),
+    Performance("task_share_collector", "1"),
+    Performance("task_share_starter", "1"),
+    Performance("task_share_finisher", "1"),
+    Performance("task_share_transferer", "1"),
+    Performance("task_share_cache_collector", "1"),
+    Performance("throttle", "1"),
+    Performance("throttle_mean", "1"),
+    Performance("handling_cost", "ticks"),
+    Performance("handling_cost_mean", "ticks"),
+    Performance("deaths", "robots", is_total=True),
+    Performance("births", "robots", is_total=True),
+    Performance("malfunctions", "robots", is_total=True),
+    Performance("repairs", "robots", is_total=True),
+    Performance("n_in_repair", "robots", words="robots in repair"),
+    Performance("time_at_work_s", "s"),
+    Performance("time_in_repair_s", "s"),
 )
-PERFORMANCE_COLUMNS = {each.name: each for each in _QUANTITIES}
+PERFORMANCE_COLUMNS = {each.name: each for each in _RECORDED}
 """Columns of a record that can be its performance: all numbers but the clock (`interval`, `t_end_s`)."""
 
-_NAME_OF_WORDS = {entry.title.replace("-", "").replace(" ", "_"): entry.name for entry in _QUANTITIES}
+_NAME_OF_WORDS = {entry.title.replace("-", "").replace(" ", "_"): entry.name for entry in _RECORDED}
 """What people may type who know a column from tables, "deliveries" or "first_pickups" -> its name."""
 
 ABSENT: dict[str, float | str] = {
@@ -138,9 +153,9 @@ def cache_load(columns: Columns) -> Curve:
     return np.divide(objects, caches, out=np.zeros_like(objects), where=caches > 0.0)
 
 
-_FORMULAS: dict[str, tuple[Quantity, Callable[[Columns], Curve]]] = {
-    "task_balance": (Quantity("task_balance", "1"), task_balance),
-    "cache_load": (Quantity("cache_load", "objects per cache"), cache_load),
+_FORMULAS: dict[str, tuple[Performance, Callable[[Columns], Curve]]] = {
+    "task_balance": (Performance("task_balance", "1"), task_balance),
+    "cache_load": (Performance("cache_load", "objects per cache"), cache_load),
 }
 DERIVED_PERFORMANCES = tuple(_FORMULAS)
 """Performances that are computed from several columns."""
@@ -161,21 +176,21 @@ def part_column(part: int | str, column: str) -> str:
     return f"part_{part}_{column}"
 
 
-def _quantity_of_part(name: str) -> Quantity | None:
+def _performance_of_part(name: str) -> Performance | None:
     found = _PART_NAME.fullmatch(name)
     if found is None:
         return None
     column, of_part = found["column"], f"of part {found['part']}"
     whole = PERFORMANCE_COLUMNS[column.removesuffix(_PER_ROBOT)]
     if column.endswith(_PER_ROBOT):
-        return Quantity(name, f"{whole.unit} per robot", whole.is_total, f"{whole.title} per robot {of_part}")
-    return Quantity(name, whole.unit, whole.is_total, f"{whole.title} {of_part}")
+        return Performance(name, f"{whole.unit} per robot", whole.is_total, f"{whole.title} per robot {of_part}")
+    return Performance(name, whole.unit, whole.is_total, f"{whole.title} {of_part}")
 
 
 def _of_part(name: str, columns: Columns) -> Curve:
-    """Compute a quantity of one part. A swarm that is not mixed, of robots of one kind, is its only part."""
+    """Compute a performance of one part. A swarm that is not mixed, of robots of one kind, is its only part."""
     found = _PART_NAME.fullmatch(name)
-    assert found is not None, "quantity knows the name"
+    assert found is not None, "performance_of knows the name"
     part, column = int(found["part"]), found["column"]
     if column.endswith(_PER_ROBOT):
         total = _of_part(part_column(part, column.removesuffix(_PER_ROBOT)), columns)
@@ -187,7 +202,7 @@ def _of_part(name: str, columns: Columns) -> Curve:
     return np.zeros(len(columns["interval"])) if is_mixed or part > 1 else _column(column, columns)
 
 
-def quantity(name: str) -> Quantity:
+def performance_of(name: str) -> Performance:
     """Return what the numbers of a performance are.
 
     Args:
@@ -199,7 +214,7 @@ def quantity(name: str) -> Quantity:
     """
     is_text = isinstance(name, str)  # pyright: ignore[reportUnnecessaryIsInstance] - files and users give anything
     sign, own = _split(name) if is_text else ("", "")
-    found = _FORMULAS[own][0] if own in _FORMULAS else PERFORMANCE_COLUMNS.get(own) or _quantity_of_part(own)
+    found = _FORMULAS[own][0] if own in _FORMULAS else PERFORMANCE_COLUMNS.get(own) or _performance_of_part(own)
     if found is None:
         known = [sign + each for each in (*PERFORMANCE_COLUMNS, *_FORMULAS)]
         meant = sign + _NAME_OF_WORDS.get(own, own)
@@ -210,23 +225,23 @@ def quantity(name: str) -> Quantity:
     if not sign:
         return found
     unit = "1" if found.unit == "1" else f"1/({found.unit})" if " " in found.unit else f"1/{found.unit}"
-    return Quantity(name, unit, words=f"{sign}{found.title}")
+    return Performance(name, unit, words=f"{sign}{found.title}")
 
 
 def performance_curve(name: str, columns: Columns) -> Curve:
     """Compute a performance from the columns of a run.
 
     Args:
-        name: As in `quantity`.
+        name: As in `performance_of`.
         columns: Column -> (T,) numbers; one that the run does not have counts as `ABSENT` says.
 
     Returns:
-        (T,) float64, in the unit of `quantity`.
+        (T,) float64, in the unit of `performance_of`.
 
     Raises:
-        ConfigError: as `quantity`.
+        ConfigError: as `performance_of`.
     """
-    quantity(name)
+    performance_of(name)
     sign, own = _split(name)
     if own in _FORMULAS:
         values = _FORMULAS[own][1](columns)

@@ -144,7 +144,8 @@ def joined_wrappers(
     taken = sorted({config.name for config in always} & {config.name for config in varied})
     if taken:
         raise ConfigError(
-            f"Expected no wrapper {taken[0]} in a world where {criterion} is varied, which sets it; leave out one of the two."
+            f"Expected no wrapper {taken[0]} in a world where {criterion} is varied, which sets it, too; leave out "
+            "one of the two."
         )
     return (*always, *varied)
 

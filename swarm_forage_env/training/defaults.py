@@ -23,5 +23,3 @@ EVALUATE_EVERY = 1_000_000
 """Decisions of single robots between two evaluations, at least."""
 EVALUATION_SHARE = 0.5
 """Most that evaluations may add to the simulated time of all robots; large swarms are evaluated less often for it."""
-SCRIPTED = ("crw", "dpo", "stochm", "stochx")
-"""The scripted controllers that trainings are compared with."""

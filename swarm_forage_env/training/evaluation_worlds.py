@@ -27,7 +27,6 @@ from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.config import from_mapping as config_from_mapping
 from swarm_forage_env.scenarios.presets import scenario as preset
-from swarm_forage_env.training.defaults import SCRIPTED
 from swarm_forage_env.training.status import WorldEvaluation
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
@@ -127,8 +126,10 @@ def judged_baseline(world: EvaluationWorld, specs: Sequence[RunSpec]) -> tuple[s
         world: The world.
         specs: The runs in it; a scripted controller has its own caches in them.
     """
+    from metrics import PAPER_POLICIES  # late: a user's own metrics.py must not keep a training from running
+
     found: dict[str, float] = {}
-    for name in SCRIPTED if world.baseline == BEST else (world.baseline,):
+    for name in PAPER_POLICIES if world.baseline == BEST else (world.baseline,):
         planned = [plan_run(spec.scenario, name, wrappers=spec.wrappers, seed=spec.seed) for spec in specs]
         found[name], _ = judged(lambda spec=planned[0]: load_policy(spec.policy, spec.parameters), planned)
     best = max(found, key=lambda name: found[name])

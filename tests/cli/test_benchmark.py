@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from metrics import PAPER_POLICIES
 from metrics.benchmark import load_protocol
 from metrics.benchmark.entry import EntryPolicy
 from metrics.benchmark.page import BEGIN, END
-from metrics.benchmark.standing import SCRIPTED
 from swarm_forage_env.cli.benchmark_report import Wanted
 from tests.support.entries import TINY, made_up_entry
 
@@ -20,7 +20,7 @@ def folder(tmp_path_factory):
     """A place with the entries of the scripted controllers, and the tiny protocol."""
     place = tmp_path_factory.mktemp("benchmark")
     (place / "benchmark_v1.toml").write_text(TINY.read_text())
-    for k, name in enumerate(SCRIPTED):
+    for k, name in enumerate(PAPER_POLICIES):
         made_up_entry(load_protocol(TINY), name, lambda _, k=k: 10.0 + k).write(place / f"{name}.json")
     return place
 
@@ -44,7 +44,7 @@ def test_a_policy_becomes_an_entry_that_can_be_shown(command, tiny):
     assert code == 0, err
     header, *rows = out.splitlines()
     assert header.split()[:2] == ["entry", "score"]
-    assert {row.split()[0] for row in rows} == {*SCRIPTED, "again"}
+    assert {row.split()[0] for row in rows} == {*PAPER_POLICIES, "again"}
     file = Path("results/benchmark/again.json")
     content = json.loads(file.read_text())
     assert content["command"] == "swarm-forage benchmark --policy crw --name again"
@@ -52,7 +52,7 @@ def test_a_policy_becomes_an_entry_that_can_be_shown(command, tiny):
     code, shown, _ = command("benchmark", "show", str(file))
     assert (code, shown) == (0, out)
     code, told, _ = command("benchmark", "show", "results/benchmark", "--json")
-    assert {standing["name"] for standing in json.loads(told)} == {*SCRIPTED, "again"}
+    assert {standing["name"] for standing in json.loads(told)} == {*PAPER_POLICIES, "again"}
 
 
 def test_a_quick_look_writes_no_entry(command, tiny):
@@ -113,7 +113,7 @@ def test_a_file_with_its_whole_path_is_told_from_the_current_folder(tmp_path, mo
 def test_a_quick_look_at_a_scripted_controller_has_another_name_than_its_entry(command, tiny):
     code, out, err = command("benchmark", "--policy", "dpo", "--quick", "--jobs", "1", "--json")
     assert code == 0, err
-    assert {standing["name"] for standing in json.loads(out)} == {*SCRIPTED, "dpo, quick"}
+    assert {standing["name"] for standing in json.loads(out)} == {*PAPER_POLICIES, "dpo, quick"}
 
 
 def test_the_entry_of_a_scripted_controller_that_was_made_again_is_shown(command, folder, tiny, tmp_path):
@@ -123,7 +123,7 @@ def test_the_entry_of_a_scripted_controller_that_was_made_again_is_shown(command
     code, out, err = command("benchmark", "show", str(shipped), "dpo.json", "--json")
     assert code == 0, err
     scores = {standing["name"]: standing["score"][0] for standing in json.loads(out)}
-    assert scores.keys() == set(SCRIPTED)
+    assert scores.keys() == set(PAPER_POLICIES)
     assert max(scores, key=scores.get) == "dpo"
 
 

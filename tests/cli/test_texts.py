@@ -23,10 +23,9 @@ from typing import Any
 
 import pytest
 
-from metrics import choose_policy, compare_policies, predict_policy, score_curves, score_policy
+from metrics import PAPER_POLICIES, choose_policy, compare_policies, predict_policy, score_curves, score_policy
 from metrics.benchmark import load_protocol
 from metrics.benchmark.page import BEGIN, END
-from metrics.benchmark.standing import SCRIPTED
 from swarm_forage_env import cli
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.study import Axis
@@ -277,7 +276,7 @@ def _same_terminal(patch: pytest.MonkeyPatch) -> None:
 def _write_benchmark(folder: Path, patch: pytest.MonkeyPatch) -> None:
     folder.mkdir()
     (folder / "benchmark_v1.toml").write_text(TINY.read_text())
-    for k, name in enumerate(SCRIPTED):
+    for k, name in enumerate(PAPER_POLICIES):
         made_up_entry(load_protocol(TINY), name, lambda world, k=k: 10.0 + k + world).write(folder / f"{name}.json")
     made_up_entry(load_protocol(TINY), "mine", lambda world: 13.0 + 2.0 * world, n_policies=2).write(Path("mine.json"))
     Path("page.md").write_text(f"# Benchmark\n\n{BEGIN}\n{END}\n\nend\n")

@@ -22,7 +22,7 @@ from swarm_forage_env.rendering.page import PageError, build_page, take_page_apa
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.kinds import RobotKind, kind_sizes
-from swarm_forage_env.scenarios.performance import quantity
+from swarm_forage_env.scenarios.performance import performance_of
 from swarm_forage_env.scenarios.units import CELL_M, WALL_M
 from swarm_forage_env.wrappers.recorder import TOTALS
 
@@ -203,7 +203,7 @@ def _kinds(scenario: ScenarioConfig) -> Iterable[tuple[RobotKind, int]]:
 def _performance(scenario: ScenarioConfig) -> dict[str, str]:
     """Return what the page counts: performance if it is something that the world counts, else deliveries."""
     column = scenario.performance if scenario.performance in TOTALS else "collected"
-    return {"counter": TOTALS[column].name.lower(), "words": quantity(column).title}
+    return {"counter": TOTALS[column].name.lower(), "words": performance_of(column).title}
 
 
 def _world(scenario: ScenarioConfig) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from metrics import PAPER_POLICIES
 from metrics.benchmark import (
     BenchmarkError,
     Training,
@@ -16,7 +17,7 @@ from metrics.benchmark import (
     standing_of,
 )
 from metrics.benchmark.page import BEGIN, END, markdown, with_block
-from metrics.benchmark.standing import SCRIPTED, improvements, scripted_entries
+from metrics.benchmark.standing import improvements, scripted_entries
 from tests.support.entries import TINY, made_up_entry
 from tests.support.pictures import words_in
 
@@ -31,7 +32,7 @@ def scripted(protocol):
     """The first two are best in every other world: 19 and 21 there, so 20 on average."""
     best = (lambda k: 19.0 if k % 2 else 9.0), (lambda k: 9.0 if k % 2 else 19.0)
     performances = (*best, lambda k: 1.0, lambda k: 2.0)
-    return [made_up_entry(protocol, name, p) for name, p in zip(SCRIPTED, performances, strict=True)]
+    return [made_up_entry(protocol, name, p) for name, p in zip(PAPER_POLICIES, performances, strict=True)]
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,7 @@ def reference(protocol, scripted):
 def test_the_reference_is_the_best_scripted_controller_of_each_world(protocol, reference):
     for k, world in enumerate(protocol.worlds):
         if world.is_scored:
-            assert reference.best[world.name] == SCRIPTED[0 if k % 2 else 1]
+            assert reference.best[world.name] == PAPER_POLICIES[0 if k % 2 else 1]
             assert reference.mean(world.name) == 20.0
     assert "room, 1 robot" not in reference.best
 
@@ -55,7 +56,9 @@ def test_no_scripted_controller_wins_against_itself():
 
 
 def test_a_world_in_which_no_scripted_controller_achieves_anything_is_refused(protocol):
-    nobody = [made_up_entry(protocol, name, lambda k: -1.0) for name in SCRIPTED]  # -1 and 1 objects: 0 on average
+    nobody = [
+        made_up_entry(protocol, name, lambda k: -1.0) for name in PAPER_POLICIES
+    ]  # -1 and 1 objects: 0 on average
     with pytest.raises(BenchmarkError, match="training: here"):
         reference_of(nobody, protocol)
 
@@ -157,5 +160,5 @@ def test_the_figure_shows_every_entry_and_world(protocol, scripted, reference, t
 def test_the_entries_of_the_scripted_controllers_are_whole_and_achieve_something():
     protocol = load_protocol()
     entries = scripted_entries(protocol)
-    assert tuple(entry.name for entry in entries) == SCRIPTED
+    assert tuple(entry.name for entry in entries) == PAPER_POLICIES
     reference_of(entries, protocol)
