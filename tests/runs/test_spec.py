@@ -17,9 +17,20 @@ from swarm_forage_env.runs.spec import RunSpec, chosen_caches, plan_run
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from swarm_forage_env.wrappers import registry
+from swarm_forage_env.wrappers.world import World
 from tests.support.wrapper_configs import InnerConfig, OuterConfig
 
-BASE = RunSpec(scenario=scenario("warehouse_small"), policy="crw")
+BASE = RunSpec(world=World(scenario("warehouse_small")), policy="crw")
+
+
+def base_in(name="warehouse_small", **overrides):
+    """The same run in another scenario."""
+    return replace(BASE, world=World(scenario(name, **overrides)))
+
+
+def base_with(**fields):
+    """The same run in a world of which other fields differ."""
+    return replace(BASE, world=replace(BASE.world, **fields, name=""))
 
 
 @pytest.fixture
@@ -31,7 +42,7 @@ def registered(monkeypatch):
 @pytest.mark.parametrize("policy", policy_names())
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 def test_every_scenario_and_policy_survives_json(name, policy):
-    spec = plan_run(scenario(name), policy, seed=3, criterion="noise", criterion_value=0.0043)
+    spec = plan_run(World(scenario(name), criterion="noise", value=0.0043), policy, seed=3)
     again = RunSpec.from_json(spec.to_json())
     assert again == spec
     assert again.run_id == spec.run_id
@@ -41,20 +52,15 @@ def test_every_scenario_and_policy_survives_json(name, policy):
 def test_quirks_parameters_and_wrappers_survive_json(registered):
     spec = replace(
         BASE,
-        scenario=scenario("search_and_rescue", quirks=AUTHORS_PROGRAM, nest_centre_m=(20.0, 24.0)),
+        world=World(
+            scenario("search_and_rescue", quirks=AUTHORS_PROGRAM, nest_centre_m=(20.0, 24.0)),
+            (InnerConfig(sigma=1 / 3), OuterConfig(groups=("light", "ground"))),
+        ),
         parameters={"gain": 0.1, "levels": (1, 2), "nested": {"on": True, "none": None}},
-        wrappers=(InnerConfig(sigma=1 / 3), OuterConfig(groups=("light", "ground"))),
     )
     again = RunSpec.from_mapping(json.loads(json.dumps(spec.to_mapping())))
     assert again == spec
     assert again.wrappers == (OuterConfig(groups=("light", "ground")), InnerConfig(sigma=1 / 3))
-
-
-def test_wrappers_are_kept_in_stack_order_and_at_most_once():
-    shuffled = replace(BASE, wrappers=(InnerConfig(), OuterConfig()))
-    assert shuffled == replace(BASE, wrappers=(OuterConfig(), InnerConfig()))
-    with pytest.raises(ConfigError, match="each wrapper at most once, got test_inner, test_inner"):
-        replace(BASE, wrappers=(InnerConfig(), InnerConfig(sigma=0.2)))
 
 
 def test_the_id_is_short_and_tells_every_difference_apart():
@@ -62,14 +68,14 @@ def test_the_id_is_short_and_tells_every_difference_apart():
         BASE,
         replace(BASE, seed=1),
         replace(BASE, policy="dpo"),
-        replace(BASE, criterion="noise"),
-        replace(BASE, criterion_value=0.1),
+        base_with(criterion="noise"),
+        base_with(value=0.1),
         replace(BASE, parameters={"a": 1}),
         replace(BASE, parameters={"a": True}),
-        replace(BASE, wrappers=(InnerConfig(),)),
-        replace(BASE, wrappers=(InnerConfig(sigma=0.2),)),
-        replace(BASE, scenario=scenario("warehouse_small", quirks=AUTHORS_PROGRAM)),
-        replace(BASE, scenario=scenario("warehouse_small", n_robots=49)),
+        base_with(wrappers=(InnerConfig(),)),
+        base_with(wrappers=(InnerConfig(sigma=0.2),)),
+        base_in(quirks=AUTHORS_PROGRAM),
+        base_in(n_robots=49),
     ]
     ids = {spec.run_id for spec in variants}
     assert len(ids) == len(variants)
@@ -78,19 +84,24 @@ def test_the_id_is_short_and_tells_every_difference_apart():
 
 
 def test_equal_numbers_give_equal_ids_however_they_are_spelt():
-    whole, real = (replace(BASE, scenario=scenario("warehouse_small", horizon_s=value)) for value in (2000, 2000.0))
+    whole, real = (base_in(horizon_s=value) for value in (2000, 2000.0))
     assert whole == real
     assert whole.run_id == real.run_id
 
 
 def test_another_performance_is_the_same_run():
-    other = replace(BASE, scenario=scenario("warehouse_small", performance="n_carrying"))
+    other = base_in(performance="n_carrying")
     assert other != BASE
     assert other.run_id == BASE.run_id
 
 
+def test_the_name_of_a_world_is_no_part_of_a_run():
+    other = replace(BASE, world=replace(BASE.world, name="at home"))
+    assert (other, other.run_id) == (BASE, BASE.run_id)
+
+
 def test_another_engine_is_another_run():
-    assert replace(BASE, scenario=scenario("warehouse_small", physics="compiled")).run_id != BASE.run_id
+    assert base_in(physics="compiled").run_id != BASE.run_id
 
 
 def test_a_specification_without_an_engine_is_one_in_chipmunk():
@@ -113,7 +124,7 @@ def test_parameters_must_be_plain(value):
 
 def test_a_horizon_of_broken_intervals_is_refused():
     with pytest.raises(ConfigError, match="whole number of intervals of 200 s, got 300 s"):
-        replace(BASE, scenario=scenario("warehouse_small", horizon_s=300.0))
+        base_in(horizon_s=300.0)
 
 
 @pytest.mark.parametrize(
@@ -145,8 +156,8 @@ def test_mappings_with_unknown_parts_are_refused():
     ):
         with pytest.raises(ConfigError, match=message):
             RunSpec.from_mapping({**BASE.to_mapping(), **part})
-    with pytest.raises(ConfigError, match="Expected scenario to be a ScenarioConfig, got 'warehouse_small'"):
-        RunSpec(scenario="warehouse_small", policy="crw")
+    with pytest.raises(ConfigError, match="Expected world to be a World, got 'warehouse_small'"):
+        RunSpec(world="warehouse_small", policy="crw")
 
 
 class ForStatic:
@@ -190,13 +201,27 @@ def test_a_policy_that_states_no_caches_leaves_the_scenario_alone():
     assert plan_run(scenario("warehouse_small", caches="static"), "random").scenario.caches == "static"
 
 
+def test_a_run_is_planned_in_a_world_a_scenario_or_a_preset_by_name():
+    world = scenario("warehouse_small")
+    assert plan_run("warehouse_small", "crw") == plan_run(world, "crw") == plan_run(World(world), "crw") == BASE
+
+
+def test_wrappers_are_added_to_those_of_the_world():
+    world = World(scenario("warehouse_small"), (InnerConfig(),), criterion="noise", value=0.1)
+    spec = plan_run(world, "stochm", wrappers=[OuterConfig()])
+    assert spec.wrappers == (OuterConfig(), InnerConfig())
+    assert (spec.scenario.caches, spec.world.criterion, spec.world.value) == ("static", "noise", 0.1)
+    with pytest.raises(ConfigError, match="each wrapper at most once"):
+        plan_run(world, "crw", wrappers=[InnerConfig()])
+
+
 def test_planning_an_unknown_policy_suggests_the_nearest():
     with pytest.raises(ValueError, match=r"Unknown policy 'crv'\. Did you mean 'crw'"):
         plan_run(scenario("warehouse_small"), "crv")
 
 
 def test_describe_is_one_line():
-    text = replace(BASE, seed=7, criterion="noise", criterion_value=0.03).describe()
+    text = replace(base_with(criterion="noise", value=0.03), seed=7).describe()
     assert text == f"{text[:16]}: crw in warehouse_small, 50 robots, seed 7, noise = 0.03"
 
 

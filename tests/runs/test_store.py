@@ -7,13 +7,15 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from swarm_forage_env.runs import store as runs_store
 from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import RunFailure, RunStore, load, read_failure
+from swarm_forage_env.runs.store import DONE, FAILED, MISSING, STATES, RunFailure, RunStore, load, read_failure
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.world import World
 
-SPEC = RunSpec(scenario=scenario("warehouse_small", n_robots=2, horizon_s=2.0, interval_s=1.0), policy="random")
+SPEC = RunSpec(world=World(scenario("warehouse_small", n_robots=2, horizon_s=2.0, interval_s=1.0)), policy="random")
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +104,35 @@ def test_a_failure_is_kept_until_the_run_succeeds(store, records):
     store.write(next(record for record in records if record.run_id == spec.run_id))
     assert store.failures() == ()
     assert len(load(store.folder)) == 3
+
+
+def test_planned_runs_are_looked_up(store, records, monkeypatch):
+    """What is done, failed, missing or damaged, and read with the performance that is asked for."""
+    other = replace(SPEC, world=World(replace(SPEC.scenario, performance="n_active")))
+    failed, missing, damaged = (replace(SPEC, seed=seed) for seed in (3, 4, 1))
+    store.write_failure(RunFailure(spec=failed, error="ValueError: no", traceback="line 1"))
+    store.path(damaged.run_id).write_bytes(b"damaged")
+    planned = [other, damaged, failed, missing]
+    found = store.look_up(planned)
+    assert found.states == dict(zip((spec.run_id for spec in planned), (DONE, MISSING, FAILED, MISSING), strict=True))
+    assert set(found.states.values()) == set(STATES)
+    assert list(found.records) == [other.run_id]
+    assert found.records[other.run_id].performance.tolist() == [2.0, 2.0]
+    assert list(found.damaged) == [damaged.run_id]
+    assert found.damaged[damaged.run_id].startswith(f"Cannot read {store.path(damaged.run_id)}: it is no Parquet file")
+    assert found.n_foreign == 0
+    without = store.look_up(planned, keep=False)
+    assert (without.records, without.states) == ({}, found.states)
+    monkeypatch.setattr(runs_store, "software_versions", lambda: {"numba": "0.0"})
+    assert store.look_up(planned, keep=False).n_foreign == 1, "the damaged one tells no version"
+
+
+def test_a_damaged_file_that_is_put_aside_is_no_record_any_more(store, records):
+    path = store.path(records[0].run_id)
+    path.write_bytes(b"damaged")
+    store.put_aside(records[0].run_id)
+    assert path.with_name(f"{path.name}.damaged").read_bytes() == b"damaged"
+    assert len(load(store.folder)) == 2
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"spec": {}, "error": "e", "traceback": []}'])

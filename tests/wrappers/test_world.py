@@ -1,0 +1,92 @@
+"""World: its name, its wrappers in order, and what it refuses."""
+
+from dataclasses import replace
+
+import pytest
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.noise import SensorNoiseConfig
+from swarm_forage_env.wrappers.population import PopulationConfig
+from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World, world_of
+from tests.support.wrapper_configs import InnerConfig, OuterConfig
+
+SMALL = scenario("warehouse_small")
+
+
+@pytest.mark.parametrize(
+    ("world", "name"),
+    [
+        (World(SMALL), "warehouse_small, 50 robots"),
+        (World(scenario("search_and_rescue", n_robots=1)), "search_and_rescue, 1 robot"),
+        (World(SMALL, (InnerConfig(), OuterConfig())), "warehouse_small, 50 robots, test_outer, test_inner"),
+        (World(SMALL, (InnerConfig(),), criterion="noise", value=0.025), "warehouse_small, 50 robots, noise 0.025"),
+        (World(SMALL, criterion="noise", value=0.0), "warehouse_small, 50 robots, noise 0"),
+        (World(SMALL, (InnerConfig(),), criterion=SIZE, value=50), "warehouse_small, 50 robots, test_inner"),
+        (World(SMALL, criterion=SIZE, value=50, name="the usual"), "the usual"),
+    ],
+)
+def test_a_name_tells_the_swarm_and_what_is_varied_or_disturbs_it(world, name):
+    assert world.name == name
+
+
+def test_a_name_is_for_people_only():
+    named = World(SMALL, name="home")
+    assert named == World(SMALL)
+    assert hash(named) == hash(World(SMALL))
+    assert named != World(SMALL, criterion="noise")
+
+
+def test_wrappers_are_kept_in_stack_order_and_at_most_once():
+    shuffled = World(SMALL, (InnerConfig(), OuterConfig()))
+    assert shuffled.wrappers == (OuterConfig(), InnerConfig())
+    assert shuffled == World(SMALL, (OuterConfig(), InnerConfig()))
+    with pytest.raises(ConfigError, match="each wrapper at most once, got test_inner, test_inner"):
+        World(SMALL, (InnerConfig(), InnerConfig(sigma=0.2)))
+
+
+@pytest.mark.parametrize(
+    ("given", "fields", "message"),
+    [
+        ("warehouse_small", {}, "Expected scenario to be a ScenarioConfig, got 'warehouse_small'"),
+        (SMALL, {"criterion": ""}, "Expected criterion to be a non-empty text"),
+        (SMALL, {"criterion": 3}, "Expected criterion to be a non-empty text"),
+        (SMALL, {"value": "much"}, "Expected criterion_value to be a finite number, got 'much'"),
+        (SMALL, {"value": float("nan")}, "Expected criterion_value to be a finite number, got nan"),
+        (SMALL, {"value": True}, "Expected criterion_value to be a finite number, got True"),
+    ],
+)
+def test_what_is_no_world_is_refused(given, fields, message):
+    with pytest.raises(ConfigError, match=message):
+        World(given, **fields)
+
+
+def test_whole_values_are_numbers_like_others():
+    assert World(SMALL, criterion=SIZE, value=50) == World(SMALL, criterion=SIZE, value=50.0)
+    assert isinstance(World(SMALL, value=50).value, float)
+
+
+def test_a_world_is_given_as_itself_a_scenario_or_a_preset():
+    world = World(SMALL)
+    assert world_of(world) is world
+    assert world_of(SMALL) == world_of("warehouse_small") == world
+    assert (world.criterion, world.value, world.n_robots) == (UNDISTURBED, 0.0, 50)
+    with pytest.raises(ConfigError, match="Did you mean 'warehouse_small'"):
+        world_of("warehouse_smal")
+    with pytest.raises(ConfigError, match="ScenarioConfig"):
+        world_of(7)
+
+
+def test_the_rates_of_its_population_are_found_among_its_wrappers():
+    rates = PopulationConfig(death_per_tick=0.001)
+    assert World(SMALL, (SensorNoiseConfig(sigma=0.1), rates)).population == rates
+    assert World(SMALL, (SensorNoiseConfig(sigma=0.1),)).population is None
+
+
+def test_other_caches_leave_the_rest_as_it_is():
+    world = World(SMALL, (InnerConfig(),), criterion="noise", value=0.1, name="mine")
+    assert world.with_caches(None) is world.with_caches("none") is world
+    assert world.with_caches("static") == replace(world, scenario=replace(SMALL, caches="static"))
+    assert world.with_caches("static").name == "mine"
+    with pytest.raises(ConfigError, match="caches"):
+        world.with_caches("heaps")
