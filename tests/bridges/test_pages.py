@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarm_forage_env import RunSpec, load_policy, parallel_env, run_one, scenario
+from swarm_forage_env import RunSpec, World, load_policy, parallel_env, run_one, scenario
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -38,7 +38,7 @@ def run(arguments: list[str], folder: Path) -> str:
 def check_runs(file: Path) -> None:
     """What was saved is a policy that runs, with numpy alone, in a swarm of another size than it was trained in."""
     small = scenario("warehouse_small", n_robots=8, horizon_s=200.0)
-    record = run_one(RunSpec(scenario=small, policy=str(file), seed=1))
+    record = run_one(RunSpec(world=World(small), policy=str(file), seed=1))
     assert record.performance.shape == (1,)
 
 

@@ -96,7 +96,7 @@ def test_trainings_in_folders_of_one_name_are_told_apart(command, monkeypatch):
 
 def test_the_place_of_the_picture_is_looked_at_before_anything_is_run(command, monkeypatch):
     pictures = drawn(monkeypatch)
-    monkeypatch.setattr("swarm_forage_env.runs.runner.run_all", lambda *_, **__: pytest.fail("a run was started"))
+    monkeypatch.setattr("swarm_forage_env.runs.runner.run_specs", lambda *_, **__: pytest.fail("a run was started"))
     training("first")
     Path("taken.png").mkdir()
     told = "swarm-forage: Expected a file to write, got a folder: taken.png\n"

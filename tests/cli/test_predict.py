@@ -9,7 +9,7 @@ import pytest
 
 from metrics import SizeLaw, predict_performance
 from swarm_forage_env.policies.registry import RandomPolicy
-from swarm_forage_env.runs.runner import StudyInterrupted, StudyResult
+from swarm_forage_env.runs.runner import Outcomes, RunsInterrupted
 from swarm_forage_env.runs.store import load
 
 RUNS = ("predict", "--policy", "crw", "--fit", "1,2,3,4", "--hold", "6", "--seeds", "2", "--jobs", "1")
@@ -41,20 +41,10 @@ def curves():
 def one_object_per_robot(monkeypatch):
     """Runs of four seconds deliver nothing; count a robot's ticks at work as its performance."""
     from metrics.scoring import prediction
-    from metrics.scoring.totals import PolicyTotals, run_totals
+    from metrics.scoring.totals import run_totals
 
-    def totals(plan, **options):
-        return tuple(
-            PolicyTotals(
-                policy=one.policy,
-                totals=tuple(
-                    {seed: 10.0 * experiment.value + seed for seed in of_seeds}
-                    for experiment, of_seeds in zip(plan.experiments, one.totals, strict=True)
-                ),
-                failures=one.failures,
-            )
-            for one in run_totals(plan, **options)
-        )
+    def totals(table, condition):
+        return {seed: 10.0 * condition.world.value + seed for seed in run_totals(table, condition)}
 
     monkeypatch.setattr(prediction, "run_totals", totals)
 
@@ -133,9 +123,9 @@ def test_without_matplotlib_there_is_a_table_and_a_hint(command, curves, monkeyp
 
 def test_ctrl_c_says_what_is_kept(command, monkeypatch):
     def interrupted(*_, **__):
-        raise StudyInterrupted(StudyResult(records=(), failures=(), n_stored=0), 10)
+        raise RunsInterrupted(Outcomes(states={}, records={}, failures={}), 10)
 
-    monkeypatch.setattr("swarm_forage_env.runs.runner.run_all", interrupted)
+    monkeypatch.setattr("swarm_forage_env.runs.runner.run_specs", interrupted)
     code, out, err = command(*RUNS, *WORLD)
     assert (code, out) == (130, "")
     assert "0 of 10 runs are finished and kept. They are in results/warehouse_small" in err

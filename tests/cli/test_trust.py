@@ -14,6 +14,7 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.spec import RunSpec, pin_policy
 from swarm_forage_env.runs.store import RunFailure, RunStore
 from swarm_forage_env.scenarios.presets import scenario
+from swarm_forage_env.wrappers.world import World
 
 TINY = ("--robots", "2", "--objects", "10", "--horizon", "200")
 NOTE = {"interface": {"observation": "compact"}, "caches": "static"}
@@ -92,7 +93,7 @@ def test_a_model_that_has_changed_is_refused_without_being_opened(model):
 
 
 def test_a_failure_that_names_a_model_is_refused(command, model, tmp_path):
-    spec = RunSpec(scenario=scenario("warehouse_small", n_robots=2, n_objects=10), policy=str(model))
+    spec = RunSpec(world=World(scenario("warehouse_small", n_robots=2, n_objects=10)), policy=str(model))
     store = RunStore(tmp_path / "store")
     store.write_failure(RunFailure(spec=spec, error="e", traceback="t"))
     code, _, err = command("rerun", str(store.failure_path(spec.run_id)))
@@ -141,7 +142,7 @@ def test_the_same_holds_for_each_part_of_a_mixed_swarm(command, model, tmp_path)
 
 def test_the_option_opens_what_a_file_names(command, model, tmp_path):
     pytest.importorskip("stable_baselines3")
-    spec = RunSpec(scenario=scenario("warehouse_small", n_robots=2, n_objects=10), policy=str(model))
+    spec = RunSpec(world=World(scenario("warehouse_small", n_robots=2, n_objects=10)), policy=str(model))
     store = RunStore(tmp_path / "store")
     store.write_failure(RunFailure(spec=spec, error="e", traceback="t"))
     code, _, err = command("--trust-models", "rerun", str(store.failure_path(spec.run_id)))

@@ -12,7 +12,7 @@ import pytest
 from gymnasium import spaces
 
 from metrics import score_policy
-from metrics.scoring import plan_scores
+from metrics.scoring import score_question
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
@@ -178,7 +178,7 @@ def test_an_interface_is_said_with_the_file(tmp_path):
     given = {"interface": {"decision_ticks": 2, "automatic_gripper": True}}
     assert said == plan_run(world, str(path), parameters=given, caches="static")
     assert load_policy(f"{path}:decision_ticks=7")._config.decision_ticks == 7
-    assert plan_scores([f"{path}:decision_ticks=7"], world, budget=TINY).contestants[0].label == "model"
+    assert score_question([f"{path}:decision_ticks=7"], world, budget=TINY).plan.policies[0].label == "model"
     with pytest.raises(ConfigError, match="Did you mean 'decision_ticks'"):
         load_policy(f"{path}:decision_tick=7")
     with pytest.raises(ConfigError, match="once, got it with the file and as a parameter"):
@@ -383,8 +383,8 @@ def test_networks_are_policies_by_their_path(network_file):
 
 def test_files_are_scored_under_the_name_of_the_file_in_the_world_they_are_made_for(network_file, tmp_path):
     world = scenario("warehouse_small", n_robots=3, n_objects=20)
-    plan = plan_scores([network_file], world, budget=TINY, measures=["efficiency"])
-    assert plan.contestants[0].label == "straight"
+    plan = score_question([network_file], world, budget=TINY, measures=["efficiency"]).plan
+    assert plan.policies[0].label == "straight"
     assert {spec.scenario.caches for spec in plan.specs} == {"static"}
     assert all(spec.parameters == {"digest": file_digest(network_file)} for spec in plan.specs)
     assert all(RunSpec.from_json(spec.to_json()) == spec for spec in plan.specs)
@@ -400,9 +400,9 @@ def test_files_of_equal_names_go_by_their_folders_or_paths(network_file, tmp_pat
     for file in files:
         file.parent.mkdir(parents=True)
         file.write_bytes(network_file.read_bytes())
-    plan = plan_scores(files, scenario("warehouse_small", n_robots=3), budget=TINY)
+    plan = score_question(files, scenario("warehouse_small", n_robots=3), budget=TINY).plan
     expected = {"short": ["a/straight.npz", "b/straight.npz"], "whole": [str(file) for file in files]}
-    assert [contestant.label for contestant in plan.contestants] == expected[labels]
+    assert [policy.label for policy in plan.policies] == expected[labels]
 
 
 def test_names_are_no_files():

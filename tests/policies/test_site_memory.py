@@ -16,6 +16,7 @@ from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.views.plans import plan_arena
 from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import World
 from tests.reference.site_memory import RobotSites
 from tests.support.stage import cell_centre, lay, load, put, tidy_world
 
@@ -142,7 +143,7 @@ def test_a_policy_sees_in_a_run_what_it_saw_in_training():
 
     run_policy(
         LearnedPolicy(InterfaceConfig(**INTERFACE), choose),
-        RunSpec(scenario=world, policy="mine", seed=5),
+        RunSpec(world=World(world), policy="mine", seed=5),
     )
     np.testing.assert_array_equal(looked_at, trained_on)
     assert np.array(trained_on)[..., arena.interface.layout["pickup_site"]].any()

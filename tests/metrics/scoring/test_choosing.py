@@ -9,12 +9,28 @@ import numpy as np
 import pytest
 
 from metrics import CurveError, choose_policy
-from metrics.scoring.choosing import MET, NOT_MET, UNDECIDED, Constraint, Evidence, plan_choice, rank_policies
-from metrics.scoring.totals import PolicyTotals
+from metrics.scoring import ask
+from metrics.scoring.choosing import (
+    MET,
+    NOT_MET,
+    UNDECIDED,
+    ChoiceQuestion,
+    Constraint,
+    Evidence,
+    choice_question,
+)
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs import runner
+from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.policy_spec import PolicySpec
+from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.noise import NOISE_GROUPS, ActuatorNoiseConfig, SensorNoiseConfig
 from swarm_forage_env.wrappers.population import malfunction_levels
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import World
+from tests.support.run_tables import table_of_totals
 
 WORLD = scenario("warehouse_small", n_robots=4, n_objects=20, horizon_s=4.0, interval_s=2.0)
 DEMANDS = (Constraint(condition="undisturbed", demand=10.0), Constraint(condition="noise 0.01", demand=5.0))
@@ -27,13 +43,12 @@ def evidence(values, demand=10.0):
     )
 
 
-def chosen(**runs):
+def chosen(world=WORLD, **runs):
     """Rank policies by (undisturbed, noisy) runs."""
-    found = [
-        PolicyTotals(policy=name, totals=tuple(dict(enumerate(values)) for values in both), failures=())
-        for name, both in runs.items()
-    ]
-    return rank_policies(found, DEMANDS, WORLD)
+    worlds = [World(world), World(world, (ActuatorNoiseConfig(sigma=0.01),), criterion="noise", value=0.01)]
+    seeds = range(max((len(values) for both in runs.values() for values in both), default=0) or 3)
+    plan = Plan.product([PolicySpec(label=name, policy=name) for name in runs], worlds, tuple(seeds))
+    return ChoiceQuestion(plan=plan, constraints=DEMANDS).answer(table_of_totals(plan, runs))
 
 
 def test_a_verdict_by_hand():
@@ -104,6 +119,8 @@ def test_policies_without_runs_come_last_and_are_no_reason():
     assert choice.reason.endswith("(not met: undisturbed, noise 0.01); runs of none failed.")
     choice = chosen(none=([], []), other=([], []))
     assert "there are too few runs to test the difference" in choice.reason
+    assert len(choice.candidates[0].failures) == 6
+    assert str(choice).count("it broke") == 12
     assert chosen(alone=(GOOD, UNSURE)).reason == (
         "alone meets 1 of 2 constraints with confidence (undecided: noise 0.01)."
     )
@@ -120,19 +137,18 @@ def test_the_table_has_a_row_for_each_policy_and_constraint():
 
 def test_the_unit_is_that_of_the_performance():
     for name, unit in {"first_picked": "objects", "n_carrying": "robots summed over intervals"}.items():
-        found = [PolicyTotals(policy="a", totals=({0: 12.0, 1: 13.0}, {0: 12.0, 1: 13.0}), failures=())]
-        choice = rank_policies(found, DEMANDS, replace(WORLD, performance=name))
+        choice = chosen(replace(WORLD, performance=name), a=([12.0, 13.0], [12.0, 13.0]))
         assert str(choice).splitlines()[0] == f"warehouse_small, 4 robots, runs of 4 s: {unit}"
         assert choice.to_mapping()["unit"] == unit
 
 
 def test_disturbances_are_those_that_the_help_describes():
     world = scenario("warehouse_small")
-    plan = plan_choice(["random"], world, deliver=10, keep=0.5, failures=0.001, deaths=5, noise=0.02)
-    assert [(c.condition, c.demand) for c in plan.constraints] == [
+    question = choice_question(["random"], world, deliver=10, keep=0.5, failures=0.001, deaths=5, noise=0.02)
+    assert [(c.condition, c.demand) for c in question.constraints] == [
         ("undisturbed", 10), ("failures 0.001", 5.0), ("deaths 5", 5.0), ("noise 0.02", 5.0),
     ]  # fmt: skip
-    undisturbed, failing, dying, noisy = plan.runs.experiments
+    undisturbed, failing, dying, noisy = (condition.world for condition in question.plan.conditions)
     assert undisturbed.wrappers == ()
     study = malfunction_levels(50)[0]  # the study's lowest level, 0.001 malfunctions per tick
     assert failing.population.malfunction_per_tick == study.malfunction_per_tick
@@ -172,8 +188,8 @@ def test_demands_that_make_no_sense_are_refused(demand, reason):
 
 
 def test_all_robots_may_be_expected_to_die():
-    dying = plan_choice(["random"], WORLD, deliver=5.0, deaths=4.0).runs.experiments[1]
-    assert dying.population.death_per_tick == 4.0 / 20.0  # 4 s have 20 ticks
+    dying = choice_question(["random"], WORLD, deliver=5.0, deaths=4.0).plan.conditions[1]
+    assert dying.world.population.death_per_tick == 4.0 / 20.0  # 4 s have 20 ticks
 
 
 def test_a_failed_policy_is_shown_and_the_others_are_ranked():
@@ -189,3 +205,71 @@ def test_a_failed_policy_is_shown_and_the_others_are_ranked():
     assert len(broken.failures) == 2
     assert "failed: " in str(choice)
     assert broken.evidence[0].verdict == UNDECIDED
+
+
+def test_wrappers_of_the_world_are_in_all_runs(tmp_path):
+    slow, deaf = (
+        parse_wrapper(words) for words in ("throttle:waveform=constant,amplitude=0.3", "sensor_noise:sigma=0.2")
+    )
+    options = {"deliver": 1.0, "deaths": 2.0, "seeds": 2, "out": tmp_path, "jobs": 1, "progress": False}
+    choice = choose_policy(["random"], World(WORLD, (slow, deaf)), **options)
+    assert choice.scenario == "warehouse_small"
+    runs = [json.loads(record.spec) for record in load(tmp_path)]
+    assert len(runs) == 4
+    always = {"throttle", "sensor_noise"}
+    kinds = {run["criterion"]: {config["wrapper"] for config in run["wrappers"]} for run in runs}
+    assert kinds == {"none": always, "population_dynamics": always | {"population"}}
+    assert all(
+        config["waveform"]["amplitude"] == 0.3
+        for run in runs
+        for config in run["wrappers"]
+        if config["wrapper"] == "throttle"
+    )
+
+
+def test_a_wrapper_of_the_world_that_a_demand_sets_too_is_refused():
+    noisy = World(WORLD, (parse_wrapper("actuator_noise:sigma=0.2"),))
+    with pytest.raises(ConfigError, match="no wrapper actuator_noise in a world where noise is varied"):
+        choose_policy(["random"], noisy, deliver=1.0, noise=0.01)
+    with pytest.raises(ConfigError, match="no wrapper population in a world where population_dynamics is varied"):
+        choose_policy(
+            ["random"], World(WORLD, (parse_wrapper("population:death_per_tick=0.1"),)), deliver=1.0, deaths=1
+        )
+
+
+def test_failed_runs_are_those_of_their_condition(monkeypatch, tmp_path):
+    def failing(spec):
+        if spec.world.criterion == "noise" and spec.seed == 1:
+            raise RuntimeError("out of luck")
+        return run_one(spec)
+
+    monkeypatch.setattr(runner, "run_one", failing)
+    question = choice_question(["random", "crw"], WORLD, deliver=1.0, noise=0.01, seeds=2)
+    choice = ask(question, out=tmp_path, jobs=1, progress=False)
+    for candidate in choice.candidates:
+        calm, noisy = candidate.evidence
+        assert (calm.per_seed.keys(), noisy.per_seed.keys()) == ({0, 1}, {0})
+        (told,) = candidate.failures
+        assert (
+            f"{candidate.policy} in warehouse_small, 4 robots, seed 1, noise = 0.01: RuntimeError: out of luck" in told
+        )
+    # Asked again, only what failed is run.
+    fresh = []
+    monkeypatch.setattr(runner, "run_one", lambda spec: fresh.append(spec) or run_one(spec))
+    again = ask(question, out=tmp_path, jobs=1, progress=False)
+    assert [(spec.policy, spec.seed, spec.world.criterion) for spec in fresh] == [
+        ("random", 1, "noise"),
+        ("crw", 1, "noise"),
+    ]
+    assert not any(candidate.failures for candidate in again.candidates)
+
+
+def test_stored_runs_of_functions_need_a_name(tmp_path):
+    def still(obs):
+        return np.zeros((len(obs), 3), np.float32)
+
+    with pytest.raises(ValueError, match="Expected name= for the policy still"):
+        choose_policy([still], WORLD, deliver=1.0, seeds=2, out=tmp_path, progress=False)
+    choice = choose_policy({"v1": still}, WORLD, deliver=1.0, seeds=2, out=tmp_path, progress=False)
+    assert choice.candidates[0].policy == "v1"
+    assert {record.controller for record in load(tmp_path)} == {"v1"}

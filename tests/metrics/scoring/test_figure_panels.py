@@ -9,7 +9,8 @@ from metrics.claims import EXPERIMENTS, INTUITIONS, PanelName
 from metrics.scoring import judge_claims, study_panels
 from metrics.scoring.figure_panels import experiment_of
 from metrics.scoring.verdicts import VARIANTS
-from swarm_forage_env.studies.study import Axis, StudyPolicy
+from swarm_forage_env.runs.policy_spec import PolicySpec
+from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_file import load_study, set_names
 from swarm_forage_env.studies.study_table import StudyTable
 from tests.support.made_tables import FOUR, made_study, made_table
@@ -165,7 +166,7 @@ def test_the_claim_on_spatial_emergence_of_search_and_rescue_needs_no_lone_robot
     [
         ([made_study(), made_study()], "Expected each study once, got S1a, S1a"),
         ([made_study("mine")], "Expected studies of the paper's sets, S1a, .*; got study 'mine'"),
-        ([made_study(policies=(StudyPolicy(label="crw", policy="random"),))], "it has no dpo, stochm, stochx"),
+        ([made_study(policies=(PolicySpec(label="crw", policy="random"),))], "it has no dpo, stochm, stochx"),
     ],
 )
 def test_what_no_claim_is_about_is_refused(specs, message):

@@ -1,5 +1,6 @@
 """Public functions of scoring: any policy gives one table, no run is made twice, failures are shown."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -9,15 +10,17 @@ import pytest
 
 import metrics
 from metrics import CurveError, compare_policies, score_policy
-from metrics.scoring import plan_scores, run_scores
+from metrics.scoring import ask, score_question
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import registry as policy_module
 from swarm_forage_env.runs import runner
 from swarm_forage_env.runs.run import run_one
-from swarm_forage_env.runs.runner import StudyInterrupted
+from swarm_forage_env.runs.runner import RunsInterrupted
 from swarm_forage_env.runs.store import RunStore, load
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.ladders import Budget
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import World
 
 WORLD = scenario("warehouse_small", n_robots=4, n_objects=20)
 TINY = Budget(horizon_s=4.0, interval_s=2.0, n_seeds=2, n_sizes=2, n_levels=1)
@@ -27,6 +30,11 @@ SIZES = ["t_lost_fraction", "raw_performance"]
 def scored(policy="random", **options):
     """Score in this process, quietly, in the tiny budget."""
     return score_policy(policy, WORLD, **{"budget": TINY, "jobs": 1, "progress": False, **options})
+
+
+def planned(policies, **options):
+    """The runs that score policies in the tiny budget."""
+    return score_question(policies, WORLD, **{"budget": TINY, **options}).plan
 
 
 def still(obs):
@@ -99,7 +107,7 @@ def test_an_interrupted_call_goes_on_where_it_stopped(tmp_path, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(runner, "run_one", interrupted)
-        with pytest.raises(StudyInterrupted, match="2 of 4 runs are finished"):
+        with pytest.raises(RunsInterrupted, match="2 of 4 runs are finished"):
             scored(out=tmp_path, measures=SIZES)
     before = set(RunStore(tmp_path).run_ids())
     assert len(before) == 2
@@ -144,15 +152,14 @@ def test_policies_may_be_functions_objects_classes_and_factories(policy, label):
 
 def test_the_world_of_a_policy_is_kept(tmp_path):
     scored(Circling, measures=SIZES, name="mine", out=tmp_path)
-    assert {spec.scenario.caches for spec in plan_scores([Circling], WORLD, budget=TINY).specs} == {"static"}
-    assert {spec.scenario.caches for spec in plan_scores([still], WORLD, budget=TINY).specs} == {"none"}
-    dynamic = plan_scores([Circling], WORLD, budget=TINY, caches="dynamic")
-    assert {spec.scenario.caches for spec in dynamic.specs} == {"dynamic"}
+    assert {spec.scenario.caches for spec in planned([Circling]).specs} == {"static"}
+    assert {spec.scenario.caches for spec in planned([still]).specs} == {"none"}
+    assert {spec.scenario.caches for spec in planned([Circling], caches="dynamic").specs} == {"dynamic"}
     assert {record.controller for record in load(tmp_path)} == {"mine"}
 
 
 def test_parameters_reach_names_and_classes():
-    (spec, *_) = plan_scores(["crw"], WORLD, budget=TINY, parameters={"wander_speed_mps": 0.05}).specs
+    (spec, *_) = planned(["crw"], parameters={"wander_speed_mps": 0.05}).specs
     assert spec.parameters == {"wander_speed_mps": 0.05}
     assert scored(Circling, measures=SIZES, parameters={"speed": 0.1}).failures == ()
     with pytest.raises(ValueError, match="Expected parameters with a name, a file or a class only"):
@@ -187,10 +194,10 @@ def test_what_cannot_be_scored_is_refused_before_anything_runs(options, error, m
 
 
 def test_seeds_and_length_of_runs_can_be_chosen():
-    plan = plan_scores(["random"], WORLD, budget=TINY, seeds=[5, 9], horizon_s=8.0, measures=SIZES)
+    plan = planned(["random"], seeds=[5, 9], horizon_s=8.0, measures=SIZES)
     assert {spec.seed for spec in plan.specs} == {5, 9}
     assert {spec.scenario.horizon_s for spec in plan.specs} == {8.0}
-    assert plan_scores(["random"], WORLD, budget=TINY, seeds=3).seeds == (0, 1, 2)
+    assert planned(["random"], seeds=3).seeds == (0, 1, 2)
 
 
 def test_scores_of_population_changes_come_with_a_forecast(table):
@@ -223,16 +230,93 @@ def test_policies_are_compared_in_the_same_worlds(tmp_path):
 
 
 def test_policies_of_equal_names_are_refused():
-    with pytest.raises(CurveError, match="Expected policies of different names, got random, random"):
-        plan_scores(["random", "random"], WORLD, budget=TINY)
+    with pytest.raises(ConfigError, match="Expected policies of different names, got random, random"):
+        planned(["random", "random"])
 
 
 def test_a_budget_of_ones_own_and_a_path_as_name(tmp_path):
-    plan = plan_scores([Path("random")], WORLD, budget=replace(TINY, n_seeds=1), measures=SIZES)
-    (found,) = run_scores(plan, out=str(tmp_path), jobs=1, progress=False)
+    question = score_question([Path("random")], WORLD, budget=replace(TINY, n_seeds=1), measures=SIZES)
+    (found,) = ask(question, out=str(tmp_path), jobs=1, progress=False)
     assert found.settings["budget"] == "custom"
     assert found.settings["seeds"] == [0]
 
 
 def test_scoring_works_on_several_processes(tmp_path, table):
     assert str(scored(out=tmp_path, measures=SIZES, jobs=2)) == str(scored(measures=SIZES))
+
+
+@pytest.fixture
+def slow():
+    """A world in which robots are always slowed down."""
+    return World(WORLD, (parse_wrapper("throttle:waveform=constant,amplitude=0.3"),))
+
+
+def test_wrappers_of_the_world_are_in_all_runs(slow, tmp_path):
+    options = {"budget": TINY, "measures": [*SIZES, "population_robustness"], "jobs": 1, "progress": False}
+    found = score_policy("random", slow, out=tmp_path, **options)
+    assert (found.scenario, found.failures, found.missing) == ("warehouse_small", (), {})
+    runs = load(tmp_path)
+    assert {run.criterion for run in runs} == {"population_size", "none", "population_dynamics"}
+    for run in runs:
+        wrappers = {config["wrapper"]: config for config in json.loads(run.spec)["wrappers"]}
+        assert wrappers["throttle"]["waveform"]["amplitude"] == 0.3
+        assert ("population" in wrappers) == (run.criterion == "population_dynamics")
+        assert run.contributed["throttle"].tolist() == [0.3, 0.3]
+
+
+def test_a_world_with_wrappers_is_another_world(slow, tmp_path, monkeypatch):
+    calm = {spec.run_id for spec in planned(["random"], measures=SIZES).specs}
+    disturbed = score_question(["random"], slow, budget=TINY, measures=SIZES)
+    assert calm.isdisjoint(spec.run_id for spec in disturbed.plan.specs)
+    (first,) = ask(disturbed, out=tmp_path, jobs=1, progress=False)
+    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+    (again,) = ask(disturbed, out=tmp_path, jobs=1, progress=False)
+    assert str(again) == str(first)
+
+
+def test_policies_are_compared_in_a_world_with_wrappers(slow, tmp_path):
+    options = {"budget": TINY, "measures": SIZES, "out": tmp_path, "jobs": 1, "progress": False}
+    comparison = compare_policies(["random", "crw"], slow, **options)
+    assert comparison.policies == ("random", "crw")
+    assert all(table.failures == () for table in comparison.tables)
+    runs = [json.loads(run.spec) for run in load(tmp_path)]
+    assert len(runs) == 2 * 4
+    assert [[config["wrapper"] for config in run["wrappers"]] for run in runs] == [["throttle"]] * 8
+
+
+@pytest.mark.parametrize(
+    ("words", "measure", "told"),
+    [
+        ("throttle:waveform=constant,amplitude=0.1", "adaptability", "no wrapper throttle in a world where throttle"),
+        ("sensor_noise:sigma=0.1", "noise_robustness", "no wrapper sensor_noise in a world where noise is varied"),
+        ("population:death_per_tick=0.1", "population_robustness", "no wrapper population in a world where population"),
+    ],
+)
+def test_a_wrapper_of_the_world_that_a_criterion_varies_too_is_refused(words, measure, told, monkeypatch):
+    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("something was run"))
+    world = World(WORLD, (parse_wrapper(words),))
+    with pytest.raises(ConfigError, match=told):
+        score_policy("random", world, budget=TINY, measures=[measure], progress=False)
+    with pytest.raises(ConfigError, match=told):
+        compare_policies(["random", "crw"], world, budget=TINY, measures=[measure], progress=False)
+    # Measures that do not vary it are scored.
+    assert score_question(["random"], world, budget=TINY, measures=SIZES).plan.specs
+
+
+def test_failed_runs_are_those_of_their_policy(tmp_path, monkeypatch):
+    def failing(spec):
+        if spec.policy == "crw" and spec.seed == 1:
+            raise RuntimeError("out of luck")
+        return run_one(spec)
+
+    monkeypatch.setattr(runner, "run_one", failing)
+    options = {"budget": TINY, "measures": SIZES, "out": tmp_path, "jobs": 1, "progress": False}
+    random, crw = compare_policies(["random", "crw"], WORLD, **options).tables
+    assert random.failures == ()
+    assert [told.split("seed ")[1].split(",")[0] for told in crw.failures] == ["1", "1"]
+    # Asked again, only what failed is run.
+    fresh = []
+    monkeypatch.setattr(runner, "run_one", lambda spec: fresh.append(spec) or run_one(spec))
+    assert compare_policies(["random", "crw"], WORLD, **options).tables[1].failures == ()
+    assert {(spec.policy, spec.seed) for spec in fresh} == {("crw", 1)}
+    assert len(fresh) == 2

@@ -6,7 +6,8 @@ import pytest
 from metrics.scoring import study_figures, study_panels
 from metrics.scoring.policy_pairs import policy_pairs
 from metrics.significance import holm, paired_p
-from swarm_forage_env.studies.study import Axis, StudyPolicy
+from swarm_forage_env.runs.policy_spec import PolicySpec
+from swarm_forage_env.studies.study import Axis
 from tests.support.made_tables import FOUR, made_study, made_table
 
 HEIGHTS = dict(zip(FOUR, (4.0, 4.0, 6.0, 9.0), strict=True))
@@ -58,7 +59,7 @@ def test_a_policy_without_runs_is_left_open():
 
 def test_a_single_policy_has_no_pairs():
     spec = made_study(
-        "mine", Axis(name="population_size", values=(1, 2, 4)), policies=(StudyPolicy(label="crw", policy="crw"),)
+        "mine", Axis(name="population_size", values=(1, 2, 4)), policies=(PolicySpec(label="crw", policy="crw"),)
     )
     (figure,) = study_figures(study_panels(made_table(spec, lambda cell: 5.0), measures=("raw_performance",)))
     assert policy_pairs(figure.panels).height == 0

@@ -8,14 +8,19 @@ import numpy as np
 import pytest
 
 from metrics import CurveError, SizeLaw, predict_curves, predict_performance, predict_policy
-from metrics.scoring.prediction import counted_inside, law_text, plan_prediction, run_predictions
+from metrics.scoring import ask
+from metrics.scoring.prediction import counted_inside, law_text, prediction_question
 from metrics.scoring.prediction_plots import draw_predictions
-from metrics.scoring.totals import PolicyTotals
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs import runner
+from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.presets import scenario
-from swarm_forage_env.studies.ladders import Budget, plan_experiments
+from swarm_forage_env.studies.ladders import Budget, plan_worlds
+from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import World
 from tests.support.pictures import PNG, keep_figures
+from tests.support.run_tables import table_of_totals
 
 WORLD = scenario("warehouse_small", n_objects=20, horizon_s=4.0, interval_s=2.0)
 LAW = SizeLaw(name="universal", a=5.0, contention=0.02, coherency=0.002)
@@ -42,6 +47,11 @@ class Failing:
 
     def act(self, obs, active):
         return np.zeros((len(obs), 3), np.float32)
+
+
+def worlds_of(world, **sizes):
+    """The worlds that a prediction runs."""
+    return tuple(condition.world for condition in prediction_question(["random"], world, **sizes).plan.conditions)
 
 
 @pytest.fixture(autouse=True)
@@ -113,54 +123,47 @@ def test_laws_are_written_as_formulas():
 
 
 def test_worlds_are_those_of_the_size_sweep_of_scores():
-    plan = plan_prediction(["random"], "warehouse_small", fit=[1, 6, 12, 25], hold=[50]).runs
+    swept = worlds_of("warehouse_small", fit=[1, 6, 12, 25], hold=[50])
     standard = Budget(horizon_s=10_000.0, interval_s=200.0, n_seeds=2, n_sizes=5, n_levels=1)
-    assert plan.experiments == plan_experiments(scenario("warehouse_small"), ["population_size"], standard)
-    assert plan_prediction(["random"], WORLD, fit=[1, 2, 3, 4]).runs.experiments[0].scenario.objects.n_objects == 20
-    rescue = plan_prediction(["random"], "search_and_rescue", fit=[1, 12, 51, 115]).runs.experiments
-    assert [e.scenario.arena.width_m for e in rescue] == [16.0, 16.0, 32.0, 48.0]
-    assert [e.scenario.objects.n_objects for e in rescue] == [80, 80, 272, 368]
+    assert swept == plan_worlds(scenario("warehouse_small"), ["population_size"], standard)
+    assert worlds_of(WORLD, fit=[1, 2, 3, 4])[0].scenario.objects.n_objects == 20
+    rescue = worlds_of("search_and_rescue", fit=[1, 12, 51, 115])
+    assert [world.scenario.arena.width_m for world in rescue] == [16.0, 16.0, 32.0, 48.0]
+    assert [world.scenario.objects.n_objects for world in rescue] == [80, 80, 272, 368]
     with pytest.raises(CurveError, match=r"fill one of its arenas, 1, 12, 51, 115, .*, got 2"):
-        plan_prediction(["random"], "search_and_rescue", fit=[1, 2, 12, 51])
+        worlds_of("search_and_rescue", fit=[1, 2, 12, 51])
     with pytest.raises(CurveError, match="because those grow with the swarm, got an arena 48 m wide with 50 objects"):
-        plan_prediction(["random"], scenario("search_and_rescue", n_objects=50), fit=[1, 12, 51, 115])
+        worlds_of(scenario("search_and_rescue", n_objects=50), fit=[1, 12, 51, 115])
 
 
 def test_sizes_that_are_fitted_by_default_fill_the_arenas_of_the_scenario():
-    assert plan_prediction(["random"], "warehouse_quad").fit == (1, 2, 4, 8, 16, 32)
-    rescue = plan_prediction(["random"], "search_and_rescue", hold=[460])
+    assert prediction_question(["random"], "warehouse_quad").fit == (1, 2, 4, 8, 16, 32)
+    rescue = prediction_question(["random"], "search_and_rescue", hold=[460])
     # 5 % of 16^2, 32^2, 48^2, 64^2 and 80^2 m^2; one robot in 256 m^2 has another density.
     assert (rescue.fit, rescue.hold) == ((12, 51, 115, 204, 320), (460,))
-    assert [e.scenario.arena.width_m for e in rescue.runs.experiments] == [16.0, 32.0, 48.0, 64.0, 80.0, 96.0]
+    assert [world.scenario.arena.width_m for _, world in rescue.plan.conditions] == [16.0, 32.0, 48.0, 64.0, 80.0, 96.0]
 
 
 def test_only_power_law_clusters_grow_with_the_swarm_whatever_the_name():
     own = replace(scenario("warehouse_small", n_objects=77), name="my_hall")
-    for experiment in plan_prediction(["random"], own).runs.experiments:
-        assert (experiment.scenario.arena, experiment.scenario.objects) == (own.arena, own.objects)
+    for world in worlds_of(own):
+        assert (world.scenario.arena, world.scenario.objects) == (own.arena, own.objects)
     dense = scenario("warehouse_small", n_robots=50, density=0.05)
-    assert {e.scenario.arena for e in plan_prediction(["random"], dense).runs.experiments} == {dense.arena}
+    assert {world.scenario.arena for world in worlds_of(dense)} == {dense.arena}
     scattered = scenario("search_and_rescue", placement="random")
-    assert {e.scenario.arena for e in plan_prediction(["random"], scattered).runs.experiments} == {scattered.arena}
+    assert {world.scenario.arena for world in worlds_of(scattered)} == {scattered.arena}
     ruins = replace(scenario("search_and_rescue"), name="ruins")
-    plan = plan_prediction(["random"], ruins)
-    assert plan.fit == (12, 51, 115, 204, 320)
-    assert {e.scenario.name for e in plan.runs.experiments} == {"ruins"}
+    assert prediction_question(["random"], ruins).fit == (12, 51, 115, 204, 320)
+    assert {world.scenario.name for world in worlds_of(ruins)} == {"ruins"}
     # 57 robots in 48 x 48 m are 2.47 %; so 57 / 2304 of 256, 1,024, 4,096, 6,400 m^2.
-    sparse = plan_prediction(["random"], scenario("search_and_rescue", side_m=48.0, n_robots=57))
+    sparse = prediction_question(["random"], scenario("search_and_rescue", side_m=48.0, n_robots=57))
     assert sparse.fit == (6, 25, 57, 101, 158)
 
 
-def tables_of(monkeypatch, totals, *, fit=(1, 2, 4, 8, 16), hold=(), world=WORLD):
+def predicted(totals, *, fit=(1, 2, 4, 8, 16), hold=(), world=WORLD):
     """Predict from runs that are given by size."""
-    plan = plan_prediction(["random"], world, fit=fit, hold=hold, seeds=2)
-    found = PolicyTotals(
-        policy="random",
-        totals=tuple(dict(enumerate(totals[size])) for size in (*fit, *hold)),
-        failures=("one: it broke",),
-    )
-    monkeypatch.setattr("metrics.scoring.prediction.run_totals", lambda *_, **__: (found,))
-    (table,) = run_predictions(plan)
+    question = prediction_question(["random"], world, fit=fit, hold=hold, seeds=2)
+    (table,) = question.answer(table_of_totals(question.plan, {"random": [totals[size] for size in (*fit, *hold)]}))
     return table
 
 
@@ -168,32 +171,34 @@ def row(table, size):
     return next(line.split() for line in str(table).splitlines() if line.startswith(f"{size} "))
 
 
-def test_a_size_that_lost_its_runs_is_left_out_and_not_held_back(monkeypatch):
+def test_a_size_that_lost_its_runs_is_left_out_and_not_held_back():
     runs = {1: [5.0, 5.2], 2: [10.0, 9.8], 4: [20.0, 21.0], 8: [40.0, 39.0], 16: [80.0]}
-    table = tables_of(monkeypatch, runs)
+    table = predicted(runs)
     assert (table.fit, table.left_out, table.predicted_sizes) == ((1, 2, 4, 8), (16,), (16, 32))
     assert row(table, 16)[:3] == ["16", "1", "80"]
     assert row(table, 16)[-2:] == ["left", "out"]
+    (told,) = table.failures
+    assert told.endswith("random in warehouse_small, 16 robots, seed 1, population_size = 16: it broke")
     assert (table.is_inside(16), counted_inside([table])) == (None, "")
     told = table.to_mapping()
     assert [(each["n_robots"], each["runs"]) for each in told["left_out"]] == [(16, [80.0])]
     assert [(each["held_back"], each["measured"]) for each in told["predictions"]] == [([], None)] * 2
     # A lost size that is not predicted has its row, too.
-    table = tables_of(monkeypatch, {**runs, 2: [], 16: [80.0, 79.0]})
+    table = predicted({**runs, 2: [], 16: [80.0, 79.0]})
     assert (table.fit, table.left_out) == ((1, 4, 8, 16), (2,))
     assert row(table, 2)[:3] == ["2", "0", "-"]
     assert row(table, 2)[-2:] == ["left", "out"]
 
 
-def test_one_held_back_run_gives_no_verdict(monkeypatch):
+def test_one_held_back_run_gives_no_verdict():
     runs = {1: [5.0, 5.2], 2: [10.0, 9.8], 4: [20.0, 21.0], 8: [40.0, 39.0], 16: [80.0], 20: [100.0, 101.0]}
-    table = tables_of(monkeypatch, runs, fit=(1, 2, 4, 8), hold=(16, 20))
+    table = predicted(runs, fit=(1, 2, 4, 8), hold=(16, 20))
     assert [table.is_inside(size) for size in (16, 20)] == [None, True]
     assert row(table, 16)[-2:] == ["held", "back"]
     assert counted_inside([table]) == "1 of 1 held-back mean inside the interval"
 
 
-def test_the_unit_is_that_of_the_performance(monkeypatch, tmp_path):
+def test_the_unit_is_that_of_the_performance(tmp_path):
     runs = {size: [5.0 * size, 5.1 * size] for size in (1, 2, 4, 8)}
     units = {
         "collected": ("objects in 4 s", True),
@@ -202,7 +207,7 @@ def test_the_unit_is_that_of_the_performance(monkeypatch, tmp_path):
         "1/interference_fraction": ("1/interference_fraction summed over intervals", False),
     }
     for name, told in units.items():
-        table = tables_of(monkeypatch, runs, fit=(1, 2, 4, 8), world=replace(WORLD, performance=name))
+        table = predicted(runs, fit=(1, 2, 4, 8), world=replace(WORLD, performance=name))
         assert (table.unit, table.adds_up) == told
         assert str(table).startswith(f"random in warehouse_small: {told[0]}, fitted to")
         assert ("note: this performance is no sum over robots" in str(table)) is not told[1]
@@ -250,12 +255,57 @@ def test_sizes_that_predict_nothing_are_refused(sizes, reason):
 
 def test_a_swarm_without_room_is_refused():
     with pytest.raises(ConfigError):
-        plan_prediction(["random"], "warehouse_small", fit=[1, 2, 4, 8], hold=[100_000])
+        prediction_question(["random"], "warehouse_small", fit=[1, 2, 4, 8], hold=[100_000])
 
 
 def test_failed_runs_are_named():
     with pytest.raises(CurveError, match=r"got them at 0; the first failure: .*RuntimeError: no"):
         predict_policy(Failing, WORLD, fit=[1, 2, 3, 4], seeds=2, jobs=1, progress=False)
+
+
+def test_wrappers_of_the_world_are_in_all_runs(tmp_path, monkeypatch):
+    slow = parse_wrapper("throttle:waveform=constant,amplitude=0.3")
+    options = {"fit": [1, 2, 3, 4], "hold": [6], "seeds": 2, "out": tmp_path, "jobs": 1, "progress": False}
+    world = World(replace(WORLD, performance="n_active"), (slow,))
+    table = predict_policy("random", world, **options)
+    assert (table.fit, table.hold) == ((1, 2, 3, 4), (6,))
+    runs = load(tmp_path)
+    assert len(runs) == 10
+    for run in runs:
+        (config,) = json.loads(run.spec)["wrappers"]
+        assert (config["wrapper"], config["waveform"]["amplitude"]) == ("throttle", 0.3)
+        assert run.contributed["throttle"].tolist() == [0.3, 0.3]
+    # Asked again, the stored runs answer; they are not those of the calm world.
+    with monkeypatch.context() as patch:
+        patch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+        question = prediction_question(["random"], world, fit=[1, 2, 3, 4], hold=[6], seeds=2)
+        (again,) = ask(question, out=tmp_path, jobs=1, progress=False)
+    assert str(again) == str(table)
+    calm = prediction_question(["random"], world.scenario, fit=[1, 2, 3, 4], hold=[6], seeds=2)
+    assert {spec.run_id for spec in calm.plan.specs}.isdisjoint(run.run_id for run in runs)
+
+
+def test_failed_runs_are_those_of_their_policy(monkeypatch):
+    def failing(spec):
+        if spec.policy == "crw" and spec.world.n_robots == 3:
+            raise RuntimeError("out of luck")
+        return run_one(spec)
+
+    monkeypatch.setattr(runner, "run_one", failing)
+    question = prediction_question(
+        ["random", "crw"], replace(WORLD, performance="n_active"), fit=[1, 2, 3, 4, 5], seeds=2
+    )
+    random, crw = ask(question, jobs=1, progress=False)
+    assert (random.policy, random.fit, random.left_out, random.failures) == ("random", (1, 2, 3, 4, 5), (), ())
+    assert (crw.policy, crw.fit, crw.left_out) == ("crw", (1, 2, 4, 5), (3,))
+    assert len(crw.failures) == 2
+    assert all("crw in warehouse_small, 3 robots" in told and "out of luck" in told for told in crw.failures)
+
+
+def test_stored_runs_of_classes_need_a_name(tmp_path):
+    with pytest.raises(ValueError, match="Expected name= for the policy Failing"):
+        predict_policy(Failing, WORLD, fit=[1, 2, 3, 4], seeds=2, out=tmp_path, progress=False)
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_picture_shows_runs_law_interval_and_critical_size(tmp_path, monkeypatch):

@@ -6,12 +6,13 @@ import pytest
 from metrics.queues import PopulationRates, robots_at_work
 from metrics.scoring.model_plots import draw_models
 from metrics.scoring.study_models import MEAN_FIELD, model_figures
-from swarm_forage_env.studies.study import Axis, StudyPolicy
+from swarm_forage_env.runs.policy_spec import PolicySpec
+from swarm_forage_env.studies.study import Axis
 from tests.support.foraging_table import ONE, SIZES, foraging_table
 from tests.support.made_tables import made_study, made_table
 from tests.support.pictures import words_in
 
-TWO = (*ONE, StudyPolicy(label="dpo", policy="random"))
+TWO = (*ONE, PolicySpec(label="dpo", policy="random"))
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +70,7 @@ def test_robots_at_work_stand_beside_the_queue():
     assert figure.name == "S1g_population_described"
     assert [panel.words for panel in figure.panels] == ["level 1, crw, dpo", "level 2, crw, dpo"], "they share a panel"
     cell = next(cell for cell in spec.cells if cell.values == (1.0,))
-    world, rates = spec.experiment(cell).scenario, spec.experiment(cell).population
+    world, rates = spec.world(cell).scenario, spec.world(cell).population
     per_s = PopulationRates(lambda_bd=rates.malfunction_per_tick / world.dt_s, mu_bd=rates.repair_per_tick / world.dt_s)
     panel = figure.panels[0]
     assert panel.expected[0].y == pytest.approx(robots_at_work(per_s, world.robots.n_robots, [10, 20, 30, 40]))

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from metrics import aggregate
-from metrics.scoring.texts import spread
+from metrics.scoring.intervals import spread
 
 NAN = math.nan
 
