@@ -37,9 +37,13 @@ class Table:
     """Where the records are, None where they are not stored."""
 
     def of(self, condition: Condition) -> tuple[RunRecord, ...]:
-        """Return the records of a condition, in the order of the seeds; runs that failed are left out."""
+        """Return the records of a condition, in the order of the seeds; runs that failed are left out.
+
+        They are read with the performance of its world: worlds that differ in that alone share their runs.
+        """
         ids = (spec.run_id for spec in self.plan.specs_of(condition))
-        return tuple(self.records[run_id] for run_id in ids if run_id in self.records)
+        performance = condition.world.scenario.performance
+        return tuple(self.records[run_id].read_as(performance) for run_id in ids if run_id in self.records)
 
     def failures_of(self, condition: Condition) -> tuple[RunFailure, ...]:
         """Return the runs of a condition that failed."""
