@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_forage_env.runs import cost as calibration
-from swarm_forage_env.runs.cost import Cost, calibrate, kind_of
+from swarm_forage_env.runs.cost import Cost, MeasuredCost, calibrate, kind_of
 from swarm_forage_env.studies.study import READING_NAMES, Axis
 from tests.support.tiny_study import tiny_study
 
@@ -24,11 +24,36 @@ def test_costs_between_measured_sizes_are_in_proportion():
     assert cost.seconds(spec) == pytest.approx(2.0 + 0.3 * 20)
 
 
+def test_what_runs_took_tells_what_others_will_take():
+    """Per robot-tick: of the same kind, else of the same policy, else of all."""
+    cell = {(cell.policy, *cell.values): STUDY.specs_of(cell)[0] for cell in STUDY.cells}
+    known, noisy, other = cell["random", 4, 0.0], cell["random", 8, 0.02], cell["twin", 16, 0.0]
+    cost = MeasuredCost()
+    assert cost.seconds([known]) is None
+    cost.add(known, 4.0)
+    assert cost.seconds([known, cell["random", 16, 0.0]]) == pytest.approx(4.0 + 16.0)
+    assert cost.seconds([noisy]) == pytest.approx(8.0), "the policy took so long elsewhere"
+    cost.add(noisy, 80.0)
+    assert cost.seconds([cell["random", 1, 0.02]]) == pytest.approx(10.0)
+    assert cost.seconds([known]) == pytest.approx(4.0), "without noise it is as quick as before"
+    assert cost.seconds([other]) == pytest.approx(16 * 84.0 / 12), "static caches are new, the policy is not"
+    assert cost.seconds([]) == 0.0
+
+
+def test_a_policy_of_which_nothing_is_known_takes_what_all_others_take():
+    quick, slow, unknown = (replace(STUDY.plan.specs[0], policy=policy) for policy in ("a", "b", "c"))
+    cost = MeasuredCost()
+    for spec, seconds in ((quick, 1.0), (quick, 1.0), (slow, 10.0)):
+        cost.add(spec, seconds)
+    assert cost.seconds([unknown]) == pytest.approx(4.0), "the mean of the three"
+    assert cost.seconds([quick, slow]) == pytest.approx(11.0)
+
+
 def test_three_sizes_of_every_kind_are_measured(monkeypatch):
     told = []
     monkeypatch.setattr(calibration, "MEASURE_S", 0.001)
-    costs = calibrate(STUDY.expand(), tell=told.append)
-    assert set(costs) == {kind_of(run) for run in STUDY.expand()}
+    costs = calibrate(STUDY.plan.specs, tell=told.append)
+    assert set(costs) == {kind_of(run) for run in STUDY.plan.specs}
     assert len(costs) == 4, "two kinds of caches, with and without noise"
     for cost in costs.values():
         assert cost.n_robots.tolist() == [1.0, 4.0, 16.0]
@@ -53,5 +78,5 @@ def test_readings_and_walking_objects_are_kinds_of_their_own():
 
 def test_a_run_that_is_short_is_measured_to_its_end():
     one = replace(STUDY, axes=(), horizon_s=2.0)
-    costs = calibrate(one.expand()[:1])
-    assert costs[kind_of(one.expand()[0])].tick_s > 0.0
+    costs = calibrate(one.plan.specs[:1])
+    assert costs[kind_of(one.plan.specs[0])].tick_s > 0.0
