@@ -24,9 +24,9 @@ from metrics.scoring import Judged, StudyFigure, StudyPanels, Waiting, draw_figu
 from metrics.scoring.cell_distributions import cell_distributions
 from metrics.scoring.model_plots import draw_models
 from metrics.scoring.study_models import model_figures
-from metrics.scoring.texts import counted, number, percent
 from metrics.scoring.verdicts import VARIANTS
 from swarm_forage_env import read_study
+from swarm_forage_env._internal.wording import counted, number, percent
 from swarm_forage_env.cli.study_page import command_of
 from swarm_forage_env.cli.study_verdict import scored_studies, waiting_lines
 from swarm_forage_env.runs.store import DONE

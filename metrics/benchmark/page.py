@@ -7,8 +7,9 @@ import math
 import re
 from collections.abc import Sequence
 
+from swarm_forage_env._internal.wording import number, percent
+
 from .. import PAPER_POLICIES
-from ..scoring.texts import number, percent
 from ..statistics import Estimate
 from .entry import Entry, EntryMeasure
 from .protocol import BenchmarkError, Protocol, scenario_fields

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
+from swarm_forage_env._internal.wording import aligned, counted, number, paragraph, percent, plain
 from swarm_forage_env.runs.policy_spec import PolicyLike
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import performance_of
@@ -22,8 +23,8 @@ from ..checks import CurveError
 from ..significance import paired_p
 from ..statistics import Summary, aggregate
 from .columns import NOISE, POPULATION
+from .intervals import bounds, interval
 from .question import Question, ask, failure_lines
-from .texts import aligned, bounds, counted, interval, number, paragraph, percent, plain
 from .totals import plan_totals, run_totals, unit_text
 
 if TYPE_CHECKING:

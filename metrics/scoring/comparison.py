@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from swarm_forage_env._internal.wording import aligned, limits, paragraph, percent, plain
+
 from ..checks import CurveError
 from ..curves import FloatArray
 from ..significance import holm, paired_p
 from ..statistics import Summary, aggregate
+from .intervals import spread
 from .table import DOUBTFUL, Score, ScoreTable, forecast_lines, title
-from .texts import aligned, limits, paragraph, percent, plain, spread
 
 FAMILY_ERROR = 0.05
 """Probability that one or more differences within a measure are called significant by chance."""

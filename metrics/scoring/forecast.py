@@ -4,11 +4,12 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from swarm_forage_env._internal.wording import plain
+
 from ..queues import PopulationRates, mean_away, queue_statistics
 from ..statistics import Summary, aggregate
 from .columns import POPULATION
 from .studies import RunCurves, StudyCurves
-from .texts import plain
 
 FORECAST_TITLE = "Population: what the queueing model predicts for runs of this length, beside what the runs showed"
 FORECAST_HEADER = (

@@ -5,6 +5,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from swarm_forage_env.rendering.plots import unread
+
 from ..catalog import METRICS
 from ..claims.panel import MIN_PAIRS
 from ..statistics import Summary

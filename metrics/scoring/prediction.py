@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swarm_forage_env._internal.wording import aligned, counted, number, paragraph, percent, plain
 from swarm_forage_env.runs.policy_spec import PolicyLike
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import performance_of
@@ -22,9 +23,9 @@ from ..prediction import SizePrediction, predict_performance
 from ..statistics import Summary, aggregate
 from .columns import SIZE
 from .curves_file import read_curves
+from .intervals import bounds
 from .performance import PerformanceLike
 from .question import Question, ask, failure_lines
-from .texts import aligned, bounds, counted, number, paragraph, percent, plain
 from .totals import plan_totals, run_totals, unit_text
 
 if TYPE_CHECKING:

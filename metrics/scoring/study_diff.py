@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from scipy.special import stdtr, stdtrit  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
+from swarm_forage_env._internal.wording import plain
+
 from ..checks import CurveError
 from ..curves import FloatArray
 from ..significance import ROUNDING, holm
-from .texts import plain
 
 if TYPE_CHECKING:
     from swarm_forage_env.studies.study import Cell

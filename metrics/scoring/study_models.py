@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swarm_forage_env._internal.wording import number
+
 from ..checks import CurveError
 from ..curves import FloatArray
 from ..foraging_model import ForagingRates, estimate_rates, mean_field
@@ -19,7 +21,6 @@ from ..statistics import aggregate
 from .columns import SIZE
 from .studies import RunCurves
 from .study_tables import StudyLine, study_lines
-from .texts import number
 
 if TYPE_CHECKING:
     import polars as pl

@@ -30,7 +30,7 @@ from .columns import SIZE
 from .figure_panels import StudyPanel, StudyPanels
 from .measures import label_of
 from .plots import FEWEST_RUNS, X_LABELS
-from .texts import number
+from swarm_forage_env._internal.wording import number
 
 if TYPE_CHECKING:
     import polars as pl

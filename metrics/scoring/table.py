@@ -4,12 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from swarm_forage_env._internal.wording import aligned, counted, limits, number, paragraph, percent, plain
+
 from ..catalog import METRICS
 from ..curves import Form, Variant
 from ..statistics import Summary, aggregate
 from .forecast import FORECAST_HEADER, FORECAST_TITLE, PopulationForecast
+from .intervals import bounds, interval
 from .measures import label_of
-from .texts import aligned, bounds, counted, interval, limits, number, paragraph, percent, plain
 
 if TYPE_CHECKING:
     import polars as pl

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
+from swarm_forage_env._internal.wording import plain
+
 from ..checks import CurveError
 from ..claims import CLAIMS, Claim, PanelName, Verdict, check_claim
 from ..claims.stating import POLICIES
 from ..curves import Variant
 from .figure_panels import StudyPanel, StudyPanels
 from .measures import MEASURE_VARIANTS, label_of
-from .texts import plain
 
 if TYPE_CHECKING:
     from swarm_forage_env.studies.study_table import StudyTable

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from metrics.scoring.texts import plain
 from metrics.significance import holm, pooled_p
 from metrics.statistics import aggregate
+from swarm_forage_env._internal.wording import plain
 from swarm_forage_env.cli.report import performance_number, span
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.performance import Performance

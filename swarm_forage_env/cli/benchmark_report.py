@@ -18,9 +18,9 @@ from metrics.benchmark.protocol import BenchmarkError, Protocol, load_protocol, 
 from metrics.benchmark.running import BenchmarkQuestion, benchmark_question
 from metrics.benchmark.standing import Reference, Standing, reference_of, scripted_entries, standing_of
 from metrics.scoring.question import ask
-from metrics.scoring.texts import aligned, counted, plain
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.printable import printable
+from swarm_forage_env._internal.wording import aligned, counted, plain
 from swarm_forage_env.cli.interrupts import resumable
 from swarm_forage_env.cli.report import estimate, estimated_seconds
 from swarm_forage_env.policies.mixture import is_mixture, mixture_of, mixture_parts

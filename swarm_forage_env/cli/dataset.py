@@ -84,7 +84,7 @@ def dataset(  # long: one parameter per option
 
 def _described(plan: "DatasetPlan", folder: Path) -> str:
     """Return what is to be recorded and how much room it takes."""
-    from metrics.scoring.texts import counted
+    from swarm_forage_env._internal.wording import counted
     from swarm_forage_env.policies.registry import policy_label
 
     scenario, config, n_todo = plan.spec.scenario, plan.card.interface, len(plan.missing(folder))

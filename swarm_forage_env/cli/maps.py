@@ -30,7 +30,7 @@ def maps(
     One row per run of the page; then, for each run after the first, what is more in it than in the first. The arrays
     go to .npz files beside the picture.
     """
-    from metrics.scoring.texts import counted
+    from swarm_forage_env._internal.wording import counted
     from swarm_forage_env.inspect.maps import floor_maps
     from swarm_forage_env.inspect.replay.files import read_replays
     from swarm_forage_env.inspect.replay.frames import ReplayError

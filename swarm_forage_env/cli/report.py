@@ -11,8 +11,8 @@ import numpy as np
 from rich.table import Table
 
 from metrics.scoring.plots import FEWEST_RUNS
-from metrics.scoring.texts import counted
 from metrics.statistics import aggregate
+from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.policies.mixture import Part, is_mixture, mixture_of, mixture_parts, part_sizes
 from swarm_forage_env.policies.registry import part_labels
 from swarm_forage_env.rendering.plots import Curve, draw_curves

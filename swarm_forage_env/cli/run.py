@@ -79,7 +79,7 @@ def _run_specs(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None
 
 
 def _show_results(specs: "tuple[RunSpec, ...]", result: "Outcomes", store: "RunStore", *, as_json: bool) -> None:
-    from metrics.scoring.texts import counted
+    from swarm_forage_env._internal.wording import counted
     from swarm_forage_env.cli.report import draw_performance, results_json, results_table, summarize
 
     aside = notes()

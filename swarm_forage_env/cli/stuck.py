@@ -33,8 +33,8 @@ def stuck(
     """Find robots that get stuck: active, hardly moved for minutes, not waiting by rule. Exits with 1 if any are."""
     from rich.console import Console
 
-    from metrics.scoring.texts import counted
     from swarm_forage_env._internal.fields import ConfigError
+    from swarm_forage_env._internal.wording import counted
     from swarm_forage_env.cli.scenario_options import plan_runs, split_names
     from swarm_forage_env.inspect.stuck import find_stuck
 

@@ -53,7 +53,7 @@ def diff_report(found: "StudyDiff", header: Sequence[str]) -> str:
         header: Names of what a cell is placed by.
     """
     from metrics.scoring.study_diff import TEST
-    from metrics.scoring.texts import aligned, counted
+    from swarm_forage_env._internal.wording import aligned, counted
 
     words = {
         "identical": "identical to the last bit",
@@ -87,7 +87,7 @@ def _more(n_rows: int) -> list[str]:
 
 
 def _row(shift: "Shift") -> tuple[str, ...]:
-    from metrics.scoring.texts import limits, number
+    from swarm_forage_env._internal.wording import limits, number
 
     runs = str(shift.n_first) if shift.n_first == shift.n_second else f"{shift.n_first}, {shift.n_second}"
     means = (number(value) for value in (shift.first, shift.second, shift.difference))
@@ -95,7 +95,7 @@ def _row(shift: "Shift") -> tuple[str, ...]:
 
 
 def _line(shift: "Shift") -> tuple[str, ...]:
-    from metrics.scoring.texts import percent
+    from swarm_forage_env._internal.wording import percent
 
     mark = " *" if shift.is_significant else ""
     between = f"{percent(shift.lower)} to {percent(shift.upper)}"

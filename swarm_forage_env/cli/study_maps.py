@@ -33,8 +33,8 @@ def maps(
     One row per cell; then, for each cell after the first, what is more in it than in the first. The arrays go to .npz
     files beside the picture. Stored runs hold no positions, so they are made again.
     """
-    from metrics.scoring.texts import counted
     from swarm_forage_env._internal.files import check_file
+    from swarm_forage_env._internal.wording import counted
     from swarm_forage_env.cli.terminal import notes, progress_bar
     from swarm_forage_env.inspect.study_maps import choose_cells, maps_of_cells, robot_ticks
     from swarm_forage_env.studies.study_table import read_study

@@ -171,7 +171,7 @@ def _claim_rows(
 
 def _numbers_of(verdict: "Verdict") -> dict[str, str]:
     """Return what stands behind an answer, as texts."""
-    from metrics.scoring.texts import counted, number, percent
+    from swarm_forage_env._internal.wording import counted, number, percent
 
     numbers = [f"by bands {verdict.by_bands}", f"statistic {number(verdict.statistic)}"]
     numbers += [f"effect {percent(verdict.effect)}"] if math.isfinite(verdict.effect) else []

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
-from metrics.scoring.texts import aligned, counted
+from swarm_forage_env._internal.wording import aligned, counted
 from swarm_forage_env.cli.terminal import notes
 from swarm_forage_env.runs.cost import calibrate, kind_of
 from swarm_forage_env.runs.progress import duration

@@ -122,7 +122,7 @@ def waiting_lines(waiting: "Sequence[Waiting]") -> list[str]:
 def _table(judged: "Sequence[Judged]", what: str = "") -> "Table":
     from rich.table import Table
 
-    from metrics.scoring.texts import number, percent
+    from swarm_forage_env._internal.wording import number, percent
 
     first = judged[0]
     title = f"reading {first.reading}, measures {first.variant}" if first.reading else "from formulas alone"

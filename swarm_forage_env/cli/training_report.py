@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from metrics.scoring.texts import counted
+from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.cli.options import EXIT_INTERRUPTED, complain, no_picture
 from swarm_forage_env.rendering.plots import draw_trainings
 from swarm_forage_env.runs.progress import duration

@@ -22,12 +22,13 @@ from swarm_forage_env.runs.store import RunFailure, RunStore
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.wrappers.base import STACK_ORDER
+from swarm_forage_env.wrappers.world import World
 from tests.support.wrapper_configs import InnerConfig, OuterConfig
 
 WORLD = scenario("warehouse_small", n_robots=3, n_objects=20, horizon_s=4.0, interval_s=2.0)
-SPECS = tuple(RunSpec(scenario=WORLD, policy="random", seed=seed) for seed in range(4))
-UNKNOWN = RunSpec(scenario=WORLD, policy="nobody")
-REFUSED = RunSpec(scenario=WORLD, policy="random", parameters={"speed": 1})
+SPECS = tuple(RunSpec(world=World(WORLD), policy="random", seed=seed) for seed in range(4))
+UNKNOWN = RunSpec(world=World(WORLD), policy="nobody")
+REFUSED = RunSpec(world=World(WORLD), policy="random", parameters={"speed": 1})
 
 
 class Refusing(Executor):

@@ -1,0 +1,113 @@
+"""Answer: what a question found, as tables with titles and notes. One place prints it, in every form.
+
+    print(answer)                   # as text
+    answer.write("answer.md")       # as Markdown; .txt, .csv and .json likewise
+    answer.to_mapping()             # as plain values
+
+A new answer says what its tables are (`sheets`) and what its numbers are (`to_mapping`); the forms follow.
+"""
+
+import csv
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.wording import aligned
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Sheet:
+    """A table for people. Without rows it is a text: title and notes alone."""
+
+    title: str = ""
+    header: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    notes: Sequence[str] = ()
+    """Lines below the table."""
+
+    def text(self) -> str:
+        """Return the table with its columns under each other."""
+        table = aligned([self.header, *self.rows] if self.header else self.rows) if self.rows else []
+        return "\n".join([*([self.title] if self.title else []), *table, *self.notes])
+
+    def markdown(self) -> str:
+        """Return the table in the form of GitHub; pipes in its cells are escaped."""
+        parts = [f"**{self.title}**"] if self.title else []
+        if self.rows:
+            header = self.header or [""] * len(self.rows[0])
+            lines = [header, ["---"] * len(header), *self.rows]
+            parts.append(
+                "\n".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in lines)
+            )
+        return "\n\n".join([*parts, *self.notes])
+
+    def csv(self) -> str:
+        """Return header and rows as CSV."""
+        out = StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerows([self.header, *self.rows] if self.header else self.rows)
+        return out.getvalue()
+
+
+def _markdown_row(cells: Sequence[str]) -> str:
+    escaped = [cell.replace("|", "\\|") for cell in cells]
+    return f"| {' | '.join(escaped)} |"
+
+
+class Answer(ABC):
+    """What a question found."""
+
+    @abstractmethod
+    def sheets(self) -> Sequence[Sheet]:
+        """Return the tables, in their order."""
+
+    @abstractmethod
+    def to_mapping(self) -> dict[str, Any]:
+        """Return everything as plain values, ready for JSON; numbers that do not exist are None."""
+
+    def text(self) -> str:
+        """Return everything for people."""
+        return "\n\n".join(filter(None, (sheet.text() for sheet in self.sheets())))
+
+    def markdown(self) -> str:
+        """Return everything as Markdown."""
+        return "\n\n".join(filter(None, (sheet.markdown() for sheet in self.sheets()))) + "\n"
+
+    def csv(self) -> str:
+        """Return the tables as CSV, an empty line between two of them."""
+        return "\n".join(sheet.csv() for sheet in self.sheets() if sheet.rows)
+
+    def json(self) -> str:
+        """Return `to_mapping` as a JSON document."""
+        return json.dumps(self.to_mapping(), indent=1)
+
+    def write(self, file: str | Path) -> None:
+        """Write the answer in the form that the ending of the file names, whole or not at all.
+
+        Raises:
+            ConfigError: another ending than those of `FORMS`.
+            OSError: the file cannot be written.
+        """
+        path = Path(file)
+        if path.suffix not in FORMS:
+            raise ConfigError(f"Expected a file that ends with {', '.join(FORMS)}, got {path.name}.")
+        with replacing(path) as draft:
+            draft.write_text(FORMS[path.suffix](self), encoding="utf-8")
+
+    def __str__(self) -> str:
+        return self.text()
+
+
+FORMS: dict[str, Callable[[Answer], str]] = {
+    ".txt": lambda answer: f"{answer.text()}\n",
+    ".md": lambda answer: answer.markdown(),
+    ".csv": lambda answer: answer.csv(),
+    ".json": lambda answer: f"{answer.json()}\n",
+}
+"""Ending of a file -> what stands in it."""
