@@ -13,7 +13,8 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs import cluster
 from swarm_forage_env.runs.cluster import LOCAL, SLURM, cluster_executor, slurm_cluster
-from swarm_forage_env.studies.study_folder import DONE, StudyFolder, run_study
+from swarm_forage_env.runs.store import DONE
+from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.studies.study_table import gather_study
 from tests.support.tiny_study import tiny_study
 
@@ -108,7 +109,7 @@ def test_the_tasks_of_an_allocation_make_one_cluster(tmp_path, expected):
 from pathlib import Path
 from swarm_forage_env.runs.cluster import SLURM, cluster_executor
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
-from tests.study.test_cluster import STUDY
+from tests.runs.test_cluster import STUDY
 
 with cluster_executor(SLURM) as executor:
     run_study(STUDY, StudyFolder(Path({str(tmp_path / "done")!r})), executor=executor)

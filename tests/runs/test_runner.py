@@ -14,11 +14,14 @@ import pytest
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.policies.registry import RandomPolicy, from_callable
 from swarm_forage_env.runs import runner
-from swarm_forage_env.runs.record import RecordError, RunRecord
+from swarm_forage_env.runs import store as runs_store
+from swarm_forage_env.runs.plan import Condition, Plan
+from swarm_forage_env.runs.policy_spec import policy_spec
+from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.run import WARM_UP_TICKS, build_stack, run_one, run_policy, warm_up
-from swarm_forage_env.runs.runner import StudyInterrupted, WorkerError, run_all, run_each
+from swarm_forage_env.runs.runner import RunsInterrupted, WorkerError, longest_first, run_each, run_plan, run_specs
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import RunFailure, RunStore
+from swarm_forage_env.runs.store import DONE, FAILED, MISSING, RunFailure, RunStore
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.wrappers.base import STACK_ORDER
@@ -29,6 +32,17 @@ WORLD = scenario("warehouse_small", n_robots=3, n_objects=20, horizon_s=4.0, int
 SPECS = tuple(RunSpec(world=World(WORLD), policy="random", seed=seed) for seed in range(4))
 UNKNOWN = RunSpec(world=World(WORLD), policy="nobody")
 REFUSED = RunSpec(world=World(WORLD), policy="random", parameters={"speed": 1})
+
+
+def same(some, others):
+    """Whether both are the same runs with the same results, in the same order."""
+    return list(some) == list(others) and all(some[run_id].same_results(others[run_id]) for run_id in some)
+
+
+@pytest.fixture
+def one_by_one(monkeypatch):
+    """Every run is a task of its own, also on an executor of the caller."""
+    monkeypatch.setattr(runner, "BATCH_ROBOT_TICKS", 0)
 
 
 class Refusing(Executor):
@@ -73,14 +87,15 @@ def refuse(self, obs, active):
 
 def test_a_stored_run_is_read_with_the_performance_that_is_asked_for(tmp_path):
     store = RunStore(tmp_path)
-    run_all(SPECS[:1], store=store, jobs=1)
-    other = replace(SPECS[0], scenario=replace(WORLD, performance="n_active"))
-    found = run_all([other], store=store, executor=Refusing())
+    run_specs(SPECS[:1], store=store, jobs=1)
+    other = replace(SPECS[0], world=World(replace(WORLD, performance="n_active")))
+    found = run_specs([other], store=store, executor=Refusing())
     assert found.n_stored == 1
-    assert found.records[0].performance.tolist() == [3.0, 3.0]
-    assert RunSpec.from_json(found.records[0].spec) == other
-    assert found.records[0].same_results(run_one(other))
-    (last,) = run_all([other, SPECS[0]], store=store, executor=Refusing()).records
+    record = found.records[other.run_id]
+    assert record.performance.tolist() == [3.0, 3.0]
+    assert RunSpec.from_json(record.spec) == other
+    assert record.same_results(run_one(other))
+    (last,) = run_specs([other, SPECS[0]], store=store, executor=Refusing()).records.values()
     assert last.performance.tolist() == last.collected.tolist()
 
 
@@ -149,16 +164,19 @@ def test_warm_up_reaches_the_interactions_of_a_policy_that_asks_for_nothing(monk
 
 
 def test_outcomes_come_in_the_order_of_their_specifications(tmp_path):
-    result = run_all([SPECS[2], UNKNOWN, SPECS[0], REFUSED, SPECS[0]], store=RunStore(tmp_path), jobs=1)
-    assert [record.seed for record in result.records] == [2, 0]
-    assert [failure.spec for failure in result.failures] == [UNKNOWN, REFUSED]
-    assert result.n_stored == 0
+    result = run_specs([SPECS[2], UNKNOWN, SPECS[0], REFUSED, SPECS[0]], store=RunStore(tmp_path), jobs=1)
+    planned = [SPECS[2], UNKNOWN, SPECS[0], REFUSED]
+    states = dict(zip((spec.run_id for spec in planned), (DONE, FAILED, DONE, FAILED), strict=True))
+    assert list(result.states.items()) == list(states.items())
+    assert [record.seed for record in result.records.values()] == [2, 0]
+    assert [failure.spec for failure in result.failures.values()] == [UNKNOWN, REFUSED]
+    assert (result.n_stored, result.count(DONE), result.count(FAILED), result.count(MISSING)) == (0, 2, 2, 0)
     assert set(RunStore(tmp_path).run_ids()) == {SPECS[0].run_id, SPECS[2].run_id}
 
 
 def test_a_failed_run_says_why_and_how_to_run_it_again(tmp_path):
     store = RunStore(tmp_path)
-    (failure,) = run_all([UNKNOWN], store=store).failures
+    (failure,) = run_specs([UNKNOWN], store=store).failures.values()
     assert failure.error.startswith("ValueError: Unknown policy 'nobody'")
     assert "load_policy" in failure.traceback
     assert store.failures() == (failure,)
@@ -166,27 +184,43 @@ def test_a_failed_run_says_why_and_how_to_run_it_again(tmp_path):
 
 def test_finished_runs_are_read_and_not_repeated(tmp_path):
     store = RunStore(tmp_path)
-    first = run_all(SPECS[:2], store=store, jobs=1)
-    again = run_all(SPECS[:2], store=store, executor=Refusing())
+    first = run_specs(SPECS[:2], store=store, jobs=1)
+    again = run_specs(SPECS[:2], store=store, executor=Refusing())
     assert again.n_stored == 2
-    assert all(a.same_results(b) for a, b in zip(first.records, again.records, strict=True))
-    assert run_all(SPECS, store=store, jobs=1).n_stored == 2
+    assert same(first.records, again.records)
+    assert run_specs(SPECS, store=store, jobs=1).n_stored == 2
 
 
 def test_failed_runs_are_tried_again(tmp_path, monkeypatch):
     store = RunStore(tmp_path)
     monkeypatch.setattr(RandomPolicy, "act", refuse)
-    assert [type(failure) for failure in run_all(SPECS[:1], store=store).failures] == [RunFailure]
+    assert run_specs(SPECS[:1], store=store).count(FAILED) == 1
     monkeypatch.undo()
-    assert len(run_all(SPECS[:1], store=store).records) == 1
+    assert run_specs(SPECS[:1], store=store).count(DONE) == 1
     assert store.failures() == ()
 
 
-def test_a_damaged_record_stops_the_study_before_anything_runs(tmp_path):
+def test_a_damaged_file_is_put_aside_and_its_run_made_again(tmp_path, capsys):
     store = RunStore(tmp_path)
-    store.path(SPECS[1].run_id).write_bytes(b"damaged")
-    with pytest.raises(RecordError, match=SPECS[1].run_id):
-        run_all(SPECS, store=store, executor=Refusing())
+    first = run_specs(SPECS, store=store, jobs=1)
+    damaged = store.path(SPECS[1].run_id)
+    damaged.write_bytes(b"damaged")
+    again = run_specs(SPECS, store=store, jobs=1, progress=True)
+    assert (again.n_stored, again.count(DONE)) == (3, 4)
+    assert same(again.records, first.records)
+    assert f"Run again: Cannot read {damaged}" in capsys.readouterr().err
+    assert damaged.with_name(f"{damaged.name}.damaged").read_bytes() == b"damaged"
+    assert run_specs(SPECS, store=store, executor=Refusing()).n_stored == 4
+
+
+def test_records_stay_in_the_store_alone_if_nobody_asks_for_them(tmp_path):
+    store = RunStore(tmp_path)
+    for n_stored in (0, 4):
+        found = run_specs([*SPECS, UNKNOWN], store=store, jobs=1, keep=False)
+        assert (found.records, found.n_stored) == ({}, n_stored)
+        assert (found.count(DONE), found.count(FAILED)) == (4, 1)
+        assert list(found.failures) == [UNKNOWN.run_id]
+    assert set(store.run_ids()) == {spec.run_id for spec in SPECS}
 
 
 def test_ctrl_c_keeps_what_is_finished_and_says_so(tmp_path, monkeypatch):
@@ -200,15 +234,17 @@ def test_ctrl_c_keeps_what_is_finished_and_says_so(tmp_path, monkeypatch):
         reset(self, task, rng)
 
     monkeypatch.setattr(RandomPolicy, "reset", interrupted_in_the_third_run)
-    with pytest.raises(StudyInterrupted, match="2 of 4 runs are finished and kept") as caught:
-        run_all(SPECS, store=store, jobs=1)
-    assert [record.seed for record in caught.value.result.records] == [0, 1]
+    with pytest.raises(RunsInterrupted, match="2 of 4 runs are finished and kept") as caught:
+        run_specs(SPECS, store=store, jobs=1)
+    result = caught.value.result
+    assert [record.seed for record in result.records.values()] == [0, 1]
+    assert (result.count(DONE), result.count(MISSING)) == (2, 2)
     assert len(store.run_ids()) == 2
     monkeypatch.undo()
-    assert run_all(SPECS, store=store, jobs=1).n_stored == 2
+    assert run_specs(SPECS, store=store, jobs=1).n_stored == 2
 
 
-def test_closing_the_iterator_cancels_the_rest():
+def test_closing_the_iterator_cancels_the_rest(one_by_one):
     with ThreadPoolExecutor(1) as pool:
         gate = threading.Event()
         pool.submit(gate.wait)
@@ -225,11 +261,11 @@ def test_closing_the_iterator_cancels_the_rest():
 
 def test_any_executor_gives_the_same_records():
     with ThreadPoolExecutor(2) as pool:
-        threaded = run_all([*SPECS, UNKNOWN], executor=pool)
+        threaded = run_specs([*SPECS, UNKNOWN], executor=pool)
         assert pool.submit(int).result() == 0  # still open
-    in_process = run_all(SPECS, jobs=1)
-    assert all(a.same_results(b) for a, b in zip(threaded.records, in_process.records, strict=True))
-    assert [failure.spec for failure in threaded.failures] == [UNKNOWN]
+    in_process = run_specs(SPECS, jobs=1)
+    assert same(threaded.records, in_process.records)
+    assert [failure.spec for failure in threaded.failures.values()] == [UNKNOWN]
 
 
 def test_a_run_that_its_executor_cancels_is_a_failure():
@@ -240,11 +276,11 @@ def test_a_run_that_its_executor_cancels_is_a_failure():
             future.set_running_or_notify_cancel()
             return future
 
-    (failure,) = run_all(SPECS[:1], executor=Cancelling()).failures
+    (failure,) = run_specs(SPECS[:1], executor=Cancelling()).failures.values()
     assert failure.error == "CancelledError: by its executor"
 
 
-def test_a_broken_executor_that_is_not_ours_stops_the_study():
+def test_a_broken_executor_that_is_not_ours_ends_the_runs(one_by_one):
     seen = []
     with pytest.raises(WorkerError, match="2 runs were not started"):
         seen.extend(run_each(SPECS, executor=Breaking(SPECS[1])))
@@ -283,7 +319,7 @@ def test_a_worker_that_is_killed_while_it_compiles_costs_only_its_run(monkeypatc
 
 def test_a_store_that_cannot_be_written_to_is_told_before_the_first_run(full_disk, tmp_path):
     with pytest.raises(OSError, match="File too large") as caught:
-        run_all(SPECS, store=RunStore(tmp_path / "runs"), executor=Refusing())
+        run_specs(SPECS, store=RunStore(tmp_path / "runs"), executor=Refusing())
     assert caught.value.filename == str(tmp_path / "runs")
     assert list(tmp_path.iterdir()) == []
 
@@ -307,20 +343,25 @@ def test_thread_settings_are_put_back(monkeypatch):
     assert "MKL_NUM_THREADS" not in os.environ
 
 
+def test_long_runs_come_first():
+    large = replace(SPECS[0], world=World(replace(WORLD, horizon_s=8.0)))
+    assert longest_first([*SPECS[:2], large]) == (large, *SPECS[:2])
+
+
 @pytest.mark.parametrize("jobs", [0, -1])
 def test_jobs_must_be_positive(jobs):
     with pytest.raises(ValueError, match="Expected jobs to be a whole number >= 1"):
-        run_all(SPECS, jobs=jobs)
+        run_specs(SPECS, jobs=jobs)
 
 
 def test_nothing_to_do_is_no_error():
-    assert run_all([]).records == ()
+    assert run_specs([]).states == {}
 
 
 def test_progress_where_stderr_is_no_terminal_is_plain(tmp_path, capsys):
     store = RunStore(tmp_path)
-    run_all(SPECS[:1], store=store, jobs=1)
-    run_all([*SPECS[:2], UNKNOWN], store=store, jobs=1, progress=True)
+    run_specs(SPECS[:1], store=store, jobs=1)
+    run_specs([*SPECS[:2], UNKNOWN], store=store, jobs=1, progress=True)
     shown = capsys.readouterr()
     assert shown.out == ""
     assert shown.err.splitlines() == [
@@ -332,23 +373,24 @@ def test_progress_where_stderr_is_no_terminal_is_plain(tmp_path, capsys):
 
 def test_stored_runs_of_other_versions_are_pointed_out(tmp_path, monkeypatch, capsys):
     store = RunStore(tmp_path)
-    run_all(SPECS[:2], store=store, jobs=1)
-    run_all(SPECS[:2], store=store, jobs=1, progress=True)
+    run_specs(SPECS[:2], store=store, jobs=1)
+    run_specs(SPECS[:2], store=store, jobs=1, progress=True)
     assert capsys.readouterr().err == "2 of 2 runs are stored already.\n"
-    monkeypatch.setattr(runner, "software_versions", lambda: {"numba": "0.0"})
-    run_all(SPECS[:2], store=store, jobs=1, progress=True)
+    monkeypatch.setattr(runs_store, "software_versions", lambda: {"numba": "0.0"})
+    run_specs(SPECS[:2], store=store, jobs=1, progress=True)
     assert "2 of them were made by another version or commit" in capsys.readouterr().err
-    run_all(SPECS[:1], store=store, jobs=1, progress=True)
+    run_specs(SPECS[:1], store=store, jobs=1, progress=True)
     assert "1 of them was made by another version or commit" in capsys.readouterr().err
 
 
 @pytest.mark.compiled
 def test_local_processes_give_the_same_records(tmp_path):
-    pooled = run_all([*SPECS, UNKNOWN], store=RunStore(tmp_path), jobs=2)
-    in_process = run_all(SPECS, jobs=1)
-    assert all(a.same_results(b) for a, b in zip(pooled.records, in_process.records, strict=True))
-    assert [failure.error[:28] for failure in pooled.failures] == ["ValueError: Unknown policy '"]
-    assert "load_policy" in pooled.failures[0].traceback
+    pooled = run_specs([*SPECS, UNKNOWN], store=RunStore(tmp_path), jobs=2)
+    in_process = run_specs(SPECS, jobs=1)
+    assert same(pooled.records, in_process.records)
+    (failure,) = pooled.failures.values()
+    assert failure.error.startswith("ValueError: Unknown policy '")
+    assert "load_policy" in failure.traceback
 
 
 @pytest.mark.slow
@@ -358,7 +400,60 @@ def test_dask_gives_the_same_records():
         distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
     ):
-        remote = run_all([*SPECS, UNKNOWN], executor=client.get_executor())
-    in_process = run_all(SPECS, jobs=1)
-    assert all(a.same_results(b) for a, b in zip(remote.records, in_process.records, strict=True))
-    assert [failure.spec for failure in remote.failures] == [UNKNOWN]
+        remote = run_specs([*SPECS, UNKNOWN], executor=client.get_executor())
+    in_process = run_specs(SPECS, jobs=1)
+    assert same(remote.records, in_process.records)
+    assert [failure.spec for failure in remote.failures.values()] == [UNKNOWN]
+
+
+def plan_of(*policies, seeds=(0, 1)):
+    return Plan.product(policies, [World(WORLD)], seeds=seeds)
+
+
+def test_a_plan_runs_what_only_this_process_can_build(tmp_path):
+    """Its runs are made here, after all others, which any executor may make."""
+    elsewhere, mine = policy_spec("random"), policy_spec(RandomPolicy, label="mine")
+    plan = plan_of(mine, elsewhere)
+    with ThreadPoolExecutor(1) as executor:
+        table = run_plan(plan, store=RunStore(tmp_path), executor=executor)
+    first, second = plan.conditions
+    assert [record.controller for record in table.of(first)] == ["mine"] * 2
+    assert [record.controller for record in table.of(second)] == ["random"] * 2
+    for one, other in zip(table.of(first), table.of(second), strict=True):
+        assert one.same_columns(other)
+    assert (table.n_stored, table.folder) == (0, tmp_path)
+    assert run_plan(plan, store=RunStore(tmp_path), executor=Refusing()).n_stored == 4
+
+
+def test_a_plan_goes_on_after_runs_that_fail():
+    def fails(obs):
+        raise RuntimeError("I would rather not")
+
+    plan = plan_of(policy_spec(fails), policy_spec("random"))
+    table = run_plan(plan, jobs=1)
+    first, second = plan.conditions
+    assert [failure.error for failure in table.failures_of(first)] == ["RuntimeError: I would rather not"] * 2
+    assert len(table.of(second)) == 2
+
+
+def test_runs_of_a_policy_without_a_name_are_not_stored(tmp_path):
+    plan = plan_of(policy_spec(RandomPolicy))
+    with pytest.raises(ValueError, match=r"for the policy RandomPolicy, by which its runs in .* are found again"):
+        run_plan(plan, store=RunStore(tmp_path))
+    assert list(tmp_path.iterdir()) == []
+    (condition,) = plan.conditions
+    assert len(run_plan(plan).of(condition)) == 2
+
+
+def test_a_name_that_another_policy_has_is_refused():
+    with pytest.raises(ValueError, match="Expected a name of its own for the policy, got 'crw'"):
+        run_plan(plan_of(policy_spec(RandomPolicy, label="crw")))
+
+
+def test_conditions_of_one_run_share_it():
+    """Two names of one policy are the same runs."""
+    one, other = policy_spec("random"), policy_spec("random", label="again")
+    plan = Plan(conditions=(Condition(one, World(WORLD)), Condition(other, World(WORLD))), seeds=(0,))
+    table = run_plan(plan, jobs=1)
+    assert len(table.records) == 1
+    assert table.of(plan.conditions[0]) == table.of(plan.conditions[1])
