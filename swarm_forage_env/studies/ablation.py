@@ -85,7 +85,7 @@ class AblationResult:
     failures: tuple[RunFailure, ...]
 
     def effects(self) -> tuple[Effect, ...]:
-        """Return one effect per switched quirk; switchs whose runs failed are left out."""
+        """Return one effect per switched quirk; switches whose runs failed are left out."""
         return tuple(
             _effect(switch, self.records[switch._replace(quirk="")], records)
             for switch, records in self.records.items()

@@ -6,26 +6,28 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, QUIRK_NAMES, Quirks
-from swarm_forage_env.studies.ablation import TASK_COLUMNS, Cell, plan_ablation, run_ablation
+from swarm_forage_env.studies.ablation import TASK_COLUMNS, Switch, plan_ablation, run_ablation
 from swarm_forage_env.wrappers.noise import SensorNoiseConfig
+from swarm_forage_env.wrappers.world import World
 
 WORLD = scenario("warehouse_small", n_robots=6, horizon_s=40.0, interval_s=20.0, start_margin_m=6.5)
 
 
 def test_each_quirk_is_switched_alone_in_both_readings():
     plan = plan_ablation([WORLD], ["crw"], seeds=[3])
-    rules = {cell: specs[0].scenario.quirks for cell, specs in plan.specs.items()}
+    rules = {switch: condition.world.scenario.quirks for switch, condition in plan.conditions.items()}
     assert len(rules) == 2 * (1 + len(QUIRK_NAMES))
-    assert rules[Cell("warehouse_small", 6, "crw", "DESCRIBED", "")] == Quirks()
-    assert rules[Cell("warehouse_small", 6, "crw", "AUTHORS_PROGRAM", "")] == AUTHORS_PROGRAM
+    assert rules[Switch("warehouse_small", 6, "crw", "DESCRIBED", "")] == Quirks()
+    assert rules[Switch("warehouse_small", 6, "crw", "AUTHORS_PROGRAM", "")] == AUTHORS_PROGRAM
     for name in QUIRK_NAMES:
-        assert rules[Cell("warehouse_small", 6, "crw", "DESCRIBED", name)] == Quirks(**{name: True})
+        assert rules[Switch("warehouse_small", 6, "crw", "DESCRIBED", name)] == Quirks(**{name: True})
         off = {other: other != name for other in QUIRK_NAMES}
-        assert rules[Cell("warehouse_small", 6, "crw", "AUTHORS_PROGRAM", name)] == Quirks(**off)
+        assert rules[Switch("warehouse_small", 6, "crw", "AUTHORS_PROGRAM", name)] == Quirks(**off)
 
 
 def test_a_quirk_without_effect_is_run_once_and_one_with_effect_with_every_seed(tmp_path):
@@ -33,10 +35,10 @@ def test_a_quirk_without_effect_is_run_once_and_one_with_effect_with_every_seed(
     quirks = ["nest_left_at_random", "explore_double_start"]
     plan = plan_ablation([WORLD], ["crw"], quirks=quirks, seeds=[0, 1])
     result = run_ablation(plan, store=store, jobs=1)
-    assert len(plan.all) == 12
+    assert len(plan.specs) == 12
     # Nobody delivers in 40 s, so nobody leaves the nest after it; exploring starts in the first tick.
     assert len(list(tmp_path.rglob("*.parquet"))) == 4 + 2 * 1 + 2 * 2
-    effects = {effect.cell[3:]: effect for effect in result.effects()}
+    effects = {effect.switch[3:]: effect for effect in result.effects()}
     assert effects.keys() == {(reading, quirk) for reading in ("DESCRIBED", "AUTHORS_PROGRAM") for quirk in quirks}
     for reading in ("DESCRIBED", "AUTHORS_PROGRAM"):
         assert effects[reading, "nest_left_at_random"].is_same
@@ -49,9 +51,10 @@ def test_a_quirk_without_effect_is_run_once_and_one_with_effect_with_every_seed(
 def test_differences_are_those_of_the_runs_with_the_same_seed():
     world = scenario("warehouse_small", n_robots=20, n_objects=300, horizon_s=400.0)
     plan = plan_ablation([world], ["stochm"], quirks=["integer_estimates"], seeds=[0, 1])
-    effect = next(e for e in run_ablation(plan, jobs=1).effects() if e.cell.reading == "DESCRIBED")
-    pairs = [[run_one(plan.specs[effect.cell._replace(quirk=quirk)][seed]) for quirk in ("", "integer_estimates")]
-             for seed in (0, 1)]  # fmt: skip
+    effect = next(e for e in run_ablation(plan, jobs=1).effects() if e.switch.reading == "DESCRIBED")
+    conditions = [plan.conditions[effect.switch._replace(quirk=quirk)] for quirk in ("", "integer_estimates")]
+    runs = [Plan(conditions=(condition,), seeds=(0, 1)).specs for condition in conditions]
+    pairs = [[run_one(spec) for spec in specs] for specs in zip(*runs, strict=True)]
     mean = np.mean([before.performance.sum() for before, _ in pairs])
     for seed, (before, after) in enumerate(pairs):
         gain = after.performance.sum() - before.performance.sum()
@@ -65,8 +68,20 @@ def test_differences_are_those_of_the_runs_with_the_same_seed():
 def test_policies_are_ordered_by_performance():
     world = scenario("warehouse_small", n_robots=20, horizon_s=1000.0)
     result = run_ablation(plan_ablation([world], ["random", "dpo"], quirks=[], seeds=[0]), jobs=1)
-    assert list(result.means(Cell("warehouse_small", 20, "", "DESCRIBED", ""))) == ["dpo", "random"]
+    assert list(result.means(Switch("warehouse_small", 20, "", "DESCRIBED", ""))) == ["dpo", "random"]
     assert result.effects() == ()
+
+
+def test_a_policy_that_fails_is_left_out_and_told():
+    def refuse(obs):
+        raise RuntimeError("I would rather not")
+
+    plan = plan_ablation([WORLD], {"random": "random", "mine": refuse}, quirks=["explore_double_start"], seeds=[0, 1])
+    result = run_ablation(plan, jobs=1)
+    assert {switch.policy for switch in result.records} == {"random"}
+    assert {effect.switch.policy for effect in result.effects()} == {"random"}
+    assert {failure.spec.policy for failure in result.failures} == {"mine"}
+    assert len(result.failures) == len(plan.specs) / 2
 
 
 def test_two_worlds_of_one_name_and_size_are_refused():
@@ -77,8 +92,9 @@ def test_two_worlds_of_one_name_and_size_are_refused():
 
 
 def test_disturbances_are_the_same_in_all_runs():
-    plan = plan_ablation([WORLD], ["crw"], quirks=["explore_double_start"], wrappers=[SensorNoiseConfig(sigma=0.01)])
-    assert {spec.wrappers for spec in plan.all} == {(SensorNoiseConfig(sigma=0.01),)}
+    noisy = World(WORLD, (SensorNoiseConfig(sigma=0.01),))
+    plan = plan_ablation([noisy], ["crw"], quirks=["explore_double_start"])
+    assert {spec.wrappers for spec in plan.specs} == {noisy.wrappers}
 
 
 @pytest.mark.parametrize(

@@ -10,33 +10,33 @@ from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.studies.ladders import (
     BUDGETS,
     CRITERIA,
-    UNDISTURBED,
     Budget,
     budget,
-    plan_experiments,
-    plan_specs,
+    plan_worlds,
     repairs_per_tick,
     size_ladder,
     spread,
 )
+from swarm_forage_env.wrappers.noise import SensorNoiseConfig
 from swarm_forage_env.wrappers.throttle import ThrottleConfig
 from swarm_forage_env.wrappers.waveform import Waveform
+from swarm_forage_env.wrappers.world import UNDISTURBED, World
 
 PAPER = BUDGETS["paper"]
 
 
 def planned(name, criterion, allowed=PAPER, **overrides):
-    return plan_experiments(scenario(name, **overrides), [criterion], allowed)
+    return plan_worlds(scenario(name, **overrides), [criterion], allowed)
 
 
-def of(criterion, experiments):
-    return [experiment for experiment in experiments if experiment.criterion == criterion]
+def of(criterion, worlds):
+    return [world for world in worlds if world.criterion == criterion]
 
 
 def test_the_paper_budget_is_the_study():
     assert (PAPER.horizon_s, PAPER.interval_s, PAPER.n_seeds) == (10_000.0, 200.0, 192)
     small, medium = (
-        [e.scenario.robots.n_robots for e in planned(name, "population_size")]
+        [world.scenario.robots.n_robots for world in planned(name, "population_size")]
         for name in ("warehouse_small", "warehouse_medium")
     )
     assert small == [1, 2, 4, 8, 16, 32, 64, 128]
@@ -44,7 +44,7 @@ def test_the_paper_budget_is_the_study():
 
 
 def test_search_and_rescue_grows_at_constant_density_from_one_robot_in_the_smallest_arena():
-    worlds = [experiment.scenario for experiment in planned("search_and_rescue", "population_size")]
+    worlds = [world.scenario for world in planned("search_and_rescue", "population_size")]
     assert [(w.robots.n_robots, w.arena.width_m, w.objects.n_objects) for w in worlds] == [
         (1, 16.0, 80),
         (12, 16.0, 80),
@@ -60,10 +60,10 @@ def test_search_and_rescue_grows_at_constant_density_from_one_robot_in_the_small
 
 @pytest.mark.parametrize(("name", "n_objects"), [("warehouse_small", 512), ("warehouse_medium", 2048)])
 def test_sizes_are_swept_with_more_objects_than_everything_else(name, n_objects):
-    experiments = plan_experiments(scenario(name), CRITERIA, BUDGETS["quick"])
-    assert {e.scenario.objects.n_objects for e in of("population_size", experiments)} == {n_objects}
-    others = [e for e in experiments if e.criterion != "population_size"]
-    assert {e.scenario.objects.n_objects for e in others} == {scenario(name).objects.n_objects}
+    worlds = plan_worlds(scenario(name), CRITERIA, BUDGETS["quick"])
+    assert {world.scenario.objects.n_objects for world in of("population_size", worlds)} == {n_objects}
+    others = [world for world in worlds if world.criterion != "population_size"]
+    assert {world.scenario.objects.n_objects for world in others} == {scenario(name).objects.n_objects}
 
 
 def test_a_chosen_number_of_objects_is_kept_for_all_sizes():
@@ -154,10 +154,10 @@ def test_search_and_rescue_has_deaths():
 
 
 def test_the_undisturbed_run_is_planned_once():
-    experiments = plan_experiments(scenario("warehouse_small"), CRITERIA, BUDGETS["quick"])
-    assert len(of(UNDISTURBED, experiments)) == 1
-    assert len(experiments) == 14  # itself, 3 sizes, 3 throttles, 3 handling costs, 2 noises, 2 populations
-    assert len({(e.criterion, e.value) for e in experiments}) == 14
+    worlds = plan_worlds(scenario("warehouse_small"), CRITERIA, BUDGETS["quick"])
+    assert len(of(UNDISTURBED, worlds)) == 1
+    assert len(worlds) == 14  # itself, 3 sizes, 3 throttles, 3 handling costs, 2 noises, 2 populations
+    assert len({(world.criterion, world.value) for world in worlds}) == 14
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
@@ -165,7 +165,7 @@ def test_the_undisturbed_run_is_planned_once():
 def test_smaller_budgets_are_parts_of_the_study(name, budget_name):
     for criterion in CRITERIA[1:]:
         full, part = planned(name, criterion), planned(name, criterion, BUDGETS[budget_name])
-        assert {e.value for e in part} <= {e.value for e in full}
+        assert {world.value for world in part} <= {world.value for world in full}
         assert part[-1].value == full[-1].value
     ladder = size_ladder(scenario(name), BUDGETS[budget_name].n_sizes)
     sizes = [world.robots.n_robots for world in ladder]
@@ -218,10 +218,10 @@ def test_search_and_rescue_keeps_to_its_arenas_at_another_density():
 def test_a_plan_keeps_the_density_in_sizes_only():
     base = scenario("warehouse_small", n_robots=200, density=0.05)
     quick = BUDGETS["quick"]
-    experiments = plan_experiments(base, ["population_size", "throttle"], quick, density=0.05)
-    sizes = [e.scenario.arena.width_m for e in of("population_size", experiments)]
+    worlds = plan_worlds(base, ["population_size", "throttle"], quick, density=0.05)
+    sizes = [world.scenario.arena.width_m for world in of("population_size", worlds)]
     assert sizes == [63.6, 63.6, 89.6]
-    assert {e.scenario.arena.width_m for e in of("throttle", experiments)} == {89.6}
+    assert {world.scenario.arena.width_m for world in of("throttle", worlds)} == {89.6}
 
 
 def test_levels_are_spread_evenly_and_end_with_the_strongest():
@@ -231,15 +231,27 @@ def test_levels_are_spread_evenly_and_end_with_the_strongest():
     assert spread([1, 2], 5) == spread([1, 2], None) == (1, 2)
 
 
-def test_specifications_come_seed_by_seed_and_differ_in_identity():
-    experiments = planned("warehouse_small", "throttle", BUDGETS["quick"])
-    specs = plan_specs(experiments, "crw", seeds=(3, 4), parameters={"wander_speed_mps": 0.05})
-    assert [(spec.seed, spec.criterion_value) for spec in specs] == [
-        (seed, value) for seed in (3, 4) for value in (0.0, 0.25, 0.4)
+def test_worlds_are_named_by_what_is_varied():
+    assert [world.name for world in planned("warehouse_small", "throttle", BUDGETS["quick"])] == [
+        f"warehouse_small, 50 robots, throttle {value}" for value in ("0", "0.25", "0.4")
     ]
-    assert {spec.criterion for spec in specs} == {"throttle"}
-    assert len({spec.run_id for spec in specs}) == 6
-    assert specs[0].parameters == {"wander_speed_mps": 0.05}
+    sizes = planned("warehouse_small", "population_size", BUDGETS["quick"])
+    assert [world.name for world in sizes] == [f"warehouse_small, {n}" for n in ("1 robot", "25 robots", "50 robots")]
+
+
+def test_wrappers_of_the_world_are_in_all_worlds():
+    always, criteria = SensorNoiseConfig(sigma=0.01), ["population_size", "throttle", "population_dynamics"]
+    base = World(scenario("warehouse_small"), (always,))
+    worlds, bare = (plan_worlds(given, criteria, BUDGETS["quick"]) for given in (base, base.scenario))
+    for world, without in zip(worlds, bare, strict=True):
+        assert set(world.wrappers) == {always, *without.wrappers}
+        assert (world.scenario, world.criterion, world.value) == (without.scenario, without.criterion, without.value)
+
+
+def test_a_wrapper_that_a_criterion_varies_is_refused_in_the_world():
+    base = World(scenario("warehouse_small"), (SensorNoiseConfig(sigma=0.01),))
+    with pytest.raises(ConfigError, match="no wrapper sensor_noise in a world where noise is varied"):
+        plan_worlds(base, ["noise"], BUDGETS["quick"])
 
 
 @pytest.mark.parametrize(

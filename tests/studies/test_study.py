@@ -6,15 +6,17 @@ from dataclasses import replace
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.policy_spec import policy_spec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
-from swarm_forage_env.studies.ladders import BUDGETS, plan_experiments, plan_specs, study_values, wrappers_at
-from swarm_forage_env.studies.study import Axis, Cell, StudySpec, study_policy
+from swarm_forage_env.studies.ladders import BUDGETS, plan_worlds, study_values, wrappers_at
+from swarm_forage_env.studies.study import Axis, Cell, StudySpec
 from swarm_forage_env.wrappers.noise import ActuatorNoiseConfig, SensorNoiseConfig
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.waveform import Waveform
 
-CRW, STOCHM = study_policy("crw"), study_policy("stochm")
+CRW, STOCHM = policy_spec("crw"), policy_spec("stochm")
 
 
 def study(*axes, **changes):
@@ -35,15 +37,17 @@ def test_every_combination_is_a_cell_and_every_cell_has_all_seeds():
     assert spec.cells[0] == Cell("described", "crw", (10, 1))
     assert spec.cells[1] == Cell("described", "crw", (10, 3))
     assert spec.cells[-1] == Cell("program", "stochm", (20, 3))
-    assert (spec.n_experiments, spec.n_runs, len(spec.expand())) == (4, 32, 32)
-    assert len({run.run_id for run in spec.expand()}) == 32
+    assert (spec.n_experiments, spec.n_runs, len(spec.plan.specs)) == (4, 32, 32)
+    assert len({run.run_id for run in spec.plan.specs}) == 32
     last = spec.specs_of(spec.cells[-1])
+    assert spec.plan.specs[-2:] == last
+    assert spec.condition(spec.cells[-1]) == spec.plan.conditions[-1]
     assert [run.seed for run in last] == [0, 1]
     world = last[0].scenario
     assert (world.robots.n_robots, world.objects.n_objects, world.caches) == (3, 20, "static")
     assert (world.quirks, world.horizon_s, world.interval_s) == (AUTHORS_PROGRAM, 400.0, 200.0)
-    assert spec.experiment(spec.cells[0]).scenario.quirks == Quirks()
-    assert spec.robot_ticks == sum(run.robot_ticks for run in spec.expand()) == 8 * 2 * (1 + 3) * 2000
+    assert spec.world(spec.cells[0]).scenario.quirks == Quirks()
+    assert spec.robot_ticks == sum(run.robot_ticks for run in spec.plan.specs) == 8 * 2 * (1 + 3) * 2000
 
 
 def test_the_reference_of_a_cell_differs_on_the_last_axis_only():
@@ -56,11 +60,11 @@ def test_the_reference_of_a_cell_differs_on_the_last_axis_only():
 
 def test_fields_that_hold_lists_can_vary():
     spec = study(Axis(name="nest_size_m", values=("3.2,12.8", "3.2,6.4")))
-    sizes = [spec.experiment(cell).scenario.arena.nest_size_m for cell in spec.cells]
+    sizes = [spec.world(cell).scenario.arena.nest_size_m for cell in spec.cells]
     assert sizes == [(3.2, 12.8), (3.2, 6.4)]
     assert StudySpec.from_mapping(json.loads(spec.to_json())) == spec
     spec = study(Axis(name="own_sensors", values=("none", "nest_distance,x")))
-    assert [spec.experiment(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance", "x")]
+    assert [spec.world(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance", "x")]
 
 
 @pytest.mark.parametrize(
@@ -80,23 +84,23 @@ def test_the_runs_of_one_criterion_are_those_of_a_score(criterion):
     """One fact in one place: whoever scored a policy before finds its runs again."""
     world = scenario("warehouse_small", horizon_s=400.0)
     budget = replace(BUDGETS["paper"], horizon_s=400.0)
-    planned = plan_specs(plan_experiments(world, [criterion], budget), "stochm", seeds=(0, 1))
+    planned = Plan.product([STOCHM], plan_worlds(world, [criterion], budget), seeds=(0, 1)).specs
     values = study_values(world, criterion)
     spec = study(Axis(name=criterion, values=values if 1 in values[:1] and criterion == "population_size"
                       else (0.0, *values)), policies=(STOCHM,))  # fmt: skip
-    assert {run.run_id for run in spec.expand()} == {run.run_id for run in planned}
+    assert {run.run_id for run in spec.plan.specs} == {run.run_id for run in planned}
 
 
 def test_sizes_of_search_and_rescue_have_the_arenas_of_its_series():
     spec = study(Axis(name="population_size", values=(1, 12, 115)), scenario="search_and_rescue")
-    worlds = [spec.experiment(cell).scenario for cell in spec.cells]
+    worlds = [spec.world(cell).scenario for cell in spec.cells]
     assert [(w.arena.width_m, w.robots.n_robots, w.objects.n_objects) for w in worlds] == [
         (16.0, 1, 80), (16.0, 12, 80), (48.0, 115, 368)]  # fmt: skip
 
 
 def test_a_density_holds_for_all_sizes():
     spec = study(Axis(name="population_size", values=(1, 10, 40)), settings={"density": 0.1})
-    worlds = [spec.experiment(cell).scenario for cell in spec.cells]
+    worlds = [spec.world(cell).scenario for cell in spec.cells]
     areas = [w.arena.width_m * w.arena.height_m for w in worlds]
     assert areas[0] == areas[1], "one robot has the smallest arena of the others"
     assert areas[1] == pytest.approx(100.0, rel=0.1)
@@ -136,7 +140,7 @@ def test_fields_of_wrappers_and_switches_of_the_scenario_are_axes_too():
 
 def test_two_adversities_in_one_run_are_labelled_by_the_last():
     spec = study(Axis(name="throttle", values=(0.2,)), Axis(name="noise", values=(0.0, 0.02)))
-    calm, noisy = (spec.experiment(cell) for cell in spec.cells)
+    calm, noisy = (spec.world(cell) for cell in spec.cells)
     assert (calm.criterion, calm.value, len(calm.wrappers)) == ("throttle", 0.2, 1)
     assert (noisy.criterion, noisy.value, len(noisy.wrappers)) == ("noise", 0.02, 3)
 
@@ -150,7 +154,7 @@ def test_a_study_survives_json_and_has_an_identity():
     )
     again = StudySpec.from_mapping(json.loads(spec.to_json()))
     assert again.to_mapping() == spec.to_mapping()
-    assert [run.run_id for run in again.expand()] == [run.run_id for run in spec.expand()]
+    assert [run.run_id for run in again.plan.specs] == [run.run_id for run in spec.plan.specs]
     assert again.study_id == spec.study_id == replace(spec, title="another", budget="small").study_id
     assert replace(spec, seeds=(0,)).study_id != spec.study_id
 
@@ -209,23 +213,23 @@ def test_unknown_keys_of_a_stored_study_are_refused():
 
 
 def test_the_share_of_a_part_is_an_axis():
-    mixed = study_policy("mixed:ppo_warehouse_small=share,crw=rest", label="learned among crw")
+    mixed = policy_spec("mixed:ppo_warehouse_small=share,crw=rest", label="learned among crw")
     spec = study(Axis(name="share", values=(0.0, 0.25, 1.0)), policies=(mixed,), reference=0.0)
     assert StudySpec.from_mapping(json.loads(spec.to_json())) == spec
     runs = [spec.specs_of(cell)[0] for cell in spec.cells]
     assert [run.parameters["share"] for run in runs] == [0.0, 0.25, 1.0]
     assert len({run.run_id for run in runs}) == 3
     assert {run.policy for run in runs} == {"mixed:ppo_warehouse_small=share,crw=rest"}
-    assert [run.criterion for run in runs] == ["none"] * 3
+    assert [run.world.criterion for run in runs] == ["none"] * 3
 
 
 def test_a_share_that_no_part_has_is_refused():
     with pytest.raises(ConfigError, match="mixed:dpo=share,crw=rest, got crw"):
         study(Axis(name="share", values=(0.0, 0.5)))
-    mixed = study_policy("mixed:dpo=share,crw=rest")
+    mixed = policy_spec("mixed:dpo=share,crw=rest")
     with pytest.raises(ConfigError, match="the parameter share for"):
         study(policies=(mixed,))
     with pytest.raises(ConfigError, match="Expected share"):
         study(Axis(name="share", values=(0.5, 2.0)), policies=(mixed,))
     with pytest.raises(ConfigError, match="add up to a swarm of 3 robots"):
-        study(Axis(name="population_size", values=(3, 6)), policies=(study_policy("mixed:dpo=2,crw=4"),))
+        study(Axis(name="population_size", values=(3, 6)), policies=(policy_spec("mixed:dpo=2,crw=4"),))

@@ -88,7 +88,7 @@ def test_the_paper_ran_129024_times():
 )
 def test_the_worlds_of_the_sets(name, robots, objects, reference):
     spec = load_study(name, "paper")
-    worlds = [spec.experiment(cell).scenario for cell in spec.cells]
+    worlds = [spec.world(cell).scenario for cell in spec.cells]
     assert {world.robots.n_robots for world in worlds} == robots
     assert {world.objects.n_objects for world in worlds} == objects
     assert {world.physics for world in worlds} == {"compiled"}
@@ -124,7 +124,7 @@ def test_a_file_and_a_budget_make_a_study(written):
     assert (last.policy, last.scenario.caches, last.seed) == ("stochm", "none", 1)
     assert last.scenario.objects.n_objects == 50
     assert [config.name for config in last.wrappers] == ["sensor_noise", "population", "actuator_noise"]
-    assert (last.criterion, last.criterion_value) == ("noise", 0.04)
+    assert (last.world.criterion, last.world.value) == ("noise", 0.04)
 
 
 def test_seeds_and_readings_can_be_chosen(written):
@@ -248,7 +248,7 @@ def test_an_axis_of_lists(tmp_path):
     spec = load_study(file)
     assert spec.axes[0].values == ("none", "nest_distance")
     assert spec.reference == "none"
-    assert [spec.experiment(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance",)]
+    assert [spec.world(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance",)]
 
 
 def test_an_axis_of_kinds(tmp_path):
@@ -260,7 +260,7 @@ def test_an_axis_of_kinds(tmp_path):
     )
     spec = load_study(file)
     assert spec.axes[0].values == ("none", "slow:share=0.2,speed=0.5+rest")
-    kinds = [spec.experiment(cell).scenario.robots.robot_kinds for cell in spec.cells]
+    kinds = [spec.world(cell).scenario.robots.robot_kinds for cell in spec.cells]
     assert kinds == [(), (RobotKind(name="slow", share=0.2, speed=0.5), RobotKind(name="rest"))]
 
 

@@ -14,13 +14,10 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs.record import RecordError
+from swarm_forage_env.runs.store import DONE, FAILED, MISSING
 from swarm_forage_env.studies.study_file import load_study
 from swarm_forage_env.studies.study_folder import (
-    DONE,
-    FAILED,
-    MISSING,
     StudyFolder,
-    longest_first,
     parse_shard,
     run_study,
     shard,
@@ -64,6 +61,7 @@ def test_a_study_runs_once(tmp_path):
     folder = StudyFolder(tmp_path)
     state = run_study(STUDY, folder, jobs=1)
     assert (state.count(DONE), state.count(MISSING), state.count(FAILED)) == (16, 0, 0)
+    assert state.records == {}, "they are in the folder alone"
     assert folder.study().to_mapping() == STUDY.to_mapping()
     assert all(cell.is_complete for cell in folder.cell_states())
     counting = Counting()
@@ -73,7 +71,7 @@ def test_a_study_runs_once(tmp_path):
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 40])
 def test_shards_are_disjoint_complete_and_equal(count):
-    specs = STUDY.expand()
+    specs = STUDY.plan.specs
     parts = [shard(specs, index, count) for index in range(1, count + 1)]
     ids = [run.run_id for part in parts for run in part]
     assert len(ids) == len(set(ids)) == len(specs)
@@ -94,11 +92,6 @@ def test_a_shard_that_cannot_be(word):
     with pytest.raises(ConfigError, match="shard"):
         parse_shard(word)
     assert parse_shard("2/8") == (2, 8)
-
-
-def test_long_runs_come_first():
-    sizes = [run.scenario.robots.n_robots for run in longest_first(STUDY.expand())]
-    assert sizes == [3] * 8 + [2] * 8
 
 
 def test_seeds_of_a_cell_travel_together(tmp_path):
@@ -162,6 +155,7 @@ def test_a_damaged_file_is_found_told_and_run_again(tmp_path, capsys, damage):
     told = capsys.readouterr().err
     assert "15 of 16 runs are stored already." in told
     assert f"Run again: {'Expected' if damage == 'renamed' else 'Cannot read'} {one}" in told
+    assert one.with_name(f"{one.name}.damaged").read_bytes() == changed[damage]
     assert gather_study(folder).frame.equals(before.frame)
 
 

@@ -8,10 +8,10 @@ import pytest
 
 from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.run import run_one
-from swarm_forage_env.runs.runner import run_all
-from swarm_forage_env.runs.store import FAILURES
+from swarm_forage_env.runs.runner import longest_first, run_specs
+from swarm_forage_env.runs.store import FAILURES, MISSING
 from swarm_forage_env.studies.study import Axis, Cell
-from swarm_forage_env.studies.study_folder import MISSING, StudyFolder, longest_first, run_study
+from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.studies.study_table import gather_study, read_study
 from tests.support.tiny_study import NOBODY, RANDOM, tiny_study
 
@@ -60,7 +60,7 @@ def test_a_cell_gives_the_curves_of_its_runs_and_of_its_reference(file):
     for one in (cell, table.spec.reference_of(cell)):
         seeds, curves = table.curves(one, "collected", "interference_fraction", "believed_interference_fraction")
         assert seeds == (0, 1)
-        records = run_all(STUDY.specs_of(one), jobs=1).records
+        records = run_specs(STUDY.specs_of(one), jobs=1).records.values()
         for name, values in curves.items():
             np.testing.assert_array_equal(values, [record.columns()[name] for record in records])
         assert ("believed_interference_fraction" in curves) == (one == cell), "only noisy runs have that column"
@@ -121,7 +121,7 @@ def test_a_study_without_any_run_has_a_table_too(tmp_path):
 def test_the_order_of_the_runs_does_not_change_a_byte(folder, file, tmp_path):
     other = StudyFolder(tmp_path / "other")
     other.take(STUDY)
-    run_all(reversed(longest_first(STUDY.expand())), store=other.store, jobs=1)
+    run_specs(reversed(longest_first(STUDY.plan.specs)), store=other.store, jobs=1)
     gather_study(other).write(tmp_path / "other.parquet")
     assert (tmp_path / "other.parquet").read_bytes() == file.read_bytes()
 
