@@ -20,7 +20,7 @@ from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.registry import RandomPolicy, policy_names
 from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import load
+from swarm_forage_env.runs.store import RunStore, load
 from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from tests.support.pictures import keep_figures
@@ -472,15 +472,17 @@ def test_a_mistake_is_one_line_and_exit_code_2(command, words, complaint):
     assert [path.name for path in Path.cwd().iterdir()] == ["file"]
 
 
-def test_a_damaged_record_in_the_folder_is_named(command):
+def test_a_damaged_record_in_the_folder_is_named_put_aside_and_made_again(command):
     _, out, _ = command(*RUN, "--dry-run", "--json")
     damaged = Path("results/warehouse_small") / f"{json.loads(out)['runs'][0]['run_id']}.parquet"
     damaged.parent.mkdir(parents=True)
     damaged.write_bytes(b"damaged")
     code, _, err = command(*RUN)
-    assert code == 2
-    assert str(damaged) in err
-    assert damaged.read_bytes() == b"damaged"
+    assert code == 0
+    assert str(damaged) in "".join(err.splitlines())
+    assert damaged.with_name(f"{damaged.name}.damaged").read_bytes() == b"damaged"
+    assert RunStore(damaged.parent).read(damaged.stem).n_robots == 3
+    assert len(list(damaged.parent.glob("*.damaged"))) == 1
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(command):

@@ -8,7 +8,7 @@ import pytest
 
 from swarm_forage_env.cli import study_report
 from swarm_forage_env.runs import cost as calibration
-from swarm_forage_env.studies import study_folder as study_run
+from swarm_forage_env.runs import runner
 from swarm_forage_env.studies.study_table import read_study
 
 FILE = """
@@ -133,7 +133,7 @@ def test_an_interrupt_keeps_what_is_done(written, monkeypatch):
     def interrupted(*args, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(study_run, "run_each", interrupted)
+    monkeypatch.setattr(runner, "run_each", interrupted)
     code, _, err = written(*RUN)
     assert code == 130
     assert f"kept in {FOLDER}; the same command does the rest" in err
