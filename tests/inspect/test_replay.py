@@ -27,6 +27,7 @@ from swarm_forage_env.scenarios.kinds import RobotKind, kind_sizes
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.recorder import TOTALS
 from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import World
 
 CROWDED = scenario(
     "warehouse_small",
@@ -391,7 +392,7 @@ def test_a_write_that_is_interrupted_leaves_the_old_file(replay, tmp_path, monke
 
 @pytest.mark.compiled
 def test_performance_that_the_world_does_not_count_is_shown_as_deliveries(replay):
-    spec = dataclasses.replace(replay.spec, scenario=dataclasses.replace(CROWDED, performance="n_carrying"))
+    spec = dataclasses.replace(replay.spec, world=World(dataclasses.replace(CROWDED, performance="n_carrying")))
     other = dataclasses.replace(replay, spec=spec)
     for one, expected in ((replay, "deliveries"), (other, "deliveries")):
         header, _ = files_module.take_page_apart(files_module.page_of([one]))
@@ -401,7 +402,7 @@ def test_performance_that_the_world_does_not_count_is_shown_as_deliveries(replay
 def test_the_page_is_told_where_obstacles_are(replay):
     boxes = ((3.0, 5.0, 4.0, 6.0), (5.0, 2.0, 5.2, 4.0))
     arena = dataclasses.replace(CROWDED.arena, obstacles=boxes)
-    spec = dataclasses.replace(replay.spec, scenario=dataclasses.replace(CROWDED, arena=arena))
+    spec = dataclasses.replace(replay.spec, world=World(dataclasses.replace(CROWDED, arena=arena)))
     for one, expected in ((replay, []), (dataclasses.replace(replay, spec=spec), [list(box) for box in boxes])):
         header, _ = files_module.take_page_apart(files_module.page_of([one]))
         assert header["runs"][0]["world"]["obstacles_m"] == expected
@@ -410,7 +411,7 @@ def test_the_page_is_told_where_obstacles_are(replay):
 def test_the_page_is_told_who_is_of_which_kind(replay):
     kinds = (RobotKind(name="scout", share=0.25), RobotKind(name="hauler"))
     robots = dataclasses.replace(CROWDED.robots, robot_kinds=kinds)
-    spec = dataclasses.replace(replay.spec, scenario=dataclasses.replace(CROWDED, robots=robots))
+    spec = dataclasses.replace(replay.spec, world=World(dataclasses.replace(CROWDED, robots=robots)))
     n_scouts = kind_sizes(kinds, robots.n_robots)[0]
     named = [["scout", n_scouts], ["hauler", robots.n_robots - n_scouts]]
     for one, expected in ((replay, []), (dataclasses.replace(replay, spec=spec), named)):

@@ -17,6 +17,7 @@ from swarm_forage_env.inspect.replay.frames import Status
 from swarm_forage_env.runs.spec import plan_run
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import World
 from tests.support.browser import Browser, chromium
 from tests.support.replay_page import choose, place_of, seek
 
@@ -227,7 +228,8 @@ def test_the_subtitle_names_what_disturbs_the_runs(replays, pair, desktop, tmp_p
     told = "population: a death every 1,000 s on average, a malfunction every 400 s on average, a repair every 20 s"
     assert desktop.text("#subtitle").count(told) == 1
     assert "throttle: robots lose 0 to 40 % of their speed (sine, period 200 s)" in desktop.text("#subtitle")
-    quiet = dataclasses.replace(replays[1], spec=dataclasses.replace(replays[1].spec, wrappers=()), label="quiet")
+    undisturbed = dataclasses.replace(replays[1].spec, world=World(replays[1].spec.scenario))
+    quiet = dataclasses.replace(replays[1], spec=undisturbed, label="quiet")
     desktop.open(write_replays(tmp_path / "one_of_two.html", [quiet, replays[0]]))
     assert "stochm: population: a death" in desktop.text("#subtitle"), "not of both"
     assert "quiet:" not in desktop.text("#subtitle")
