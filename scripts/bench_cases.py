@@ -110,10 +110,10 @@ class Avoiding:
 
 def numpy_policy(engine: str, effort: float) -> float:
     """A run of a policy object."""
-    from swarm_forage_env import RunSpec, run_policy
+    from swarm_forage_env import RunSpec, World, run_policy
 
     scene = world(MEDIUM, engine, n_ticks := round(5_000 * effort))
-    spec = RunSpec(scenario=scene, policy="avoiding")
+    spec = RunSpec(world=World(scene), policy="avoiding")
     return spent(lambda _: run_policy(Avoiding(), spec), 1) / n_ticks / scene.robots.n_robots
 
 
