@@ -48,6 +48,8 @@ class Plan:
             whole("a seed", seed, at_least=0)
         if len(set(self.seeds)) < len(self.seeds):
             raise ConfigError(f"Expected different seeds, got {', '.join(map(str, self.seeds))}.")
+        for condition in self.conditions:
+            self._first_of(condition)  # refuses what runs refuse
 
     @classmethod
     def product(cls, policies: Iterable[PolicySpec], worlds: Sequence[World], seeds: Sequence[int]) -> "Plan":
@@ -67,14 +69,18 @@ class Plan:
 
     def specs_of(self, condition: Condition) -> tuple[RunSpec, ...]:
         """Return the runs of a condition, one per seed."""
+        first = self._first_of(condition)
+        return tuple(replace(first, seed=seed) for seed in self.seeds)
+
+    def _first_of(self, condition: Condition) -> RunSpec:
+        """The run of a condition with the first seed."""
         policy, world = condition
-        first = RunSpec(
+        return RunSpec(
             world=world.with_caches(policy.caches),
             policy=policy.policy,
             parameters=policy.parameters,
             seed=self.seeds[0],
         )
-        return tuple(replace(first, seed=seed) for seed in self.seeds)
 
     @property
     def specs(self) -> tuple[RunSpec, ...]:
@@ -84,4 +90,4 @@ class Plan:
     @property
     def robot_ticks(self) -> int:
         """Robots times ticks of all runs."""
-        return sum(self.specs_of(condition)[0].robot_ticks for condition in self.conditions) * len(self.seeds)
+        return sum(self._first_of(condition).robot_ticks for condition in self.conditions) * len(self.seeds)
