@@ -3,7 +3,7 @@
 from .entry import Entry, Training, read_entry
 from .figure import draw_benchmark
 from .page import details_page, page_block
-from .protocol import BenchmarkError, Protocol, load_protocol
+from .protocol import BenchmarkError, Protocol, ProtocolWorld, load_protocol
 from .running import BenchmarkQuestion, benchmark_question, run_benchmark
 from .standing import Standing, reference_of, scripted_entries, standing_of
 
@@ -20,6 +20,7 @@ __all__ = [
     "details_page",
     "draw_benchmark",
     "Protocol",
+    "ProtocolWorld",
     "Entry",
     "Training",
     "Standing",

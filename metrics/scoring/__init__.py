@@ -2,16 +2,15 @@
 
 from swarm_forage_env.scenarios.performance import Performance
 
-from .choosing import Choice, choose_policy
+from .choosing import Choice, ChoiceQuestion, choice_question, choose_policy
 from .comparison import Comparison, compare_tables
 from .figure_panels import StudyPanel, StudyPanels, study_panels
-from .front_door import compare_policies, score_curves, score_policy
+from .front_door import ScoreQuestion, compare_policies, score_curves, score_policy, score_question
 from .measures import ScoreForms
 from .plots import draw_scores
-from .prediction import PredictionTable, predict_curves, predict_policy
+from .prediction import PredictionQuestion, PredictionTable, predict_curves, predict_policy, prediction_question
 from .prediction_plots import draw_predictions
 from .question import Question, ask
-from .score_question import ScoreQuestion, score_question
 from .study_diff import StudyDiff, diff_studies
 from .study_plots import StudyFigure, draw_figure, draw_map, study_figures
 from .study_tables import StudyLine, study_lines
@@ -25,6 +24,8 @@ __all__ = [
     "compare_tables",
     "ask",
     "score_question",
+    "prediction_question",
+    "choice_question",
     "study_lines",
     "study_panels",
     "study_figures",
@@ -43,6 +44,8 @@ __all__ = [
     "Comparison",
     "Question",
     "ScoreQuestion",
+    "PredictionQuestion",
+    "ChoiceQuestion",
     "StudyLine",
     "StudyPanel",
     "StudyPanels",

@@ -53,8 +53,10 @@ SIGNATURES = {
     "lone_interference=None, avoidance_s=1.0",
     "fit_ladder": "sizes, runs, *, level=0.95, n_resamples=200, seed=None",
     "predict_performance": "sizes, runs, at, *, level=0.95, n_resamples=500, seed=None",
-    "predict_policy": "policy, scenario='warehouse_small', *, fit=None, hold=(), seeds=4",
-    "choose_policy": "policies, scenario='warehouse_small', *, deliver, keep=1.0, failures=None, deaths=None, "
+    "score_policy": "policy, world='warehouse_small', *, measures=None, budget='standard', seeds=None",
+    "compare_policies": "policies, world='warehouse_small', *, measures=None, budget='standard', seeds=None",
+    "predict_policy": "policy, world='warehouse_small', *, fit=None, hold=(), seeds=4",
+    "choose_policy": "policies, world='warehouse_small', *, deliver, keep=1.0, failures=None, deaths=None, "
     "noise=None, seeds=4",
     "normalize": "theta, *, distance=False",
     "find_breakdowns": "perf, reference, *, window=5, share=0.5, interval_s=1.0",
@@ -87,7 +89,7 @@ def test_type_checkers_and_the_interpreter_see_the_same_names():
     block = next(node for node in tree.body if isinstance(node, ast.If))
     homes = {alias.name: node.module for node in block.body if isinstance(node, ast.ImportFrom) for alias in node.names}
     assert homes == metrics._HOMES
-    assert set(homes) == set(metrics.__all__)
+    assert {*homes, "PAPER_POLICIES"} == set(metrics.__all__)
 
 
 @pytest.mark.parametrize("package", [metrics, metrics.claims, metrics.scoring], ids=["metrics", "claims", "scoring"])
