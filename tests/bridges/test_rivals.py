@@ -17,9 +17,7 @@ def test_rivals_train_in_the_training_worlds_as_they_are(path):
     """Their last stages; nothing disturbs them, and no world has another number of robots than its preset."""
     from metrics.benchmark import load_protocol
 
-    wanted = {
-        world.scenario.name: world.scenario.robots.n_robots for world in load_protocol().worlds if not world.is_held_out
-    }
+    wanted = {each.world.scenario.name: each.world.n_robots for each in load_protocol().worlds if not each.is_held_out}
     plan = read_plan(path)
     assert plan.sampler is not None
     for sampler in (plan.sampler, *(stage.sampler for stage in plan.stages if stage.sampler)):
