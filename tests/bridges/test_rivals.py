@@ -26,7 +26,7 @@ def test_rivals_train_in_the_training_worlds_as_they_are(path):
         assert not any(world.wrappers for world in sampler.worlds)
     assert plan.stages[-1].sampler is None
     sizes = {config.name: (config.arena.width_m, config.arena.height_m) for config in plan.sampler.corners}
-    given = [world.scenario for world in load_protocol().worlds if not world.is_held_out]
+    given = [each.world.scenario for each in load_protocol().worlds if not each.is_held_out]
     assert sizes == {config.name: (config.arena.width_m, config.arena.height_m) for config in given}
 
 
