@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scripts.arguments import whole
 
+from scripts.arguments import whole
 from swarm_forage_env import plan_run, record_replay, scenario, write_replays
 from swarm_forage_env.inspect.replay.frames import Replay
 from tests.support.browser import NAMES, Browser, find_chromium

@@ -5,13 +5,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from swarm_forage_env.rendering.plots import unread
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle, Look, Panel, looks, saved_panels, shade
 
 from ..catalog import METRICS
 from ..claims.panel import MIN_PAIRS
 from ..statistics import Summary
-from swarm_forage_env.rendering.figures import SCREEN, FigureStyle, Look, Panel, looks, saved_panels, shade
-
 from .columns import NOISE, POPULATION, SIZE, THROTTLE
 from .measures import MEASURE_CRITERIA
 from .table import Score, ScoreTable

@@ -9,10 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..catalog import METRICS
-from ..claims import PanelName
-from ..curves import FloatArray
-from ..statistics import Summary, aggregate
+from swarm_forage_env._internal.wording import number
 from swarm_forage_env.rendering.figures import (
     SCREEN,
     FigureStyle,
@@ -26,11 +23,14 @@ from swarm_forage_env.rendering.figures import (
     size_axis,
 )
 
+from ..catalog import METRICS
+from ..claims import PanelName
+from ..curves import FloatArray
+from ..statistics import Summary, aggregate
 from .columns import SIZE
 from .figure_panels import StudyPanel, StudyPanels
 from .measures import label_of
 from .plots import FEWEST_RUNS, X_LABELS
-from swarm_forage_env._internal.wording import number
 
 if TYPE_CHECKING:
     import polars as pl

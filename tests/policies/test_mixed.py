@@ -16,7 +16,7 @@ from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.registry import local_policy, policy_label
 from swarm_forage_env.runs.run import LiveRun, build_stack
-from swarm_forage_env.scenarios.performance import PART_COLUMNS, performance_curve, quantity
+from swarm_forage_env.scenarios.performance import PART_COLUMNS, performance_curve, performance_of
 
 TINY = scenario("warehouse_small", n_robots=6, n_objects=400, horizon_s=100.0, interval_s=50.0, physics="compiled")
 
@@ -203,9 +203,9 @@ def test_a_mixed_run_is_the_same_twice_and_after_a_file(record, tmp_path):
 def test_a_part_can_be_the_performance(record):
     per_robot = record.read_as("part_1_first_picked_per_robot").performance
     np.testing.assert_array_equal(per_robot, record.contributed["part_1_first_picked"] / 2.0)
-    assert quantity("part_1_first_picked_per_robot").unit == "objects per robot"
+    assert performance_of("part_1_first_picked_per_robot").unit == "objects per robot"
     with pytest.raises(ConfigError, match="Expected performance to be a recorded column"):
-        quantity("part_0_collected")
+        performance_of("part_0_collected")
 
 
 def test_a_swarm_that_is_not_mixed_is_its_only_part():

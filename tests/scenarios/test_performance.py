@@ -10,7 +10,7 @@ from swarm_forage_env.scenarios.performance import (
     DERIVED_PERFORMANCES,
     PERFORMANCE_COLUMNS,
     performance_curve,
-    quantity,
+    performance_of,
 )
 
 TASKS = ("generalist", "harvester", "collector", "starter", "finisher", "transferer", "cache_collector")
@@ -79,16 +79,16 @@ def test_a_column_that_a_run_lacks_says_what_is_true_without_it():
     ],
 )
 def test_units_and_words(name, unit, amount, title, is_total):
-    found = quantity(name)
+    found = performance_of(name)
     assert (found.name, found.unit, found.amount, found.title, found.is_total) == (name, unit, amount, title, is_total)
 
 
 def test_counts_add_up_over_robots_and_shares_do_not():
     assert all(
-        quantity(name).adds_up for name in ("collected", "n_carrying", "n_caches", "interference_ticks", "deaths")
+        performance_of(name).adds_up for name in ("collected", "n_carrying", "n_caches", "interference_ticks", "deaths")
     )
     others = ("task_balance", "cache_load", "interference_fraction", "time_at_work_s", "1/collected", "adversity")
-    assert not any(quantity(name).adds_up for name in others)
+    assert not any(performance_of(name).adds_up for name in others)
 
 
 @pytest.mark.parametrize("name", [*PERFORMANCE_COLUMNS, *DERIVED_PERFORMANCES])
@@ -116,5 +116,5 @@ def test_every_name_has_a_curve_and_an_inverse(name):
 )
 def test_unknown_names_are_refused_with_the_nearest(name, hint):
     with pytest.raises(ConfigError, match="Expected performance to be a recorded column") as error:
-        quantity(name)
+        performance_of(name)
     assert hint in str(error.value)
