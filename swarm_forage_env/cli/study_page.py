@@ -14,8 +14,6 @@ from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env.cli.study_verdict import Places, scored_studies
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import polars as pl
 
     from metrics.claims import Claim, Verdict
@@ -23,6 +21,7 @@ if TYPE_CHECKING:
     from metrics.scoring.study_models import ModelFigure
     from metrics.scoring.study_plots import StudyFigure
     from metrics.scoring.verdicts import Judged, Waiting
+    from swarm_forage_env.cli.study_plot import Draw
     from swarm_forage_env.studies.study import StudySpec
     from swarm_forage_env.studies.study_table import StudyTable
 
@@ -256,7 +255,9 @@ def _model(figure: "ModelFigure") -> dict[str, Any]:
 
     return {
         "title": figure.title,
-        "pictures": [_picture(f"{figure.title}, runs and models", lambda paths: draw_models(figure, paths))],
+        "pictures": [
+            _picture(f"{figure.title}, runs and models", lambda paths, style: draw_models(figure, paths, style=style))
+        ],
         "facts": _numbers(figure.facts()),
     }
 
@@ -270,7 +271,7 @@ def _theory(tables: "Sequence[StudyTable]", judged: "Sequence[Judged]") -> list[
     return [
         {
             "title": figure.title,
-            "pictures": [_picture(figure.title, lambda paths, it=figure: draw_theory(it, paths))],
+            "pictures": [_picture(figure.title, lambda paths, style, it=figure: draw_theory(it, paths, style=style))],
             "claims": [
                 {
                     "name": one.claim.name,
@@ -305,13 +306,14 @@ def _snapshot(table: "StudyTable") -> dict[str, str]:
         return {"address": picture_address(file.read_bytes(), "image/png"), "words": words}
 
 
-def _picture(words: str, draw: "Callable[[Sequence[Path]], None]") -> dict[str, str]:
+def _picture(words: str, draw: "Draw") -> dict[str, str]:
     """Return a picture as the page holds it; only SVG is drawn."""
+    from swarm_forage_env.rendering.figures import SCREEN
     from swarm_forage_env.rendering.report import picture_address
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "picture.svg")
-        draw([file])
+        draw([file], SCREEN)
         return {"address": picture_address(file.read_bytes()), "words": words}
 
 

@@ -12,6 +12,7 @@ from metrics.scoring import diff_studies
 from swarm_forage_env.cli.study_diff import diff_report
 from swarm_forage_env.studies.study import Axis
 from tests.support.made_tables import made_study, made_table
+from tests.support.pictures import words_in
 
 FILE = """
 name = "S1a"
@@ -89,10 +90,23 @@ def test_figures_are_drawn_with_their_numbers(ran):
     assert len(cells.splitlines()) == 1 + 8, "four policies of two sizes"
 
 
+def test_figures_for_a_paper_have_its_width_and_no_headline(ran):
+    style = ("--format", "svg", "--width", "3.5", "--font-size", "8", "--no-title")
+    assert ran("study", "plot", "done", "--out", "paper", *style)[0] == 0
+    endings = {path.suffix for path in Path("paper").iterdir() if "snapshot" not in path.name}
+    assert endings == {".svg", ".csv"}
+    for file in Path("paper").glob("*.svg"):
+        assert 'width="252pt"' in file.read_text(), "72 points per inch"
+    words = words_in(Path("paper/S1a_raw_performance_described.svg"))
+    assert {"CRW", "robots"} <= {*words}
+    assert not any("higher is better" in line for line in words)
+
+
 def test_what_cannot_be_drawn_is_told(ran):
-    code, _, err = ran("study", "plot", "done", "--band", "cd")
-    assert code == 2
-    assert "band 'cd'" in err
+    for option, value in (("band", "cd"), ("format", "gif")):
+        code, _, err = ran("study", "plot", "done", f"--{option}", value)
+        assert code == 2
+        assert f"{option} '{value}'" in err
     words = FILE.replace("values = [1, 2]", 'values = ["none", "static"]').replace("criterion", "field")
     Path("words.toml").write_text(words.replace("population_size", "caches"))
     assert ran("study", "run", "words.toml", "--workers", "1", "--out", "words")[0] == 0
