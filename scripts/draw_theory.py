@@ -8,7 +8,8 @@ No run is needed. `swarm-forage study plot` and `report` draw the same figures. 
 import sys
 from pathlib import Path
 
-from swarm_forage_env.cli.theory import draw_theory, theory_figures
+from swarm_forage_env.cli.theory import theory_figures
+from swarm_forage_env.rendering.figures import SCREEN
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 SHOWN = ("self_organisation", "flexibility", "task_graph")
@@ -19,4 +20,4 @@ if __name__ == "__main__":
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else IMAGES
     for figure in theory_figures():
         if figure.kind in SHOWN:
-            draw_theory(figure, [folder / f"{figure.kind}.png"])
+            figure.draw([folder / f"{figure.kind}.png"], SCREEN)

@@ -25,8 +25,8 @@ def availability(
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env.cli.scenario_options import split_numbers
     from swarm_forage_env.cli.terminal import notes, output
-    from swarm_forage_env.cli.theory import availability_figure, draw_theory
-    from swarm_forage_env.rendering.figures import check_picture
+    from swarm_forage_env.cli.theory import availability_figure
+    from swarm_forage_env.rendering.figures import SCREEN, check_picture
 
     sizes = split_numbers("--robots", robots, int)
     means = split_numbers("--teams", teams, float)
@@ -47,7 +47,7 @@ def availability(
     else:
         output().print(_table(rows, demands))
     if out is not None and figure is not None:
-        draw_theory(figure, [out])
+        figure.draw([out], SCREEN)
         notes().print(f"picture {out}")
 
 

@@ -50,7 +50,7 @@ def plot(
     from swarm_forage_env._internal.fields import known_name
     from swarm_forage_env.cli.scenario_options import split_names
     from swarm_forage_env.cli.score_options import score_forms
-    from swarm_forage_env.cli.theory import draw_theory, theory_of
+    from swarm_forage_env.cli.theory import theory_of
     from swarm_forage_env.rendering.figures import FORMATS, FigureStyle
     from swarm_forage_env.studies.study_table import read_study
 
@@ -71,7 +71,7 @@ def plot(
         drawing.write(model.name, lambda paths, style, it=model: draw_models(it, paths, style=style), tables)
     for sketch in theory_of(table.spec):
         tables = {f"{sketch.name}.csv": sketch.numbers}
-        drawing.write(sketch.name, lambda paths, style, it=sketch: draw_theory(it, paths, style=style), tables)
+        drawing.write(sketch.name, sketch.draw, tables)
     typer.echo(snapshot_written(table.spec, folder / f"{table.spec.name}_snapshot.png"))
     cells = folder / f"{table.spec.name}_cells.csv"
     cell_distributions(table).write_csv(cells)

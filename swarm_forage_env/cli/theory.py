@@ -17,11 +17,10 @@ from metrics.laws import SizeLaw
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.rendering.figures import (
     COLOURS,
-    SCREEN,
-    Figure,
     FigureStyle,
     legend_below,
     saved_figure,
+    saved_panels,
     size_axis,
 )
 from swarm_forage_env.scenarios.presets import warehouse_small
@@ -61,21 +60,13 @@ class TheoryFigure:
     """self_organisation, flexibility, availability or task_graph."""
     title: str
     numbers: "pl.DataFrame"
-    size_in: tuple[float, float]
-    """Width and height of its picture."""
-    draw: Callable[[Figure], None]
-    """Draws it into an empty figure."""
+    draw: Callable[[Sequence[Path], FigureStyle], None]
+    """Draws it into picture files; its errors are those of `saved_figure`."""
 
     @property
     def name(self) -> str:
         """Name of its files."""
         return f"theory_{self.kind}"
-
-
-def draw_theory(figure: TheoryFigure, paths: Sequence[Path], *, style: FigureStyle = SCREEN) -> None:
-    """Draw a figure into picture files; errors are those of `saved_figure`."""
-    with saved_figure(paths, figure.size_in, style=style) as picture:
-        figure.draw(picture)
 
 
 def theory_figures() -> tuple[TheoryFigure, ...]:
@@ -112,20 +103,19 @@ def self_organisation() -> TheoryFigure:
             rows.append({"curve": words, "robots": int(size), "per_robot": float(each), "task_emergence": gained})
     frame = _frame(rows)
 
-    def draw(picture: Figure) -> None:
-        left, right = picture.subplots(1, 2)
-        for colour, words in zip(COLOURS, SKETCHED, strict=False):
-            mine = frame.filter(frame["curve"] == words)
-            left.plot(mine["robots"], mine["per_robot"], color=colour, marker="o", label=words)
-            right.plot(mine["robots"][1:], mine["task_emergence"][1:], color=colour, marker="o")
-        left.set_ylabel("performance per robot")
-        right.set_ylabel("task self-organisation, E_T")
-        for place in (left, right):
-            size_axis(place, SIZES)
-        legend_below(picture)
+    def draw(paths: Sequence[Path], style: FigureStyle) -> None:
+        with saved_panels(paths, 2, (4.2, 2.7), style=style) as (left, right):
+            for colour, words in zip(COLOURS, SKETCHED, strict=False):
+                mine = frame.filter(frame["curve"] == words)
+                left.plot(mine["robots"], mine["per_robot"], color=colour, marker="o", label=words)
+                right.plot(mine["robots"][1:], mine["task_emergence"][1:], color=colour, marker="o")
+            left.set_ylabel("performance per robot")
+            right.set_ylabel("task self-organisation, E_T")
+            for place in (left, right):
+                size_axis(place, SIZES)
 
     title = "Theory: what self-organisation means (sketched laws, no runs)"
-    return TheoryFigure(kind="self_organisation", title=title, numbers=frame, size_in=(9.0, 3.6), draw=draw)
+    return TheoryFigure(kind="self_organisation", title=title, numbers=frame, draw=draw)
 
 
 def flexibility() -> TheoryFigure:
@@ -146,22 +136,23 @@ def flexibility() -> TheoryFigure:
         ]
     frame = _frame(rows)
 
-    def draw(picture: Figure) -> None:
-        above, below = picture.subplots(2, 1, sharex=True, height_ratios=(1, 2))
-        above.step(seconds, CONDITIONS, where="pre", color="0.2", label="applied conditions, V(t)")
-        above.axhline(IDEAL_CONDITIONS, color="0.2", linestyle="--", label="ideal conditions, I_ec")
-        above.set_ylabel("share of\nspeed lost")
-        above.set_ylim(-0.05, 0.95)
-        for colour, (name, label) in zip(COLOURS, labels.items(), strict=False):
-            mine = frame.filter(frame["swarm"] == name)
-            below.step(mine["time_s"], mine["performance"], where="pre", color=colour, label=label)
-        below.set_ylim(0.0, 1.3 * IDEAL_PERFORMANCE)
-        below.set_ylabel("performance,\nobjects per interval")
-        below.set_xlabel("time, s")
-        legend_below(picture)
+    def draw(paths: Sequence[Path], style: FigureStyle) -> None:
+        with saved_figure(paths, (9.0, 4.6), style=style) as picture:
+            above, below = picture.subplots(2, 1, sharex=True, height_ratios=(1, 2))
+            above.step(seconds, CONDITIONS, where="pre", color="0.2", label="applied conditions, V(t)")
+            above.axhline(IDEAL_CONDITIONS, color="0.2", linestyle="--", label="ideal conditions, I_ec")
+            above.set_ylabel("share of\nspeed lost")
+            above.set_ylim(-0.05, 0.95)
+            for colour, (name, label) in zip(COLOURS, labels.items(), strict=False):
+                mine = frame.filter(frame["swarm"] == name)
+                below.step(mine["time_s"], mine["performance"], where="pre", color=colour, label=label)
+            below.set_ylim(0.0, 1.3 * IDEAL_PERFORMANCE)
+            below.set_ylabel("performance,\nobjects per interval")
+            below.set_xlabel("time, s")
+            legend_below(picture)
 
     title = "Theory: an example of reactivity R and adaptability A (sketched swarms, no runs)"
-    return TheoryFigure(kind="flexibility", title=title, numbers=frame, size_in=(9.0, 4.6), draw=draw)
+    return TheoryFigure(kind="flexibility", title=title, numbers=frame, draw=draw)
 
 
 def availability_figure(sizes: Sequence[int], teams: Sequence[float] = AVAILABILITY_TEAMS) -> TheoryFigure:
@@ -174,21 +165,19 @@ def availability_figure(sizes: Sequence[int], teams: Sequence[float] = AVAILABIL
     ]
     frame = _frame(rows)
 
-    def draw(picture: Figure) -> None:
-        places: Any = picture.subplots(1, len(sizes), sharey=True, squeeze=False)[0]
-        for place, size in zip(places, sizes, strict=True):
-            for index, team in enumerate(teams):
-                mine = frame.filter((frame["robots"] == size) & (frame["mean_team"] == team))
-                colour = COLOURS[index % len(COLOURS)]
-                place.plot(mine["needed"], mine["availability"], color=colour, label=f"mean team {team:g}")
-            place.axvline(size / 10.0, color="0.5", linestyle=":", linewidth=1)
-            place.set(title=f"{size} robots (dotted: a tenth)", xlabel="robots needed at work", xlim=(0, size))
-        places[0].set(ylabel="availability", ylim=(0, 1))
-        places[-1].legend()
+    def draw(paths: Sequence[Path], style: FigureStyle) -> None:
+        with saved_panels(paths, len(sizes), (4.0, 3.2), sharey=True, style=style) as places:
+            for place, size in zip(places, sizes, strict=True):
+                for index, team in enumerate(teams):
+                    mine = frame.filter((frame["robots"] == size) & (frame["mean_team"] == team))
+                    colour = COLOURS[index % len(COLOURS)]
+                    place.plot(mine["needed"], mine["availability"], color=colour, label=f"mean team {team:g}")
+                place.axvline(size / 10.0, color="0.5", linestyle=":", linewidth=1)
+                place.set(title=f"{size} robots (dotted: a tenth)", xlabel="robots needed at work", xlim=(0, size))
+            places[0].set(ylabel="availability", ylim=(0, 1))
 
-    size_in = 4.0 * len(sizes) + 0.8, 4.0
     title = "Theory: availability, how likely enough robots are at work (no runs)"
-    return TheoryFigure(kind="availability", title=title, numbers=frame, size_in=size_in, draw=draw)
+    return TheoryFigure(kind="availability", title=title, numbers=frame, draw=draw)
 
 
 def task_graph() -> TheoryFigure:
@@ -210,22 +199,23 @@ def task_graph() -> TheoryFigure:
         for task in places
     ]
 
-    def draw(picture: Figure) -> None:
-        place = picture.subplots()
-        blocks = TAB_ROOT.tolist()
-        for child, root in parents.items():
-            (x, y), (to_x, to_y) = places[root], places[child]
-            place.plot([x, to_x], [y, to_y], color=COLOURS[blocks.index(root)], linewidth=2.0, zorder=1)
-        for row, (x, y) in zip(rows, places.values(), strict=True):
-            label = f"{row['task']}\n{row['source']} to {row['destination']}"
-            box = {"boxstyle": "round,pad=0.5", "facecolor": "white", "edgecolor": "0.4"}
-            place.text(x, y, label, ha="center", va="center", bbox=box, zorder=2)
-        place.set_xlim(0.0, 1.0)
-        place.set_ylim(-0.4, 2.4)
-        place.set_axis_off()
+    def draw(paths: Sequence[Path], style: FigureStyle) -> None:
+        with saved_figure(paths, (9.0, 4.2), style=style) as picture:
+            place = picture.subplots()
+            blocks = TAB_ROOT.tolist()
+            for child, root in parents.items():
+                (x, y), (to_x, to_y) = places[root], places[child]
+                place.plot([x, to_x], [y, to_y], color=COLOURS[blocks.index(root)], linewidth=2.0, zorder=1)
+            for row, (x, y) in zip(rows, places.values(), strict=True):
+                label = f"{row['task']}\n{row['source']} to {row['destination']}"
+                box = {"boxstyle": "round,pad=0.5", "facecolor": "white", "edgecolor": "0.4"}
+                place.text(x, y, label, ha="center", va="center", bbox=box, zorder=2)
+            place.set_xlim(0.0, 1.0)
+            place.set_ylim(-0.4, 2.4)
+            place.set_axis_off()
 
     title = "The task graph of STOCHM (upper block) and STOCHX (all)"
-    return TheoryFigure(kind="task_graph", title=title, numbers=_frame(rows), size_in=(9.0, 4.2), draw=draw)
+    return TheoryFigure(kind="task_graph", title=title, numbers=_frame(rows), draw=draw)
 
 
 def _words(name: str) -> str:

@@ -46,7 +46,7 @@ _PLACES_OF_OTHERS = (6, 4, 5, 0, 1, 2, 3, 7)
 PANELS_PER_ROW = 4
 _NARROWEST_PANEL = 0.25
 """Inches per point of the font: with less, the numbers along an axis run into each other."""
-_FLATTEST = 0.65
+_FLATTEST = 0.8
 """Height of a figure that is made narrower, as a share of its width: words need as much height as before."""
 _NARROWEST_FIGURE_IN = 5.2
 """Unless a style says otherwise: room for a headline."""
