@@ -69,12 +69,9 @@ def _draw_scores(panel: Panel, ranked: Sequence[Standing]) -> None:
 
 
 def _draw_worlds(panel: Panel, ranked: Sequence[Standing], reference: Reference, protocol: Protocol) -> None:
-    from matplotlib.colors import LinearSegmentedColormap
-
     worlds = protocol.scored
     shares = np.array([[shares_of(standing.entry, world, reference).mean() for standing in ranked] for world in worlds])
-    colours = LinearSegmentedColormap.from_list("shares", [COLOURS[1], "white", COLOURS[0]])
-    heat_map(panel, shares, share, cmap=colours, vmin=0.0, vmax=_MOST_SHADE)
+    heat_map(panel, shares, share, colours=(COLOURS[1], "white", COLOURS[0]), vmin=0.0, vmax=_MOST_SHADE)
     panel.set_yticks(np.arange(len(worlds)), [world.name for world in worlds])
     names = [policy_words(standing.entry.name) for standing in ranked]
     panel.set_xticks(np.arange(len(ranked)), names, rotation=20, ha="right")

@@ -229,16 +229,22 @@ def shade(panel: Panel, x: Any, low: Any, high: Any, colour: str, *, label: str 
     panel.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0.0, zorder=1.9, label=label)
 
 
-def heat_map(panel: Panel, values: FloatArray, words: Callable[[float], str], **options: Any) -> Any:
+def heat_map(
+    panel: Panel, values: FloatArray, words: Callable[[float], str], *, colours: Sequence[str] = (), **options: Any
+) -> Any:
     """Draw a table of numbers as colours with the numbers in them; returns the image.
 
     Args:
         panel: Where.
         values: (rows, columns), from above unless `origin` says otherwise.
         words: Says a number.
+        colours: From the lowest number to the highest; default those of the style.
         options: Of `imshow`.
     """
-    image = panel.imshow(values, aspect="auto", **options)
+    from matplotlib.colors import LinearSegmentedColormap
+
+    shades = LinearSegmentedColormap.from_list("shades", colours) if colours else None
+    image = panel.imshow(values, aspect="auto", cmap=shades, **options)
     for (row, column), value in np.ndenumerate(values):
         red, green, blue, alpha = image.cmap(image.norm(value))  # what is no number lets the page through
         is_dark = alpha * (0.3 * red + 0.6 * green + 0.1 * blue) + 1.0 - alpha < 0.45

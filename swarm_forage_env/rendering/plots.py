@@ -142,8 +142,6 @@ def draw_maps(
     width = style.width_in or 3.6 * len(columns)
     size_in = width, (0.75 * shape * width / len(columns) + 0.1 * style.font_size) * len(rows)
     with saved_figure(path, size_in, style=style) as figure:
-        from matplotlib.patches import Rectangle
-
         panels = figure.subplots(len(rows), len(columns), squeeze=False)
         bar = min(1.0, 1.2 * shape)  # as long as a panel is high
         for (label, arrays, is_difference, size_m, obstacles), line in zip(rows, panels, strict=True):
@@ -154,7 +152,7 @@ def draw_maps(
                 extent = (0, size_m[0], 0, size_m[1])
                 image = axes.imshow(arrays[name], origin="lower", extent=extent, vmin=low, vmax=top, cmap=colours)
                 for x_low, y_low, x_high, y_high in obstacles:
-                    axes.add_patch(Rectangle((x_low, y_low), x_high - x_low, y_high - y_low, **_OBSTACLE))
+                    axes.fill([x_low, x_high, x_high, x_low], [y_low, y_low, y_high, y_high], **_OBSTACLE)
                 axes.set(title=f"{policy_words(label)}\n{what}", xlabel="x [m]", ylabel="y [m]")
                 axes.grid(visible=False)
                 scale = figure.colorbar(image, ax=axes, shrink=bar, extend=ends)
