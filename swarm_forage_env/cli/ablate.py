@@ -76,7 +76,7 @@ def _plan(
 
 def _show_plan(plan: "Ablation", store: "RunStore", seeds: int, jobs: int | None) -> None:
     from swarm_forage_env.cli.report import estimated_seconds, plan_note
-    from swarm_forage_env.runs.runner import available_cores
+    from swarm_forage_env.runs.workers import available_cores
 
     todo = [spec for spec in plan.specs if spec.run_id not in store]
     processes = jobs or available_cores()

@@ -25,8 +25,8 @@ from swarm_forage_env.cli.interrupts import resumable
 from swarm_forage_env.cli.report import estimate, estimated_seconds
 from swarm_forage_env.policies.mixture import is_mixture, mixture_of, mixture_parts
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_label
-from swarm_forage_env.runs.runner import available_cores
 from swarm_forage_env.runs.store import RunStore
+from swarm_forage_env.runs.workers import available_cores
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

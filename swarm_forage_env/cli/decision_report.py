@@ -23,8 +23,8 @@ from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture
 from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
 from swarm_forage_env.cli.score_report import plan_json, plan_text
 from swarm_forage_env.runs.plan import Plan
-from swarm_forage_env.runs.runner import available_cores
 from swarm_forage_env.runs.store import RunStore
+from swarm_forage_env.runs.workers import available_cores
 
 _PICTURE = "prediction.png"
 _Result = TypeVar("_Result")

@@ -47,7 +47,7 @@ def end(error: BaseException) -> int:
     Raises:
         BaseException: `error` again, if nobody foresaw it and `DEBUG_VARIABLE` is set.
     """
-    from swarm_forage_env.runs.runner import WorkerError  # late: only a command that fails needs it
+    from swarm_forage_env.runs.workers import WorkerError  # late: only a command that fails needs it
 
     if isinstance(error, _USAGE_ERROR):
         return complain(_about_words(error), EXIT_USAGE)

@@ -57,7 +57,7 @@ def run(
 
 def _show_plan(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None, *, as_json: bool) -> None:
     from swarm_forage_env.cli.report import estimated_seconds, plan_json, plan_note, plan_table
-    from swarm_forage_env.runs.runner import available_cores
+    from swarm_forage_env.runs.workers import available_cores
 
     todo = [spec for spec in specs if spec.run_id not in store]
     processes = jobs or available_cores()

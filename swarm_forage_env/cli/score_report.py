@@ -16,8 +16,8 @@ from swarm_forage_env.cli.interrupts import resumable
 from swarm_forage_env.cli.options import EXIT_FAILURE, no_picture
 from swarm_forage_env.cli.report import estimate, estimated_seconds
 from swarm_forage_env.runs.plan import Plan
-from swarm_forage_env.runs.runner import available_cores
 from swarm_forage_env.runs.store import RunStore
+from swarm_forage_env.runs.workers import available_cores
 
 
 def run_and_show(

@@ -84,8 +84,8 @@ def run(  # long: one parameter per option
     from swarm_forage_env.cli.study_report import plan_report, state_report
     from swarm_forage_env.cli.terminal import notes
     from swarm_forage_env.runs.cluster import cluster_executor
-    from swarm_forage_env.runs.runner import available_cores
     from swarm_forage_env.runs.store import FAILED
+    from swarm_forage_env.runs.workers import available_cores
     from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard, run_study
 
     spec = _chosen(name, budget, seeds, reading)

@@ -15,7 +15,7 @@ from typing import Any
 
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.runs.runner import available_cores
+from swarm_forage_env.runs.workers import available_cores
 
 LOCAL, SLURM, SLURM_JOBS = "local", "slurm", "slurm-jobs"
 ROLES = ("the scheduler", "the process that writes", "at least one worker")

@@ -11,7 +11,7 @@ import pytest
 from baselines.crw import CRWPolicy
 from swarm_forage_env._internal.compiling import is_compiled, is_new
 from swarm_forage_env.runs import first_compilation as first_run
-from swarm_forage_env.runs import runner
+from swarm_forage_env.runs import workers
 from swarm_forage_env.runs.first_compilation import compile_outermost, compile_run, compile_start, is_first_run
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec
@@ -179,9 +179,9 @@ class Noting:
 
 def test_workers_of_a_pool_compile_the_halves_before_what_is_made_of_them():
     pool = Noting()
-    assert runner._warm_up_workers(pool, [run_of("compiled")])
+    assert workers._warm_up_workers(pool, [run_of("compiled")])
     halves = [(compile_half, 0), (compile_half, 1)]
-    assert pool.given == [(is_first_run,), *halves, (compile_outermost,), (compile_start,), (runner.warm_up,)]
+    assert pool.given == [(is_first_run,), *halves, (compile_outermost,), (compile_start,), (workers.warm_up,)]
 
 
 @pytest.mark.parametrize("physics", ["compiled", "chipmunk"])

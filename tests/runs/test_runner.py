@@ -13,15 +13,16 @@ import pytest
 
 from swarm_forage_env.contract.codes import Grip
 from swarm_forage_env.policies.registry import RandomPolicy, from_callable
-from swarm_forage_env.runs import runner
 from swarm_forage_env.runs import store as runs_store
+from swarm_forage_env.runs import workers
 from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.policy_spec import policy_spec
 from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.run import WARM_UP_TICKS, build_stack, run_one, run_policy, warm_up
-from swarm_forage_env.runs.runner import RunsInterrupted, WorkerError, longest_first, run_each, run_plan, run_specs
+from swarm_forage_env.runs.runner import RunsInterrupted, longest_first, run_plan, run_specs
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE, FAILED, MISSING, RunFailure, RunStore
+from swarm_forage_env.runs.workers import WorkerError, run_each
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.wrappers.base import STACK_ORDER
@@ -42,7 +43,7 @@ def same(some, others):
 @pytest.fixture
 def one_by_one(monkeypatch):
     """Every run is a task of its own, also on an executor of the caller."""
-    monkeypatch.setattr(runner, "BATCH_ROBOT_TICKS", 0)
+    monkeypatch.setattr(workers, "BATCH_ROBOT_TICKS", 0)
 
 
 class Refusing(Executor):
@@ -295,8 +296,8 @@ def test_a_crashed_worker_costs_only_the_run_that_crashed_it(monkeypatch):
         pools.append(n_workers)
         yield Breaking(SPECS[1], n_workers)
 
-    monkeypatch.setattr(runner, "_process_pool", breaking_pool)
-    outcomes = list(runner._run_in_pool(deque((spec,) for spec in SPECS), 2))
+    monkeypatch.setattr(workers, "_process_pool", breaking_pool)
+    outcomes = list(workers._run_in_pool(deque((spec,) for spec in SPECS), 2))
     assert {outcome.seed for outcome in outcomes if isinstance(outcome, RunRecord)} == {0, 2, 3}
     (failure,) = (outcome for outcome in outcomes if isinstance(outcome, RunFailure))
     assert failure.spec == SPECS[1]
@@ -309,8 +310,8 @@ def test_a_worker_that_is_killed_while_it_compiles_costs_only_its_run(monkeypatc
     def breaking_pool(n_workers):
         yield Breaking(SPECS[3], n_workers)
 
-    monkeypatch.setattr(runner, "_process_pool", breaking_pool)
-    outcomes = list(runner._run_in_pool(deque((spec,) for spec in SPECS), 2))
+    monkeypatch.setattr(workers, "_process_pool", breaking_pool)
+    outcomes = list(workers._run_in_pool(deque((spec,) for spec in SPECS), 2))
     assert {outcome.seed for outcome in outcomes if isinstance(outcome, RunRecord)} == {0, 1, 2}
     (failure,) = (outcome for outcome in outcomes if isinstance(outcome, RunFailure))
     assert failure.spec == SPECS[3]
@@ -329,16 +330,16 @@ def test_workers_that_cannot_start_are_an_error_with_a_hint(monkeypatch):
     def dead_pool(n_workers):
         yield Breaking(None)
 
-    monkeypatch.setattr(runner, "_process_pool", dead_pool)
+    monkeypatch.setattr(workers, "_process_pool", dead_pool)
     with pytest.raises(WorkerError, match="if __name__ == '__main__'"):
-        list(runner._run_in_pool(deque([SPECS[:1]]), 2))
+        list(workers._run_in_pool(deque([SPECS[:1]]), 2))
 
 
 def test_thread_settings_are_put_back(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
-    with runner._single_threaded_children():
-        assert {os.environ[name] for name in runner.THREAD_SETTINGS} == {"1"}
+    with workers._single_threaded_children():
+        assert {os.environ[name] for name in workers.THREAD_SETTINGS} == {"1"}
     assert os.environ["OMP_NUM_THREADS"] == "7"
     assert "MKL_NUM_THREADS" not in os.environ
 

@@ -35,7 +35,7 @@ from swarm_forage_env.policies.network import Network, NetworkPolicy
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.first_compilation import compile_world
 from swarm_forage_env.runs.record import software_versions
-from swarm_forage_env.runs.runner import available_cores
+from swarm_forage_env.runs.workers import available_cores
 from swarm_forage_env.training.evaluation_worlds import BEST, CHOSEN_BY, judged, judged_baseline, judged_in_world
 from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, PLAN_FILE, read_evaluations, write_evaluations
 from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan

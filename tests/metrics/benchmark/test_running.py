@@ -13,7 +13,7 @@ from swarm_forage_env import run_one
 from swarm_forage_env.policies.model_files import file_digest
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.registry import RandomPolicy
-from swarm_forage_env.runs import runner
+from swarm_forage_env.runs import workers
 from swarm_forage_env.runs.record import RunRecord
 from tests.support.entries import TINY
 
@@ -104,7 +104,7 @@ def test_a_question_has_every_policy_in_every_world(protocol):
 
 
 def test_asked_again_the_stored_runs_answer(entry, protocol, folder, monkeypatch):
-    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+    monkeypatch.setattr(workers, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
     question = benchmark_question(["crw", "ppo_warehouse_small"], name="both", protocol=protocol)
     assert ask(question, out=folder, jobs=1, progress=False).runs == entry.runs
 

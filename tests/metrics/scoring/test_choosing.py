@@ -20,7 +20,7 @@ from metrics.scoring.choosing import (
     choice_question,
 )
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.runs import runner
+from swarm_forage_env.runs import workers
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.runs.run import run_one
@@ -243,7 +243,7 @@ def test_failed_runs_are_those_of_their_condition(monkeypatch, tmp_path):
             raise RuntimeError("out of luck")
         return run_one(spec)
 
-    monkeypatch.setattr(runner, "run_one", failing)
+    monkeypatch.setattr(workers, "run_one", failing)
     question = choice_question(["random", "crw"], WORLD, deliver=1.0, noise=0.01, seeds=2)
     choice = ask(question, out=tmp_path, jobs=1, progress=False)
     for candidate in choice.candidates:
@@ -255,7 +255,7 @@ def test_failed_runs_are_those_of_their_condition(monkeypatch, tmp_path):
         )
     # Asked again, only what failed is run.
     fresh = []
-    monkeypatch.setattr(runner, "run_one", lambda spec: fresh.append(spec) or run_one(spec))
+    monkeypatch.setattr(workers, "run_one", lambda spec: fresh.append(spec) or run_one(spec))
     again = ask(question, out=tmp_path, jobs=1, progress=False)
     assert [(spec.policy, spec.seed, spec.world.criterion) for spec in fresh] == [
         ("random", 1, "noise"),

@@ -13,7 +13,7 @@ from metrics import CurveError, compare_policies, score_policy
 from metrics.scoring import ask, score_question
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies import registry as policy_module
-from swarm_forage_env.runs import runner
+from swarm_forage_env.runs import workers
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.runner import RunsInterrupted
 from swarm_forage_env.runs.store import RunStore, load
@@ -91,7 +91,7 @@ def test_the_same_call_gives_the_same_table(table):
 
 def test_stored_runs_are_not_repeated(tmp_path, monkeypatch):
     first = scored(out=tmp_path, measures=SIZES)
-    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+    monkeypatch.setattr(workers, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
     assert str(scored(out=tmp_path, measures=SIZES)) == str(first)
 
 
@@ -106,7 +106,7 @@ def test_an_interrupted_call_goes_on_where_it_stopped(tmp_path, monkeypatch):
         return run_one(spec)
 
     with monkeypatch.context() as patch:
-        patch.setattr(runner, "run_one", interrupted)
+        patch.setattr(workers, "run_one", interrupted)
         with pytest.raises(RunsInterrupted, match="2 of 4 runs are finished"):
             scored(out=tmp_path, measures=SIZES)
     before = set(RunStore(tmp_path).run_ids())
@@ -121,7 +121,7 @@ def test_failed_runs_are_told_in_every_row_they_touch(tmp_path, monkeypatch):
             raise RuntimeError("out of luck")
         return run_one(spec)
 
-    monkeypatch.setattr(runner, "run_one", failing)
+    monkeypatch.setattr(workers, "run_one", failing)
     found = scored(out=tmp_path, measures=["raw_performance", "task_emergence"])
     alone, together = found["raw_performance"]
     assert (alone.n_lost, together.n_lost, found["task_emergence"][0].n_lost) == (0, 1, 1)
@@ -188,7 +188,7 @@ def test_stored_runs_of_functions_need_a_name(tmp_path):
     ],
 )
 def test_what_cannot_be_scored_is_refused_before_anything_runs(options, error, message, monkeypatch):
-    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("something was run"))
+    monkeypatch.setattr(workers, "run_one", lambda spec: pytest.fail("something was run"))
     with pytest.raises(error, match=message):
         scored(**options)
 
@@ -269,7 +269,7 @@ def test_a_world_with_wrappers_is_another_world(slow, tmp_path, monkeypatch):
     disturbed = score_question(["random"], slow, budget=TINY, measures=SIZES)
     assert calm.isdisjoint(spec.run_id for spec in disturbed.plan.specs)
     (first,) = ask(disturbed, out=tmp_path, jobs=1, progress=False)
-    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+    monkeypatch.setattr(workers, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
     (again,) = ask(disturbed, out=tmp_path, jobs=1, progress=False)
     assert str(again) == str(first)
 
@@ -293,7 +293,7 @@ def test_policies_are_compared_in_a_world_with_wrappers(slow, tmp_path):
     ],
 )
 def test_a_wrapper_of_the_world_that_a_criterion_varies_too_is_refused(words, measure, told, monkeypatch):
-    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("something was run"))
+    monkeypatch.setattr(workers, "run_one", lambda spec: pytest.fail("something was run"))
     world = World(WORLD, (parse_wrapper(words),))
     with pytest.raises(ConfigError, match=told):
         score_policy("random", world, budget=TINY, measures=[measure], progress=False)
@@ -309,14 +309,14 @@ def test_failed_runs_are_those_of_their_policy(tmp_path, monkeypatch):
             raise RuntimeError("out of luck")
         return run_one(spec)
 
-    monkeypatch.setattr(runner, "run_one", failing)
+    monkeypatch.setattr(workers, "run_one", failing)
     options = {"budget": TINY, "measures": SIZES, "out": tmp_path, "jobs": 1, "progress": False}
     random, crw = compare_policies(["random", "crw"], WORLD, **options).tables
     assert random.failures == ()
     assert [told.split("seed ")[1].split(",")[0] for told in crw.failures] == ["1", "1"]
     # Asked again, only what failed is run.
     fresh = []
-    monkeypatch.setattr(runner, "run_one", lambda spec: fresh.append(spec) or run_one(spec))
+    monkeypatch.setattr(workers, "run_one", lambda spec: fresh.append(spec) or run_one(spec))
     assert compare_policies(["random", "crw"], WORLD, **options).tables[1].failures == ()
     assert {(spec.policy, spec.seed) for spec in fresh} == {("crw", 1)}
     assert len(fresh) == 2

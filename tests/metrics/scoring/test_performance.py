@@ -9,7 +9,7 @@ import metrics
 from metrics import CurveError, Performance, compare_policies, compare_tables, score_curves, score_policy
 from metrics.scoring.performance import checked_performance
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.runs import runner
+from swarm_forage_env.runs import workers
 from swarm_forage_env.runs.record import schema_table
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.performance import DERIVED_PERFORMANCES, PERFORMANCE_COLUMNS
@@ -45,7 +45,7 @@ def values(found) -> dict[tuple[int, int], float]:
 
 @pytest.fixture
 def no_runs(monkeypatch):
-    monkeypatch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+    monkeypatch.setattr(workers, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
 
 
 def recorded() -> set[str]:

@@ -12,7 +12,7 @@ from metrics.scoring import ask
 from metrics.scoring.prediction import counted_inside, law_text, prediction_question
 from metrics.scoring.prediction_plots import draw_predictions
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.runs import runner
+from swarm_forage_env.runs import workers
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.presets import scenario
@@ -277,7 +277,7 @@ def test_wrappers_of_the_world_are_in_all_runs(tmp_path, monkeypatch):
         assert run.contributed["throttle"].tolist() == [0.3, 0.3]
     # Asked again, the stored runs answer; they are not those of the calm world.
     with monkeypatch.context() as patch:
-        patch.setattr(runner, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
+        patch.setattr(workers, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
         question = prediction_question(["random"], world, fit=[1, 2, 3, 4], hold=[6], seeds=2)
         (again,) = ask(question, out=tmp_path, jobs=1, progress=False)
     assert str(again) == str(table)
@@ -291,7 +291,7 @@ def test_failed_runs_are_those_of_their_policy(monkeypatch):
             raise RuntimeError("out of luck")
         return run_one(spec)
 
-    monkeypatch.setattr(runner, "run_one", failing)
+    monkeypatch.setattr(workers, "run_one", failing)
     question = prediction_question(
         ["random", "crw"], replace(WORLD, performance="n_active"), fit=[1, 2, 3, 4, 5], seeds=2
     )

@@ -1,0 +1,366 @@
+"""Who makes runs: this process, a pool of local processes, or an executor of the caller, such as Dask's.
+
+Workers need no shared disk, because records are sent back. A run that fails, or kills its worker, ends no other one.
+"""
+
+import os
+import signal
+import threading
+import traceback
+from collections import deque
+from collections.abc import Generator, Iterable, Iterator
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
+from contextlib import closing, contextmanager, suppress
+from dataclasses import replace
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from typing import Any, TypeAlias
+
+from swarm_forage_env._internal.compiling import tell_of_first_run
+from swarm_forage_env._internal.fields import as_whole
+from swarm_forage_env._internal.files import check_folder
+from swarm_forage_env.runs.first_compilation import (
+    WAKE_UP_EVERY_S,
+    compile_outermost,
+    compile_run,
+    compile_start,
+    is_first_run,
+)
+from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.run import run_one, warm_up
+from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.store import RunFailure, RunStore
+from swarm_forage_env.world.compiled import compile_half
+
+Outcome: TypeAlias = RunRecord | RunFailure
+Task: TypeAlias = tuple[RunSpec, ...]
+"""Runs that an executor gets together."""
+
+THREAD_SETTINGS = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "POLARS_MAX_THREADS",
+)
+"""Environment variables set to 1 for workers: runs are parallel, the libraries inside a run are not."""
+QUEUED_PER_WORKER = 2
+"""Runs given to the pool per worker: enough that no worker waits, few enough that a crash loses little."""
+BATCH_ROBOT_TICKS = 20_000_000
+"""How much an executor of several machines gets as one task: ten seconds or more, much longer than sending it takes."""
+QUEUED_ELSEWHERE = 4096
+"""Tasks given to the executor of the caller at a time: enough for the workers that may join it, few enough to watch."""
+KILLED = (
+    "The worker process that made the run was killed, most likely because memory ran out; try fewer processes at a "
+    "time (--jobs 1), or a smaller run."
+)
+"""What is said of a run whose worker died: the system gives no reason."""
+
+
+class WorkerError(RuntimeError):
+    """Worker processes could not be started at all."""
+
+
+def run_each(
+    specs: Iterable[RunSpec],
+    *,
+    store: RunStore | None = None,
+    executor: Executor | None = None,
+    jobs: int | None = None,
+) -> Generator[Outcome]:
+    """Run specifications and yield each outcome as it finishes, already stored.
+
+    It also runs what is stored already. Closing the iterator, also by Ctrl-C, cancels the runs that have not finished.
+
+    Args:
+        specs: What to run. Neighbours that differ in the seed alone go to `executor` as one task.
+        store: Where records and failures go.
+        executor: Runs the work; default a pool of local processes.
+        jobs: Processes of the default pool, default one per available core; 1 = in this process.
+
+    Raises:
+        OSError: the store cannot be written to; then nothing has been run.
+        WorkerError: no worker process could be started.
+    """
+    todo = deque((spec,) for spec in specs)
+    if store is not None and todo:
+        check_folder(store.folder)
+    if jobs is not None:
+        jobs = as_whole("jobs", jobs, at_least=1, or_none=True)
+    if executor is not None:
+        outcomes = _run_elsewhere(executor, _batches(todo, BATCH_ROBOT_TICKS))
+    elif jobs == 1 or len(todo) == 1:
+        outcomes = _run_here(todo)
+    else:
+        outcomes = _run_in_pool(todo, processes_of(len(todo), jobs))
+    return _stored(outcomes, store)
+
+
+def _stored(outcomes: Generator[Outcome], store: RunStore | None) -> Generator[Outcome]:
+    """Yield outcomes after they are stored."""
+    with closing(outcomes):
+        for outcome in outcomes:
+            if store is not None:
+                if isinstance(outcome, RunRecord):
+                    store.write(outcome)
+                else:
+                    store.write_failure(outcome)
+            yield outcome
+
+
+def available_cores() -> int:
+    """Return the number of cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def processes_of(n_runs: int, jobs: int | None) -> int:
+    """Return how many local processes make so many runs, if `jobs` are asked for; None = one per available core."""
+    return min(jobs or available_cores(), max(1, n_runs))
+
+
+def run_several(specs: Task) -> tuple[Outcome, ...]:
+    """Run specifications one after the other; a run that fails does not end the others."""
+    outcomes: list[Outcome] = []
+    for spec in specs:
+        try:
+            outcomes.append(run_one(spec))
+        except Exception as error:  # noqa: BLE001 - whatever a run raises is its failure
+            outcomes.append(_failure(spec, error))
+    return tuple(outcomes)
+
+
+def _run_on(
+    executor: Executor, todo: deque[Task], *, limit: int, lost: deque[Task] | None = None
+) -> Generator[Outcome]:
+    """Run `todo` with at most `limit` tasks submitted at a time; if the executor breaks, stop and leave the rest.
+
+    Runs that were submitted when it broke are failures, or go to `lost` if it is given. If a task of several runs
+    fails as a whole, they are tried again one by one, so that only those fail that kill their worker.
+    """
+    running: dict[Future[Any], Task] = {}
+    broken = False
+    try:
+        while running or (todo and not broken):
+            while todo and not broken and len(running) < limit:
+                try:
+                    running[_submitted(executor, todo[0])] = todo[0]
+                    todo.popleft()
+                except BrokenExecutor:
+                    broken = True
+            finished, _ = wait(running, timeout=WAKE_UP_EVERY_S, return_when=FIRST_COMPLETED)
+            for future in finished:
+                task = running.pop(future)
+                error = CancelledError("by its executor") if future.cancelled() else future.exception()
+                if isinstance(error, BrokenExecutor):
+                    broken = True
+                    if lost is not None:
+                        lost.append(task)
+                        continue
+                if error is None:
+                    yield from future.result() if len(task) > 1 else (future.result(),)
+                elif len(task) > 1 and not broken:
+                    todo.extend((spec,) for spec in task)
+                else:
+                    yield from (_failure(spec, error) for spec in task)
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _submitted(executor: Executor, task: Task) -> Future[Any]:
+    return executor.submit(run_one, task[0]) if len(task) == 1 else executor.submit(run_several, task)
+
+
+def _run_here(todo: deque[Task]) -> Generator[Outcome]:
+    """Run `todo` in this process. A further one may help to compile."""
+    if todo and available_cores() > 1:
+        with suppress(Exception):  # the run itself raises it again, and it is recorded then
+            compile_run(todo[0][0])
+    yield from _run_on(_InProcess(), todo, limit=1)
+
+
+def _batches(tasks: deque[Task], robot_ticks: int) -> deque[Task]:
+    """Join neighbours that differ in the seed alone, until a task has so many robot-ticks."""
+    joined: deque[Task] = deque()
+    size = 0
+    for task in tasks:
+        last = joined[-1] if joined else ()
+        if last and size < robot_ticks and replace(task[0], seed=last[0].seed) == last[0]:
+            joined[-1] = (*last, *task)
+            size += task[0].robot_ticks
+        else:
+            joined.append(task)
+            size = task[0].robot_ticks
+    return joined
+
+
+def _run_elsewhere(executor: Executor, todo: deque[Task]) -> Generator[Outcome]:
+    """Run `todo` on the executor of the caller, which is not replaced if it breaks."""
+    yield from _run_on(executor, todo, limit=min(QUEUED_ELSEWHERE, max(1, len(todo))))
+    if todo:
+        n_left = sum(len(task) for task in todo)
+        raise WorkerError(f"The executor broke; {n_left} runs were not started. Run them again on a new one.")
+
+
+def _failure(spec: RunSpec, error: BaseException) -> RunFailure:
+    reason = str(error).splitlines()
+    kind = MemoryError if isinstance(error, MemoryError) else type(error)  # numpy has a kind of its own
+    told = f"{kind.__name__}: {reason[0] if reason else 'no message'}"
+    if isinstance(error, BrokenExecutor):
+        told = f"{type(error).__name__}: {KILLED}"
+    return RunFailure(
+        spec=spec,
+        error=told,
+        traceback="".join(traceback.format_exception(error)).rstrip(),
+    )
+
+
+class _InProcess(Executor):
+    """Runs submitted calls at once, in this process. Ctrl-C passes through; other errors go into the future."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Make the call and return a finished future."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:  # noqa: BLE001 - an executor hands on whatever the call raises
+            future.set_exception(error)
+        return future
+
+
+def _run_in_pool(todo: deque[Task], n_workers: int) -> Generator[Outcome]:
+    """Run `todo` in local processes.
+
+    A pool breaks as a whole when one worker is killed (for lack of memory, for example). It is replaced for the other
+    runs, and the runs that were under way are tried once more, one at a time. So only runs that kill their worker fail.
+    """
+    lost: deque[Task] = deque()
+    with _process_pool(n_workers) as pool:
+        _check_workers_start(pool)
+        if _warm_up_workers(pool, [spec for task in todo for spec in task]):
+            yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers, lost=lost)
+    while todo:
+        with _process_pool(n_workers) as pool:
+            yield from _run_on(pool, todo, limit=QUEUED_PER_WORKER * n_workers, lost=lost)
+    while lost:
+        with _process_pool(1) as pool:
+            yield from _run_on(pool, lost, limit=1)
+
+
+def _check_workers_start(pool: Executor) -> None:
+    if _is_broken_by(pool.submit(os.getpid)):
+        raise WorkerError(
+            "Worker processes could not be started. A script that starts runs must do so under "
+            "`if __name__ == '__main__':`; jobs=1 runs everything in this process."
+        )
+
+
+def _warm_up_workers(pool: Executor, specs: Iterable[RunSpec]) -> bool:
+    """Have one run of each kind compile and cache its kernels before many processes need them.
+
+    Errors are ignored here: the same run raises them again later, and they are recorded then. That holds for a worker
+    that is killed, too: False is returned, the pool is broken, and in the next one only runs that kill again fail.
+    """
+    kinds = tuple({_kernel_kind(spec): spec for spec in specs}.values())
+    if not all(_compiled_together(pool, spec) for spec in kinds[:1]):  # what is left of other kinds is their policy
+        return False
+    return not any(_is_broken_by(pool.submit(warm_up, spec)) for spec in kinds)
+
+
+def _compiled_together(pool: Executor, spec: RunSpec) -> bool:
+    """Have two workers compile what a first run needs, see `runs.first_compilation`; False if one is killed."""
+    asked = pool.submit(is_first_run, spec)
+    if _is_broken_by(asked):
+        return False
+    if asked.exception() is not None or not asked.result():
+        return True
+    tell_of_first_run()
+    try:
+        halves = [pool.submit(compile_half, spec.scenario, half) for half in (0, 1)]
+        if any([_is_broken_by(future) for future in halves]):  # noqa: C419 - a list: all are waited for
+            return False
+        ends = [pool.submit(end, spec) for end in (compile_outermost, compile_start)]
+        return not any([_is_broken_by(future) for future in ends])  # noqa: C419 - as above
+    except BrokenExecutor:  # between two tasks
+        return False
+
+
+def _is_broken_by(future: Future[Any]) -> bool:
+    """Wait for a task, and say whether the worker that did it died."""
+    while not future.done():
+        wait((future,), timeout=WAKE_UP_EVERY_S)
+    return isinstance(future.exception(), BrokenExecutor)
+
+
+def _kernel_kind(spec: RunSpec) -> tuple[Any, ...]:
+    """Runs of one kind use the same kernels."""
+    world = spec.scenario
+    return spec.policy, world.caches, world.physics, tuple(config.name for config in spec.wrappers)
+
+
+class _Pool(ProcessPoolExecutor):
+    """A process pool whose workers never see Ctrl-C, not even while they start; only the driver handles it."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Submit with SIGINT blocked, because a worker that starts here inherits the blocked signals."""
+        if not hasattr(signal, "pthread_sigmask"):  # Windows: workers ignore Ctrl-C from `_start_worker` on
+            return super().submit(fn, *args, **kwargs)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return super().submit(fn, *args, **kwargs)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _process_pool(n_workers: int) -> Iterator[ProcessPoolExecutor]:
+    """A pool of spawned, single-threaded processes that exit at once when the driver stops or dies."""
+    context = get_context("spawn")
+    lifeline, held_by_driver = context.Pipe(duplex=False)
+    with _single_threaded_children():
+        pool = _Pool(n_workers, mp_context=context, initializer=_start_worker, initargs=(lifeline,))
+        try:
+            yield pool
+        except BaseException:
+            held_by_driver.close()  # workers see the end of the lifeline and exit in the middle of their runs
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+        pool.shutdown()
+        held_by_driver.close()
+        lifeline.close()
+
+
+def _start_worker(lifeline: Connection) -> None:
+    """Prepare a worker process: it ignores Ctrl-C, and exits when the driver is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_leave_at_end_of, args=(lifeline,), daemon=True).start()
+
+
+def _leave_at_end_of(lifeline: Connection) -> None:
+    try:
+        lifeline.recv()
+    except (EOFError, OSError):
+        os._exit(1)
+
+
+@contextmanager
+def _single_threaded_children() -> Iterator[None]:
+    """Processes started inside this context use one thread each; libraries read the settings at import."""
+    before = {name: os.environ.get(name) for name in THREAD_SETTINGS}
+    os.environ.update(dict.fromkeys(THREAD_SETTINGS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
