@@ -9,6 +9,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from typing import Annotated, Any
 
 import typer
@@ -137,12 +138,18 @@ def _carry_out(words: list[str]) -> int | None:
 
     Not by `app(...)`: typer turns Ctrl-C into an exit code there, and nobody would say what is kept.
     """
-    command = typer.main.get_command(app)
+    command = _command()
     try:
         with command.make_context("swarm-forage", words) as context:
             return command.invoke(context)
     except typer.Exit as ending:
         return ending.exit_code
+
+
+@cache
+def _command() -> Any:
+    """Return all commands with their options; to make them takes longer than many a command."""
+    return typer.main.get_command(app)
 
 
 def _refuse_unreadable(words: Sequence[str]) -> None:
