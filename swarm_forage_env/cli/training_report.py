@@ -1,21 +1,17 @@
 """What `swarm-forage train` shows: progress, evaluations as they come, a picture, and where the results are."""
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.cli.options import EXIT_INTERRUPTED, complain, no_picture
-from swarm_forage_env.rendering.plots import draw_trainings
-from swarm_forage_env.runs.progress import duration
-from swarm_forage_env.scenarios.performance import performance_of
-from swarm_forage_env.training.evaluation_worlds import ALL_WORLDS
+from swarm_forage_env.training.curves import curve_of_training
+from swarm_forage_env.training.evaluations import TrainingCurve
+from swarm_forage_env.training.lines import evaluation_lines, heading, progress_line
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.training.status import Evaluation, TrainingStatus
 
@@ -68,14 +64,7 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
     if not evaluations:
         return None
     try:
-        draw_trainings(
-            path,
-            {"trained policy": points_of(evaluations)},
-            beside={baseline_of(plan): (evaluations[-1].baseline, math.nan)},
-            stage_ends=stage_ends(plan),
-            title=f"{plan.algorithm} in {place_of(plan)}",
-            ylabel=counted_in(plan),
-        )
+        curve_of_training(TrainingCurve(label="trained policy", plan=plan, evaluations=tuple(evaluations))).draw(path)
     except ImportError as error:
         console.print(str(error))
         return None
@@ -83,39 +72,6 @@ def _draw(plan: TrainingPlan, evaluations: Sequence[Evaluation], path: Path, con
         console.print(no_picture(path, error))
         return None
     return path
-
-
-def place_of(plan: TrainingPlan) -> str:
-    """Say where policies of a plan are judged."""
-    if plan.evaluation.worlds:
-        return counted(len(plan.evaluation.worlds), "world")
-    return f"{plan.scenario.name}, {plan.scenario.robots.n_robots} robots"
-
-
-def counted_in(plan: TrainingPlan) -> str:
-    """Say what the numbers of a plan's evaluations are."""
-    if plan.evaluation.worlds:
-        return f"{plan.evaluation.chosen_by} ratio to the baselines"
-    return f"{performance_of(plan.scenario.performance).title} per 1,000 s"
-
-
-def baseline_of(plan: TrainingPlan) -> str:
-    """Say what the policy is compared with."""
-    return "baseline of each world" if plan.evaluation.worlds else plan.evaluation.baseline
-
-
-def points_of(evaluations: Sequence[Evaluation]) -> tuple[list[int], list[float], list[float]]:
-    """Return evaluations as pictures want them: decisions, performance and interference."""
-    return (
-        [evaluation.steps for evaluation in evaluations],
-        [evaluation.performance for evaluation in evaluations],
-        [evaluation.interference_fraction for evaluation in evaluations],
-    )
-
-
-def stage_ends(plan: TrainingPlan) -> list[int]:
-    """Return the decisions at which the stages of a plan end."""
-    return np.cumsum([stage.steps for stage in plan.stages]).tolist()
 
 
 def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | Evaluation], None]:
@@ -134,52 +90,12 @@ def _reporter(plan: TrainingPlan, bar: Progress) -> Callable[[TrainingStatus | E
             if first_words:
                 bar.console.print(first_words)
                 first_words = ""
-            for line in _evaluation_lines(news):
+            for line in evaluation_lines(news):
                 bar.console.print(line)
         elif not bar.disable:
             bar.update(task, completed=news.steps, description=f"mean return {news.episode_return:.2f}")
         elif time.monotonic() - told_at >= LINE_EVERY_S:
-            bar.console.print(_progress_line(plan, news, told))
+            bar.console.print(progress_line(plan, news, told))
             told, told_at = news, time.monotonic()
 
     return report
-
-
-def heading(plan: TrainingPlan) -> str:
-    """Return what stands above the evaluations: their runs, and the names of the columns."""
-    horizons = {spec.scenario.horizon_s for spec in plan.judging_runs("policy")}
-    runs = f"Evaluated in {counted(plan.evaluation.n_runs, 'run' if len(horizons) == 1 else 'whole run')}"
-    if len(horizons) == 1:
-        runs += f" of {horizons.pop():,.0f} s"
-    if plan.evaluation.worlds:
-        return (
-            f"{runs} in each of {place_of(plan)}; what counts is the {plan.evaluation.chosen_by} ratio:\n"
-            f"{'decisions':>10}  {'world':<20} {'per 1,000 s':>11} {'baseline':>13} {'ratio':>6} {'interference':>12}"
-        )
-    baseline = plan.evaluation.baseline
-    return f"{runs}:\n{'decisions':>12} {'per 1,000 s':>12} {baseline:>8} {'interference':>13}"
-
-
-def _evaluation_lines(news: Evaluation) -> list[str]:
-    interference = news.interference_fraction
-    if not news.worlds:
-        return [f"{news.steps:>12,} {news.performance:>12.1f} {news.baseline:>8.1f} {interference:>13.3f}"]
-    lines = [
-        f"{'':>10}  {world.world:<20} {world.performance:>11.1f} {f'{world.baseline_policy} {world.baseline:.1f}':>13} "
-        f"{world.ratio:>6.2f} {world.interference_fraction:>12.3f}"
-        for world in news.worlds
-    ]
-    return [
-        *lines,
-        f"{news.steps:>10,}  {ALL_WORLDS:<20} {'':>11} {'':>13} {news.performance:>6.2f} {interference:>12.3f}",
-    ]
-
-
-def _progress_line(plan: TrainingPlan, now: TrainingStatus, before: TrainingStatus | None) -> str:
-    """Say how far a training is, and how long it takes at the pace since the line before."""
-    steps, seconds = (0, 0.0) if before is None else (before.steps, before.wall_time_s)
-    left_s = (plan.total_steps - now.steps) * (now.wall_time_s - seconds) / max(1, now.steps - steps)
-    return (
-        f"{now.steps:,} of {plan.total_steps:,} decisions, mean return {now.episode_return:.2f}, "
-        f"about {duration(max(0.0, left_s))} left"
-    )

@@ -2,7 +2,7 @@
 
 import dataclasses
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,8 @@ from swarm_forage_env._internal.parsing import parse_json, parse_toml
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping, learner_layout
 from swarm_forage_env.policies.registry import policy_class
-from swarm_forage_env.runs.spec import RunSpec
+from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size, with_overrides
 from swarm_forage_env.training.defaults import DEFAULT_ARENAS, DEFAULT_HIDDEN, DEFAULT_STEPS, EVALUATE_EVERY
@@ -39,6 +40,8 @@ SAMPLING = ("ppo", "a2c")
 """Those whose networks give probabilities of discrete actions."""
 MOST_ARENAS, MOST_LAYERS, MOST_UNITS = 10_000, 20, 10_000
 """Sizes of a training that are far beyond sense and still fit into the memory of a machine; our choice."""
+LEARNING = PolicySpec(label="policy", policy="policy")
+"""The policy that is trained, in its evaluations."""
 _COUNTS = ("n_steps", "batch_size", "n_epochs", "buffer_size")
 _RANGES: dict[str, dict[str, float]] = {
     "gamma": {"above": 0.0, "at_most": 1.0},
@@ -131,15 +134,24 @@ class EvaluationPlan:
         except ValueError as error:
             raise ConfigError(f"Expected evaluation.baseline to be a controller: {error}") from error
 
-    def specs(self, scenario: ScenarioConfig, wrappers: tuple[WrapperConfig, ...], policy: str) -> tuple[RunSpec, ...]:
-        """Return one specification per run, in `scenario`, of another horizon where the plan has one.
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """Seeds of the runs in each world."""
+        return tuple(range(self.first_seed, self.first_seed + self.n_runs))
+
+    def runs(self, worlds: Iterable[World], *policies: PolicySpec) -> Plan:
+        """Return the runs of policies in worlds, of another horizon where the plan has one.
 
         Raises:
             ConfigError: a horizon that is not a whole number of recording intervals.
         """
-        whole_run = scenario if self.horizon_s is None else with_overrides(scenario, horizon_s=self.horizon_s)
-        seeds = range(self.first_seed, self.first_seed + self.n_runs)
-        return tuple(RunSpec(world=World(whole_run, wrappers), policy=policy, seed=seed) for seed in seeds)
+        return Plan.product(policies, [self.timed(world) for world in worlds], self.seeds)
+
+    def timed(self, world: World) -> World:
+        """Return a world with runs as long as the plan says."""
+        if self.horizon_s is None:
+            return world
+        return dataclasses.replace(world, scenario=with_overrides(world.scenario, horizon_s=self.horizon_s))
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the plan as plain values, with what is about worlds only where there are some."""
@@ -217,7 +229,7 @@ class TrainingPlan:
         whole("seed", self.seed, at_least=0)
         _check_options("options", self.options)
         self._check_worlds()
-        self.judging_runs("policy")  # refuses horizons that cannot be
+        self.judging(LEARNING)  # refuses horizons that cannot be
 
     def _check_worlds(self) -> None:
         """Refuse worlds that are said twice, that cannot be, or that one policy cannot have in common."""
@@ -269,11 +281,14 @@ class TrainingPlan:
                 f"{self.scenario.caches!r}, got {world.scenario.caches!r}; give both the same."
             )
 
-    def judging_runs(self, policy: str) -> tuple[RunSpec, ...]:
-        """Return the runs of an evaluation of a policy, in all worlds; raises ConfigError where one cannot be."""
-        worlds = self.evaluation.worlds
-        places = [(world.scenario, world.wrappers) for world in worlds] or [(self.scenario, self.wrappers)]
-        return tuple(spec for place in places for spec in self.evaluation.specs(*place, policy))
+    @property
+    def judging_worlds(self) -> tuple[World, ...]:
+        """Worlds that the policy is judged in, with runs as long as evaluations have them."""
+        return tuple(map(self.evaluation.timed, self.evaluation.worlds or (World(self.scenario, self.wrappers),)))
+
+    def judging(self, *policies: PolicySpec) -> Plan:
+        """Return the runs of an evaluation of policies, in all worlds; raises ConfigError where one cannot be."""
+        return Plan.product(policies, self.judging_worlds, self.evaluation.seeds)
 
     @property
     def total_steps(self) -> int:

@@ -32,11 +32,12 @@ from swarm_forage_env.training.defaults import (
     EVALUATION_SHARE,
 )
 from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
-from swarm_forage_env.training.plan import SAMPLING, EvaluationPlan, Stage, TrainingPlan
+from swarm_forage_env.training.plan import LEARNING, SAMPLING, EvaluationPlan, Stage, TrainingPlan
 from swarm_forage_env.views.plans import DEFAULT_SCENARIO
 from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_configs
+from swarm_forage_env.wrappers.world import World
 
 DEFAULT_OPTIONS: dict[str, dict[str, Any]] = {
     "ppo": {
@@ -219,8 +220,7 @@ def _evaluation(
     plan = EvaluationPlan(**fields)
     if "every_steps" in fields:
         return plan
-    places = [(world.scenario, world.wrappers) for world in plan.worlds] or [(scenario, ())]
-    robot_ticks = sum(spec.robot_ticks for place in places for spec in plan.specs(*place, plan.baseline))
+    robot_ticks = plan.runs(plan.worlds or (World(scenario),), LEARNING).robot_ticks
     return dataclasses.replace(
         plan, every_steps=max(EVALUATE_EVERY, round(robot_ticks / decision_ticks / EVALUATION_SHARE))
     )

@@ -1,6 +1,7 @@
 """The command `curves`, on folders as trainings leave them."""
 
 import dataclasses
+import re
 import sys
 from pathlib import Path
 
@@ -36,8 +37,8 @@ def test_trainings_are_drawn_beside_others(command, monkeypatch):
     words = ("curves", "first", "second", "--beside", "random,crw", "--jobs", "1")
     code, out, _ = command(*words, "-o", "both.png")
     assert code == 0
-    rows = [line.split("│") for line in out.splitlines() if line.startswith("│")]
-    cells = {row[1].strip(): [cell.strip() for cell in row[2:5]] for row in rows}
+    rows = [re.split(r" {2,}", line) for line in out.splitlines()]
+    cells = {row[0]: row[1:] for row in rows}
     assert cells["first, at its best"] == ["20", "40.0", "0.250"]
     assert cells["second, at its best"] == ["20", "8.0", "0.250"]
     assert cells.keys() >= {"random", "crw"}

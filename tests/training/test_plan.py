@@ -8,7 +8,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.plan import LEARNING, EvaluationPlan, Stage, TrainingPlan, read_plan
 
 TOML = """
 algorithm = "dqn"
@@ -65,7 +65,7 @@ def test_a_plan_says_what_its_file_says(plan):
 
 def test_evaluations_are_whole_runs_of_the_scenario_under_seeds_of_their_own(plan):
     twice = replace(plan.evaluation, n_runs=2)
-    specs = twice.specs(plan.scenario, plan.wrappers, "crw")
+    specs = replace(plan, evaluation=twice).judging(LEARNING).specs
     assert [spec.seed for spec in specs] == [1_000_000, 1_000_001]
     assert {spec.scenario.horizon_s for spec in specs} == {400.0}
     assert specs[0].wrappers == plan.wrappers

@@ -34,7 +34,7 @@ def test_defaults_are_what_a_driver_needs():
         "ent_coef": 0.003,
     }
     assert plan.evaluation == EvaluationPlan()
-    assert {spec.scenario.horizon_s for spec in plan.evaluation.specs(plan.scenario, (), "crw")} == {10_000.0}
+    assert {world.scenario.horizon_s for world in plan.judging_worlds} == {10_000.0}
     assert recipe(algorithm="sac").interface.actions == "continuous"
 
 
@@ -125,11 +125,11 @@ def test_policies_draw_their_actions_where_they_have_probabilities(algorithm, ac
 def test_trainings_have_compiled_bodies_and_evaluations_what_was_asked_for():
     plan = recipe("search_and_rescue")
     assert {stage.scenario["physics"] for stage in plan.stages} == {"compiled"}
-    assert {spec.scenario.physics for spec in plan.judging_runs("crw")} == {"chipmunk"}
+    assert {world.scenario.physics for world in plan.judging_worlds} == {"chipmunk"}
     for engine in ("chipmunk", "compiled"):
         asked = recipe("search_and_rescue", physics=engine)
         trained_in = {with_overrides(asked.scenario, **stage.scenario).physics for stage in asked.stages}
-        assert trained_in == {spec.scenario.physics for spec in asked.judging_runs("crw")} == {engine}
+        assert trained_in == {world.scenario.physics for world in asked.judging_worlds} == {engine}
 
 
 @pytest.mark.parametrize(("n_robots", "n_arenas"), [(4, 8), (50, 8), (51, 7), (115, 3), (200, 2), (1000, 1)])

@@ -11,13 +11,15 @@ pytest.importorskip("stable_baselines3", reason="needs the train extra: stable-b
 from stable_baselines3 import DQN, PPO
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.training_report import heading
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.network import Network
+from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.training import evaluation_worlds
-from swarm_forage_env.training.evaluation_worlds import EvaluationWorld, judged_baseline, ratio_to
+from swarm_forage_env.training import judging
+from swarm_forage_env.training.evaluation_worlds import EvaluationWorld
 from swarm_forage_env.training.evaluations import read_evaluations
+from swarm_forage_env.training.judging import baseline_runs, best_baselines, ratio_to
+from swarm_forage_env.training.lines import heading
 from swarm_forage_env.training.plan import EvaluationPlan, Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 from swarm_forage_env.training.sb3 import ActiveRolloutBuffer, PresentReplayBuffer, SwarmVecEnv
@@ -139,18 +141,17 @@ def test_plans_without_worlds_write_what_they_always_wrote():
 
 
 def test_a_baseline_that_finds_nothing_counts_as_one_object():
-    specs = EvaluationPlan(n_runs=2).specs(warehouse_small(**QUICK), (), "policy")
-    assert ratio_to(0.0, 5.0, specs) == pytest.approx(5.0 / (1000.0 / 400.0))
-    assert ratio_to(10.0, 5.0, specs) == 0.5
+    assert ratio_to(0.0, 5.0, 400.0) == pytest.approx(5.0 / (1000.0 / 400.0))
+    assert ratio_to(10.0, 5.0, 400.0) == 0.5
 
 
 def test_the_best_of_the_scripted_controllers_runs_with_its_own_caches(monkeypatch):
     reached = {"none": 3.0, "static": 9.0, "dynamic": 5.0}
-    monkeypatch.setattr(
-        evaluation_worlds, "judged", lambda make_policy, specs: (reached[specs[0].scenario.caches], 0.0)
-    )
     world = EvaluationWorld(scenario=warehouse_small(**QUICK))
-    assert judged_baseline(world, EvaluationPlan().specs(world.scenario, (), "policy")) == ("stochm", 9.0)
+    runs = baseline_runs(dataclasses.replace(FIXED, evaluation=EvaluationPlan(worlds=(world,))))
+    caches = {condition: runs.specs_of(condition)[0].scenario.caches for condition in runs.conditions}
+    monkeypatch.setattr(judging, "means", lambda _, condition: (reached[caches[condition]], 0.0))
+    assert best_baselines(Table(plan=runs, records={})) == {"warehouse_small_2": ("stochm", 9.0)}
 
 
 def test_the_recipe_judges_in_the_largest_world_of_each_name():

@@ -10,7 +10,7 @@ import inspect
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -36,12 +36,20 @@ from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.runs.first_compilation import compile_world
 from swarm_forage_env.runs.record import software_versions
 from swarm_forage_env.runs.workers import available_cores
-from swarm_forage_env.training.evaluation_worlds import BEST, CHOSEN_BY, judged, judged_baseline, judged_in_world
+from swarm_forage_env.training.evaluation_worlds import BEST
 from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, PLAN_FILE, read_evaluations, write_evaluations
-from swarm_forage_env.training.plan import Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.judging import (
+    baseline_runs,
+    best_baselines,
+    finished_runs,
+    in_all_worlds,
+    judged,
+    known_baselines,
+)
+from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan, read_plan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
 from swarm_forage_env.training.sb3.export import export_network, note_interface
-from swarm_forage_env.training.status import Evaluation, TrainingStatus, WorldEvaluation
+from swarm_forage_env.training.status import Evaluation, TrainingStatus
 from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 
 ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
@@ -305,10 +313,8 @@ class _Watch(BaseCallback):
         self._started = time.perf_counter()
         self._last_report = -math.inf
         self._next_evaluation = 0
-        self._baseline: float | None = None
         self.evaluations = read_evaluations(folder / EVALUATIONS_FILE)
-        known = self.evaluations[-1].worlds if self.evaluations else ()
-        self._baselines = {world.world: (world.baseline_policy, world.baseline) for world in known}
+        self._baselines = known_baselines(plan, self.evaluations[-1]) if self.evaluations else {}
         self._counted = {
             config.name: config.performance
             for sampler in (plan.sampler, *(stage.sampler for stage in plan.stages))
@@ -391,7 +397,7 @@ class _Watch(BaseCallback):
         """Keep a checkpoint, run the policy, and note how it did."""
         self._next_evaluation = self.num_timesteps + self._plan.evaluation.every_steps
         self.keep(self.model)
-        evaluation = self._judged_in_worlds() if self._plan.evaluation.worlds else self._judged_in_scenario()
+        evaluation = self._judged()
         for name in ("performance", "baseline", "interference_fraction"):
             self.logger.record(f"evaluation/{name}", getattr(evaluation, name))
         for world in evaluation.worlds:
@@ -423,46 +429,28 @@ class _Watch(BaseCallback):
         plan = self._plan
         return export_network(self.model, plan.interface, samples=plan.samples, caches=plan.scenario.caches, card=card)
 
-    def _judged_in_scenario(self) -> Evaluation:
-        """Run the policy in the plan's scenario, beside the baseline."""
-        if self._baseline is None:
-            self._baseline, _ = self._judged(lambda: load_policy(self._plan.evaluation.baseline))
-        performance, interference = self._judged(self._policy)
+    def _judged(self) -> Evaluation:
+        """Run the policy in the worlds of the evaluation, beside the baselines."""
+        plan = self._plan
+        if not self._baselines:  # their runs are made once, by a resumed training, too
+            self._baselines = best_baselines(finished_runs(baseline_runs(plan)))
+        runs = plan.judging(replace(LEARNING, factory=self._policy))
+        worlds = judged(finished_runs(runs), LEARNING.label, self._baselines)
+        performance, interference = in_all_worlds(plan.evaluation, worlds)
         return Evaluation(
             steps=self.num_timesteps,
             wall_time_s=round(self._wall_time_s(), 1),
             performance=performance,
-            baseline=self._baseline,
+            baseline=1.0 if plan.evaluation.worlds else worlds[0].baseline,
             interference_fraction=interference,
+            worlds=worlds if plan.evaluation.worlds else (),
         )
-
-    def _judged(self, make_policy: Callable[[], Policy]) -> tuple[float, float]:
-        """Return performance per 1,000 s and interference, means over the runs of the evaluation."""
-        return judged(make_policy, self._plan.judging_runs("policy"))
 
     def _policy(self) -> Policy:
         """The policy as it is now; one that draws its actions does so by the chance of its run, not of the training."""
         if self._plan.samples:
             return NetworkPolicy(self._network())
         return LearnedPolicy(self._plan.interface, remember=deterministic_choice(self.model))
-
-    def _judged_in_worlds(self) -> Evaluation:
-        """Run the policy in each of the worlds of the evaluation."""
-        plan = self._plan.evaluation
-        found: list[WorldEvaluation] = []
-        for world in plan.worlds:
-            specs = plan.specs(world.scenario, world.wrappers, "policy")
-            if world.name not in self._baselines:  # the runs of a baseline are made once, by a resumed training, too
-                self._baselines[world.name] = judged_baseline(world, specs)
-            found.append(judged_in_world(world, self._policy, specs, self._baselines[world.name]))
-        return Evaluation(
-            steps=self.num_timesteps,
-            wall_time_s=round(self._wall_time_s(), 1),
-            performance=float(CHOSEN_BY[plan.chosen_by]([world.ratio for world in found])),
-            baseline=1.0,
-            interference_fraction=float(np.mean([world.interference_fraction for world in found])),
-            worlds=tuple(found),
-        )
 
 
 class _Together(CallbackList):
