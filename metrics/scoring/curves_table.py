@@ -13,7 +13,7 @@ import numpy as np
 from ..checks import CurveError
 from ..curves import FRACTION_TOLERANCE, FloatArray
 from ..queues import PopulationRates
-from .columns import CRITERIA, CURVE_COLUMNS, INTERVAL_COLUMNS, RATE_COLUMNS, SIZE
+from .columns import CRITERIA, CURVE_COLUMNS, INTERVAL_COLUMNS, RATE_COLUMNS, REQUIRED_COLUMNS, SIZE
 from .studies import RunCurves, StudyCurves
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def _checked_frame(frame: "pl.DataFrame", where: str, controller: str) -> "pl.Da
     """Return the known columns, of the right types, with the optional keys filled in."""
     import polars as pl
 
-    missing = [name for name, column in CURVE_COLUMNS.items() if column.is_required and name not in frame.columns]
+    missing = [name for name in REQUIRED_COLUMNS if name not in frame.columns]
     if missing:
         close = difflib.get_close_matches(missing[0], frame.columns, n=1)
         hint = f" Is {close[0]!r} meant to be {missing[0]!r}?" if close else ""
@@ -92,7 +92,8 @@ def _checked_column(frame: "pl.DataFrame", name: str, where: str) -> "pl.Series"
         _refuse(values, values.str.contains(_STEERING), name, where, "a text without control characters")
         return values
     values = given.cast(pl.Float64, strict=False)
-    unread = values.is_null() & (pl.repeat(True, len(given), eager=True) if column.is_required else given.is_not_null())
+    is_required = name in REQUIRED_COLUMNS
+    unread = values.is_null() & (pl.repeat(True, len(given), eager=True) if is_required else given.is_not_null())
     _refuse(given, unread | values.is_nan().fill_null(False), name, where, "a number")
     _refuse(given, values.is_infinite().fill_null(False), name, where, "a finite number")
     _refuse(given, (values.abs() > MOST).fill_null(False), name, where, f"a number of at most {MOST:g} in size")

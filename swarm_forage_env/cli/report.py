@@ -21,8 +21,9 @@ from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.runner import Outcomes
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import RunStore
+from swarm_forage_env.scenarios.columns import part_column
 from swarm_forage_env.scenarios.kinds import kind_sizes
-from swarm_forage_env.scenarios.performance import Performance, part_column, performance_curve, performance_of
+from swarm_forage_env.scenarios.performance import Performance, performance_curve, performance_of
 
 LEVEL = 0.95
 """Confidence level of all intervals."""

@@ -1,8 +1,8 @@
 """RunRecord: one run as columns over recording intervals, and the Parquet file that holds it.
 
-The fields of `RunRecord` are the schema: name, type, unit and meaning stand there and nowhere else; `schema_table()`
-returns them as text. A file is self-contained: its metadata hold the complete specification of the run, the versions
-that made it, and a digest by which a damaged file is noticed.
+The fields of `RunRecord` are the schema. Units and meanings stand in `scenarios.columns`; `schema_table()` returns all
+as text. A file is self-contained: its metadata hold the complete specification of the run, the versions that made it,
+and a digest by which a damaged file is noticed.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ from functools import cache, lru_cache
 from importlib import metadata
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeAlias, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.contract.types import FloatArray, IntArray
-from swarm_forage_env.scenarios.performance import PART_COLUMNS, PERFORMANCE_COLUMNS, part_column, performance_curve
+from swarm_forage_env.scenarios.columns import ALL_COLUMNS, INTERVAL_COLUMNS, KEY_COLUMNS
+from swarm_forage_env.scenarios.performance import performance_curve
 
 if TYPE_CHECKING:
     import polars as pl
@@ -43,14 +44,6 @@ class RecordError(ValueError):
     """A record that cannot be built, or a file that holds no undamaged record; the message names the file."""
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
-    """What a field of `RunRecord` holds: per interval, or once per run for keys."""
-
-    unit: str
-    meaning: str
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunRecord:
     """One run: its keys and arrays over T intervals, all of length T and read-only.
@@ -58,40 +51,38 @@ class RunRecord:
     After an early end (every robot dead) the remaining intervals are zeros.
     """
 
-    run_id: Annotated[str, Column("", "hash of the run's specification")]
-    scenario: Annotated[str, Column("", "name of the scenario")]
-    controller: Annotated[str, Column("", "name of the policy")]
-    n_robots: Annotated[int, Column("robots", "swarm size N, all rows that can appear")]
-    criterion: Annotated[str, Column("", "what a study varied, 'none' for a single run")]
-    criterion_value: Annotated[float, Column("", "value of the criterion")]
-    seed: Annotated[int, Column("", "seed of the run")]
+    run_id: str
+    scenario: str
+    controller: str
+    n_robots: int
+    criterion: str
+    criterion_value: float
+    seed: int
 
-    interval: Annotated[IntArray, Column("", "index of the interval, from 0")]
-    t_end_s: Annotated[FloatArray, Column("s", "end of the interval")]
-    performance: Annotated[FloatArray, Column("", "what `performance` of the scenario names, in its unit")]
-    collected: Annotated[CountArray, Column("objects", "delivered to the nest")]
-    first_picked: Annotated[CountArray, Column("objects", "picked up that no robot had carried since they were placed")]
-    free_pickups: Annotated[CountArray, Column("objects", "picked up from the floor")]
-    cache_pickups: Annotated[CountArray, Column("objects", "picked up from a cache")]
-    cache_drops: Annotated[CountArray, Column("objects", "dropped into a cache")]
-    floor_drops: Annotated[CountArray, Column("objects", "laid on the floor by a robot, displaced ones included")]
-    displaced_drops: Annotated[CountArray, Column("objects", "dropped without a free cell and re-placed elsewhere")]
-    objects_moved: Annotated[CountArray, Column("cells", "steps taken by randomly walking objects")]
-    caches_created: Annotated[CountArray, Column("caches", "created")]
-    caches_depleted: Annotated[CountArray, Column("caches", "dissolved because one object was left")]
-    interference_ticks: Annotated[CountArray, Column("robot-ticks", "active robots in interference, summed over ticks")]
-    interference_fraction: Annotated[FloatArray, Column("1", "share of active robots in interference, mean over ticks")]
-    n_active: Annotated[FloatArray, Column("robots", "mean over ticks of the tasked swarm: present and not in repair")]
-    n_present: Annotated[FloatArray, Column("robots", "mean over ticks of robots that are born and alive")]
-    n_carrying: Annotated[FloatArray, Column("robots", "mean over ticks of active robots that carry an object")]
-    n_caches: Annotated[FloatArray, Column("caches", "mean over ticks")]
-    n_objects_cached: Annotated[FloatArray, Column("objects", "mean over ticks of objects inside caches")]
-    adversity: Annotated[
-        FloatArray, Column("1 or ticks", "mean over ticks of a throttle, else of the ticks that handling takes, else 0")
-    ]
+    interval: IntArray
+    t_end_s: FloatArray
+    performance: FloatArray
+    collected: CountArray
+    first_picked: CountArray
+    free_pickups: CountArray
+    cache_pickups: CountArray
+    cache_drops: CountArray
+    floor_drops: CountArray
+    displaced_drops: CountArray
+    objects_moved: CountArray
+    caches_created: CountArray
+    caches_depleted: CountArray
+    interference_ticks: CountArray
+    interference_fraction: FloatArray
+    n_active: FloatArray
+    n_present: FloatArray
+    n_carrying: FloatArray
+    n_caches: FloatArray
+    n_objects_cached: FloatArray
+    adversity: FloatArray
 
     contributed: Mapping[str, FloatArray]
-    """Further columns, (T,) float64 each, from wrappers and policies; see `KNOWN_CONTRIBUTIONS`."""
+    """Further columns, (T,) float64 each, from wrappers and policies; see `CONTRIBUTED_COLUMNS`."""
     spec: str
     """The run's complete specification as JSON (`runs.spec.RunSpec.from_json`)."""
     provenance: Mapping[str, str]
@@ -252,53 +243,20 @@ _DTYPES: dict[Any, type] = {
     CountArray: np.int64,
     FloatArray: np.float64,
 }
-_HINTS = {
-    name: hint for name, hint in get_type_hints(RunRecord, include_extras=True).items() if get_origin(hint) is Annotated
-}
-_KEY_DTYPES = {name: _DTYPES[hint.__origin__] for name, hint in _HINTS.items() if hint.__origin__ in (str, int, float)}
-_COLUMN_DTYPES = {name: _DTYPES[hint.__origin__] for name, hint in _HINTS.items() if name not in _KEY_DTYPES}
-
-KNOWN_CONTRIBUTIONS: dict[str, tuple[str, str]] = {
-    "task_share_none": ("1", "mean over ticks of the share of active robots without a task"),
-    "task_share_generalist": ("1", "the same for the task Generalist"),
-    "task_share_harvester": ("1", "the same for the task Harvester"),
-    "task_share_collector": ("1", "the same for the task Collector"),
-    "task_share_starter": ("1", "the same for the task Cache Starter"),
-    "task_share_finisher": ("1", "the same for the task Cache Finisher"),
-    "task_share_transferer": ("1", "the same for the task Cache Transferer"),
-    "task_share_cache_collector": ("1", "the same for the task Cache Collector"),
-    "throttle": ("1", "waveform V(t) of the throttle at the last tick of the interval"),
-    "throttle_mean": ("1", "waveform V(t) of the throttle, mean over the ticks of the interval"),
-    "believed_interference_fraction": (
-        "1",
-        "share of active robots that see an obstacle under sensor noise, false ones included, mean over ticks",
-    ),
-    "handling_cost": ("ticks", "mean ticks of a pick-up and a drop that start in the last tick of the interval"),
-    "handling_cost_mean": ("ticks", "the same, mean over the ticks of the interval"),
-    "deaths": ("robots", "that died in the interval"),
-    "births": ("robots", "that were born"),
-    "malfunctions": ("robots", "that went into repair"),
-    "repairs": ("robots", "that came back from repair"),
-    "n_in_repair": ("robots", "length of the repair queue, mean over ticks"),
-    "time_at_work_s": ("s", "mean length of the stays in the tasked swarm that ended in the interval; 0 = none ended"),
-    "time_in_repair_s": ("s", "mean length of the absences that ended with a repair in the interval; 0 = none ended"),
-}
-KNOWN_CONTRIBUTIONS |= {
-    part_column("K", name): (
-        PERFORMANCE_COLUMNS[name].unit,
-        f"{name} of part K of a mixed swarm, or of kind K of robots, from 1",
-    )
-    for name in PART_COLUMNS
-}
-"""Columns of `RunRecord.contributed` that this package may write: unit and meaning. Present only where they apply."""
+_HINTS = get_type_hints(RunRecord)
+_KEY_DTYPES = {name: _DTYPES[_HINTS[name]] for name in KEY_COLUMNS}
+_COLUMN_DTYPES = {name: _DTYPES[_HINTS[name]] for name in INTERVAL_COLUMNS}
 
 
 def schema_table() -> str:
     """Return the schema as a text table: name, type, unit, meaning; contributed columns last."""
     dtypes = _KEY_DTYPES | _COLUMN_DTYPES
-    notes: dict[str, Column] = {name: hint.__metadata__[0] for name, hint in _HINTS.items()}
-    rows = [(name, dtypes[name].__name__, note.unit or "-", note.meaning) for name, note in notes.items()]
-    rows += [(name, "float64", unit, meaning + " (optional)") for name, (unit, meaning) in KNOWN_CONTRIBUTIONS.items()]
+    rows = [
+        (name, dtypes[name].__name__, column.unit or "-", column.meaning)
+        if name in dtypes
+        else (name, "float64", column.unit, column.meaning + " (optional)")
+        for name, column in ALL_COLUMNS.items()
+    ]
     width = max(len(name) for name, *_ in rows) + 2
     header = f"{'column':<{width}}{'type':<9}{'unit':<13}meaning"
     return "\n".join(

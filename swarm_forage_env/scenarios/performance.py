@@ -3,7 +3,7 @@
     collected                   a recorded column, as it is
     1/interference_fraction     a column of which less is better, turned round: 1/x in each interval, where 1/0 is 0
     task_balance, cache_load    computed from several columns
-    part_1_collected            the same of the first part of a mixed swarm, see `PART_COLUMNS`
+    part_1_collected            the same of the first part of a mixed swarm, see `columns.PART_COLUMNS`
     part_1_collected_per_robot  divided by the robots of that part which are present
 
 Performance is a way to read a run and no part of it: a record holds all columns, so another performance needs no other
@@ -20,6 +20,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env.scenarios.columns import (
+    CONTRIBUTED_COLUMNS,
+    COUNTED_OF_PARTS,
+    INTERVAL_COLUMNS,
+    PART_COLUMNS,
+    part_column,
+)
 
 if TYPE_CHECKING:
     import polars as pl
@@ -71,50 +78,14 @@ class Performance:
         return self.words or self.name.replace("_", " ")
 
 
-_RECORDED = (
-    Performance("collected", "objects", is_total=True, words="deliveries"),
-    Performance("first_picked", "objects", is_total=True, words="first pick-ups"),
-    Performance("free_pickups", "objects", is_total=True, words="pick-ups from the floor"),
-    Performance("cache_pickups", "objects", is_total=True, words="pick-ups from caches"),
-    Performance("cache_drops", "objects", is_total=True, words="drops into caches"),
-    Performance("floor_drops", "objects", is_total=True, words="drops on the floor"),
-    Performance("displaced_drops", "objects", is_total=True),
-    Performance("objects_moved", "cells", is_total=True),
-    Performance("caches_created", "caches", is_total=True),
-    Performance("caches_depleted", "caches", is_total=True),
-    Performance("interference_ticks", "robot-ticks", is_total=True),
-    Performance("interference_fraction", "1"),
-    Performance("believed_interference_fraction", "1"),
-    Performance("n_active", "robots", words="robots at work"),
-    Performance("n_present", "robots", words="robots present"),
-    Performance("n_carrying", "robots", words="robots carrying"),
-    Performance("n_caches", "caches", words="caches"),
-    Performance("n_objects_cached", "objects", words="objects in caches"),
-    Performance("adversity", "1 or ticks"),
-    Performance("task_share_none", "1"),
-    Performance("task_share_generalist", "1"),
-    Performance("task_share_harvester", "1"),
-    Performance("task_share_collector", "1"),
-    Performance("task_share_starter", "1"),
-    Performance("task_share_finisher", "1"),
-    Performance("task_share_transferer", "1"),
-    Performance("task_share_cache_collector", "1"),
-    Performance("throttle", "1"),
-    Performance("throttle_mean", "1"),
-    Performance("handling_cost", "ticks"),
-    Performance("handling_cost_mean", "ticks"),
-    Performance("deaths", "robots", is_total=True),
-    Performance("births", "robots", is_total=True),
-    Performance("malfunctions", "robots", is_total=True),
-    Performance("repairs", "robots", is_total=True),
-    Performance("n_in_repair", "robots", words="robots in repair"),
-    Performance("time_at_work_s", "s"),
-    Performance("time_in_repair_s", "s"),
-)
-PERFORMANCE_COLUMNS = {each.name: each for each in _RECORDED}
-"""Columns of a record that can be its performance: all numbers but the clock (`interval`, `t_end_s`)."""
+PERFORMANCE_COLUMNS = {
+    name: Performance(name, column.unit, column.is_total, column.words)
+    for name, column in {**INTERVAL_COLUMNS, **CONTRIBUTED_COLUMNS}.items()
+    if name not in ("interval", "t_end_s", "performance")
+}
+"""Columns of a record that can be its performance: all numbers but the clock."""
 
-_NAME_OF_WORDS = {entry.title.replace("-", "").replace(" ", "_"): entry.name for entry in _RECORDED}
+_NAME_OF_WORDS = {entry.title.replace("-", "").replace(" ", "_"): entry.name for entry in PERFORMANCE_COLUMNS.values()}
 """What people may type who know a column from tables, "deliveries" or "first_pickups" -> its name."""
 
 ABSENT: dict[str, float | str] = {
@@ -161,19 +132,10 @@ DERIVED_PERFORMANCES = tuple(_FORMULAS)
 """Performances that are computed from several columns."""
 
 
-_COUNTED_OF_PARTS = ("collected", "first_picked")
-PART_COLUMNS = (*_COUNTED_OF_PARTS, "interference_fraction", "n_active", "n_present")
-"""Columns that the record of a mixed swarm also has of each part, under the name of `part_column`; that of another
-swarm has them of each kind of robots where there are several."""
 _PER_ROBOT = "_per_robot"
 _PART_NAME = re.compile(
-    rf"part_(?P<part>[1-9]\d{{0,3}})_(?P<column>{'|'.join(PART_COLUMNS)}|(?:{'|'.join(_COUNTED_OF_PARTS)}){_PER_ROBOT})"
+    rf"part_(?P<part>[1-9]\d{{0,3}})_(?P<column>{'|'.join(PART_COLUMNS)}|(?:{'|'.join(COUNTED_OF_PARTS)}){_PER_ROBOT})"
 )
-
-
-def part_column(part: int | str, column: str) -> str:
-    """Return the name of a column about one part of a mixed swarm, numbered from 1; "K" stands for any."""
-    return f"part_{part}_{column}"
 
 
 def _performance_of_part(name: str) -> Performance | None:

@@ -161,7 +161,7 @@ class SwarmWrapper(BaseParallelWrapper):
 
         Called once at the end of each interval, after `after_step` of every wrapper inside the recorder; a mean
         over the interval starts anew with the call. The names must be the same at each call; their meanings are
-        listed in `runs.record.KNOWN_CONTRIBUTIONS`.
+        listed in `scenarios.columns.CONTRIBUTED_COLUMNS`.
         """
         return {}
 

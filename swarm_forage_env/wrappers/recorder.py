@@ -9,8 +9,9 @@ from swarm_forage_env.contract.codes import Counter, Event, Task
 from swarm_forage_env.contract.policy import CompiledPolicy, refused_tasks
 from swarm_forage_env.contract.types import BoolArray, CodeArray
 from swarm_forage_env.env import ForageEnv
+from swarm_forage_env.scenarios.columns import part_column
 from swarm_forage_env.scenarios.config import whole_intervals
-from swarm_forage_env.scenarios.performance import part_column, performance_curve
+from swarm_forage_env.scenarios.performance import performance_curve
 from swarm_forage_env.world.kernels.counting import add_task_shares
 from swarm_forage_env.wrappers.base import SwarmWrapper
 
@@ -61,7 +62,7 @@ class _PartTally:
         self._interference += np.count_nonzero(events.interfering[rows]) / max(1, n_active)
 
     def columns(self, n_ticks: int) -> dict[str, float]:
-        """Return the columns of the interval that ends now, see `scenarios.performance.PART_COLUMNS`; start anew."""
+        """Return the columns of the interval that ends now, see `scenarios.columns.PART_COLUMNS`; start anew."""
         columns = {
             "collected": float(self._collected),
             "first_picked": float(self._first_picked),

@@ -16,7 +16,8 @@ from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.registry import local_policy, policy_label
 from swarm_forage_env.runs.run import LiveRun, build_stack
-from swarm_forage_env.scenarios.performance import PART_COLUMNS, performance_curve, performance_of
+from swarm_forage_env.scenarios.columns import PART_COLUMNS
+from swarm_forage_env.scenarios.performance import performance_curve, performance_of
 
 TINY = scenario("warehouse_small", n_robots=6, n_objects=400, horizon_s=100.0, interval_s=50.0, physics="compiled")
 

@@ -14,9 +14,10 @@ from pettingzoo.utils.conversions import parallel_to_aec
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.runs.record import KNOWN_CONTRIBUTIONS, RunRecord
+from swarm_forage_env.runs.record import RunRecord
 from swarm_forage_env.runs.run import build_stack, run_one
 from swarm_forage_env.runs.spec import RunSpec, plan_run
+from swarm_forage_env.scenarios.columns import CONTRIBUTED_COLUMNS
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.gymnasium import JointForageEnv
 from swarm_forage_env.wrappers.base import STACK_ORDER, WrapperConfig
@@ -255,7 +256,7 @@ def test_runs_survive_json_and_parquet(wrappers, tmp_path):
     assert stored.wrappers == spec.wrappers
     assert stored.run_id == spec.run_id
     assert run_one(stored).same_results(record)
-    assert set(record.contributed) <= set(KNOWN_CONTRIBUTIONS)
+    assert set(record.contributed) <= set(CONTRIBUTED_COLUMNS)
 
 
 def test_every_difference_between_wrappers_is_another_run():
