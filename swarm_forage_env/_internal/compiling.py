@@ -45,7 +45,8 @@ _COMPILED_IN_EVERYWHERE = tuple(
 )
 """Modules whose functions and constants are compiled into those of other folders."""
 _COMPILED_IN_BY_FOLDER = {
-    _PACKAGE / "wrappers/kernels": (_PACKAGE / "world/kernels/drive.py", _PACKAGE / "world/kernels/kinds.py")
+    _PACKAGE / "world/kernels": (_PACKAGE / "world/state.py",),
+    _PACKAGE / "wrappers/kernels": (_PACKAGE / "world/kernels/drive.py", _PACKAGE / "world/kernels/kinds.py"),
 }
 """Further modules that are compiled into the functions of one folder."""
 

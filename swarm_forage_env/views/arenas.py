@@ -313,9 +313,8 @@ class ArenaBatch:
         else:
             n_terminated = [
                 book_rows(
+                    arena.forage_env.swarm,
                     ticks[number][0],
-                    arena.forage_env.swarm.present,
-                    arena.forage_env.active,
                     *(row[: arena.n_robots] for row in rows),
                 )
                 for number, (arena, *rows) in enumerate(zip(self.arenas, rewards, *self._rows, *flags, strict=True))

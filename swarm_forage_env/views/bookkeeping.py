@@ -10,7 +10,6 @@ from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, Obs
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.views.learner_arena import LearnerArena
 from swarm_forage_env.world.kernels.lockstep import book_each, pay_each
-from swarm_forage_env.world.kernels.reward import Robots
 from swarm_forage_env.world.lockstep import addresses, are_others
 from swarm_forage_env.world.rewards import RewardModel
 
@@ -60,9 +59,9 @@ class Bookkeeping:
         self.pays = plain and len(payments) == len(environments) and len(kinds) == 1
         self._payments = payments[:1], np.array([addresses(payment) for payment in payments], np.intp)
         self.copies = plain and all(arena.interface.shows_all for arena in self._arenas)
-        robots = [Robots(env.terminated, env.swarm.present, env.swarm.active, env.arena.obs) for env in environments]
+        robots = [(env.swarm, env.terminated, env.last_obs) for env in environments]
         self._robots = robots[0], np.array([addresses(each) for each in robots], np.intp)
-        self._no_obs = np.empty((0, *robots[0].obs.shape), np.float32)
+        self._no_obs = np.empty((0, *environments[0].last_obs.shape), np.float32)
 
     def remember(self, seats: Sequence[int]) -> None:
         """Keep what rewards need of the world before a tick."""

@@ -16,19 +16,18 @@ from swarm_forage_env.contract.policy import CompiledPolicy, layout_for, refused
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import MAX_HANDLING_TICKS, ScenarioConfig
 from swarm_forage_env.scenarios.units import CELLS_PER_M
+from swarm_forage_env.world.allocation import new_arrays, new_state
 from swarm_forage_env.world.bodies import Bodies
 from swarm_forage_env.world.caches import (
     create_dynamic_caches,
     create_static_caches,
-    n_cache_slots,
     restore_static_caches,
 )
-from swarm_forage_env.world.compiled import CompiledTick, new_world, tasks_of
-from swarm_forage_env.world.interactions import Interactions
+from swarm_forage_env.world.compiled import CompiledTick, tasks_of
 from swarm_forage_env.world.kernels.bodies import BodyState
+from swarm_forage_env.world.kernels.interact import drop_cargo
 from swarm_forage_env.world.kernels.kinds import blank
 from swarm_forage_env.world.kernels.tick import DONE, NO_ROOM, TO_PLACE, run
-from swarm_forage_env.world.kernels.world import World
 from swarm_forage_env.world.kinds import blank_boxes
 from swarm_forage_env.world.neighbourhood import Neighbourhood
 from swarm_forage_env.world.physics import Physics
@@ -40,7 +39,7 @@ from swarm_forage_env.world.placement import (
     static_cache_centres,
 )
 from swarm_forage_env.world.sensors import new_sensors, read_slices
-from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
+from swarm_forage_env.world.state import ArenaArrays, listed
 
 _FUNCTIONS = ("_compiled", "_own_sensors")
 """Attributes of an arena that hold functions: made when they are needed, for one run."""
@@ -93,15 +92,12 @@ class ForagingArena:
         config = self.config
         n_robots = config.robots.n_robots
         self.tick = 0
-        self.swarm = SwarmState.empty(n_robots)
-        self.objects = ObjectState.empty(config)
-        self.caches = CacheState.empty(n_cache_slots(config))
-        self.events = StepEvents.empty(n_robots)
+        state = new_state(config)
+        self.swarm, self.objects, self.caches, self.events, self._requests = state
         self._placement_rng = stream_rng(seed, Stream.PLACEMENT)
         self._walk_chance = TickDraws(stream_rng(seed, Stream.OBJECT_MOTION), config.objects.n_objects)
         self._pick_chance = TickDraws(stream_rng(seed, Stream.INTERACTION), n_robots)
         self._cache_rng = stream_rng(seed, Stream.CACHE)
-        self._interactions = Interactions(config, self.swarm, self.objects, self.caches, self.events)
         self._furnish()
         position, heading = draw_start_poses(config, stream_rng(seed, Stream.START_POSE))
         self.swarm.position[:], self.swarm.heading[:] = position, heading
@@ -112,24 +108,16 @@ class ForagingArena:
         else:
             self._physics = Physics(config, position, heading, keeps_history=self._snapshots)
         self.obs = sensors.obs
-        self._world = new_world(
-            config,
-            self.swarm,
-            self.events,
-            self._interactions,
-            sensors,
-            self._physics.twist,
-            self._static_caches,
-        )
+        self._arrays = new_arrays(config, state, sensors, self._physics.twist, self._static_caches)
         for name in _FUNCTIONS:
-            vars(self).pop(name, None)  # those of the run before hold its world
+            vars(self).pop(name, None)  # those of the run before hold its arrays
         self._neighbourhood = Neighbourhood(config.robots, self.layout, self.reads)
         self.has_changed = False
         return self.observe()
 
     @cached_property
     def _compiled(self) -> CompiledTick:
-        return CompiledTick(self._world, self._physics.state if isinstance(self._physics, Bodies) else None)
+        return CompiledTick(self._arrays, self._physics.state if isinstance(self._physics, Bodies) else None)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what copies and snapshots are made of: everything but functions, which cannot all be stored."""
@@ -140,7 +128,7 @@ class ForagingArena:
 
     def observe(self) -> ObsArray:
         """Return the observation (N, D) of the world as it is now; only needed after a change between two steps."""
-        self._compiled.observe(self._world)
+        self._compiled.observe(self._arrays)
         self._sense_further()
         return self.obs
 
@@ -205,16 +193,16 @@ class ForagingArena:
         """
         tick = self.tick + 1
         gain = self._unit_gain if wheel_gain is None else np.ascontiguousarray(wheel_gain, np.float64)
-        world, compiled, physics = self._world, self._compiled, self._physics
+        arrays, compiled, physics = self._arrays, self._compiled, self._physics
         picks, walks = self.draws(tick)
         draws = picks[0], walks[0]
         if isinstance(physics, Bodies):
-            outcome = compiled.whole(world, physics.state, actions, gain, tick, self.has_changed, *draws)
+            outcome = compiled.whole(arrays, physics.state, actions, gain, tick, self.has_changed, *draws)
         else:
-            outcome = compiled.set_out(world, actions, gain, tick, self.has_changed)
+            outcome = compiled.set_out(arrays, actions, gain, tick, self.has_changed)
             if outcome == DONE:
                 physics.advance(self.swarm)
-                outcome = compiled.meet_and_close(world, actions, tick, *draws)
+                outcome = compiled.meet_and_close(arrays, actions, tick, *draws)
         self.conclude(outcome, actions, gain, tasks)
         return self.obs
 
@@ -256,12 +244,12 @@ class ForagingArena:
         picks, walks = self.draws(self.tick)
         if outcome == NO_ROOM:
             self._physics.advance(self.swarm)
-            outcome = self._compiled.meet_and_close(self._world, actions, self.tick, picks[0], walks[0])
+            outcome = self._compiled.meet_and_close(self._arrays, actions, self.tick, picks[0], walks[0])
         if outcome == TO_PLACE:
             self._create_dynamic_caches()
             self._replace_displaced()
             self._restore_caches(tasks)
-            self._compiled.close(self._world, walks[0])
+            self._compiled.close(self._arrays, walks[0])
 
     def run(self, policy: CompiledPolicy, n_ticks: int, task_shares: FloatArray) -> None:
         """Let a compiled policy drive the world for some ticks; what happens is what `step` and `act` do by turns.
@@ -282,7 +270,7 @@ class ForagingArena:
             picks, walks = self.draws(first)
             n_drawn = min(len(rows) for rows in (policy_draws, picks, walks) if rows is not self._nothing)
             arguments = (
-                self._world,
+                self._arrays,
                 bodies.state,
                 self._unit_gain,
                 first,
@@ -322,31 +310,31 @@ class ForagingArena:
         return self._physics
 
     @property
-    def parts(self) -> tuple[World, BodyState]:
+    def parts(self) -> tuple[ArenaArrays, BodyState]:
         """What the compiled tick works on; other objects after a reset, and where bodies need more room."""
-        return self._world, self.bodies.state
+        return self._arrays, self.bodies.state
 
     def _create_dynamic_caches(self) -> None:
-        creators = self._interactions.creators()
+        creators = listed(self._requests.creators)
         if len(creators):
             create_dynamic_caches(
                 creators,
                 self.config,
                 self._source,
-                self._robot_cells(),
+                self._robot_squares(),
                 self.objects,
                 self.caches,
                 self.events,
                 self._cache_rng,
             )
 
-    def _robot_cells(self) -> IntArray:
+    def _robot_squares(self) -> IntArray:
         nx, ny = self.config.arena.n_cells
-        cells = np.floor(self.swarm.position * CELLS_PER_M).astype(np.int32)
-        return np.clip(cells, 0, (nx - 1, ny - 1))
+        squares = np.floor(self.swarm.position * CELLS_PER_M).astype(np.int32)
+        return np.clip(squares, 0, (nx - 1, ny - 1))
 
     def _replace_displaced(self) -> None:
-        rows = self._interactions.displaced()
+        rows = listed(self._requests.displaced)
         if len(rows):
             area = self.config.arena.distributable_cells
             place_objects(rows, self.objects, self._source, area, self._placement_rng)
@@ -371,7 +359,7 @@ class ForagingArena:
         """
         for name, ticks in (("pickup", pickup), ("drop", drop)):
             whole(f"{name}, in ticks,", ticks, at_least=1, at_most=MAX_HANDLING_TICKS)
-        self._interactions.set_handling_ticks(pickup=pickup, drop=drop)
+        self._requests.handling_ticks[:] = pickup, drop
 
     def set_population(self, *, active: BoolArray, present: BoolArray) -> None:
         """Set which robots are in the world and which are at work; takes effect in the next step.
@@ -395,7 +383,7 @@ class ForagingArena:
             raise ValueError("Expected active robots to be present; a robot that is not in the world cannot work.")
         leaving = np.flatnonzero(swarm.present & ~present)
         for robot in leaving.tolist():
-            self._interactions.drop_cargo(robot)
+            drop_cargo(self._arrays.state, self._arrays.rules, robot)
             self._replace_displaced()
             self._physics.park(robot)
             swarm.wheel_speed[robot] = 0.0

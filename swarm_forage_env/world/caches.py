@@ -11,7 +11,7 @@ from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.regions import Box, overlap_cells, square_box
 from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.placement import Source, static_cache_centres
-from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
+from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState, listed, make_list
 
 MAX_PASSES = 100
 """Attempts to push a new dynamic cache clear of nest, sources and caches before the place is given up."""
@@ -51,15 +51,13 @@ def create_cache(
     objects.status[rows] = ObjectStatus.CACHED
     objects.cell[rows] = centre_cell
     objects.cache_slot[rows] = slot
-    if objects.waiting:
-        joined = set(rows.tolist())
-        objects.waiting = [row for row in objects.waiting if row not in joined]
-    caches.last_serial += 1
+    waiting = listed(objects.waiting)
+    make_list(objects.waiting, waiting[~np.isin(waiting, rows)])
+    events.counters[Counter.CACHES_CREATED] += 1
     caches.alive[slot] = True
     caches.cell[slot] = centre_cell
-    caches.serial[slot] = caches.last_serial
+    caches.serial[slot] = events.counters[Counter.CACHES_CREATED]
     caches.count[slot] = len(rows)
-    events.counters[Counter.CACHES_CREATED] += 1
     return slot
 
 

@@ -16,17 +16,13 @@ from swarm_forage_env._internal.compiling import compile_part, direct, is_new
 from swarm_forage_env.contract.policy import CompiledPolicy, layout_for
 from swarm_forage_env.contract.types import ActionArray, CodeArray, FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.world.allocation import new_arrays, new_state
 from swarm_forage_env.world.bodies import Bodies
-from swarm_forage_env.world.caches import n_cache_slots
-from swarm_forage_env.world.interactions import Interactions
 from swarm_forage_env.world.kernels import tick
 from swarm_forage_env.world.kernels.bodies import BodyState, move_bodies, tell_poses
 from swarm_forage_env.world.kernels.interact import serve
-from swarm_forage_env.world.kernels.world import Sensors, Wandering, World
-from swarm_forage_env.world.kinds import speeds
-from swarm_forage_env.world.motion import TOUCH_SLACK_M, drive_limits, new_memory
 from swarm_forage_env.world.sensors import new_sensors
-from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents, SwarmState
+from swarm_forage_env.world.state import ArenaArrays
 
 Call = tuple[Callable[..., Any], *tuple[Any, ...]]
 """A kernel and arguments of the types that it is called with."""
@@ -35,12 +31,12 @@ Call = tuple[Callable[..., Any], *tuple[Any, ...]]
 class ExampleCalls:
     """A call of each function of `kernels.tick`, as runs make it: what is compiled beforehand is what they ask for."""
 
-    def __init__(self, world: World, bodies: BodyState | None) -> None:
-        """Take world and bodies (None where Chipmunk has them) from a run, or empty ones; only types matter."""
-        n_robots = len(world.present)
+    def __init__(self, arrays: ArenaArrays, bodies: BodyState | None) -> None:
+        """Take arrays and bodies (None where Chipmunk has them) from a run, or empty ones; only types matter."""
+        n_robots = len(arrays.state.swarm.present)
         self.actions: ActionArray = np.zeros((n_robots, 3), np.float32)
         self.draws: FloatArray = np.zeros(n_robots)
-        self._world, self._bodies = world, bodies
+        self._arrays, self._bodies = arrays, bodies
         self._gain: FloatArray = np.zeros((n_robots, 2))
 
     @property
@@ -52,34 +48,34 @@ class ExampleCalls:
     @property
     def observe(self) -> Call:
         """Of `kernels.tick.observe`."""
-        return tick.observe, self._world
+        return tick.observe, self._arrays
 
     @property
     def set_out(self) -> Call:
         """Of `kernels.tick.set_out`."""
-        return tick.set_out, self._world, self.actions, self._gain, 0, False
+        return tick.set_out, self._arrays, self.actions, self._gain, 0, False
 
     @property
     def meet_and_close(self) -> Call:
         """Of `kernels.tick.meet_and_close`."""
-        return tick.meet_and_close, self._world, self.actions, 0, self.draws, self.draws
+        return tick.meet_and_close, self._arrays, self.actions, 0, self.draws, self.draws
 
     @property
     def close(self) -> Call:
         """Of `kernels.tick.close`."""
-        return tick.close, self._world, self.draws
+        return tick.close, self._arrays, self.draws
 
     @property
     def whole(self) -> Call:
         """Of `kernels.tick.whole`; for compiled bodies only."""
-        return tick.whole, self._world, self.bodies, self.actions, self._gain, 0, False, self.draws, self.draws
+        return tick.whole, self._arrays, self.bodies, self.actions, self._gain, 0, False, self.draws, self.draws
 
     def run(self, policy: CompiledPolicy) -> Call:
         """Of `kernels.tick.run`, for a policy that has been reset; for compiled bodies only."""
         rows = self.draws[None]
         of_policy = policy.callback, policy.state, 0, rows[None]
         tasks = tasks_of(policy), np.zeros(1)
-        return tick.run, self._world, self.bodies, self._gain, 0, 0, False, *of_policy, rows, rows, *tasks
+        return tick.run, self._arrays, self.bodies, self._gain, 0, 0, False, *of_policy, rows, rows, *tasks
 
 
 def tasks_of(policy: CompiledPolicy) -> CodeArray:
@@ -93,90 +89,51 @@ class CompiledTick:
     They are called without a look at the arguments, which must be contiguous arrays of exactly these types.
     """
 
-    def __init__(self, world: World, bodies: BodyState | None) -> None:
+    def __init__(self, arrays: ArenaArrays, bodies: BodyState | None) -> None:
         """Take the types of the arguments from a run; the types are the same in all runs of a scenario.
 
         Args:
-            world: State and constants of the run.
+            arrays: State and constants of the run.
             bodies: Compiled bodies, None where Chipmunk has them.
         """
-        self._calls = ExampleCalls(world, bodies)
+        self._calls = ExampleCalls(arrays, bodies)
 
     @cached_property
-    def observe(self) -> Callable[[World], None]:
+    def observe(self) -> Callable[[ArenaArrays], None]:
         """See `kernels.tick.observe`."""
         return direct(*self._calls.observe)
 
     @cached_property
-    def set_out(self) -> Callable[[World, ActionArray, FloatArray, int, bool], int]:
+    def set_out(self) -> Callable[[ArenaArrays, ActionArray, FloatArray, int, bool], int]:
         """See `kernels.tick.set_out`."""
         return direct(*self._calls.set_out)
 
     @cached_property
-    def meet_and_close(self) -> Callable[[World, ActionArray, int, FloatArray, FloatArray], int]:
+    def meet_and_close(self) -> Callable[[ArenaArrays, ActionArray, int, FloatArray, FloatArray], int]:
         """See `kernels.tick.meet_and_close`."""
         return direct(*self._calls.meet_and_close)
 
     @cached_property
-    def close(self) -> Callable[[World, FloatArray], None]:
+    def close(self) -> Callable[[ArenaArrays, FloatArray], None]:
         """See `kernels.tick.close`."""
         return direct(*self._calls.close)
 
     @cached_property
-    def whole(self) -> Callable[[World, BodyState, ActionArray, FloatArray, int, bool, FloatArray, FloatArray], int]:
+    def whole(
+        self,
+    ) -> Callable[[ArenaArrays, BodyState, ActionArray, FloatArray, int, bool, FloatArray, FloatArray], int]:
         """See `kernels.tick.whole`; for compiled bodies only."""
         return direct(*self._calls.whole)
 
 
-def new_world(
-    config: ScenarioConfig,
-    swarm: SwarmState,
-    events: StepEvents,
-    interactions: Interactions,
-    sensors: Sensors,
-    twist: FloatArray,
-    n_static_caches: int,
-) -> World:
-    """Bind the state of a run and what else a tick needs; the arrays must not be replaced afterwards, only edited."""
-    n_robots = config.robots.n_robots
-    return World(
-        state=interactions.state,
-        rules=interactions.rules,
-        heading=swarm.heading,
-        facing=swarm.facing,
-        wheel_speed=swarm.wheel_speed,
-        present=swarm.present,
-        twist=twist,
-        command=np.zeros((n_robots, 2)),
-        drive_limits=drive_limits(config),
-        speeds=speeds(config.robots),
-        dt_s=config.dt_s,
-        touch_m=2 * config.robots.radius_m + TOUCH_SLACK_M,
-        pressing=(new_memory(n_robots), new_memory(n_robots)),
-        sensors=sensors,
-        interfering=events.interfering,
-        interference_sum=events.interference_sum,
-        wandering=Wandering(
-            probability=config.objects.walk_probability,
-            area=config.arena.distributable_cells,
-            self_conflict=config.quirks.motion_self_conflict,
-        ),
-        n_static_caches=n_static_caches,
-        has_caches=config.caches != "none",
-    )
-
-
-def _empty_parts(config: ScenarioConfig) -> tuple[World, BodyState | None]:
-    """Return a world in which nothing is: its types are those of every run of the scenario."""
-    n_robots = config.robots.n_robots
-    swarm, events = SwarmState.empty(n_robots), StepEvents.empty(n_robots)
-    objects, caches = ObjectState.empty(config), CacheState.empty(n_cache_slots(config))
+def _empty_parts(config: ScenarioConfig) -> tuple[ArenaArrays, BodyState | None]:
+    """Return an arena in which nothing is: its types are those of every run of the scenario."""
+    state = new_state(config)
     sensors = new_sensors(config, layout_for(config), None)
-    interactions = Interactions(config, swarm, objects, caches, events)
-    twist, bodies = np.zeros((n_robots + 1, 3)), None
+    twist, bodies = np.zeros((config.robots.n_robots + 1, 3)), None
     if config.physics == "compiled":
-        bodies = Bodies(config, swarm.position, swarm.heading, sensors.near, sensors.bins).state
-    return new_world(config, swarm, events, interactions, sensors, twist, 0), bodies
+        bodies = Bodies(config, state.swarm.position, state.swarm.heading, sensors.near, sensors.bins).state
+    return new_arrays(config, state, sensors, twist, 0), bodies
 
 
 def compile_half(config: ScenarioConfig, half: int) -> None:
@@ -192,15 +149,15 @@ def compile_half(config: ScenarioConfig, half: int) -> None:
 
 def parts_of(config: ScenarioConfig, half: int) -> tuple[Call, ...]:
     """Return the outer kernels of a half: what robots see and how they set out (0); what they do, and bodies (1)."""
-    world, bodies = _empty_parts(config)
-    calls = ExampleCalls(world, bodies)
+    arrays, bodies = _empty_parts(config)
+    calls, swarm, motion = ExampleCalls(arrays, bodies), arrays.state.swarm, arrays.motion
     if half == 0:
         return calls.close, calls.set_out
-    serving = serve, world.state, world.rules, calls.actions, 0, calls.draws
+    serving = serve, arrays.state, arrays.rules, calls.actions, 0, calls.draws
     if bodies is None:
         return (serving,)
-    poses = bodies.poses, world.present, world.state.position, world.heading, world.facing
-    return serving, (move_bodies, bodies, world.twist, world.present, world.dt_s), (tell_poses, *poses)
+    poses = bodies.poses, swarm.present, swarm.position, swarm.heading, swarm.facing
+    return serving, (move_bodies, bodies, motion.twist, swarm.present, motion.dt_s), (tell_poses, *poses)
 
 
 def outermost(config: ScenarioConfig, policy: CompiledPolicy | None) -> Call:

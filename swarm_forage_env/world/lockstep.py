@@ -11,7 +11,7 @@ from swarm_forage_env.contract.types import ActionArray, FloatArray
 from swarm_forage_env.world.arena import ForagingArena
 from swarm_forage_env.world.kernels.bodies import BodyState
 from swarm_forage_env.world.kernels.lockstep import whole_each
-from swarm_forage_env.world.kernels.world import World
+from swarm_forage_env.world.state import ArenaArrays
 
 
 def can_go_in_lockstep(arenas: Sequence[ForagingArena]) -> bool:
@@ -45,7 +45,7 @@ class Lockstep:
         self.arenas = tuple(arenas)
         self._draws_picks = config.caches != "none"
         self._draws_walks = config.objects.walk_probability > 0.0
-        self._seated: list[tuple[World, BodyState]] = []
+        self._seated: list[tuple[ArenaArrays, BodyState]] = []
         self._has_gain = [False] * n_seats
         self._gain = np.ones((n_seats, n_robots, 2))
         self._ticks = np.zeros(n_seats, np.int64)

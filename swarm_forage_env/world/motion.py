@@ -28,7 +28,8 @@ import numpy as np
 from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
-from swarm_forage_env.world.kernels.world import Memory
+from swarm_forage_env.world.kinds import speeds
+from swarm_forage_env.world.state import Motion, Touching
 
 TOUCH_SLACK_M = 0.001
 """Gap within which two robots still touch: one that physics leaves when it undoes an overlap does not part a pair."""
@@ -42,8 +43,26 @@ def drive_limits(config: ScenarioConfig) -> FloatArray:
     return np.array([WHEEL_SCALE_MPS, robots.max_speed_mps, robots.max_wheel_difference_mps, robots.wheel_base_m])
 
 
-def new_memory(n_robots: int) -> Memory:
-    """Return room for the pairs in touch of a swarm, with none."""
+def new_motion(config: ScenarioConfig, twist: FloatArray) -> Motion:
+    """Return what robots are driven with, none of them in touch.
+
+    Args:
+        config: The scenario.
+        twist: (N + 1, 3) velocities that the bodies take.
+    """
+    n_robots = config.robots.n_robots
+    return Motion(
+        twist=twist,
+        command=np.zeros((n_robots, 2)),
+        drive_limits=drive_limits(config),
+        speeds=speeds(config.robots),
+        dt_s=config.dt_s,
+        touch_m=2 * config.robots.radius_m + TOUCH_SLACK_M,
+        touching=(_nobody_touching(n_robots), _nobody_touching(n_robots)),
+    )
+
+
+def _nobody_touching(n_robots: int) -> Touching:
     return (
         np.zeros(n_robots, np.int32),
         np.full((n_robots, PARTNER_SLOTS), -1, np.int32),

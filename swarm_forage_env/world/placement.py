@@ -18,7 +18,7 @@ from swarm_forage_env.scenarios.regions import Box, overlap_cells, square_box
 from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.clusters import draw_clusters
 from swarm_forage_env.world.kernels.placement import DRAWS, UNLIMITED, scatter
-from swarm_forage_env.world.state import ObjectState
+from swarm_forage_env.world.state import ObjectState, listed, make_list
 
 _CHUNK = 8192
 """Objects whose random numbers are held in memory at once."""
@@ -116,15 +116,14 @@ def place_objects(
     """
     if len(rows) == 0:
         return
-    newest = [int(row) for row in rows]
+    newest = np.asarray(rows, np.int32)
     # Trying in this order until the first failure is the same as trying the whole waiting list after every new object:
     # if there is no cell for one object, there is none for the later ones, and if all are placed, the list is empty.
-    queue = np.array([newest[0], *objects.waiting, *newest[1:]], np.int32)
+    queue = np.concatenate((newest[:1], listed(objects.waiting), newest[1:]))
     n_placed = _place_until_full(queue, objects, source, distributable_box, rng)
     if n_placed == 0:
-        objects.waiting.extend(newest)
-    else:
-        objects.waiting[:] = queue[n_placed:].tolist()
+        queue = np.concatenate((listed(objects.waiting), newest))
+    make_list(objects.waiting, queue[n_placed:])
 
 
 def place_all(objects: ObjectState, source: Source, distributable_box: Box, rng: np.random.Generator) -> None:
@@ -139,13 +138,13 @@ def place_all(objects: ObjectState, source: Source, distributable_box: Box, rng:
     Raises:
         ConfigError: the source has too few free cells; the message says how many objects fit.
     """
-    queue = np.array(objects.waiting, np.int32)
+    queue = listed(objects.waiting).copy()
     n_placed = _place_until_full(queue, objects, source, distributable_box, rng)
-    objects.waiting[:] = queue[n_placed:].tolist()
-    if objects.waiting:
+    make_list(objects.waiting, queue[n_placed:])
+    if n_placed < len(queue):
         n_objects = len(objects.status)
         raise ConfigError(
-            f"Expected at most {n_objects - len(objects.waiting)} objects (one per free cell of the source, up to its "
+            f"Expected at most {n_objects - len(queue) + n_placed} objects (one per free cell of the source, up to its "
             f"capacity), got {n_objects}; ask for fewer objects or a larger arena."
         )
 

@@ -16,10 +16,9 @@ from swarm_forage_env.contract.layout import KIND, LIGHT_IF_CARRYING, MESSAGES, 
 from swarm_forage_env.contract.types import ObsArray
 from swarm_forage_env.scenarios.config import ArenaConfig, ScenarioConfig
 from swarm_forage_env.scenarios.units import CELL_M, WHEEL_SCALE_MPS
-from swarm_forage_env.world.kernels.world import Columns, Sensors
 from swarm_forage_env.world.kinds import blank_boxes, half_windows, kind_columns
 from swarm_forage_env.world.physics import obstacle_rows
-from swarm_forage_env.world.state import ObjectState, SwarmState
+from swarm_forage_env.world.state import Columns, ObjectState, Sensors, SwarmState
 
 PROXIMITY_RANGE_M = 0.1
 """Reach of a proximity beam beyond the body."""

@@ -1,19 +1,35 @@
-"""The state of the world as arrays: robots, objects, caches, this tick's events. Row i is always robot i.
+"""The arrays of a world, in named tuples that Python and compiled functions share.
 
+N, M, K are the numbers of robots, objects and cache slots. Row i is always robot i. Arrays are edited, never replaced.
 There are no rules here; every rule is a function in another module of this folder, which edits the arrays it names.
+A *list* is an array with room for all entries there can be, and one more place at the end that holds their number.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from swarm_forage_env.contract.codes import CELL_EMPTY, CELL_NEST, CELL_OBSTACLE, Counter, ObjectStatus
-from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray
-from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.contract.codes import Counter, ObjectStatus
+from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+
+N_HANDLERS = 5
+"""Kinds of interactions of which a tick can finish one, see `kernels.interact`."""
 
 
-@dataclass(slots=True)
-class SwarmState:
+def listed(entries: IntArray) -> IntArray:
+    """Return the entries of a list, a view."""
+    return entries[: entries[-1]]
+
+
+def make_list(entries: IntArray, values: IntArray | Sequence[int]) -> None:
+    """Let a list hold these values."""
+    entries[: len(values)] = values
+    entries[len(values) : -1] = -1
+    entries[-1] = len(values)
+
+
+class SwarmState(NamedTuple):
     """All robots that can appear in a run. SI units, arena frame with the origin at the lower left."""
 
     position: FloatArray
@@ -64,56 +80,46 @@ class SwarmState:
         )
 
 
-@dataclass(slots=True)
-class ObjectState:
+class ObjectState(NamedTuple):
     """All objects and the floor they lie on."""
 
     floor: IntArray
-    """(ny, nx) code per cell, row = y: object row, CELL_EMPTY, CELL_NEST, CELL_OBSTACLE or CELL_CACHE - slot."""
+    """(ny, nx) code per square, row = y: object row, CELL_EMPTY, CELL_NEST, CELL_OBSTACLE or CELL_CACHE - slot."""
     status: CodeArray
     """(M,) ObjectStatus."""
     cell: IntArray
-    """(M, 2) cell (x, y) of a free object; the cache's centre cell of a cached one; else (-1, -1)."""
+    """(M, 2) square (x, y) of a free object; the cache's centre square of a cached one; else (-1, -1)."""
     cache_slot: IntArray
     """(M,) cache slot of a cached object, else -1."""
     carriers: IntArray
     """(M,) robots that have carried the object since it was last placed."""
-    waiting: list[int] = field(default_factory=list)
-    """Rows of waiting objects, longest wait first."""
+    waiting: IntArray
+    """(M + 1,) list of the rows of waiting objects, longest wait first."""
 
     @classmethod
-    def empty(cls, config: ScenarioConfig) -> "ObjectState":
-        """All objects waiting, the floor painted with obstacles and nest only."""
-        n_objects = config.objects.n_objects
-        nx, ny = config.arena.n_cells
-        floor = np.full((ny, nx), CELL_EMPTY, np.int32)
-        # The nest comes last: an obstacle beside it may keep cells free that reach into it.
-        painted = [*((box, CELL_OBSTACLE) for box in config.obstacle_cells), (config.arena.nest_cells, CELL_NEST)]
-        for (x_low, y_low, x_high, y_high), code in painted:
-            floor[y_low:y_high, x_low:x_high] = code
+    def empty(cls, floor: IntArray, n_objects: int) -> "ObjectState":
+        """All objects waiting, beside a floor on which none lies."""
         return cls(
             floor=floor,
             status=np.full(n_objects, ObjectStatus.WAITING, np.int8),
             cell=np.full((n_objects, 2), -1, np.int32),
             cache_slot=np.full(n_objects, -1, np.int32),
             carriers=np.zeros(n_objects, np.int32),
-            waiting=list(range(n_objects)),
+            waiting=np.arange(n_objects + 1, dtype=np.int32),
         )
 
 
-@dataclass(slots=True)
-class CacheState:
+class CacheState(NamedTuple):
     """Cache slots. A slot is reused after its cache is gone; a serial number is never reused."""
 
     alive: BoolArray
     """(K,) whether the slot holds a cache."""
     cell: IntArray
-    """(K, 2) centre cell (x, y)."""
+    """(K, 2) centre square (x, y)."""
     serial: IntArray
     """(K,) serial number of the cache, from 1, in order of creation; 0 = slot never used."""
-    count: IntArray
+    count: IntArray  # pyright: ignore[reportIncompatibleMethodOverride] - nobody counts values of the tuple
     """(K,) objects inside; at least 2 while alive, 0 otherwise."""
-    last_serial: int = 0
 
     @classmethod
     def empty(cls, n_slots: int) -> "CacheState":
@@ -126,8 +132,7 @@ class CacheState:
         )
 
 
-@dataclass(slots=True)
-class StepEvents:
+class StepEvents(NamedTuple):
     """What happened in this tick, per robot, rewritten in place; and cumulative counters."""
 
     code: CodeArray
@@ -135,7 +140,7 @@ class StepEvents:
     event_object: IntArray
     """(N,) object row of the event, -1 = none."""
     event_cache: IntArray
-    """(N, 4) serial, centre cell x, y, count of the event's cache; serial 0 = none."""
+    """(N, 4) serial, centre square x, y, count of the event's cache; serial 0 = none."""
     first_picked: BoolArray
     """(N,) picked up an object that no robot had carried since it was placed."""
     interfering: BoolArray
@@ -160,3 +165,167 @@ class StepEvents:
             counters=np.zeros(len(Counter), np.int64),
             interference_sum=np.zeros(1),
         )
+
+
+class Requests(NamedTuple):
+    """What robots ask for in a tick, while it is served, and what is left to be placed afterwards."""
+
+    queue: IntArray
+    """(2 N,) scratch: robots with a request and what they ask."""
+    handler_used: BoolArray
+    """(N_HANDLERS,) scratch: kinds of interaction that finished this tick."""
+    displaced: IntArray
+    """(N + 1,) list of objects to re-place: delivered, or dropped without a free square."""
+    creators: IntArray
+    """(N + 1,) list of robots whose CREATE_CACHE drop left an object lying at their square."""
+    handling_ticks: IntArray
+    """(2,) ticks that a pick-up and a drop take which start in this tick, at least 1."""
+
+    @classmethod
+    def empty(cls, n_robots: int, pickup_ticks: int, drop_ticks: int) -> "Requests":
+        """No requests."""
+        return cls(
+            queue=np.zeros(2 * n_robots, np.int32),
+            handler_used=np.zeros(N_HANDLERS, np.bool_),
+            displaced=np.zeros(n_robots + 1, np.int32),
+            creators=np.zeros(n_robots + 1, np.int32),
+            handling_ticks=np.array([pickup_ticks, drop_ticks], np.int32),
+        )
+
+
+class WorldState(NamedTuple):
+    """Robots, objects, caches and what happens to them."""
+
+    swarm: SwarmState
+    objects: ObjectState
+    caches: CacheState
+    events: StepEvents
+    requests: Requests
+
+
+class Rules(NamedTuple):
+    """Constants of interactions."""
+
+    nest_x_low: float
+    nest_y_low: float
+    nest_x_high: float
+    nest_y_high: float
+    """Of the nest, in m."""
+    area_x_low: int
+    area_y_low: int
+    area_x_high: int
+    area_y_high: int
+    """Squares on which objects may lie, half-open."""
+    cache_half_side: int
+    """(cache side in squares - 1) / 2."""
+    cache_proximity_m: float
+    """SITE and CREATE_CACHE are refused this close to a cache centre."""
+    dynamic_caches: bool
+    serialized: bool
+    """At most one interaction per handler finishes in a tick (quirk `serialized_interactions`)."""
+
+
+class Columns(NamedTuple):
+    """First column of every slice of the observation that sensors write."""
+
+    proximity: int
+    light: int
+    ground: int
+    wheel_speed: int
+    carrying: int
+    los_cell: int
+    los_object: int
+    los_cache: int
+
+
+Bins: TypeAlias = tuple[float, IntArray, IntArray]
+"""Present robots by place, as of the last look: side of a bin's cells in m, first_in_bin (bins,), next_in_bin (N,),
+-1 = end; see `kernels.neighbourhood`."""
+
+
+class Sensors(NamedTuple):
+    """Buffers and constants of all sensors."""
+
+    obs: ObsArray
+    """(N, D), rewritten in every tick."""
+    near: BoolArray
+    """(N,) whether any proximity beam may have hit something in the last sweep."""
+    bins: Bins
+    columns: Columns
+    interior: FloatArray
+    """x low, y low, x high, y high of the free floor in m."""
+    lights: FloatArray
+    """(L, 3) x, y, height in m."""
+    intensity: float
+    radius_m: float
+    reach_m: float
+    """Of a proximity beam, beyond the body."""
+    scales: FloatArray
+    """Wheel scale in m/s, arena width and height in m."""
+    sizes: tuple[int, int, int]
+    """Squares along x, along y, objects."""
+    shares: ObsArray
+    """(M + 1,) what the window shows: 0 for no object, (row + 1) / M for each."""
+    obstacles: FloatArray
+    """(B, 4) boxes on the floor: x low, y low, x high, y high in m."""
+    cache_half_side: int
+    reads_light: bool
+    light_of_carriers_only: bool
+    reads_ground: bool
+    reads_line_of_sight: bool
+    behind_counts: bool
+    """Quirk `obstacle_behind_counts`."""
+    half_windows: IntArray
+    """(N,) squares that a robot sees on either side of its own."""
+    kinds: ObsArray
+    """(N, C) what robots observe of their kind; (0, C) where they do not differ."""
+    kind_start: int
+    """First column of that."""
+    blanks: IntArray
+    """(B, 4) what stays zero, as `kernels.kinds.blank` takes it."""
+
+
+Touching: TypeAlias = tuple[IntArray, IntArray, FloatArray]
+"""Pairs of robots in touch: number of partners (N,), partners (N, slots), common speeds (N, slots) in m/s."""
+
+
+class Motion(NamedTuple):
+    """How robots are driven, and how they press against each other."""
+
+    twist: FloatArray
+    """(N + 1, 3) velocity x, y in m/s and turn rate in rad/s, for the bodies; the last row stays zero."""
+    command: FloatArray
+    """(N, 2) scratch."""
+    drive_limits: FloatArray
+    """Wheel scale, centre-speed limit, difference limit in m/s, wheel base in m."""
+    speeds: FloatArray
+    """(N,) factor on the wheels' speeds of each robot, by its kind."""
+    dt_s: float
+    touch_m: float
+    """Distance of centres within which two robots touch."""
+    touching: tuple[Touching, Touching]
+    """Pairs in touch as of the last tick, by turns in the first (before even ticks) or in the second."""
+
+
+class Wandering(NamedTuple):
+    """How objects move by themselves."""
+
+    probability: float
+    """Per object and tick; 0 = they lie still."""
+    area: tuple[int, int, int, int]
+    """Squares on which they may lie, half-open box."""
+    self_conflict: bool
+    """Quirk `motion_self_conflict`."""
+
+
+class ArenaArrays(NamedTuple):
+    """Everything that a tick of an arena reads and writes."""
+
+    state: WorldState
+    rules: Rules
+    motion: Motion
+    sensors: Sensors
+    wandering: Wandering
+    n_static_caches: int
+    """Caches that are there again when they were used up; 0 where there are none or they are dynamic."""
+    has_caches: bool

@@ -11,7 +11,8 @@ from swarm_forage_env.rendering.view import PALETTE, THEMES
 from swarm_forage_env.scenarios.overrides import with_overrides
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.units import CELL_M
-from swarm_forage_env.world.state import CacheState, ObjectState, SwarmState
+from swarm_forage_env.world.allocation import new_objects
+from swarm_forage_env.world.state import CacheState, SwarmState
 
 CONFIG = scenario("warehouse_small", n_robots=2, n_objects=3)
 LAYOUT = observation_layout(32.0, 16.0, 3)
@@ -25,7 +26,7 @@ class Place:
     def __init__(self):
         self.swarm = SwarmState.empty(2)
         self.swarm.position[:] = [(16.1, 8.1), (3.0, 3.0)]
-        self.objects = ObjectState.empty(CONFIG)
+        self.objects = new_objects(CONFIG)
         self.obs = np.zeros(LAYOUT.size, np.float32)
 
     def draw(self, **options):

@@ -9,6 +9,7 @@ from swarm_forage_env.contract.codes import Counter, ObjectStatus
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.obstacles import distances_m
 from swarm_forage_env.scenarios.units import WHEEL_SCALE_MPS
+from swarm_forage_env.world.state import listed
 from swarm_forage_env.wrappers.recorder import TICK_MEANS, TOTALS, RunRecorder
 from tests.support.stage import assert_conserved
 
@@ -53,10 +54,10 @@ def look_at(env: ForageEnv, obs: np.ndarray, before: bytes = b"") -> tuple[float
 def _digest_of_objects(env: ForageEnv) -> bytes:
     """Digest of all that `assert_conserved` looks at."""
     objects, caches, swarm = env.objects, env.caches, env.swarm
-    happened = hashlib.sha256(repr(sorted(objects.waiting)).encode() + bytes([caches.last_serial % 256]))
+    happened = hashlib.sha256(np.sort(listed(objects.waiting)))
     lie = objects.floor, objects.status, objects.cell, objects.cache_slot, objects.carriers
     stand = caches.alive, caches.cell, caches.count, caches.serial
-    for array in (*lie, *stand, swarm.carried_object, swarm.present):
+    for array in (*lie, *stand, swarm.carried_object, swarm.present, env.events.counters[Counter.CACHES_CREATED]):
         happened.update(np.ascontiguousarray(array))
     return happened.digest()
 

@@ -22,6 +22,7 @@ from swarm_forage_env.contract.codes import (
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.caches import create_cache
+from swarm_forage_env.world.state import listed, make_list
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from tests.support import engines
 
@@ -60,9 +61,9 @@ def clear(env: ForageEnv) -> None:
     """Take all objects and caches out of the world; the test has to lay down every object before it goes on."""
     objects, caches = env.objects, env.caches
     objects.floor[(objects.floor >= 0) | (objects.floor <= CELL_CACHE)] = CELL_EMPTY
-    caches.alive[:], caches.count[:], caches.serial[:], caches.last_serial = False, 0, 0, 0
+    caches.alive[:], caches.count[:], caches.serial[:] = False, 0, 0
     objects.status[:], objects.cache_slot[:], objects.carriers[:], objects.cell[:] = ObjectStatus.WAITING, -1, 0, -1
-    objects.waiting.clear()
+    make_list(objects.waiting, [])
     env.events.counters[:] = 0
 
 
@@ -95,8 +96,7 @@ def lift(env: ForageEnv, row: int) -> None:
     objects = env.objects
     if objects.status[row] == ObjectStatus.FREE and objects.cell[row, 0] >= 0:
         objects.floor[objects.cell[row, 1], objects.cell[row, 0]] = CELL_EMPTY
-    if row in objects.waiting:
-        objects.waiting.remove(row)
+    make_list(objects.waiting, [other for other in listed(objects.waiting).tolist() if other != row])
     objects.cell[row] = -1
 
 
@@ -162,8 +162,7 @@ def snapshot(env: ForageEnv) -> dict[str, np.ndarray]:
     world: dict[str, np.ndarray] = {"tick": np.array(env.tick)}
     for name in ("swarm", "objects", "caches", "events"):
         state = getattr(env, name)
-        for field in type(state).__slots__:
-            world[f"{name}.{field}"] = np.array(getattr(state, field))
+        world |= {f"{name}.{field}": array.copy() for field, array in state._asdict().items()}
     return world
 
 
@@ -212,11 +211,11 @@ def assert_conserved(env: ForageEnv) -> None:
     assert np.array_equal(objects.cell[cached], caches.cell[objects.cache_slot[cached]]), "objects lie at their cache"
     serials = caches.serial[caches.alive]
     assert len(np.unique(serials)) == len(serials)
-    assert caches.serial.max(initial=0) <= caches.last_serial
+    assert caches.serial.max(initial=0) <= env.events.counters[Counter.CACHES_CREATED]
     # Robots: one object each, carried by nobody else; only robots in the world carry.
     carried = swarm.carried_object[swarm.carried_object >= 0]
     assert sorted(carried.tolist()) == np.flatnonzero(status == ObjectStatus.CARRIED).tolist()
     assert np.all(swarm.carried_object[~swarm.present] < 0)
     assert np.all(objects.carriers[carried] >= 1)
     # Waiting list.
-    assert sorted(objects.waiting) == np.flatnonzero(status == ObjectStatus.WAITING).tolist()
+    assert sorted(listed(objects.waiting).tolist()) == np.flatnonzero(status == ObjectStatus.WAITING).tolist()

@@ -10,6 +10,7 @@ from swarm_forage_env.contract.codes import CELL_CACHE, Counter, Grip, ObjectSta
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.regions import square_box
+from swarm_forage_env.world.allocation import new_objects
 from swarm_forage_env.world.caches import (
     count_cache_users,
     create_static_caches,
@@ -18,7 +19,7 @@ from swarm_forage_env.world.caches import (
     restore_static_caches,
 )
 from swarm_forage_env.world.placement import static_cache_centres
-from swarm_forage_env.world.state import CacheState, ObjectState, StepEvents
+from swarm_forage_env.world.state import CacheState, StepEvents, listed, make_list
 from tests.support.engines import in_each_engine
 from tests.support.stage import act, assert_conserved, build_cache, clear, lay, load, stand, tidy_world
 
@@ -227,7 +228,7 @@ def test_all_missing_caches_come_back_together():
         env.objects.floor[env.objects.floor == CELL_CACHE - slot] = -1
         env.objects.cache_slot[rows], env.objects.status[rows] = -1, ObjectStatus.WAITING
         env.objects.cell[rows] = -1
-        env.objects.waiting.extend(rows.tolist())
+        make_list(env.objects.waiting, [*listed(env.objects.waiting), *rows])
         env.caches.alive[slot], env.caches.count[slot] = False, 0
     actions = np.zeros((4, 3), np.float32)
     env.step_batch(actions, tasks=np.full(4, Task.HARVESTER, np.int8))
@@ -272,7 +273,7 @@ def test_a_freed_slot_is_used_again_under_a_new_serial():
 
 def test_creation_takes_waiting_objects_off_the_waiting_list():
     config = scenario("search_and_rescue", side_m=16.0, n_robots=1, caches="static")
-    objects, caches = ObjectState.empty(config), CacheState.empty(n_cache_slots(config))
+    objects, caches = new_objects(config), CacheState.empty(n_cache_slots(config))
     create_static_caches(config, objects, caches, StepEvents.empty(1), supply=ObjectStatus.WAITING)
-    assert objects.waiting == list(range(8, config.objects.n_objects))
+    assert listed(objects.waiting).tolist() == list(range(8, config.objects.n_objects))
     assert np.all(objects.status[:8] == ObjectStatus.CACHED)

@@ -12,6 +12,7 @@ from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.scenarios.regions import overlap_cells, square_box
 from swarm_forage_env.world.caches import MAX_PASSES, cache_members, clear_centre, protected_boxes
 from swarm_forage_env.world.placement import Source, place_objects
+from swarm_forage_env.world.state import listed
 from tests.support.engines import in_each_engine
 from tests.support.stage import act, assert_conserved, build_cache, clear, depot, lay, lift, load, stand, tidy_world
 
@@ -391,7 +392,7 @@ def test_a_cluster_takes_objects_on_the_cells_that_a_cache_leaves_to_it():
         range(2, 10), env.objects, env.arena._source, env.scenario.arena.distributable_cells, np.random.default_rng(0)
     )
     assert sorted(env.objects.cell[2:8].tolist()) == [[40, y] for y in range(44, 50)]
-    assert env.objects.waiting == [8, 9]
+    assert listed(env.objects.waiting).tolist() == [8, 9]
     assert np.count_nonzero(env.objects.floor == CELL_CACHE - slot) == 47 * 47
     assert_conserved(env)
     # A robot takes one of the last pair and delivers it: the square is floor again, and there is room for all.
@@ -401,7 +402,7 @@ def test_a_cluster_takes_objects_on_the_cells_that_a_cache_leaves_to_it():
     stand(env, 0, (120, 120))
     act(env, {0: Grip.DELIVER})
     assert act(env, {0: Grip.DELIVER})[0] == Event.DELIVERED
-    assert not env.objects.waiting
+    assert len(listed(env.objects.waiting)) == 0
     x, y = env.objects.cell.T
     assert np.count_nonzero((x >= 40) & (x < 48) & (y >= 44) & (y < 50)) == 9
     assert_conserved(env)

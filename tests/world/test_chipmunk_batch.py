@@ -20,7 +20,7 @@ def test_batch_rows_are_the_bodies_in_order():
     physics.park(3)
     swarm.present[3] = False
     for _ in range(20):
-        swarm.heading += rng.uniform(-0.5, 0.5, 30)
+        swarm.heading[:] += rng.uniform(-0.5, 0.5, 30)
         drive_at(physics, swarm, swarm.heading, 0.10)
         physics.twist[:] = 0.0
     bodies = [disc.body for disc in physics._shapes]

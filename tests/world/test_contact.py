@@ -161,20 +161,21 @@ class Pressing:
         """Stand the robots there."""
         env = ForageEnv(with_overrides(scenario("warehouse_small"), n_robots=len(places)))
         env.reset_batch(0)
-        self._world = env.arena._world
-        self._memory = self._world.pressing
+        self._arrays = env.arena._arrays
+        self._memory = self._arrays.motion.touching
         self.position = env.swarm.position
         self.position[:], env.swarm.present[:] = places, present
 
     def velocities(self, command: np.ndarray) -> np.ndarray:
         """Velocities (N, 3) after contact for commanded ones (N, 3)."""
-        world = self._world
-        look(world)
-        world.twist[:-1] = command
-        touching = world.sensors.near, world.sensors.bins, world.touch_m
-        press(self.position, world.present, *touching, *self._memory, world.command, world.twist)
+        sensors, motion = self._arrays.sensors, self._arrays.motion
+        look(self._arrays)
+        motion.twist[:-1] = command
+        touching = sensors.near, sensors.bins, motion.touch_m
+        present = self._arrays.state.swarm.present
+        press(self.position, present, *touching, *self._memory, motion.command, motion.twist)
         self._memory = self._memory[1], self._memory[0]
-        return world.twist[:-1].copy()
+        return motion.twist[:-1].copy()
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -9,6 +9,7 @@ from swarm_forage_env.contract.codes import CELL_EMPTY, Counter, Event, Grip, Ob
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.kernels.interact import CREATE_CACHE, DELIVER_ONLY, GRASP, RELEASE, SITE, band_of, serve
+from swarm_forage_env.world.state import listed
 from tests.support.engines import in_each_engine
 from tests.support.stage import (
     BASE_CELL,
@@ -307,9 +308,9 @@ def test_objects_without_any_free_cell_wait_and_come_back():
     assert len(source) == 28
     act(env, {0: Grip.DELIVER})
     assert act(env, {0: Grip.DELIVER, 1: Grip.DELIVER})[:2] == [DELIVERED, NONE]
-    assert env.objects.waiting == [30], "the source is full"
+    assert listed(env.objects.waiting).tolist() == [30], "the source is full"
     assert act(env, {1: Grip.DELIVER, 2: Grip.GRASP})[1] == DELIVERED
-    assert env.objects.waiting == [30, 31], "longest wait first"
+    assert listed(env.objects.waiting).tolist() == [30, 31], "longest wait first"
     assert np.all(env.objects.status[[30, 31]] == ObjectStatus.WAITING)
     assert_conserved(env)
     # A robot clears a cell and brings its object away: the newest object is tried first, the others wait on.
@@ -318,7 +319,7 @@ def test_objects_without_any_free_cell_wait_and_come_back():
     stand(env, 2, (3, 10))
     assert events_of(env, Grip.DELIVER, 2, robot=2) == [NONE, DELIVERED]
     assert env.objects.cell[taken].tolist() == list(source[0])
-    assert env.objects.waiting == [30, 31]
+    assert listed(env.objects.waiting).tolist() == [30, 31]
     assert_conserved(env)
     # Two cells at once: the newest object takes one, the one that waited longest the other.
     for row, cell in ((1, (20, 10)), (2, (22, 10))):
@@ -327,7 +328,7 @@ def test_objects_without_any_free_cell_wait_and_come_back():
     events_of(env, Grip.DELIVER, 2, robot=2)
     placed = {tuple(env.objects.cell[row].tolist()) for row in (33, 30)}
     assert placed == {source[1], source[2]}
-    assert env.objects.waiting == [31]
+    assert listed(env.objects.waiting).tolist() == [31]
     assert_conserved(env)
 
 
@@ -355,14 +356,14 @@ def test_an_object_leaves_a_cache_uniformly():
     env = tidy_world(caches="static")
     tally: Tally[int] = Tally()
     rng = np.random.default_rng(0)
-    interactions = env.arena._interactions
+    state, rules = env.arena._arrays.state, env.arena._arrays.rules
     slot = build_cache(env, [1, 4, 6, 7], BASE_CELL)
     stand(env, 0, BASE_CELL)
     rounds = 2000
     actions = np.array([[0, 0, Grip.GRASP]] + [[0, 0, Grip.RELEASE]] * 3, np.float32)
     for _ in range(rounds):
         for tick in (1, 2):
-            serve(interactions.state, interactions.rules, actions, tick, rng.random(4))
+            serve(state, rules, actions, tick, rng.random(4))
         row = int(env.swarm.carried_object[0])
         tally[row] += 1
         env.swarm.carried_object[0] = -1

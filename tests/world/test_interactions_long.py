@@ -174,7 +174,7 @@ def test_a_reset_restores_what_the_scenario_says():
     env = slow_world()
     env.set_handling_ticks(pickup=7, drop=8)
     env.reset_batch(1)
-    assert env.arena._interactions.state.handling_ticks.tolist() == [3, 2]
+    assert env.arena._requests.handling_ticks.tolist() == [3, 2]
 
 
 @pytest.mark.parametrize("ticks", [0, -1, 1.5, 2_000_000])

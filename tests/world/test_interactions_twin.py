@@ -10,6 +10,7 @@ from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import Quirks
 from swarm_forage_env.world.kernels import interact as kernel
+from swarm_forage_env.world.state import listed
 from tests.reference import interacting
 from tests.reference.interacting import SlowCache, SlowWorld
 from tests.support.stage import assert_conserved, build_cache
@@ -70,8 +71,8 @@ def mirror(env: ForageEnv) -> SlowWorld:
         cargo={robot: row for robot, row in enumerate(swarm.carried_object.tolist()) if row >= 0},
         pending=pending,
         until={robot: int(swarm.pending_until[robot]) for robot in pending},
-        pickup_ticks=int(env.arena._interactions.state.handling_ticks[0]),
-        drop_ticks=int(env.arena._interactions.state.handling_ticks[1]),
+        pickup_ticks=int(env.arena._requests.handling_ticks[0]),
+        drop_ticks=int(env.arena._requests.handling_ticks[1]),
         floor={tuple(objects.cell[row].tolist()): row for row in lying},
         caches={
             int(caches.serial[slot]): SlowCache(
@@ -93,9 +94,9 @@ def assert_same(env: ForageEnv, expected: SlowWorld) -> None:
     for name in ("cargo", "pending", "until", "floor", "caches", "carriers"):
         assert getattr(seen, name) == getattr(expected, name), name
     assert set(np.flatnonzero(env.events.first_picked).tolist()) == expected.first_picked
-    interactions = env.arena._interactions
-    assert interactions.displaced().tolist() == expected.displaced
-    assert interactions.creators().tolist() == expected.creators
+    requests = env.arena._requests
+    assert listed(requests.displaced).tolist() == expected.displaced
+    assert listed(requests.creators).tolist() == expected.creators
 
 
 def shuffle(env: ForageEnv, rng: np.random.Generator, grips: np.ndarray) -> None:
@@ -151,7 +152,7 @@ def test_every_tick_equals_the_twin(caches, serialized, longest):
             env.set_handling_ticks(pickup=pickup, drop=drop)
         expected = mirror(env)
         expected.serve(actions[:, 2].tolist(), tick, chance.tolist())
-        kernel.serve(env.arena._interactions.state, env.arena._interactions.rules, actions, tick, chance)
+        kernel.serve(env.arena._arrays.state, env.arena._arrays.rules, actions, tick, chance)
         assert_same(env, expected)
         env.arena._replace_displaced()
         assert_conserved(env)

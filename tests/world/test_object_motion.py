@@ -28,6 +28,7 @@ def world(cells: list[tuple[int, int]], nx: int, ny: int) -> ObjectState:
         cell=np.array(cells, np.int32).reshape(n_objects, 2),
         cache_slot=np.full(n_objects, -1, np.int32),
         carriers=np.zeros(n_objects, np.int32),
+        waiting=np.zeros(n_objects + 1, np.int32),
     )
 
 

@@ -12,9 +12,10 @@ from swarm_forage_env.scenarios.config import ArenaConfig, ObjectConfig, Scenari
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
 from swarm_forage_env.scenarios.regions import PLACEMENTS, Box, source_boxes
 from swarm_forage_env.scenarios.robots import RobotConfig
+from swarm_forage_env.world.allocation import new_objects
 from swarm_forage_env.world.kernels.placement import DRAWS, UNLIMITED, count_objects, draw_source_cell, scatter
 from swarm_forage_env.world.placement import Source, draw_source, place_all, place_objects
-from swarm_forage_env.world.state import ObjectState
+from swarm_forage_env.world.state import ObjectState, listed, make_list
 from tests.reference.object_placement import choose_cell, random_source, scatter_slowly, waiting_by_the_word
 
 SIGNIFICANCE = 0.001
@@ -22,14 +23,11 @@ SIGNIFICANCE = 0.001
 
 
 def bare_objects(n_objects: int, nx: int, ny: int) -> ObjectState:
-    return ObjectState(
-        floor=np.full((ny, nx), CELL_EMPTY, np.int32),
-        status=np.full(n_objects, ObjectStatus.WAITING, np.int8),
-        cell=np.full((n_objects, 2), -1, np.int32),
-        cache_slot=np.full(n_objects, -1, np.int32),
-        carriers=np.zeros(n_objects, np.int32),
-        waiting=list(range(n_objects)),
-    )
+    return ObjectState.empty(np.full((ny, nx), CELL_EMPTY, np.int32), n_objects)
+
+
+def waiting(objects: ObjectState) -> list[int]:
+    return listed(objects.waiting).tolist()
 
 
 def one_region(box: Box, capacity: int = UNLIMITED) -> Source:
@@ -45,7 +43,7 @@ def lift(objects: ObjectState, row: int) -> None:
 
 
 def furnished(config: ScenarioConfig, seed: int = 0) -> tuple[ObjectState, Source, np.random.Generator]:
-    objects = ObjectState.empty(config)
+    objects = new_objects(config)
     rng = stream_rng(seed, Stream.PLACEMENT)
     source = draw_source(config, objects.floor, rng)
     place_all(objects, source, config.arena.distributable_cells, rng)
@@ -57,19 +55,19 @@ def assert_consistent(objects: ObjectState) -> None:
     x, y = objects.cell[free].T
     np.testing.assert_array_equal(objects.floor[y, x], free)
     assert np.count_nonzero(objects.floor >= 0) == len(free)
-    waiting = np.flatnonzero(objects.status == ObjectStatus.WAITING)
-    assert sorted(objects.waiting) == waiting.tolist()
-    assert np.all(objects.cell[waiting] == -1)
+    not_lying = np.flatnonzero(objects.status == ObjectStatus.WAITING)
+    assert sorted(waiting(objects)) == not_lying.tolist()
+    assert np.all(objects.cell[not_lying] == -1)
 
 
 @pytest.mark.parametrize("name", SCENARIO_NAMES)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_presets_place_every_object_on_its_own_free_cell(name, seed):
     config = scenario(name)
-    before = ObjectState.empty(config).floor
+    before = new_objects(config).floor
     objects, source, _ = furnished(config, seed)
     assert np.all(objects.status == ObjectStatus.FREE)
-    assert objects.waiting == []
+    assert waiting(objects) == []
     assert_consistent(objects)
     x, y = objects.cell.T
     assert len({*zip(x.tolist(), y.tolist(), strict=True)}) == config.objects.n_objects
@@ -85,7 +83,7 @@ def test_presets_place_every_object_on_its_own_free_cell(name, seed):
 def test_sources_are_the_regions_without_limit(placement):
     config = scenario("warehouse_medium", placement=placement)
     rng = stream_rng(0, Stream.PLACEMENT)
-    source = draw_source(config, ObjectState.empty(config).floor, rng)
+    source = draw_source(config, new_objects(config).floor, rng)
     assert tuple(map(tuple, source.regions.tolist())) == source_boxes(placement, 240, 240)
     assert np.all(source.capacity == UNLIMITED)
     assert source.group_start.tolist() == [0, len(source.regions)]
@@ -117,7 +115,7 @@ def test_place_all_leaves_objects_in_caches_alone():
     objects.cache_slot[[1, 4]] = 0
     objects.cell[[1, 4]] = (15, 15)
     objects.floor[14:17, 14:17] = CELL_CACHE
-    objects.waiting = [0, 2, 3, 5]
+    make_list(objects.waiting, [0, 2, 3, 5])
     place_all(objects, one_region((0, 0, 20, 20)), (0, 0, 20, 20), np.random.default_rng(0))
     assert objects.status.tolist() == [0, 2, 0, 0, 2, 0]
     assert objects.cache_slot.tolist() == [-1, 0, -1, -1, 0, -1]
@@ -134,7 +132,7 @@ def test_the_largest_arena_is_furnished():
         objects=ObjectConfig(n_objects=116_121, placement="random"),
     )
     objects, _, _ = furnished(config)
-    assert objects.waiting == []
+    assert waiting(objects) == []
     assert_consistent(objects)
 
 
@@ -205,14 +203,14 @@ def test_a_region_at_capacity_is_skipped_dropped_objects_included():
     objects.floor[2, 2], objects.floor[3, 3] = 4, 5  # laid there by robots
     objects.cell[[4, 5]] = (2, 2), (3, 3)
     objects.status[[4, 5]] = ObjectStatus.FREE
-    objects.waiting = []
+    make_list(objects.waiting, [])
     place_objects([0, 1, 2, 3], objects, source, (0, 0, 12, 6), np.random.default_rng(0))
     assert count_objects(objects.floor, 0, 0, 5, 5) == 3
     assert count_objects(objects.floor, 6, 0, 11, 5) == 3
     lift(objects, 4)  # frees a slot although cells were free all along
     place_objects([4], objects, source, (0, 0, 12, 6), np.random.default_rng(0))
     assert count_objects(objects.floor, 0, 0, 5, 5) == 3
-    assert objects.waiting == []
+    assert waiting(objects) == []
 
 
 def test_a_cluster_under_a_cache_is_passed_over():
@@ -248,23 +246,23 @@ def test_placed_objects_start_anew():
 
 def test_newest_first_then_the_longest_wait():
     objects = bare_objects(6, 5, 3)
-    objects.waiting = []
+    make_list(objects.waiting, [])
     area, source, rng = (0, 0, 5, 3), one_region((1, 1, 4, 2)), np.random.default_rng(0)
     place_objects([0, 1, 2, 3], objects, source, area, rng)
-    assert objects.waiting == [3]
+    assert waiting(objects) == [3]
     place_objects([4], objects, source, area, rng)
-    assert objects.waiting == [3, 4]
+    assert waiting(objects) == [3, 4]
     lift(objects, 0)
     place_objects([5], objects, source, area, rng)
-    assert (objects.waiting, int(objects.status[5])) == ([3, 4], ObjectStatus.FREE)
+    assert (waiting(objects), int(objects.status[5])) == ([3, 4], ObjectStatus.FREE)
     lift(objects, 1)
     lift(objects, 5)
     place_objects([0], objects, source, area, rng)
-    assert (objects.waiting, int(objects.status[3])) == ([4], ObjectStatus.FREE)
+    assert (waiting(objects), int(objects.status[3])) == ([4], ObjectStatus.FREE)
     lift(objects, 2)
     lift(objects, 0)
     place_objects([1, 2], objects, source, area, rng)  # 1, then 4, which leaves no cell for 2
-    assert objects.waiting == [2]
+    assert waiting(objects) == [2]
     assert [int(row) for row in np.flatnonzero(objects.status == ObjectStatus.FREE)] == [1, 3, 4]
     assert np.flatnonzero(objects.status == ObjectStatus.CARRIED).tolist() == [0, 5]
     assert_consistent(objects)
@@ -274,7 +272,7 @@ def test_nothing_to_place_draws_nothing_and_wakes_nobody():
     objects = bare_objects(3, 5, 3)
     rng = np.random.default_rng(0)
     place_objects([], objects, one_region((0, 0, 5, 3)), (0, 0, 5, 3), rng)
-    assert objects.waiting == [0, 1, 2]
+    assert waiting(objects) == [0, 1, 2]
     assert rng.bit_generator.state == np.random.default_rng(0).bit_generator.state
 
 
@@ -285,12 +283,12 @@ def test_waiting_list_follows_the_rule_word_by_word(seed):
     objects = bare_objects(100, floor.shape[1], floor.shape[0])
     objects.floor[:] = floor
     objects.status[:] = ObjectStatus.CARRIED
-    objects.waiting = []
+    make_list(objects.waiting, [])
     outside = list(range(100))
     n_waiting = []
     for _ in range(30):
         rows = [outside.pop(0) for _ in range(min(len(outside), int(rng.integers(1, 16))))]
-        twin_floor, twin_waiting = objects.floor.copy(), list(objects.waiting)
+        twin_floor, twin_waiting = objects.floor.copy(), waiting(objects)
 
         def place(row: int, twin_floor: IntArray = twin_floor) -> bool:
             cell = choose_cell(twin_floor, source, area, rng.random(DRAWS))
@@ -299,9 +297,9 @@ def test_waiting_list_follows_the_rule_word_by_word(seed):
             return cell is not None
 
         place_objects(rows, objects, source, area, rng)
-        assert objects.waiting == waiting_by_the_word(rows, twin_waiting, place)
+        assert waiting(objects) == waiting_by_the_word(rows, twin_waiting, place)
         assert_consistent(objects)
-        n_waiting.append(len(objects.waiting))
+        n_waiting.append(len(waiting(objects)))
         for row in rng.permutation(np.flatnonzero(objects.status == ObjectStatus.FREE))[: rng.integers(15)].tolist():
             lift(objects, row)
             outside.append(row)

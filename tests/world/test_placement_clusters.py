@@ -13,6 +13,7 @@ from swarm_forage_env.contract.codes import CELL_CACHE, CELL_EMPTY, CELL_NEST
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.presets import SEARCH_AND_RESCUE_OBJECTS, scenario
 from swarm_forage_env.scenarios.quirks import Quirks
+from swarm_forage_env.world.allocation import new_objects
 from swarm_forage_env.world.clusters import (
     ClusterLaw,
     cluster_law,
@@ -41,7 +42,7 @@ PROGRAM = Quirks(large_clusters_likelier=True)
 
 def painted(config: ScenarioConfig) -> ObjectState:
     """Return the objects of a world whose static caches stand already."""
-    objects = ObjectState.empty(config)
+    objects = new_objects(config)
     half = config.cache_side_cells // 2
     for slot, (x, y) in enumerate(static_cache_centres(config)):
         objects.floor[y - half : y + half + 1, x - half : x + half + 1] = CELL_CACHE - slot
@@ -129,7 +130,7 @@ def test_footprint_leaves_space_around_the_objects(size, cells):
 @pytest.mark.parametrize("caches", ["none", "static"])
 def test_clusters_keep_off_nest_caches_and_each_other(side, caches, quirks):
     config = scenario("search_and_rescue", side_m=side, caches=caches, quirks=quirks)
-    floor = (painted(config) if caches == "static" else ObjectState.empty(config)).floor
+    floor = (painted(config) if caches == "static" else new_objects(config)).floor
     x_low, y_low, x_high, y_high = config.arena.distributable_cells
     for seed in range(5):
         boxes, sizes = draw_clusters(config, floor, np.random.default_rng(seed))
@@ -149,7 +150,7 @@ def test_clusters_keep_off_nest_caches_and_each_other(side, caches, quirks):
 @pytest.mark.parametrize("quirks", [Quirks(), PROGRAM], ids=["described", "program"])
 def test_preset_counts_always_fit(side, quirks):
     config = scenario("search_and_rescue", side_m=side, quirks=quirks)
-    floor = ObjectState.empty(config).floor
+    floor = new_objects(config).floor
     for seed in range(25):
         source = draw_source(config, floor, stream_rng(seed, Stream.PLACEMENT))
         assert source.capacity.sum() >= SEARCH_AND_RESCUE_OBJECTS[side]
@@ -171,7 +172,7 @@ def test_every_object_lies_in_a_cluster_within_its_capacity(side, seed):
 
 def test_source_groups_hold_equal_capacities():
     config = scenario("search_and_rescue", side_m=128, quirks=PROGRAM)
-    source = draw_source(config, ObjectState.empty(config).floor, stream_rng(0, Stream.PLACEMENT))
+    source = draw_source(config, new_objects(config).floor, stream_rng(0, Stream.PLACEMENT))
     assert source.group_start[0] == 0
     assert source.group_start[-1] == len(source.regions) == len(source.capacity)
     groups = [set(part.tolist()) for part in np.split(source.capacity, source.group_start[1:-1])]
@@ -183,7 +184,7 @@ def test_source_groups_hold_equal_capacities():
 def test_too_many_objects_for_the_clusters_of_the_program():
     config = scenario("search_and_rescue", n_objects=369, quirks=PROGRAM)
     with pytest.raises(ConfigError, match=r"Expected at most 368 objects for the 23 power-law clusters .* got 369"):
-        draw_source(config, ObjectState.empty(config).floor, stream_rng(0, Stream.PLACEMENT))
+        draw_source(config, new_objects(config).floor, stream_rng(0, Stream.PLACEMENT))
 
 
 def test_no_room_for_the_clusters():
@@ -208,4 +209,4 @@ def test_an_arena_narrower_than_a_cluster():
     )
     # 8 distributable cells across; a cluster of 32 objects needs 10.
     with pytest.raises(ConfigError, match="Expected room for 29 clusters of 16 to 32 objects"):
-        draw_clusters(corridor, ObjectState.empty(corridor).floor, np.random.default_rng(0))
+        draw_clusters(corridor, new_objects(corridor).floor, np.random.default_rng(0))

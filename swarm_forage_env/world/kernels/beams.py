@@ -7,9 +7,10 @@ import numpy as np
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.detection import BEAM_ANGLES_RAD
 from swarm_forage_env.contract.layout import RING_SENSORS
-from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray, Row
+from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray, Row
 from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of
 from swarm_forage_env.world.kernels.obstacles import is_within
+from swarm_forage_env.world.state import Bins
 
 _BEAM_COS = np.cos(BEAM_ANGLES_RAD)
 _BEAM_SIN = np.sin(BEAM_ANGLES_RAD)
@@ -124,7 +125,7 @@ def proximity(
     position: FloatArray,
     facing: FloatArray,
     present: BoolArray,
-    bins: tuple[float, IntArray, IntArray],
+    bins: Bins,
     interior: FloatArray,
     obstacles: FloatArray,
     radius: float,

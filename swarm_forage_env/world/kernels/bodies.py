@@ -33,6 +33,7 @@ from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
 from swarm_forage_env.world.kernels.drive import hold_inside
 from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of
 from swarm_forage_env.world.kernels.obstacles import hold_outside, is_within, nearest
+from swarm_forage_env.world.state import Bins
 
 FRICTION = 0.7
 """Of robots, walls and boxes."""
@@ -83,8 +84,8 @@ class BodyState(NamedTuple):
     """(N + 1, 3) x, y in m and unwrapped angle in rad; the last row is nobody."""
     near: BoolArray
     """(N,) who has anything within reach, as of the last proximity sweep."""
-    bins: tuple[float, IntArray, IntArray]
-    """Robots by place as of that sweep: cell size in m, first_in_bin, next_in_bin."""
+    bins: Bins
+    """As of that sweep."""
     room: FloatArray
     """x low, y low, x high, y high of centres on the floor, m."""
     obstacles: FloatArray
@@ -102,7 +103,7 @@ def find_pairs(
     poses: FloatArray,
     present: BoolArray,
     near: BoolArray,
-    bins: tuple[float, IntArray, IntArray],
+    bins: Bins,
     sight_m: float,
     pairs: IntArray,
 ) -> int:

@@ -3,8 +3,9 @@
 import math
 
 from swarm_forage_env._internal.compiling import kernel
-from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray
+from swarm_forage_env.contract.types import BoolArray, FloatArray
 from swarm_forage_env.world.kernels.neighbourhood import bin_of, cell_of
+from swarm_forage_env.world.state import Bins, Touching
 
 LEAST_SPEED_M_S = 3e-4
 """Slowest common speed. Our choice: two robots that are equally strong would stand against each other for ever. At this
@@ -33,7 +34,7 @@ def east_or_north(dx: float, dy: float) -> float:
 
 
 @kernel
-def remembered(memory: tuple[IntArray, IntArray, FloatArray], i: int, j: int) -> float:
+def remembered(memory: Touching, i: int, j: int) -> float:
     """Common speed of the pair i, j in the tick before, seen from i, m/s; NaN if they did not press."""
     n_partners, partner, speed = memory
     for slot in range(n_partners[i]):
@@ -47,10 +48,10 @@ def press(
     position: FloatArray,
     present: BoolArray,
     near: BoolArray,
-    bins: tuple[float, IntArray, IntArray],
+    bins: Bins,
     touch_m: float,
-    memory: tuple[IntArray, IntArray, FloatArray],
-    next_memory: tuple[IntArray, IntArray, FloatArray],
+    memory: Touching,
+    next_memory: Touching,
     command: FloatArray,
     twist: FloatArray,
 ) -> None:

@@ -1,12 +1,11 @@
 """What is counted in every tick: who is in interference, who is at work, and how the swarm divides over tasks."""
 
-import numpy as np
-
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.detection import sees_obstacle
 from swarm_forage_env.contract.layout import RING_SENSORS
-from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, ObsArray
+from swarm_forage_env.world.state import StepEvents, SwarmState
 
 _INTERFERING, _ACTIVE, _PRESENT = int(Counter.INTERFERING), int(Counter.ACTIVE), int(Counter.PRESENT)
 _CARRYING = int(Counter.CARRYING)
@@ -18,12 +17,8 @@ def mark(
     proximity: int,
     near: BoolArray,
     behind_counts: bool,
-    active: BoolArray,
-    present: BoolArray,
-    carried_object: IntArray,
-    interfering: BoolArray,
-    counters: np.ndarray,
-    interference_sum: FloatArray,
+    swarm: SwarmState,
+    events: StepEvents,
 ) -> None:
     """Flag active robots for which the obstacle rule holds in this tick, walls and boxes included, and count the tick.
 
@@ -34,13 +29,11 @@ def mark(
         proximity: Column of the first of them.
         near: (N,) whether any beam may have hit something; others are skipped.
         behind_counts: Quirk `obstacle_behind_counts`.
-        active: (N,) read.
-        present: (N,) read.
-        carried_object: (N,) read.
-        interfering: (N,) written.
-        counters: Added to.
-        interference_sum: (1,) the share of active robots is added, 0/0 = 0.
+        swarm: Read.
+        events: `interfering` is written, `counters` are added to, and the share of active robots (0/0 = 0) is added to
+            `interference_sum`.
     """
+    active, counters = swarm.active, events.counters
     n_interfering = 0
     n_active = 0
     n_present = 0
@@ -48,17 +41,17 @@ def mark(
     for i in range(active.shape[0]):
         ring = obs[i, proximity : proximity + RING_SENSORS]
         flag = active[i] and near[i] and sees_obstacle(ring, behind_counts)
-        interfering[i] = flag
+        events.interfering[i] = flag
         n_interfering += flag
         n_active += active[i]
-        n_present += present[i]
-        n_carrying += active[i] and carried_object[i] >= 0
+        n_present += swarm.present[i]
+        n_carrying += active[i] and swarm.carried_object[i] >= 0
     counters[_INTERFERING] += n_interfering
     counters[_ACTIVE] += n_active
     counters[_PRESENT] += n_present
     counters[_CARRYING] += n_carrying
     if n_active > 0:
-        interference_sum[0] += n_interfering / n_active
+        events.interference_sum[0] += n_interfering / n_active
 
 
 @kernel

@@ -17,6 +17,7 @@ from swarm_forage_env.contract.layout import (
 )
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray, Row
 from swarm_forage_env.scenarios.units import CELLS_PER_M
+from swarm_forage_env.world.state import CacheState
 
 _GROUND_X = np.array([0.063, 0.063, -0.063, -0.063])
 _GROUND_Y = np.array([0.0116, -0.0116, 0.0116, -0.0116])
@@ -131,7 +132,7 @@ def line_of_sight(
     present: BoolArray,
     floor: IntArray,
     shares: ObsArray,
-    caches: tuple[BoolArray, IntArray, IntArray, IntArray],
+    caches: CacheState,
     half_side: int,
     half_windows: IntArray,
     obs: ObsArray,
@@ -140,8 +141,8 @@ def line_of_sight(
     """Write the robot's cell, the objects of its 5 x 5 window and the caches that meet it.
 
     `shares` (M + 1,) = what is written for no object, and for each object (row + 1) / M;
-    `caches` = alive, centre cell, serial, count per slot; `half_side` = (cache side in cells - 1) / 2;
-    `half_windows` (N,) = cells that a robot sees on either side of its own, the others of its window hold nothing;
+    `half_side` = (cache side in squares - 1) / 2; `half_windows` (N,) = squares that a robot sees on either side of its
+    own, the others of its window hold nothing;
     `starts` = first columns of los_cell, los_object, los_cache.
     """
     ny, nx = floor.shape
@@ -165,7 +166,7 @@ def line_of_sight(
             _narrow_window(half_windows[i], window)
         for k in range(cache_start, cache_start + CACHE_FIELDS * VISIBLE_CACHES):
             obs[i, k] = 0.0
-        if caches[0].shape[0] > 0:
+        if caches.alive.shape[0] > 0:
             reach = half_side + half_windows[i]
             _visible_caches(cell_x, cell_y, position, caches, reach, i, obs, cache_start, (nx, ny, n_objects))
 
@@ -202,7 +203,7 @@ def _visible_caches(
     cell_x: int,
     cell_y: int,
     position: FloatArray,
-    caches: tuple[BoolArray, IntArray, IntArray, IntArray],
+    caches: CacheState,
     reach: int,
     i: int,
     obs: ObsArray,
@@ -210,7 +211,7 @@ def _visible_caches(
     sizes: tuple[int, int, int],
 ) -> None:
     """List up to VISIBLE_CACHES caches with a centre within `reach` cells, nearest centre first, ties by slot."""
-    alive, centre, serial, count = caches
+    alive, centre = caches.alive, caches.cell
     last_distance = -1.0
     last_slot = -1
     for place in range(VISIBLE_CACHES):
@@ -230,7 +231,7 @@ def _visible_caches(
                 best_distance = distance
         if best < 0:
             return
-        fields = (serial[best], centre[best, 0], centre[best, 1], count[best])
+        fields = (caches.serial[best], centre[best, 0], centre[best, 1], caches.count[best])
         write_cache(obs, i, start + CACHE_FIELDS * place, fields, sizes)
         last_distance = best_distance
         last_slot = best

@@ -1,7 +1,7 @@
-"""Several worlds of one scenario, stepped by one call. Each stays where it is; a table tells where its arrays are.
+"""Several arenas of one scenario, stepped by one call. Each stays where it is; a table tells where its arrays are.
 
-B is the number of worlds. Worlds know nothing of each other: each is stepped by the function that steps a single one.
-Only arrays have addresses. Everything else, such as rules, columns and other constants, is that of the world that is
+B is the number of arenas. They know nothing of each other: each is stepped by the function that steps a single one.
+Only arrays have addresses. Everything else, such as rules, columns and other constants, is that of the arena that is
 given for all, so all must be of one scenario.
 """
 
@@ -20,9 +20,9 @@ from numba.extending import intrinsic
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.types import ActionArray, BoolArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.world.kernels.bodies import BodyState
-from swarm_forage_env.world.kernels.reward import Payment, Robots, book_rows, pay
+from swarm_forage_env.world.kernels.reward import Payment, book_rows, pay
 from swarm_forage_env.world.kernels.tick import whole
-from swarm_forage_env.world.kernels.world import World
+from swarm_forage_env.world.state import ArenaArrays, SwarmState
 
 
 def _alike(typingctx: Any, like: Any, at: Any) -> Any:  # noqa: ARG001 - numba hands over the types
@@ -59,7 +59,7 @@ alike: Any = intrinsic(_alike)
 
 @kernel
 def whole_each(
-    parts: tuple[World, BodyState],
+    parts: tuple[ArenaArrays, BodyState],
     parts_at: np.ndarray,
     seats: np.ndarray,
     actions: ActionArray,
@@ -70,36 +70,36 @@ def whole_each(
     walk_chance: FloatArray,
     outcomes: np.ndarray,
 ) -> None:
-    """Step worlds, each by `tick.whole`.
+    """Step arenas, each by `tick.whole`.
 
     Args:
-        parts: Any of the worlds and its bodies: gives types, shapes and constants.
+        parts: Those of any of the arenas, with its bodies: gives types, shapes and constants.
         parts_at: (B, arrays) addresses of the arrays of each.
-        seats: Which of the B worlds are stepped.
+        seats: Which of the B arenas are stepped.
         actions: (B, N, A), and all others as in `tick.whole` with one more dimension in front.
         wheel_gain: (B, N, 2).
         ticks: (B,) int64.
         look_first: (B,) bool.
         chance: (B, N).
         walk_chance: (B, M), or (B, N) where it is not read.
-        outcomes: (B,) is written for the worlds that are stepped.
+        outcomes: (B,) is written for the arenas that are stepped.
     """
     for seat in range(seats.shape[0]):
         b = seats[seat]
-        world, bodies = alike(parts, parts_at[b])
+        arrays, bodies = alike(parts, parts_at[b])
         outcomes[b] = whole(
-            world, bodies, actions[b], wheel_gain[b], ticks[b], look_first[b], chance[b], walk_chance[b]
+            arrays, bodies, actions[b], wheel_gain[b], ticks[b], look_first[b], chance[b], walk_chance[b]
         )
 
 
 @kernel
 def pay_each(payment: Payment, payments_at: np.ndarray, seats: np.ndarray, paid: ObsArray) -> None:
-    """Add the rewards of a tick, world by world, as `reward.pay` does.
+    """Add the rewards of a tick, arena by arena, as `reward.pay` does.
 
     Args:
         payment: Any of the payments: gives types, shapes and weights.
         payments_at: (B, arrays) addresses of the arrays of each.
-        seats: Which of the B worlds were stepped.
+        seats: Which of the B arenas were stepped.
         paid: (B, N) float32.
     """
     for seat in range(seats.shape[0]):
@@ -109,7 +109,7 @@ def pay_each(payment: Payment, payments_at: np.ndarray, seats: np.ndarray, paid:
 
 @kernel
 def book_each(
-    robots: Robots,
+    robots: tuple[SwarmState, BoolArray, ObsArray],
     robots_at: np.ndarray,
     reward: ObsArray,
     absent: BoolArray,
@@ -121,10 +121,10 @@ def book_each(
     n_terminated: np.ndarray,
     obs: ObsArray,
 ) -> None:
-    """Book a step of learners, world by world, as `reward.book_rows` does, and copy the observations.
+    """Book a step of learners, arena by arena, as `reward.book_rows` does, and copy the observations.
 
     Args:
-        robots: Those of any of the worlds: gives types and shapes.
+        robots: Those of any of the arenas, who of them is dead for good, and observations: gives types and shapes.
         robots_at: (B, arrays) addresses of the arrays of each.
         reward: (B, N), and all others as in `book_rows` with one more dimension in front.
         absent: (B, N).
@@ -133,15 +133,14 @@ def book_each(
         lengths: (B, N).
         terminated: (B, N).
         active: (B, N).
-        n_terminated: (B,) is written: how many rows of each world terminate.
+        n_terminated: (B,) is written: how many rows of each arena terminate.
         obs: (B, N, D) is written, or (0, N, D) where nobody wants it.
     """
     for b in range(robots_at.shape[0]):
-        now = alike(robots, robots_at[b])
+        swarm, dead, seen = alike(robots, robots_at[b])
         n_terminated[b] = book_rows(
-            now.dead,
-            now.is_present,
-            now.is_active,
+            swarm,
+            dead,
             reward[b],
             absent[b],
             present[b],
@@ -151,6 +150,6 @@ def book_each(
             active[b],
         )
         if obs.shape[0] > 0:
-            for i in range(now.obs.shape[0]):
-                for k in range(now.obs.shape[1]):
-                    obs[b, i, k] = now.obs[i, k]
+            for i in range(seen.shape[0]):
+                for k in range(seen.shape[1]):
+                    obs[b, i, k] = seen[i, k]

@@ -7,6 +7,7 @@ so that all robots in range are in the nine cells around a robot.
 from swarm_forage_env._internal.compiling import inline_kernel, kernel
 from swarm_forage_env.contract.layout import NEIGHBOUR_FIELDS
 from swarm_forage_env.contract.types import BoolArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.world.state import Bins
 
 
 @inline_kernel
@@ -36,9 +37,7 @@ def bin_robots(
 
 
 @inline_kernel
-def _next_in_cell(
-    j: int, cell_x: int, cell_y: int, position: FloatArray, bins: tuple[float, IntArray, IntArray]
-) -> int:
+def _next_in_cell(j: int, cell_x: int, cell_y: int, position: FloatArray, bins: Bins) -> int:
     """First robot from `j` on, along the list of its bin, that is really in the cell; -1 = none.
 
     Several cells may share a bin. Without this look a robot would be met twice where two of the nine cells do.
@@ -54,7 +53,7 @@ def see_neighbours(
     facing: FloatArray,
     present: BoolArray,
     carried_object: IntArray,
-    bins: tuple[float, IntArray, IntArray],
+    bins: Bins,
     range_m: float,
     nearest: tuple[FloatArray, IntArray],
     obs: ObsArray,
@@ -142,7 +141,7 @@ def say(actions: ObsArray, first: int, active: BoolArray, said: ObsArray, speaks
 def hear(
     position: FloatArray,
     present: BoolArray,
-    bins: tuple[float, IntArray, IntArray],
+    bins: Bins,
     range_m: float,
     said: ObsArray,
     speaks: BoolArray,

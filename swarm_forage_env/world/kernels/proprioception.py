@@ -2,8 +2,9 @@
 
 from swarm_forage_env._internal.compiling import kernel
 from swarm_forage_env.contract.layout import EVENT_SCALE
-from swarm_forage_env.contract.types import BoolArray, CodeArray, FloatArray, IntArray, ObsArray
+from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.world.kernels.floor import write_cache
+from swarm_forage_env.world.state import StepEvents, SwarmState
 
 
 @kernel
@@ -34,37 +35,28 @@ def own_motion(
 
 
 @kernel
-def own_status(
-    carried_object: IntArray,
-    pending_kind: CodeArray,
-    active: BoolArray,
-    events: tuple[CodeArray, IntArray, IntArray],
-    sizes: tuple[int, int, int],
-    present: BoolArray,
-    obs: ObsArray,
-    start: int,
-) -> None:
+def own_status(swarm: SwarmState, events: StepEvents, sizes: tuple[int, int, int], obs: ObsArray, start: int) -> None:
     """Write carrying, interacting, active, cargo, event_object, event, event_cache, ten columns from `start`.
 
-    `events` = code (N,), event_object (N,), event_cache (N, 4); `sizes` = cells along x, along y, objects.
+    `sizes` = squares along x, along y, objects.
     """
-    code, event_object, event_cache = events
+    carried_object, event_cache = swarm.carried_object, events.event_cache
     n_objects = sizes[2]
     for i in range(carried_object.shape[0]):
         for k in range(start, start + 10):
             obs[i, k] = 0.0
-        if not present[i]:
+        if not swarm.present[i]:
             continue
         if carried_object[i] >= 0:
             obs[i, start] = 1.0
             obs[i, start + 3] = (carried_object[i] + 1) / n_objects
-        if pending_kind[i] != 0:
+        if swarm.pending_kind[i] != 0:
             obs[i, start + 1] = 1.0
-        if active[i]:
+        if swarm.active[i]:
             obs[i, start + 2] = 1.0
-        if code[i] != 0:
-            obs[i, start + 4] = (event_object[i] + 1) / n_objects
-            obs[i, start + 5] = code[i] / EVENT_SCALE
+        if events.code[i] != 0:
+            obs[i, start + 4] = (events.event_object[i] + 1) / n_objects
+            obs[i, start + 5] = events.code[i] / EVENT_SCALE
             if event_cache[i, 0] > 0:
                 fields = (event_cache[i, 0], event_cache[i, 1], event_cache[i, 2], event_cache[i, 3])
                 write_cache(obs, i, start + 6, fields, sizes)

@@ -26,7 +26,7 @@ from swarm_forage_env.world.kernels.drive import drive
 from swarm_forage_env.world.kernels.interact import serve
 from swarm_forage_env.world.kernels.neighbourhood import bin_robots
 from swarm_forage_env.world.kernels.walk import walk
-from swarm_forage_env.world.kernels.world import World
+from swarm_forage_env.world.state import ArenaArrays, CacheState
 
 DONE = -1
 """No action was refused and nothing is left to do. Rows of refused actions are 0 and above."""
@@ -39,15 +39,14 @@ _OBJECTS_MOVED = int(Counter.OBJECTS_MOVED)
 
 
 @kernel
-def look(w: World) -> None:
+def look(a: ArenaArrays) -> None:
     """Find out who is near whom, and write the proximity readings: a ring of beams, 1 at contact, 0 without a hit."""
-    s = w.sensors
-    position = w.state.position
-    bin_robots(position, w.present, s.bins[0], s.bins[1], s.bins[2])
+    swarm, s = a.state.swarm, a.sensors
+    bin_robots(swarm.position, swarm.present, s.bins[0], s.bins[1], s.bins[2])
     beams.proximity(
-        position,
-        w.facing,
-        w.present,
+        swarm.position,
+        swarm.facing,
+        swarm.present,
         s.bins,
         s.interior,
         s.obstacles,
@@ -60,141 +59,130 @@ def look(w: World) -> None:
 
 
 @kernel
-def sense(w: World) -> None:
+def sense(a: ArenaArrays) -> None:
     """Complete the observation after `look`; slices that are not read may stay zero."""
-    s, a = w.sensors, w.state
-    c = s.columns
+    swarm, objects, events, s = a.state.swarm, a.state.objects, a.state.events, a.sensors
+    position, facing, present, c = swarm.position, swarm.facing, swarm.present, s.columns
     if s.reads_light:
         floor.light(
-            a.position,
-            w.facing,
-            w.present,
+            position,
+            facing,
+            present,
             s.lights,
             s.intensity,
-            a.carried_object,
+            swarm.carried_object,
             s.light_of_carriers_only,
             s.obs,
             c.light,
         )
     if s.reads_ground:
-        floor.ground(a.position, w.facing, w.present, a.floor, s.obs, c.ground)
-    proprioception.own_motion(a.position, w.facing, w.wheel_speed, w.present, s.scales, s.obs, c.wheel_speed)
-    events = (a.code, a.event_object, a.event_cache)
-    proprioception.own_status(a.carried_object, a.pending_kind, a.active, events, s.sizes, w.present, s.obs, c.carrying)
+        floor.ground(position, facing, present, objects.floor, s.obs, c.ground)
+    proprioception.own_motion(position, facing, swarm.wheel_speed, present, s.scales, s.obs, c.wheel_speed)
+    proprioception.own_status(swarm, events, s.sizes, s.obs, c.carrying)
     if s.reads_line_of_sight:
         floor.line_of_sight(
-            a.position,
-            w.present,
-            a.floor,
+            position,
+            present,
+            objects.floor,
             s.shares,
-            (a.cache_alive, a.cache_cell, a.cache_serial, a.cache_count),
+            a.state.caches,
             s.cache_half_side,
             s.half_windows,
             s.obs,
             (c.los_cell, c.los_object, c.los_cache),
         )
-    kinds.tell_kinds(s.kinds, w.present, s.obs, s.kind_start)
+    kinds.tell_kinds(s.kinds, present, s.obs, s.kind_start)
     kinds.blank(s.obs, s.blanks)
 
 
 @kernel
-def observe(w: World) -> None:
+def observe(a: ArenaArrays) -> None:
     """Write the observation of the world as it is now."""
-    look(w)
-    sense(w)
+    look(a)
+    sense(a)
 
 
 @kernel
-def set_out(w: World, actions: ActionArray, wheel_gain: FloatArray, tick: int, look_first: bool) -> int:
+def set_out(a: ArenaArrays, actions: ActionArray, wheel_gain: FloatArray, tick: int, look_first: bool) -> int:
     """From actions to velocities of the bodies, in tick number `tick`.
 
     `look_first`: robots came or went since the last `look`. Returns `DONE`, or the first active row whose action or
     gain is not finite; then nothing has happened.
     """
-    a, s = w.state, w.sensors
+    swarm, m, s = a.state.swarm, a.motion, a.sensors
     bad = drive(
         actions,
         wheel_gain,
-        w.speeds,
-        a.active,
-        a.pending_kind,
-        w.facing,
-        w.drive_limits,
-        w.dt_s,
-        w.wheel_speed,
-        w.twist,
+        m.speeds,
+        swarm.active,
+        swarm.pending_kind,
+        swarm.facing,
+        m.drive_limits,
+        m.dt_s,
+        swarm.wheel_speed,
+        m.twist,
     )
     if bad >= 0:
         return bad
     if look_first:
-        look(w)
-    before, now = (w.pressing[0], w.pressing[1]) if tick % 2 == 0 else (w.pressing[1], w.pressing[0])
-    press(a.position, w.present, s.near, s.bins, w.touch_m, before, now, w.command, w.twist)
+        look(a)
+    before, now = (m.touching[0], m.touching[1]) if tick % 2 == 0 else (m.touching[1], m.touching[0])
+    press(swarm.position, swarm.present, s.near, s.bins, m.touch_m, before, now, m.command, m.twist)
     return DONE
 
 
 @kernel
-def meet(w: World, actions: ActionArray, tick: int, chance: FloatArray) -> bool:
+def meet(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray) -> bool:
     """After the bodies have moved: who is near, who is in interference, who picks up and drops.
 
     `chance` (N,) uniform in [0, 1) decides which object leaves a cache. Returns whether anything is to be placed.
     """
-    s, a = w.sensors, w.state
-    look(w)
-    mark(
-        s.obs,
-        s.columns.proximity,
-        s.near,
-        s.behind_counts,
-        a.active,
-        w.present,
-        a.carried_object,
-        w.interfering,
-        a.counters,
-        w.interference_sum,
-    )
-    serve(a, w.rules, actions, tick, chance)
-    return a.displaced[-1] > 0 or a.creators[-1] > 0 or (w.n_static_caches > 0 and _alive(w) < w.n_static_caches)
+    state, s = a.state, a.sensors
+    look(a)
+    mark(s.obs, s.columns.proximity, s.near, s.behind_counts, state.swarm, state.events)
+    serve(state, a.rules, actions, tick, chance)
+    is_to_place = state.requests.displaced[-1] > 0 or state.requests.creators[-1] > 0
+    return is_to_place or (a.n_static_caches > 0 and _alive(state.caches) < a.n_static_caches)
 
 
 @kernel
-def _alive(w: World) -> int:
+def _alive(caches: CacheState) -> int:
     n_alive = 0
-    for slot in range(w.state.cache_alive.shape[0]):
-        n_alive += w.state.cache_alive[slot]
+    for slot in range(caches.alive.shape[0]):
+        n_alive += caches.alive[slot]
     return n_alive
 
 
 @kernel
-def close(w: World, walk_chance: FloatArray) -> None:
+def close(a: ArenaArrays, walk_chance: FloatArray) -> None:
     """After everything is placed: objects walk, caches are counted, robots sense.
 
     `walk_chance` (M,) uniform in [0, 1); not read where objects lie still.
     """
-    a, o = w.state, w.wandering
-    if o.probability > 0.0:
-        a.counters[_OBJECTS_MOVED] += walk(
-            a.floor, a.status, a.object_cell, walk_chance, o.probability, o.area, o.self_conflict
+    objects, caches, counters, w = a.state.objects, a.state.caches, a.state.events.counters, a.wandering
+    if w.probability > 0.0:
+        counters[_OBJECTS_MOVED] += walk(
+            objects.floor, objects.status, objects.cell, walk_chance, w.probability, w.area, w.self_conflict
         )
-    if w.has_caches:
-        a.counters[_CACHES_ALIVE] += _alive(w)
-        for slot in range(a.cache_count.shape[0]):
-            a.counters[_OBJECTS_CACHED] += a.cache_count[slot]
-    sense(w)
+    if a.has_caches:
+        counters[_CACHES_ALIVE] += _alive(caches)
+        for slot in range(caches.count.shape[0]):
+            counters[_OBJECTS_CACHED] += caches.count[slot]
+    sense(a)
 
 
 @kernel
-def meet_and_close(w: World, actions: ActionArray, tick: int, chance: FloatArray, walk_chance: FloatArray) -> int:
+def meet_and_close(a: ArenaArrays, actions: ActionArray, tick: int, chance: FloatArray, walk_chance: FloatArray) -> int:
     """`meet`, then `close` unless anything is to be placed; returns `DONE` or `TO_PLACE`."""
-    if meet(w, actions, tick, chance):
+    if meet(a, actions, tick, chance):
         return TO_PLACE
-    close(w, walk_chance)
+    close(a, walk_chance)
     return DONE
 
 
 @kernel
 def whole(
-    w: World,
+    a: ArenaArrays,
     b: BodyState,
     actions: ActionArray,
     wheel_gain: FloatArray,
@@ -204,18 +192,19 @@ def whole(
     walk_chance: FloatArray,
 ) -> int:
     """The whole tick, with compiled bodies; returns `DONE`, `TO_PLACE`, `NO_ROOM` or the row of a refused action."""
-    refused = set_out(w, actions, wheel_gain, tick, look_first)
+    swarm = a.state.swarm
+    refused = set_out(a, actions, wheel_gain, tick, look_first)
     if refused != DONE:
         return refused
-    if not move_bodies(b, w.twist, w.present, w.dt_s):
+    if not move_bodies(b, a.motion.twist, swarm.present, a.motion.dt_s):
         return NO_ROOM
-    tell_poses(b.poses, w.present, w.state.position, w.heading, w.facing)
-    return meet_and_close(w, actions, tick, chance, walk_chance)
+    tell_poses(b.poses, swarm.present, swarm.position, swarm.heading, swarm.facing)
+    return meet_and_close(a, actions, tick, chance, walk_chance)
 
 
 @kernel
 def run(
-    w: World,
+    a: ArenaArrays,
     b: BodyState,
     wheel_gain: FloatArray,
     first: int,
@@ -235,7 +224,7 @@ def run(
     It ends early with a tick that is not `DONE`, or of which the tasks cannot be counted.
 
     Args:
-        w: The world.
+        a: The arena.
         b: Its bodies.
         wheel_gain: (N, 2), see `set_out`.
         first: Number of the first tick.
@@ -254,11 +243,11 @@ def run(
         How many ticks have begun, the outcome of the last of them, and whether its tasks were codes of `Task`, one per
         robot. Tasks of a tick with a refused action are not looked at.
     """
-    obs, active, actions = w.sensors.obs, w.state.active, policy_state[-1]
+    obs, active, actions = a.sensors.obs, a.state.swarm.active, policy_state[-1]
     for k in range(n_ticks):
         policy(obs, active, policy_draws[k], policy_state, policy_first + k)
         chance, walk_chance = chances[k % chances.shape[0]], walk_chances[k % walk_chances.shape[0]]
-        outcome = whole(w, b, actions, wheel_gain, first + k, look_first and k == 0, chance, walk_chance)
+        outcome = whole(a, b, actions, wheel_gain, first + k, look_first and k == 0, chance, walk_chance)
         counted = outcome >= 0 or tasks.shape[0] == 0 or add_task_shares(tasks, active, task_shares)
         if outcome != DONE or not counted:
             return k + 1, outcome, counted
