@@ -5,7 +5,7 @@ Section numbers refer to the paper, "Improved Swarm Engineering: Aligning Intuit
 `scenario("warehouse_small", n_robots=20, n_objects=100)`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from swarm_forage_env._internal import fields
@@ -21,9 +21,6 @@ from swarm_forage_env.scenarios.sizing import (
     in_arena,
     robots_at_density,
 )
-
-SCENARIO_NAMES = ("warehouse_small", "warehouse_medium", "warehouse_dual", "warehouse_quad", "search_and_rescue")
-"""What `scenario` takes: the presets below."""
 
 SEARCH_AND_RESCUE_OBJECTS = {16: 80, 32: 272, 48: 368, 64: 448, 80: 544, 96: 1248, 112: 1408, 128: 1568}
 """Side in metres -> objects: what the clusters of the authors' program always hold, so that both readings have the same
@@ -198,6 +195,18 @@ def _with_density(config: ScenarioConfig, density: float, overrides: Mapping[str
     return at_density(config, density, n_robots=overrides.get("n_robots"), n_objects=overrides.get("n_objects"))
 
 
+PRESETS: dict[str, Callable[..., ScenarioConfig]] = {
+    "warehouse_small": warehouse_small,
+    "warehouse_medium": warehouse_medium,
+    "warehouse_dual": warehouse_dual,
+    "warehouse_quad": warehouse_quad,
+    "search_and_rescue": search_and_rescue,
+}
+"""Name -> what builds the scenario. A new one is registered here, and nowhere else."""
+SCENARIO_NAMES = tuple(PRESETS)
+"""What `scenario` takes."""
+
+
 def scenario(name: str, /, *, density: float | None = None, **overrides: Any) -> ScenarioConfig:
     """Return a preset by name with fields overridden.
 
@@ -213,20 +222,13 @@ def scenario(name: str, /, *, density: float | None = None, **overrides: Any) ->
     if density is not None:
         others = {key: value for key, value in overrides.items() if key not in _SIZES}
         return _with_density(scenario(name, **others), density, overrides)
-    builders = {
-        "warehouse_small": warehouse_small,
-        "warehouse_medium": warehouse_medium,
-        "warehouse_dual": warehouse_dual,
-        "warehouse_quad": warehouse_quad,
-        "search_and_rescue": search_and_rescue,
-    }
-    known_name("scenario", name, builders)
+    known_name("scenario", name, PRESETS)
     if "side_m" in overrides and name != "search_and_rescue":
         raise ConfigError(
             f"Expected side_m with search_and_rescue only, got it with {name}; "
             "other arenas change by width_m and height_m."
         )
-    return builders[name](**overrides)
+    return PRESETS[name](**overrides)
 
 
 def chosen_scenario(given: str | ScenarioConfig, overrides: Mapping[str, Any]) -> ScenarioConfig:
