@@ -6,11 +6,11 @@ import pytest
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.codes import Counter, Event
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM
 from tests.support.busy import BusyPolicy, change_population
 from tests.support.crowded_runs import DENSE, RUNS, fresh, make, side
-from tests.support.foraging import quick_world
+from tests.support.foraging import NEAR, quick_world
 from tests.support.stage import assert_conserved
 
 
@@ -36,7 +36,7 @@ def test_objects_are_conserved(policy, name, caches):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
+@pytest.mark.parametrize("name", NEAR)
 def test_objects_are_conserved_while_controllers_forage(name):
     """What is lost or doubled stays so: a look now and then finds it in these long runs."""
     env = ForageEnv(quick_world(name))

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from swarm_forage_env import SCENARIO_NAMES
 from swarm_forage_env._internal.rng import Stream, stream_rng
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.env import ForageEnv
@@ -13,7 +12,7 @@ from swarm_forage_env.policies.registry import load_policy, policy_names
 from swarm_forage_env.runs.run import build_stack
 from swarm_forage_env.scenarios.presets import scenario
 from tests.support.busy import BusyPolicy, change_population
-from tests.support.foraging import mild_wrappers, quick_world
+from tests.support.foraging import NEAR, mild_wrappers, quick_world
 
 TICKS = 60
 CROWDED: dict[str, Any] = {"n_robots": 20, "walk_probability": 0.01}
@@ -32,11 +31,11 @@ def made_for(policy: str) -> tuple[str, ...]:
     return ("none", "static", "dynamic") if stated == "none" else (stated,)
 
 
-RUNS = [("busy", name, caches) for name in SCENARIO_NAMES for caches in made_for("busy")]
-"""The world is asked by a policy that does everything, in every preset with every kind of caches."""
+RUNS = [("busy", name, caches) for name in DENSE for caches in made_for("busy")]
+"""The world is asked by a policy that does everything, in every kind of scenario with every kind of caches."""
 RUNS += [(policy, "warehouse_small", caches) for policy in policy_names() for caches in made_for(policy)]
 """A policy sees observations only, so one preset tells what it does."""
-EPISODES = [(name, "dpo") for name in SCENARIO_NAMES]
+EPISODES = [(name, "dpo") for name in NEAR]
 
 
 def make(name: str, caches: str) -> ForageEnv:

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from scripts.update_docs import made_with
-from swarm_forage_env import AUTHORS_PROGRAM, SCENARIO_NAMES, Quirks
+from swarm_forage_env import AUTHORS_PROGRAM, Quirks
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.spec import RunSpec, plan_run
 from swarm_forage_env.views.arenas import ArenaBatch
 from swarm_forage_env.views.plans import plan_arena
-from tests.support.foraging import mild_wrappers, quick_world
+from tests.support.foraging import NEAR, mild_wrappers, quick_world
 
 FILE = Path(__file__).with_suffix(".json")
 _HERE, _THEN = made_with(), json.loads(FILE.read_text(encoding="utf-8"))["made_with"]
@@ -54,7 +54,7 @@ def golden_specs() -> dict[str, RunSpec]:
     All of them have Chipmunk's bodies; a part of those by the description has compiled bodies as well.
     """
     specs = {}
-    for scenario in SCENARIO_NAMES:
+    for scenario in NEAR:
         for policy in POLICIES:
             for reading, quirks in READINGS.items():
                 for adversity, wrappers in WRAPPERS.items():

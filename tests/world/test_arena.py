@@ -8,8 +8,9 @@ import pytest
 
 from swarm_forage_env.contract.codes import Counter, Event, Grip, ObjectStatus
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.arena import ForagingArena
+from tests.support.foraging import NEAR
 from tests.support.stage import (
     OPEN_CELL,
     act,
@@ -233,7 +234,7 @@ def test_state_shows_robots_and_objects():
 
 
 @pytest.mark.parametrize("caches", ["none", "static", "dynamic"])
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
+@pytest.mark.parametrize("name", NEAR)
 def test_policies_are_told_the_constants_of_the_world(name, caches):
     config = scenario(name, caches=caches)
     env = ForageEnv(config)

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.codes import Event, Grip
 from swarm_forage_env.env import ForageEnv
-from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.world.kernels.beams import proximity_reading
 from tests.reference import sensing
 from tests.support.engines import in_each_engine
+from tests.support.foraging import NEAR
 from tests.support.stage import act, build_cache, cell_centre, lay, load, put, stand, tidy_world
 
 MODELLED = ("proximity", "light", "ground", "wheel_speed", "position", "heading")
@@ -80,7 +81,7 @@ def build_two_caches(env: ForageEnv) -> None:
         build_cache(env, sorted({*rows, *square[square >= 0].tolist()}), centre)
 
 
-@pytest.mark.parametrize(("name", "caches"), [*zip(SCENARIO_NAMES, itertools.cycle(CACHE_KINDS), strict=False)])
+@pytest.mark.parametrize(("name", "caches"), [*zip(NEAR, itertools.cycle(CACHE_KINDS), strict=False)])
 def test_every_slice_equals_its_twin_along_a_run(name, caches):
     env = ForageEnv(scenario(name, n_robots=12, caches=caches, **crowding(name)))
     assert_matches_twin(env, env.reset_batch(5))
@@ -228,7 +229,7 @@ def test_unknown_slice_to_read_is_refused():
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("caches", CACHE_KINDS)
-@pytest.mark.parametrize("name", SCENARIO_NAMES)
+@pytest.mark.parametrize("name", NEAR)
 def test_observations_and_state_stay_inside_their_spaces(name, caches):
     env = ForageEnv(scenario(name, n_robots=30, caches=caches, n_objects=80))
     space = env.observation_space("robot_0")

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from swarm_forage_env import SCENARIO_NAMES, Snapshot, SnapshotError, parallel_env, scenario
+from swarm_forage_env import Snapshot, SnapshotError, parallel_env, scenario
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
@@ -32,7 +32,7 @@ def small(**options) -> ForageEnv:
 
 @pytest.mark.compiled
 @pytest.mark.parametrize("physics", PHYSICS_ENGINES)
-@pytest.mark.parametrize(("name", "caches"), [*zip(SCENARIO_NAMES, itertools.cycle(CACHES), strict=False)])
+@pytest.mark.parametrize(("name", "caches"), [*zip(DENSE, itertools.cycle(CACHES), strict=False)])
 def test_a_run_goes_on_from_a_snapshot(name, caches, physics):
     run = Branch(crowded(name, caches, physics), BusyPolicy()).go_on(150)
     snapshot = run.env.snapshot()

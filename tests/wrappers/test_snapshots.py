@@ -11,19 +11,20 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from swarm_forage_env import SCENARIO_NAMES, SnapshotError, load_policy
+from swarm_forage_env import SnapshotError, load_policy
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.scenarios.config import PHYSICS_ENGINES
 from swarm_forage_env.wrappers.base import SwarmWrapper
 from swarm_forage_env.wrappers.registry import parse_wrapper
 from tests.support.branches import Branch, pickled, whole_stack
 from tests.support.fake_arena import small_scenario
+from tests.support.foraging import NEAR
 
 ROOT = Path(__file__).resolve().parents[2]
 POLICY_OF = {"none": "dpo", "static": "stochm", "dynamic": "stochx"}
 RUNS = [
     (name, caches, physics)
-    for place, name in enumerate(SCENARIO_NAMES)
+    for place, name in enumerate(NEAR)
     for caches in (tuple(POLICY_OF)[place % 3],)
     for physics in PHYSICS_ENGINES
 ]

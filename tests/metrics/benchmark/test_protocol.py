@@ -3,9 +3,10 @@
 import pytest
 
 from metrics.benchmark import BenchmarkError, load_protocol
-from swarm_forage_env import SCENARIO_NAMES, plan_run
+from swarm_forage_env import plan_run, scenario
 from swarm_forage_env.env import ForageEnv
 from tests.support.entries import TINY
+from tests.support.foraging import NEAR
 
 IDENTITY_OF_VERSION_1 = "8c641b8515a43882"
 """A change of worlds, seeds or lengths is another version: entries of this one must stay comparable."""
@@ -45,7 +46,8 @@ def test_the_protocol_has_what_it_promises(protocol):
     """Sizes from 8 to 512, every kind of placement, all disturbances."""
     sizes = [world.world.n_robots for world in protocol.scored]
     assert (min(sizes), max(sizes)) == (8, 512)
-    assert {world.world.scenario.name for world in protocol.scored} == set(SCENARIO_NAMES)
+    placements = {world.world.scenario.objects.placement for world in protocol.scored}
+    assert placements == {scenario(name).objects.placement for name in NEAR}
     disturbances = {config.name for world in protocol.scored for config in world.world.wrappers}
     assert disturbances == {"throttle", "handling_cost", "sensor_noise", "actuator_noise", "population"}
     rates = [config for world in protocol.scored for config in world.world.wrappers if config.name == "population"]
