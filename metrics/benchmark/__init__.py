@@ -1,5 +1,6 @@
 """A benchmark that others can enter: a fixed protocol of worlds and seeds, entry files, and what they are worth."""
 
+from .board import Board, board_of
 from .entry import Entry, Training, read_entry
 from .figure import draw_benchmark
 from .page import details_page, page_block
@@ -16,6 +17,8 @@ __all__ = [
     "scripted_entries",
     "reference_of",
     "standing_of",
+    "board_of",
+    "Board",
     "page_block",
     "details_page",
     "draw_benchmark",

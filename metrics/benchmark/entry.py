@@ -113,6 +113,11 @@ class Entry:
         return np.asarray(self.runs[world]["interference"], dtype=np.float64)
 
     @property
+    def is_scripted(self) -> bool:
+        """Whether it is of the installed policy whose name it has."""
+        return [(policy.name, policy.digest) for policy in self.policies] == [(self.name, "")]
+
+    @property
     def digest(self) -> str:
         """Hash of everything that the entry holds."""
         return self.to_mapping()["digest"]

@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 
 from swarm_forage_env._internal.wording import number, percent
+from swarm_forage_env.runs.answer import Sheet
 
 from .. import PAPER_POLICIES
 from ..statistics import Estimate
@@ -30,17 +31,6 @@ MATCHED = (
     "population_robustness",
 )
 """Measures of which the page says how often an entry is as good as the best scripted controller."""
-BOARD_HEADER = (
-    "entry",
-    "score",
-    "better than the best scripted",
-    "worlds won",
-    "calm",
-    "disturbed",
-    "training worlds",
-    "interference",
-)
-"""Headings of `board_rows`."""
 
 
 def sorted_standings(standings: Sequence[Standing]) -> list[Standing]:
@@ -48,9 +38,19 @@ def sorted_standings(standings: Sequence[Standing]) -> list[Standing]:
     return sorted(standings, key=lambda standing: (-standing.score.value, standing.entry.name))
 
 
-def board_rows(standings: Sequence[Standing]) -> list[tuple[str, ...]]:
-    """Return one row per entry under `BOARD_HEADER`."""
-    return [
+def board_sheet(standings: Sequence[Standing]) -> Sheet:
+    """Return one row per entry."""
+    header = (
+        "entry",
+        "score",
+        "better than the best scripted",
+        "worlds won",
+        "calm",
+        "disturbed",
+        "training worlds",
+        "interference",
+    )
+    rows = [
         (
             standing.entry.name,
             bounded(standing.score),
@@ -63,6 +63,7 @@ def board_rows(standings: Sequence[Standing]) -> list[tuple[str, ...]]:
         )
         for standing in standings
     ]
+    return Sheet(header=header, rows=rows)
 
 
 def page_block(standings: Sequence[Standing], protocol: Protocol, picture: str = "", details: str = "") -> str:
@@ -80,16 +81,16 @@ def page_block(standings: Sequence[Standing], protocol: Protocol, picture: str =
     parts = [
         f"Version {protocol.version}: {len(protocol.scored)} held-out worlds, {len(protocol.seeds)} seeds, so {n_runs} "
         f"runs of {protocol.horizon_s:,g} s that count per policy.",
-        markdown(BOARD_HEADER, board_rows(ranked)),
+        board_sheet(ranked).markdown(),
         *([f"![Scores of all entries, and their shares in each world]({picture})"] if picture else []),
         *([f"All numbers, world by world and measure by measure: [{details}]({details})."] if details else []),
-        "### How each was made\n\n" + markdown(*_origins(entries)),
+        "### How each was made\n\n" + _origins(entries).markdown(),
         "These commands make them again:\n\n" + _commands(entries),
-        "### Group by group\n\n" + markdown(*_groups(ranked, protocol)),
+        "### Group by group\n\n" + _groups(ranked, protocol).markdown(),
         "### Measure by measure\n\nIn how many rows of a measure an entry is at least as good as the best of the four "
-        "scripted controllers; amounts and distances as shares of performance.\n\n" + markdown(*_matched(entries)),
+        "scripted controllers; amounts and distances as shares of performance.\n\n" + _matched(entries).markdown(),
         "### One against the other\n\nHow often a run of the row's entry is better than one of the column's in the "
-        "same world.\n\n" + markdown(*_duels(entries, protocol)),
+        "same world.\n\n" + _duels(entries, protocol).markdown(),
     ]
     return f"{BEGIN}\n\n" + "\n\n".join(parts) + f"\n\n{END}"
 
@@ -109,9 +110,9 @@ def details_page(standings: Sequence[Standing], reference: Reference, protocol: 
         f"The numbers behind the [benchmark]({page}), the entry with the highest score first. `swarm-forage benchmark "
         "page` writes this page.",
         "## World by world\n\nPerformance per 1,000 s, mean over runs; the best of all entries is bold.\n\n"
-        + markdown(*_worlds(entries, reference, protocol)),
+        + _worlds(entries, reference, protocol).markdown(),
         "## All measures\n\nMeans over runs; amounts and distances as shares of performance.\n\n"
-        + markdown(*_measures(entries)),
+        + _measures(entries).markdown(),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -125,12 +126,6 @@ def with_block(text: str, block: str, where: str) -> str:
     if len(_BLOCK.findall(text)) != 1:
         raise BenchmarkError(f"Expected one part between {BEGIN} and {END} in {where}; write these two lines into it.")
     return _BLOCK.sub(lambda _: block, text)
-
-
-def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in Markdown."""
-    lines = ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in (header, *rows)]
-    return "\n".join([lines[0], "|" + " --- |" * len(header), *lines[1:]])
 
 
 def bounded(estimate: Estimate) -> str:
@@ -150,12 +145,7 @@ def percent_of(value: float, decimals: int = 0) -> str:
     return "-" if math.isnan(value) else f"{100.0 * value:.{decimals}f} %"
 
 
-def _cell(text: str) -> str:
-    """A cell of a Markdown table: names may hold what would end it, or begin HTML."""
-    return " ".join(text.split()).replace("|", r"\|").replace("<", "&lt;")
-
-
-def _origins(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def _origins(entries: Sequence[Entry]) -> Sheet:
     header = ("entry", "trained in", "library", "training seeds", "core-hours of training", "core-hours of its runs")
     rows = [
         (
@@ -168,7 +158,7 @@ def _origins(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str,
         )
         for entry in entries
     ]
-    return header, rows
+    return Sheet(header=header, rows=rows)
 
 
 def _commands(entries: Sequence[Entry]) -> str:
@@ -179,7 +169,7 @@ def _commands(entries: Sequence[Entry]) -> str:
     return "\n".join(["```bash", *(" ".join(line.replace("```", "").split()) for line in lines), "```"])
 
 
-def _groups(ranked: Sequence[Standing], protocol: Protocol) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def _groups(ranked: Sequence[Standing], protocol: Protocol) -> Sheet:
     names = [group.name for group in protocol.groups]
     several = any(standing.by_policy for standing in ranked)
     header = ("entry", *names, *(("score of each training seed",) if several else ()))
@@ -191,10 +181,10 @@ def _groups(ranked: Sequence[Standing], protocol: Protocol) -> tuple[tuple[str, 
         )
         for standing in ranked
     ]
-    return header, rows
+    return Sheet(header=header, rows=rows)
 
 
-def _matched(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def _matched(entries: Sequence[Entry]) -> Sheet:
     scripted = [entry for entry in entries if entry.name in PAPER_POLICIES]
     best: dict[tuple[str, str, str], float] = {}
     for entry in scripted:
@@ -208,7 +198,7 @@ def _matched(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str,
                 won[measure.label][0] += _goodness(measure) >= best[measure.key]
                 won[measure.label][1] += 1
         rows.append((entry.name, *(f"{reached} of {of}" if of else "-" for reached, of in won.values())))
-    return ("entry", *(label.replace("_", " ") for label in MATCHED)), rows
+    return Sheet(header=("entry", *(label.replace("_", " ") for label in MATCHED)), rows=rows)
 
 
 def _goodness(measure: EntryMeasure) -> float:
@@ -216,19 +206,17 @@ def _goodness(measure: EntryMeasure) -> float:
     return measure_mean(measure) * (1.0 if measure.higher_is_better else -1.0)
 
 
-def _duels(entries: Sequence[Entry], protocol: Protocol) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def _duels(entries: Sequence[Entry], protocol: Protocol) -> Sheet:
     shares = improvements(entries, protocol)
     names = [entry.name for entry in entries]
     rows = [
         (name, *("" if k == other else percent_of(shares[k, other]) for other in range(len(names))))
         for k, name in enumerate(names)
     ]
-    return ("", *names), rows
+    return Sheet(header=("", *names), rows=rows)
 
 
-def _worlds(
-    entries: Sequence[Entry], reference: Reference, protocol: Protocol
-) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def _worlds(entries: Sequence[Entry], reference: Reference, protocol: Protocol) -> Sheet:
     rows: list[tuple[str, ...]] = []
     for world in protocol.worlds:
         if not world.is_scored:
@@ -243,10 +231,10 @@ def _worlds(
                 *(f"**{number(mean)}**" if mean == max(means) else number(mean) for mean in means),
             )
         )
-    return ("world", "what it is", "best scripted", *(entry.name for entry in entries)), rows
+    return Sheet(header=("world", "what it is", "best scripted", *(entry.name for entry in entries)), rows=rows)
 
 
-def _measures(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def _measures(entries: Sequence[Entry]) -> Sheet:
     """All measures but those that only say the performance of a world again."""
     known = [{measure.key: measure for measure in entry.measures} for entry in entries]
     places = {key: measure for of_entry in known for key, measure in of_entry.items()}
@@ -258,4 +246,4 @@ def _measures(entries: Sequence[Entry]) -> tuple[tuple[str, ...], list[tuple[str
         values = [measure_mean(found[key]) if key in found else math.nan for found in known]
         better = "higher" if measure.higher_is_better else "lower"
         rows.append((f"{measure.label}, {measure.group}", measure.at, better, *map(show, values)))
-    return ("measure", "at", "better", *(entry.name for entry in entries)), rows
+    return Sheet(header=("measure", "at", "better", *(entry.name for entry in entries)), rows=rows)

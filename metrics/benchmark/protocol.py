@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.studies.ladders import wrappers_at
 from swarm_forage_env.wrappers.registry import wrappers_from_mapping
 from swarm_forage_env.wrappers.world import SIZE, World
@@ -63,6 +64,11 @@ class ProtocolWorld:
         """Whether its performance is part of the score."""
         return self.is_held_out and self.is_scored
 
+    @property
+    def role(self) -> str:
+        """Whether it counts, in words."""
+        return "yes" if self.counts else "reference of measures" if self.is_held_out else "no, to train in"
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Group:
@@ -75,8 +81,8 @@ class Group:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Protocol:
-    """Everything that decides what an entry has to run."""
+class Protocol(Answer):
+    """Everything that decides what an entry has to run; printed, it shows its worlds."""
 
     version: int
     identity: str
@@ -98,6 +104,26 @@ class Protocol:
     def name(self) -> str:
         """Name for people."""
         return f"version {self.version}" + (", quick" if self.is_quick else "")
+
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return the worlds: those to train in, and those that are held out."""
+        title = (
+            f"Benchmark, {self.name}: seeds {', '.join(map(str, self.seeds))}, {self.horizon_s:,g} s per run, "
+            f"{len(self.scored)} worlds that count"
+        )
+        header = ("world", "scenario", "robots", "objects", "arena", "disturbed by", "counts")
+        rows = [(world.name, *map(str, scenario_fields(world).values()), world.role) for world in self.worlds]
+        return (Sheet(title=title, header=header, rows=rows),)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return what there is to run as plain values."""
+        return {
+            "version": self.version,
+            "is_quick": self.is_quick,
+            "horizon_s": self.horizon_s,
+            "seeds": list(self.seeds),
+            "worlds": [{"world": world.name, **scenario_fields(world), "counts": world.role} for world in self.worlds],
+        }
 
 
 def protocol_folder() -> Path:

@@ -1,21 +1,24 @@
 """From policies to an entry: the runs of the protocol, and the measures that they allow."""
 
 import math
+import os
+import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from swarm_forage_env.policies.registry import policy_label
+from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_label
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import policy_specs
 from swarm_forage_env.runs.record import RunRecord, software_versions
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import performance_of
 
+from .. import PAPER_POLICIES
 from ..scoring.columns import INTERVAL_COLUMNS
 from ..scoring.question import Question, ask
 from ..scoring.runs import run_curves, study_curves
@@ -86,6 +89,12 @@ def benchmark_question(
 ) -> BenchmarkQuestion:
     """Return what `run_benchmark` asks; arguments and errors as there."""
     chosen = protocol or load_protocol()
+    is_shipped = tuple(policies) == (name,) and not chosen.is_quick  # made again
+    if name in PAPER_POLICIES and not is_shipped:
+        raise BenchmarkError(
+            f"Expected another name than {name!r}, which is that of an entry that comes with the package; choose one "
+            "with --name."
+        )
     if training_seeds and len(training_seeds) != len(policies):
         raise BenchmarkError(
             f"Expected one training seed per policy, got {len(training_seeds)} for {len(policies)} policies."
@@ -94,7 +103,7 @@ def benchmark_question(
         plan=Plan.product(policy_specs(policies), [each.world for each in chosen.worlds], chosen.seeds),
         name=name,
         protocol=chosen,
-        command=command,
+        command=command or entry_command(policies, name),
         training=training or Training(),
         training_seeds=tuple(training_seeds),
     )
@@ -119,7 +128,7 @@ def run_benchmark(
         policies: Registered names or policy files; several are training seeds of one method, and one entry.
         name: Name of the entry in tables.
         protocol: Default the latest version.
-        command: What the page tells people to type to make the entry again.
+        command: What the page tells people to type to make the entry again; default `entry_command`.
         training: How the policies were made; what a network file tells of it is added.
         training_seeds: One per policy; default what network files tell.
         out: Folder for run records. Runs that it already holds are not repeated, so you can repeat an interrupted call.
@@ -128,7 +137,8 @@ def run_benchmark(
         progress: Show progress and an estimate on stderr.
 
     Raises:
-        BenchmarkError: runs failed, or there is not one training seed per policy.
+        BenchmarkError: runs failed, there is not one training seed per policy, or the name is that of a scripted
+            controller.
         ValueError: an unknown policy, or a file that cannot be opened.
         swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
     """
@@ -143,6 +153,32 @@ def run_benchmark(
     return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)
 
 
+def entry_name(policy: str, *, quick: bool = False) -> str:
+    """Return the name of an entry of one policy; a quick look at a scripted controller is not the shipped entry."""
+    label = policy_label(policy)
+    return f"{label}, quick" if quick and label in PAPER_POLICIES else label
+
+
+def entry_command(policies: Sequence[str], name: str) -> str:
+    """Return what makes an entry again from the current folder: policies as given, but files without whole paths."""
+    words = [word for policy in policies for word in ("--policy", _from_here(policy))]
+    return shlex.join(["swarm-forage", "benchmark", *words, "--name", name])
+
+
+def _from_here(policy: str) -> str:
+    """A policy with the path of each of its files from the current folder, where the whole path was given."""
+    from swarm_forage_env.policies.mixture import is_mixture, mixture_of, mixture_parts
+
+    if is_mixture(policy):
+        parts = mixture_parts(policy)
+        told = [replace(part, policy=_from_here(part.policy)) for part in parts]
+        return policy if told == list(parts) else mixture_of(told)  # as given: 20% stays 20%
+    file = file_of(policy)
+    if not (is_policy_file(policy) and Path(file).is_absolute()):
+        return policy
+    return Path(os.path.relpath(file)).as_posix() + policy.removeprefix(file)
+
+
 def _core_hours(records: Iterable[RunRecord]) -> float | None:
     """What runs took, of those whose records tell it; three digits, as time is never the same twice."""
     known = [record.cpu_time_s for record in records if math.isfinite(record.cpu_time_s)]
@@ -155,7 +191,6 @@ def _told_by_file(policy: str) -> dict[str, Any]:
     from swarm_forage_env.policies.model_files import file_digest
     from swarm_forage_env.policies.network import Network
     from swarm_forage_env.policies.pretrained import network_file
-    from swarm_forage_env.policies.registry import file_of, is_policy_file
 
     if is_mixture(policy):
         digests = [_told_by_file(part.policy)["digest"] for part in mixture_parts(policy)]

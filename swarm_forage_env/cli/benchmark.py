@@ -1,11 +1,17 @@
 """The commands `benchmark`, `benchmark worlds`, `show` and `page`."""
 
+import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from metrics import PAPER_POLICIES
+from swarm_forage_env._internal.printable import printable
 from swarm_forage_env.cli.options import AsJson, DryRun, Jobs
+
+if TYPE_CHECKING:
+    from metrics.benchmark import BenchmarkQuestion, Board
 
 Entries = Annotated[list[Path], typer.Argument(metavar="ENTRY...", help="Entry files; the scripted four come along.")]
 
@@ -57,9 +63,6 @@ def run(  # long: one parameter per option
     """
     if context.invoked_subcommand is not None:
         return
-    from swarm_forage_env._internal.files import as_file_name, check_file
-    from swarm_forage_env.cli.benchmark_report import Wanted, default_name, plan_text, run_and_show
-
     if not policy:
         raise typer.BadParameter(
             "Expected --policy, the name or the file of a policy; swarm-forage list has the names."
@@ -68,40 +71,51 @@ def run(  # long: one parameter per option
         raise typer.BadParameter("Expected --name for an entry of several policies.")
     if quick and out is not None:
         raise typer.BadParameter("Expected --out without --quick: a quick look is no entry.")
-    called = name or default_name(policy[0], quick=quick)
-    wanted = Wanted(
-        policies=tuple(policy),
+    from metrics.benchmark import Training, benchmark_question, board_of, load_protocol, scripted_entries
+    from metrics.benchmark.running import entry_name
+    from metrics.scoring.question import ask
+    from swarm_forage_env._internal.files import as_file_name, check_file
+    from swarm_forage_env.cli.interrupts import resumable
+
+    protocol = load_protocol(quick=quick)
+    called = name or entry_name(policy[0], quick=quick)
+    question = benchmark_question(
+        policy,
         name=called,
-        quick=quick,
-        trained_in=trained_in,
-        training=training,
-        library=library,
-        training_hours=training_hours,
-        training_seeds=tuple(training_seeds or ()),
+        protocol=protocol,
+        training=Training(worlds=trained_in, command=training, library=library, core_hours=training_hours),
+        training_seeds=training_seeds or (),
     )
     if dry_run:
-        typer.echo(plan_text(wanted, records, jobs))
+        typer.echo(_plan_text(question, records, jobs))
         return
     file = None if quick else out or Path("results/benchmark", f"{as_file_name(called)}.json")
     if file is not None:
         check_file(file)
-    run_and_show(wanted, file, records, jobs, as_json=as_json)
+    if called not in PAPER_POLICIES:
+        scripted_entries(load_protocol())  # what it will be shown beside
+    with resumable(records):
+        entry = ask(question, out=records, jobs=jobs)
+    if file is not None:
+        entry.write(file)
+        typer.echo(f"entry {file}", err=True)
+    _show(board_of([entry], protocol), as_json=as_json)
+    if quick:
+        typer.echo("A quick look, no entry: shorter runs than those of the scripted controllers.", err=True)
 
 
 @benchmark.command()
 def worlds() -> None:
     """Show the worlds of the benchmark: those to train in, and those that are held out."""
-    from swarm_forage_env.cli.benchmark_report import worlds_text
+    from metrics.benchmark import load_protocol
 
-    typer.echo(worlds_text())
+    typer.echo(load_protocol().text())
 
 
 @benchmark.command()
 def show(entries: Entries, as_json: AsJson = False) -> None:
     """Show what entries are worth, beside the scripted controllers."""
-    from swarm_forage_env.cli.benchmark_report import show_entries
-
-    show_entries(entries, as_json=as_json)
+    _show(_board_of(entries), as_json=as_json)
 
 
 @benchmark.command()
@@ -115,7 +129,37 @@ def page(
     ),
 ) -> None:
     """Write the tables of all entries into a page, and draw its figure."""
-    from swarm_forage_env.cli.benchmark_report import write_page
-
-    for file in write_page(entries, into, picture):
+    for file in _board_of(entries).write_page(into, picture):
         typer.echo(file)
+
+
+def _board_of(paths: list[Path]) -> "Board":
+    from metrics.benchmark import board_of, load_protocol, read_entry
+    from metrics.benchmark.board import entry_files
+
+    protocol = load_protocol()
+    return board_of([read_entry(path, protocol) for path in entry_files(paths)])
+
+
+def _show(board: "Board", *, as_json: bool) -> None:
+    typer.echo(json.dumps(board.to_mapping()["entries"], indent=1) if as_json else printable(board.text()))
+
+
+def _plan_text(question: "BenchmarkQuestion", records: Path, jobs: int | None) -> str:
+    """What would be run, with an estimate."""
+    from swarm_forage_env._internal.wording import counted
+    from swarm_forage_env.cli.report import estimate, estimated_seconds
+    from swarm_forage_env.runs.store import RunStore
+    from swarm_forage_env.runs.workers import available_cores
+
+    protocol, store, specs = question.protocol, RunStore(records), question.plan.specs
+    todo = [spec for spec in specs if spec.run_id not in store]
+    processes = jobs or available_cores()
+    seconds = estimated_seconds(todo, processes)
+    return "\n".join(
+        [
+            f"{question.name} in the benchmark, {protocol.name}: {counted(len(protocol.worlds), 'world')}, "
+            f"{counted(len(protocol.seeds), 'seed')}, {protocol.horizon_s:,g} s per run, records go to {store.folder}",
+            f"{counted(len(specs), 'run')}, {len(todo):,} to do" + estimate(seconds, processes, any_left=bool(todo)),
+        ]
+    )

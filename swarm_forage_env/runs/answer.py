@@ -37,14 +37,12 @@ class Sheet:
         return "\n".join([*([self.title] if self.title else []), *table, *self.notes])
 
     def markdown(self) -> str:
-        """Return the table in the form of GitHub; pipes in its cells are escaped."""
+        """Return the table in the form of GitHub; what would end a cell is escaped."""
         parts = [f"**{self.title}**"] if self.title else []
         if self.rows:
             header = self.header or [""] * len(self.rows[0])
             lines = [header, ["---"] * len(header), *self.rows]
-            parts.append(
-                "\n".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |" for row in lines)
-            )
+            parts.append("\n".join(f"| {' | '.join(map(_markdown_cell, row))} |" for row in lines))
         return "\n\n".join([*parts, *self.notes])
 
     def csv(self) -> str:
@@ -55,9 +53,9 @@ class Sheet:
         return out.getvalue()
 
 
-def _markdown_row(cells: Sequence[str]) -> str:
-    escaped = [cell.replace("|", "\\|") for cell in cells]
-    return f"| {' | '.join(escaped)} |"
+def _markdown_cell(text: str) -> str:
+    """A cell of a table: names may hold what would end it, or begin HTML."""
+    return " ".join(text.split()).replace("|", r"\|").replace("<", "&lt;")
 
 
 class Answer(ABC):

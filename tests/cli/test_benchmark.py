@@ -11,7 +11,7 @@ from metrics import PAPER_POLICIES
 from metrics.benchmark import load_protocol
 from metrics.benchmark.entry import EntryPolicy
 from metrics.benchmark.page import BEGIN, END
-from swarm_forage_env.cli.benchmark_report import Wanted
+from metrics.benchmark.running import entry_command
 from tests.support.entries import TINY, made_up_entry
 
 
@@ -95,9 +95,7 @@ def test_a_page_is_written_with_its_figure(command, mine):
 
 def test_a_mixed_swarm_can_be_run_again_with_the_command_of_its_entry():
     policy = "mixed:runs/a.npz=20%,crw=rest"
-    assert Wanted(policies=(policy,), name="a few").command == (
-        f"swarm-forage benchmark --policy {policy} --name 'a few'"
-    )
+    assert entry_command((policy,), "a few") == (f"swarm-forage benchmark --policy {policy} --name 'a few'")
 
 
 def test_a_file_with_its_whole_path_is_told_from_the_current_folder(tmp_path, monkeypatch):
@@ -105,7 +103,7 @@ def test_a_file_with_its_whole_path_is_told_from_the_current_folder(tmp_path, mo
     monkeypatch.chdir(tmp_path)
     given = ("runs/a.npz", f"{tmp_path}/runs/a.npz", f"{tmp_path}/m.zip:decision_ticks=5",
              f"mixed:{tmp_path}/a.npz=20%,crw=rest", "dpo")  # fmt: skip
-    words = Wanted(policies=given, name="x").command.split()
+    words = entry_command(given, "x").split()
     told = [word for before, word in pairwise(words) if before == "--policy"]
     assert told == ["runs/a.npz", "runs/a.npz", "m.zip:decision_ticks=5", "mixed:a.npz=0.2,crw=rest", "dpo"]
 

@@ -16,7 +16,7 @@ from metrics.benchmark import (
     reference_of,
     standing_of,
 )
-from metrics.benchmark.page import BEGIN, END, markdown, with_block
+from metrics.benchmark.page import BEGIN, END, with_block
 from metrics.benchmark.standing import improvements, scripted_entries
 from tests.support.entries import TINY, made_up_entry
 from tests.support.pictures import words_in
@@ -144,10 +144,6 @@ def test_a_page_gets_another_block_between_its_marks():
     assert with_block(page, f"{BEGIN}\nnew \\1\n{END}", "page") == f"before\n{BEGIN}\nnew \\1\n{END}\nafter\n"
     with pytest.raises(BenchmarkError, match=r"in page\.md"):
         with_block("no marks", "new", "page.md")
-
-
-def test_a_table_in_markdown():
-    assert markdown(("a", "b"), [("1", "2|3")]) == "| a | b |\n| --- | --- |\n| 1 | 2\\|3 |"
 
 
 def test_the_figure_shows_every_entry_and_world(protocol, scripted, reference, tmp_path):
