@@ -1,36 +1,50 @@
 """The command `ablate`."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, Caches, DryRun, Jobs, Out
-from swarm_forage_env.cli.world_options import World, takes_world
+from metrics import PAPER_POLICIES
+from swarm_forage_env.cli.option_groups import PlaceOptions, PolicyOptions, WorldOptions, takes_options
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, Jobs, Out
 
 if TYPE_CHECKING:
     from swarm_forage_env.runs.store import RunStore
     from swarm_forage_env.studies.ablation import Ablation
 
 
-@takes_world("performance", "settings", "wrappers")
-def ablate(
-    *,
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SeveralPlaces(PlaceOptions):
+    """Options of worlds that differ in scenario and size."""
+
     scenario: Annotated[
-        str, typer.Option("--scenario", help="One or more presets, separated by commas.")
-    ] = "warehouse_small,warehouse_medium",
-    policy: Annotated[
-        str, typer.Option("--policy", "--controller", help="One or more, separated by commas.")
-    ] = "crw,dpo,stochm,stochx",
-    robots: Annotated[str, typer.Option("--robots", help="One or more swarm sizes, separated by commas.")] = "32,256",
+        str,
+        typer.Option("--scenario", metavar="NAME|FILE.toml", help="One or more presets or files, separated by commas."),
+    ] = "warehouse_small,warehouse_medium"
+    robots: Annotated[str, typer.Option("--robots", help="One or more swarm sizes, separated by commas.")] = "32,256"
+
+    def places(self) -> list[WorldOptions]:
+        """Return the options of each world."""
+        from swarm_forage_env.cli.scenario_options import split_names, split_numbers
+
+        common = {field.name: getattr(self, field.name) for field in fields(PlaceOptions)}
+        return [
+            WorldOptions(**{**common, "scenario": name}, robots=size)
+            for name in split_names(self.scenario)
+            for size in split_numbers("--robots", self.robots, int)
+        ]
+
+
+@takes_options
+def ablate(
+    policies: PolicyOptions,
+    described: SeveralPlaces,
     quirks: Annotated[
         str, typer.Option("--quirks", help="Which to switch, separated by commas; all; or none: the readings only.")
     ] = "all",
     seeds: Annotated[int, typer.Option(min=2, help="Runs per policy, size and switched quirk.")] = 3,
-    horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
-    caches: Caches = None,
-    described: World,
     out: Out = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -43,16 +57,10 @@ def ablate(
     from pathlib import Path
 
     from swarm_forage_env._internal.fields import MOST_SEEDS, whole
-    from swarm_forage_env.cli.scenario_options import split_names, split_numbers
     from swarm_forage_env.runs.store import RunStore
 
     whole("--seeds", seeds, at_least=2, at_most=MOST_SEEDS)
-    worlds = [
-        replace(described, scenario=name, robots=size, horizon=horizon)
-        for name in split_names(scenario)
-        for size in split_numbers("--robots", robots, int)
-    ]
-    plan = _plan(worlds, split_names(policy), quirks, seeds, caches)
+    plan = _plan(described, policies.names(",".join(PAPER_POLICIES)), quirks, seeds)
     store = RunStore(out or Path("results", "ablation"))
     if dry_run:
         _show_plan(plan, store, seeds, jobs)
@@ -60,18 +68,15 @@ def ablate(
         _run(plan, store, jobs, as_json=as_json)
 
 
-def _plan(
-    described: Sequence[World], policies: Sequence[str], quirks: str, seeds: int, caches: str | None
-) -> "Ablation":
+def _plan(described: SeveralPlaces, policies: Sequence[str], quirks: str, seeds: int) -> "Ablation":
     from swarm_forage_env.cli.scenario_options import described_world, split_names
     from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
     from swarm_forage_env.studies.ablation import plan_ablation
-    from swarm_forage_env.wrappers.world import World
 
-    worlds = [World(scenario, wrappers) for scenario, _, wrappers in map(described_world, described)]
+    worlds = [described_world(place)[0] for place in described.places()]
     every = {"all": QUIRK_NAMES, "none": ()}
     switched = every[quirks] if quirks in every else split_names(quirks)
-    return plan_ablation(worlds, policies, quirks=switched, seeds=range(seeds), caches=caches)
+    return plan_ablation(worlds, policies, quirks=switched, seeds=range(seeds), caches=described.caches)
 
 
 def _show_plan(plan: "Ablation", store: "RunStore", seeds: int, jobs: int | None) -> None:

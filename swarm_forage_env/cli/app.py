@@ -18,7 +18,6 @@ from swarm_forage_env.cli.ablate import ablate
 from swarm_forage_env.cli.availability import availability
 from swarm_forage_env.cli.benchmark import benchmark
 from swarm_forage_env.cli.choose import choose
-from swarm_forage_env.cli.compare import compare
 from swarm_forage_env.cli.curves import curves
 from swarm_forage_env.cli.dataset import dataset
 from swarm_forage_env.cli.ending import end
@@ -74,7 +73,10 @@ def _options(
 
 
 # `--help` lists them in this order.
-for command in (run, score, compare, predict, choose, train, curves, dataset):
+for command in (run, score):
+    app.command()(command)
+app.command("compare")(score)
+for command in (predict, choose, train, curves, dataset):
     app.command()(command)
 app.add_typer(study, name="study")
 app.add_typer(benchmark, name="benchmark")

@@ -2,12 +2,11 @@
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from swarm_forage_env.cli.options import AsJson
+from swarm_forage_env.cli.options import AsJson, Picture
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -17,7 +16,7 @@ def availability(
     robots: Annotated[str, typer.Option("--robots", help="Swarm sizes, separated by commas.")] = "50,200",
     teams: Annotated[str, typer.Option("--teams", help="Mean teams M, robots at work on average.")] = "5,10,20",
     needed: Annotated[str, typer.Option("--needed", help="Numbers of robots needed, for the table.")] = "1,5,10,20,40",
-    out: Annotated[Path | None, typer.Option("--out", help="Picture to draw: .png, .svg or .pdf.")] = None,
+    picture: Picture = None,
     as_json: AsJson = False,
 ) -> None:
     """Show how likely enough robots are at work, over how many are needed. Computed in equilibrium, without runs."""
@@ -31,24 +30,24 @@ def availability(
     sizes = split_numbers("--robots", robots, int)
     means = split_numbers("--teams", teams, float)
     demands = split_numbers("--needed", needed, int)
-    if out is not None:
-        check_picture(out)
+    if picture is not None:
+        check_picture(picture)
     try:
         rows = [
             {"robots": n, "team": team, "at_work": _mean_at_work(n, team), "needed": demands, "availability": curve}
             for n in sizes
             for team, curve in zip(means, availability_curves(n, means, demands).tolist(), strict=True)
         ]
-        figure = None if out is None else availability_figure(sizes, means)
+        figure = None if picture is None else availability_figure(sizes, means)
     except ValueError as error:  # a size or a team that cannot be
         raise ConfigError(str(error)) from error
     if as_json:
-        typer.echo(json.dumps({"curves": rows, "picture": None if out is None else str(out)}))
+        typer.echo(json.dumps({"curves": rows, "picture": None if picture is None else str(picture)}))
     else:
         output().print(_table(rows, demands))
-    if out is not None and figure is not None:
-        figure.draw([out], SCREEN)
-        notes().print(f"picture {out}")
+    if picture is not None and figure is not None:
+        figure.draw([picture], SCREEN)
+        notes().print(f"picture {picture}")
 
 
 def _mean_at_work(n: int, team: float) -> float:

@@ -1,23 +1,17 @@
 """The command `choose`."""
 
-from dataclasses import replace
 from typing import Annotated
 
 import typer
 
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
 from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Out
-from swarm_forage_env.cli.world_options import World, takes_world
 
 
-@takes_world("scenario", "robots", "objects", "side", "caches", "performance", "settings")
+@takes_options
 def choose(
-    described: World,
-    policy: Annotated[
-        str,
-        typer.Option(
-            "--policy", "--policies", help="One or more, separated by commas: names, or files of trained policies."
-        ),
-    ],
+    policies: PolicyOptions,
+    described: WorldOptions,
     deliver: Annotated[
         float,
         typer.Option(help="Performance that an undisturbed run must reach, in all: objects or what is asked for."),
@@ -44,7 +38,6 @@ def choose(
         typer.Option(metavar="SIGMA", help="Standard deviation of the noise of all sensors and wheels."),
     ] = None,
     seeds: Annotated[int, typer.Option(min=2, help="Runs per policy and condition.")] = 4,
-    horizon: Annotated[float | None, typer.Option(help="Seconds per run, whole intervals of 200 s.")] = None,
     out: Out = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -56,9 +49,9 @@ def choose(
     mean performance reaches the demand. Runs that the folder holds already are not repeated.
     """
     from swarm_forage_env.cli.decision_report import Demands, choose_runs
-    from swarm_forage_env.cli.scenario_options import default_folder
+    from swarm_forage_env.cli.scenario_options import default_folder, described_world
 
-    described = replace(described, horizon=horizon)
+    world, caches = described_world(described)
     demands = Demands(deliver=deliver, keep=keep, failures=failures, deaths=deaths, noise=noise)
-    folder = out or default_folder(described.scenario)
-    choose_runs(described, policy, demands, seeds, folder, jobs, as_json=as_json, dry_run=dry_run)
+    folder = out or default_folder(world.scenario.name)
+    choose_runs(policies.names(), world, caches, demands, seeds, folder, jobs, as_json=as_json, dry_run=dry_run)

@@ -1,27 +1,23 @@
 """The command `dataset`."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
 from swarm_forage_env.cli.options import EXIT_INTERRUPTED, DryRun, complain
-from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
     from swarm_forage_env.training.datasets.recording import DatasetPlan
 
 
-@takes_world()
+@takes_options
 def dataset(  # long: one parameter per option
-    described: World,
-    policy: Annotated[
-        str, typer.Option("--policy", help="A name, a file of a trained policy, or a mixed swarm.")
-    ] = "dpo",
+    policies: PolicyOptions,
+    described: WorldOptions,
     seeds: Annotated[int, typer.Option(min=1, help="Number of runs.")] = 1,
     first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first run.")] = 0,
-    horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
     observation: Annotated[
         str | None,
         typer.Option(help="full or compact; default what a learned policy sees, else full."),
@@ -51,8 +47,7 @@ def dataset(  # long: one parameter per option
     from swarm_forage_env.policies.registry import policy_label
     from swarm_forage_env.training.datasets.recording import plan_dataset, record_dataset
 
-    options = replace(described, horizon=horizon)
-    spec = plan_runs(options, (policy,), n_seeds=1, first_seed=first_seed)[0]
+    spec = plan_runs(described, (policies.one("dpo"),), n_seeds=1, first_seed=first_seed)[0]
     plan = plan_dataset(
         spec,
         range(first_seed, first_seed + seeds),

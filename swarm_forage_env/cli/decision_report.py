@@ -20,11 +20,11 @@ from metrics.scoring.question import ask
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli.interrupts import resumable
 from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture
-from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, split_names
 from swarm_forage_env.cli.score_report import plan_json, plan_text
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.runs.workers import available_cores
+from swarm_forage_env.wrappers.world import World
 
 _PICTURE = "prediction.png"
 _Result = TypeVar("_Result")
@@ -42,12 +42,13 @@ class Demands:
 
 
 def predict_runs(
-    described: ScenarioOptions,
-    policies: str,
-    fit: Sequence[int] | None,
-    hold: Sequence[int],
+    policies: Sequence[str],
+    world: World,
+    caches: str | None,
+    sizes: tuple[Sequence[int] | None, Sequence[int]],
     seeds: int,
     folder: Path,
+    picture: Path | None,
     jobs: int | None,
     *,
     as_json: bool,
@@ -59,18 +60,16 @@ def predict_runs(
         ConfigError: whatever is wrong with the words.
         typer.Exit: Ctrl-C, or runs have failed.
     """
-    if any(word.partition("=")[0] == "n_robots" for word in described.settings):
-        raise ConfigError("Expected no --set n_robots=..., because sizes are varied; give them by --fit and --hold.")
-    scenario, caches = build_scenario(described)
+    fit, hold = sizes
     try:
-        question = prediction_question(split_names(policies), scenario, fit=fit, hold=hold, seeds=seeds, caches=caches)
+        question = prediction_question(policies, world, fit=fit, hold=hold, seeds=seeds, caches=caches)
     except ValueError as error:  # of a policy or a size
         raise ConfigError(str(error)) from error
     if dry_run:
         _show_plan(question.plan, question.world.scenario.name, folder, jobs, as_json=as_json)
         return
     tables = _carried_out(lambda: ask(question, out=folder, jobs=jobs), folder)
-    _show_predictions(tables, folder, as_json=as_json)
+    _show_predictions(tables, picture or folder / _PICTURE, as_json=as_json)
     if any(table.failures for table in tables):
         raise typer.Exit(EXIT_FAILURE)
 
@@ -80,11 +79,11 @@ def predict_file(
     fit: Sequence[int] | None,
     hold: Sequence[int],
     performance: str | None,
-    folder: Path | None,
+    picture: Path | None,
     *,
     as_json: bool,
 ) -> None:
-    """Predict from a file of curves and print; draw only where a folder is given.
+    """Predict from a file of curves and print; draw only where a picture is asked for.
 
     Raises:
         ConfigError: whatever is wrong with the file or the sizes.
@@ -93,12 +92,13 @@ def predict_file(
         tables = predict_curves(path, fit=fit, hold=hold, performance=performance)
     except ValueError as error:
         raise ConfigError(str(error)) from error
-    _show_predictions(tables, folder, as_json=as_json)
+    _show_predictions(tables, picture, as_json=as_json)
 
 
 def choose_runs(
-    described: ScenarioOptions,
-    policies: str,
+    policies: Sequence[str],
+    world: World,
+    caches: str | None,
     demands: Demands,
     seeds: int,
     folder: Path,
@@ -113,13 +113,12 @@ def choose_runs(
         ConfigError: whatever is wrong with the words.
         typer.Exit: Ctrl-C, or runs have failed.
     """
-    scenario, caches = build_scenario(described)
     try:
-        question = choice_question(split_names(policies), scenario, seeds=seeds, caches=caches, **asdict(demands))
+        question = choice_question(policies, world, seeds=seeds, caches=caches, **asdict(demands))
     except ValueError as error:  # of a policy or a demand
         raise ConfigError(str(error)) from error
     if dry_run:
-        _show_plan(question.plan, scenario.name, folder, jobs, as_json=as_json)
+        _show_plan(question.plan, world.scenario.name, folder, jobs, as_json=as_json)
         return
     choice = _carried_out(lambda: ask(question, out=folder, jobs=jobs), folder)
     typer.echo(json.dumps(choice.to_mapping(), indent=1) if as_json else str(choice))
@@ -147,10 +146,8 @@ def _carried_out(run: Callable[[], _Result], folder: Path) -> _Result:
         raise typer.Exit(EXIT_FAILURE) from None
 
 
-def _show_predictions(tables: Sequence[PredictionTable], folder: Path | None, *, as_json: bool) -> None:
-    picture = None
-    if folder is not None:
-        picture = folder / _PICTURE
+def _show_predictions(tables: Sequence[PredictionTable], picture: Path | None, *, as_json: bool) -> None:
+    if picture is not None:
         try:
             draw_predictions(tables, picture)
         except ImportError as error:

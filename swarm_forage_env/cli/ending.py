@@ -14,6 +14,7 @@ from typing import Any
 
 import typer
 
+from swarm_forage_env.cli.former_words import right_option
 from swarm_forage_env.cli.options import (
     EXIT_FAILURE,
     EXIT_INTERRUPTED,
@@ -27,9 +28,6 @@ DEBUG_VARIABLE = "SWARM_FORAGE_DEBUG"
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
 """Base of typer's complaints about arguments; typer gives it no public name."""
 
-_TWINS = {"--jobs": "--workers", "--workers": "--jobs"}
-"""Options that people mistake for each other: commands have the one, `study run`, which may have its workers elsewhere,
-the other."""
 _BOUNDS = {
     "greater_than_equal": ("ge", ">="),
     "greater_than": ("gt", ">"),
@@ -78,9 +76,10 @@ def end(error: BaseException) -> int:
 
 def _about_words(error: Any) -> str:
     """Return what is wrong with the words of a command, a `_USAGE_ERROR`, in the style of our other errors."""
-    other = _TWINS.get(getattr(error, "option_name", ""))
-    if other and any(other in option.opts for option in error.ctx.command.params):
-        return f"No such option: {error.option_name}; for this command it is {other}."
+    wrong = getattr(error, "option_name", "")
+    right = right_option(wrong, [word for option in error.ctx.command.params for word in option.opts]) if wrong else ""
+    if right:
+        return f"No such option: {wrong}; for this command it is {right}."
     found = getattr(error.__cause__, "errors", None)  # of pydantic, by which typer checks values
     param = getattr(error, "param", None)
     if found is None or param is None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
+from swarm_forage_env.cli.options import Picture
 from swarm_forage_env.cli.terminal import notes
 
 if TYPE_CHECKING:
@@ -19,10 +20,8 @@ OwnScales: TypeAlias = Annotated[
 
 def maps(
     page: Annotated[Path, typer.Argument(help="A file that 'swarm-forage replay' has written.")],
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Picture to write; default the page's name and .maps.png.")
-    ] = None,
-    side: Annotated[float, typer.Option(help="Side of the squares in m.")] = 0.4,
+    picture: Picture = None,
+    square: Annotated[float, typer.Option("--square", help="Side of the squares in m.")] = 0.4,
     own_scales: OwnScales = False,
 ) -> None:
     """Draw where robots were, took and left objects, and got in each other's way, from a replay.
@@ -42,13 +41,13 @@ def maps(
             f"'swarm-forage replay {page}' makes the page of a run, and 'swarm-forage study maps' the maps of a study."
         )
     try:
-        found = [floor_maps(replay, side_m=side) for replay in read_replays(page)]
+        found = [floor_maps(replay, side_m=square) for replay in read_replays(page)]
     except ReplayError as error:
         raise typer.BadParameter(str(error)) from error
-    picture = out or page.with_suffix(".maps.png")
-    check_picture(picture)
-    write_maps(with_differences(found), picture, own_scales=own_scales)
-    typer.echo(f"wrote maps of {counted(len(found), 'run')} to {picture} and .npz files beside it")
+    file = picture or page.with_suffix(".maps.png")
+    check_picture(file)
+    write_maps(with_differences(found), file, own_scales=own_scales)
+    typer.echo(f"wrote maps of {counted(len(found), 'run')} to {file} and .npz files beside it")
 
 
 def with_differences(found: "Sequence[FloorMaps]") -> "list[FloorMaps]":

@@ -1,6 +1,5 @@
 """What several commands share: options, exit codes, complaints. Light, so that `--help` answers at once."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -17,7 +16,23 @@ EXIT_INTERRUPTED = 130
 EXIT_TERMINATED = 143
 """Exit code that shells report for a program ended by SIGTERM, as batch systems and containers send it."""
 
-Scenario = Annotated[str, typer.Option("--scenario", help="Preset; see 'swarm-forage list'.")]
+Policies = Annotated[
+    tuple[str, ...],
+    typer.Argument(
+        metavar="POLICY",
+        help="Policies, also separated by commas: names, files of trained ones, or classes in Python files "
+        "(my_module.py:MyPolicy); docs/policies.md has more.",
+    ),
+]
+NamedPolicies = Annotated[tuple[str, ...], typer.Option("--policy", metavar="POLICY", help="The same, as an option.")]
+Scenario = Annotated[
+    str,
+    typer.Option(
+        "--scenario",
+        metavar="NAME|FILE.toml",
+        help="A preset, see 'swarm-forage list'; or a file with fields of a scenario, and wrappers (docs/files.md).",
+    ),
+]
 Robots = Annotated[int | None, typer.Option("--robots", min=1, help="Swarm size.")]
 Objects = Annotated[int | None, typer.Option("--objects", min=1, help="Number of objects.")]
 Side = Annotated[float | None, typer.Option("--side", help="Side of the arena in m (search_and_rescue only).")]
@@ -38,26 +53,20 @@ Performance = Annotated[
         "task_balance or cache_load; default the scenario's. Stored runs are read again, not repeated.",
     ),
 ]
+Horizon = Annotated[
+    float | None, typer.Option("--horizon", help="Simulated seconds per run, whole intervals of 200 s.")
+]
 Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Any scenario field; may be repeated.")
+    tuple[str, ...], typer.Option("--set", metavar="KEY=VALUE", help="Any scenario field; may be repeated.")
 ]
 Wrappers = Annotated[
-    list[str] | None,
+    tuple[str, ...],
     typer.Option(
         "--wrapper",
         metavar="NAME:KEY=VALUE,...",
         help="Disturb the swarm, e.g. sensor_noise:sigma=0.03 or population:death_per_tick=0.0001; may be repeated.",
     ),
 ]
-ConfigFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--config",
-        metavar="FILE.toml",
-        help="Scenario fields and wrappers, one table each; other options override it.",
-    ),
-]
-
 Measures = Annotated[str | None, typer.Option("--measures", help="Names separated by commas; default all.")]
 Disturbance = Annotated[
     str,
@@ -78,8 +87,35 @@ Band = Annotated[
 ]
 Budget = Annotated[str, typer.Option("--budget", help="quick, standard or paper: how long, how many runs and levels.")]
 ScoreSeeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per experiment; default the budget's.")]
-ScoreHorizon = Annotated[float | None, typer.Option("--horizon", help="Seconds per run; default the budget's.")]
-Out = Annotated[Path | None, typer.Option("--out", help="Folder for records; default results/SCENARIO.")]
+Curves = Annotated[
+    Path | None,
+    typer.Option(
+        "--curves", metavar="FILE", help="Read curves from CSV or Parquet, and run nothing (docs/scoring.md)."
+    ),
+]
+OF_RUNS = "which are about runs; leave them out"
+"""What is said of other options than those of curves."""
+Picture = Annotated[
+    Path | None,
+    typer.Option(
+        "--picture", metavar="FILE", help="Picture to draw, .png, .svg or .pdf; default in the folder of results."
+    ),
+]
+
+
+def _a_folder(path: Path | None) -> Path | None:
+    """Refuse names of files, which other options take."""
+    if path is not None and path.suffix in _FILES:
+        raise typer.BadParameter(f"Expected --out as a folder, got {path}; --file and --picture take files.")
+    return path
+
+
+_FILES = (".csv", ".gif", ".html", ".json", ".mp4", ".parquet", ".pdf", ".png", ".svg")
+"""Endings of files that commands write."""
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="FOLDER", callback=_a_folder, help="Folder for records; default results/SCENARIO."),
+]
 Jobs = Annotated[
     int | None,
     typer.Option("--jobs", min=1, help="Processes; default one per core that it may use; 1 = in this process."),
@@ -97,28 +133,3 @@ def complain(message: str, code: int) -> int:
     """Print one line on stderr; returns `code`."""
     typer.echo("swarm-forage: " + printable(" ".join(message.split())), err=True)
     return code
-
-
-def refuse_options_of_runs(context: typer.Context, of_curves: Sequence[str]) -> None:
-    """Refuse options about runs, which would have no effect on curves from a file.
-
-    Args:
-        context: Of the command.
-        of_curves: Parameters that go with --curves, itself first.
-
-    Raises:
-        typer.BadParameter: others were given.
-    """
-    words = {str(option.name): option.opts[0] for option in context.command.params}
-    sources = {name: context.get_parameter_source(name) for name in words}
-    given = [
-        words[name]
-        for name, source in sources.items()
-        if source is not None and source.name == "COMMANDLINE" and name not in of_curves
-    ]
-    if given:
-        allowed = [words[name] for name in of_curves[1:]]
-        raise typer.BadParameter(
-            f"Expected --curves with no other options than {', '.join(allowed[:-1])} and {allowed[-1]}, got "
-            f"{', '.join(given)}, which are about runs."
-        )

@@ -1,28 +1,22 @@
 """The command `predict`."""
 
-from dataclasses import replace
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Out, refuse_options_of_runs
-from swarm_forage_env.cli.world_options import World, takes_world
+from swarm_forage_env.cli.option_groups import PlaceOptions, PolicyOptions, refuse_others, takes_options
+from swarm_forage_env.cli.options import OF_RUNS, AsJson, Curves, DryRun, Jobs, Out, Picture
 
-_OF_CURVES = ("curves", "fit", "hold", "performance", "out", "as_json")
+_OF_CURVES = ("curves", "fit", "hold", "performance", "picture", "as_json")
 """Options of `predict` that go with --curves."""
 
 
-@takes_world("scenario", "objects", "caches", "performance", "settings")
+@takes_options
 def predict(
     context: typer.Context,
-    described: World,
-    policy: Annotated[
-        str | None, typer.Option(help="One or more, separated by commas: names, or files of trained policies.")
-    ] = None,
-    curves: Annotated[
-        Path | None, typer.Option(help="Predict from curves in a CSV or Parquet file instead (docs/deciding.md).")
-    ] = None,
+    policies: PolicyOptions,
+    described: PlaceOptions,
+    curves: Curves = None,
     fit: Annotated[
         str | None,
         typer.Option(
@@ -34,8 +28,8 @@ def predict(
         str | None, typer.Option(help="Larger sizes that are run, or in the file, but not fitted: the test.")
     ] = None,
     seeds: Annotated[int, typer.Option(min=2, help="Runs per size.")] = 4,
-    horizon: Annotated[float | None, typer.Option(help="Seconds per run, whole intervals of 200 s.")] = None,
     out: Out = None,
+    picture: Picture = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
     dry_run: DryRun = False,
@@ -46,16 +40,26 @@ def predict(
     the prediction. Runs that the folder holds already are not repeated.
     """
     from swarm_forage_env.cli.decision_report import predict_file, predict_runs
-    from swarm_forage_env.cli.scenario_options import default_folder, split_numbers
+    from swarm_forage_env.cli.scenario_options import default_folder, described_world, split_numbers
 
-    if (policy is None) == (curves is None):
-        raise typer.BadParameter("Expected either --policy or --curves.")
     fitted = None if fit is None else split_numbers("--fit", fit, int)
     held = () if hold is None else split_numbers("--hold", hold, int)
     if curves is not None:
-        refuse_options_of_runs(context, _OF_CURVES)
-        predict_file(curves, fitted, held, described.performance, out, as_json=as_json)
+        refuse_others(context, "--curves", _OF_CURVES, OF_RUNS)
+        predict_file(curves, fitted, held, described.performance, picture, as_json=as_json)
         return
-    folder = out or default_folder(described.scenario)
-    world = replace(described, horizon=horizon)
-    predict_runs(world, policy or "", fitted, held, seeds, folder, jobs, as_json=as_json, dry_run=dry_run)
+    if any(word.partition("=")[0] == "n_robots" for word in described.settings):
+        raise typer.BadParameter("Expected no --set n_robots=..., because sizes are varied; use --fit and --hold.")
+    world, caches = described_world(described)
+    predict_runs(
+        policies.names(),
+        world,
+        caches,
+        (fitted, held),
+        seeds,
+        out or default_folder(world.scenario.name),
+        picture,
+        jobs,
+        as_json=as_json,
+        dry_run=dry_run,
+    )

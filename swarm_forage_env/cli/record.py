@@ -5,20 +5,20 @@ from typing import Annotated, Any
 
 import typer
 
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
 from swarm_forage_env.cli.terminal import progress_bar
-from swarm_forage_env.cli.world_options import World, takes_world
 
 
-@takes_world()
+@takes_options
 def record(
-    described: World,
-    out: Annotated[
+    policies: PolicyOptions,
+    described: WorldOptions,
+    file: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", help="File to write, .gif or .mp4, or .png with --at; default results/SCENARIO_POLICY.gif."
+            "--file", help="File to write, .gif or .mp4, or .png with --at; default results/SCENARIO_POLICY.gif."
         ),
     ] = None,
-    policy: Annotated[str, typer.Option("--policy", "--controller", help="Name, or file of a trained policy.")] = "crw",
     at: Annotated[
         float | None, typer.Option(metavar="SECONDS", help="One picture at this simulated time, in place of a film.")
     ] = None,
@@ -31,7 +31,7 @@ def record(
 ) -> None:
     """Film a run, or draw it at one time.
 
-    'swarm-forage record --policy dpo --at 300 --out dpo.png' draws how it is after 300 s.
+    'swarm-forage record dpo --at 300 --file dpo.png' draws how it is after 300 s.
     """
     from swarm_forage_env._internal.files import as_file_name
     from swarm_forage_env.cli.scenario_options import described_world
@@ -41,24 +41,30 @@ def record(
     from swarm_forage_env.policies.registry import policy_label
     from swarm_forage_env.rendering.view import RenderError
 
-    world, asked_caches, disturbances = described_world(described)
+    policy = policies.one("crw")
+    world, asked_caches = described_world(described)
     _refuse_unknown(policy)
     ending = "gif" if at is None else "png"
-    file = out or Path("results", f"{described.scenario}_{as_file_name(policy_label(policy))}.{ending}")
-    look: dict[str, Any] = {"seed": seed, "size_px": size, "theme": theme, "caches": asked_caches}
+    path = file or Path("results", f"{world.scenario.name}_{as_file_name(policy_label(policy))}.{ending}")
+    look: dict[str, Any] = {
+        "seed": seed,
+        "size_px": size,
+        "theme": theme,
+        "caches": asked_caches,
+        "wrappers": world.wrappers,
+    }
     try:
         if at is not None:
-            written = picture_run(world, policy, file, at_s=at, wrappers=disturbances, **look)
+            written = picture_run(world.scenario, policy, path, at_s=at, **look)
         else:
             with progress_bar("pictures") as progress:
                 written = record_run(
-                    world,
+                    world.scenario,
                     policy,
-                    file,
+                    path,
                     seconds=seconds,
                     speedup=speedup,
                     fps=fps,
-                    wrappers=disturbances,
                     progress=progress,
                     **look,
                 )

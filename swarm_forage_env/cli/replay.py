@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, refuse_others, takes_options
 from swarm_forage_env.cli.terminal import notes, progress_bar
-from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions
     from swarm_forage_env.inspect.replay.frames import Replay
     from swarm_forage_env.runs.record import RunRecord
     from swarm_forage_env.runs.spec import RunSpec
@@ -20,30 +19,16 @@ if TYPE_CHECKING:
 RESULTS = Path("results")
 """Where the runs of a run id are looked for: the folder that `swarm-forage run` stores them in."""
 _RUN_ID = re.compile(r"[0-9a-f]{16}")
-_OPTIONS_OF_STORED_RUNS = ("run", "out", "beside", "seconds", "frame")
+_OPTIONS_OF_STORED_RUNS = ("policies", "named_policies", "file", "seconds", "frame")
 
 
-@takes_world()
+@takes_options
 def replay(
     context: typer.Context,
-    described: World,
-    run: Annotated[
-        str,
-        typer.Argument(
-            metavar="RUN|POLICY",
-            help="A stored run (file.parquet, or the id of one in results/), or a policy: name, or file of a trained "
-            "one.",
-        ),
-    ],
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File to write; default results/SCENARIO_POLICY.html.")
-    ] = None,
-    beside: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="RUN|POLICY",
-            help="Another run to be seen beside it, a policy in the same world with the same seed; may be repeated.",
-        ),
+    policies: PolicyOptions,
+    described: WorldOptions,
+    file: Annotated[
+        Path | None, typer.Option("--file", help="File to write; default results/SCENARIO_POLICY.html.")
     ] = None,
     seconds: Annotated[float | None, typer.Option(help="Simulated seconds to keep; default the whole run.")] = None,
     frame: Annotated[
@@ -54,18 +39,24 @@ def replay(
 ) -> None:
     """Look into a run: write it as one HTML file, with play, zoom, every robot's state, and curves.
 
-    The file needs no network and works on phones, too. A stored run is made again for it.
+    Several policies act beside each other, in the same world with the same seed. In place of a policy you can name a
+    stored run (file.parquet, or the id of one in results/), which is made again. The file needs no network.
     """
     from swarm_forage_env._internal.files import check_file
 
-    stored = _stored_run(run)
-    if stored is not None:
-        _refuse_scenario_options(context)
+    words = policies.names()
+    if _stored_run(words[0]) is not None:
+        refuse_others(
+            context,
+            "a stored run",
+            _OPTIONS_OF_STORED_RUNS,
+            "which describe another one; leave them out, or name a policy",
+        )
     with _complaints():
-        runs = _planned([run, *(beside or ())], described, seed)
-        check_file(out or _default_file(runs[0][0]))
-        replays = [_recorded(spec, record, seconds, frame) for spec, record in runs]
-        _write(out or _default_file(runs[0][0]), replays)
+        runs = _planned(words, described, seed)
+        path = file or _default_file(runs[0][0])
+        check_file(path)
+        _write(path, [_recorded(spec, record, seconds, frame) for spec, record in runs])
 
 
 def _write(path: Path, replays: "Sequence[Replay]") -> None:
@@ -75,7 +66,7 @@ def _write(path: Path, replays: "Sequence[Replay]") -> None:
     typer.echo(f"wrote {written} ({written.stat().st_size / 1e6:.1f} MB)")
 
 
-def _planned(words: Sequence[str], options: "ScenarioOptions", seed: int) -> "list[tuple[RunSpec, RunRecord | None]]":
+def _planned(words: Sequence[str], options: WorldOptions, seed: int) -> "list[tuple[RunSpec, RunRecord | None]]":
     """Return a specification for each run or policy, and the record of stored ones; the first decides the world."""
     from swarm_forage_env.cli.scenario_options import plan_runs
     from swarm_forage_env.runs.spec import RunSpec, plan_run
@@ -88,7 +79,7 @@ def _planned(words: Sequence[str], options: "ScenarioOptions", seed: int) -> "li
         elif runs and runs[0][1] is not None:
             first = runs[0][0]
             with _refusing_policies():
-                runs.append((plan_run(first.scenario, word, wrappers=first.wrappers, seed=first.seed), None))
+                runs.append((plan_run(first.world, word, seed=first.seed), None))
         else:
             runs.append((plan_runs(options, (word,), n_seeds=1, first_seed=seed)[0], None))
     return runs
@@ -106,21 +97,6 @@ def _stored_run(word: str) -> "RunRecord | None":
     if not found:
         raise RecordError(f"Expected the run {word} below {RESULTS}/, found none; give the path of its file.")
     return RunRecord.read(found[0])
-
-
-def _refuse_scenario_options(context: typer.Context) -> None:
-    given = [
-        option.opts[0]
-        for option in context.command.params
-        if option.name not in _OPTIONS_OF_STORED_RUNS
-        and (source := context.get_parameter_source(str(option.name))) is not None
-        and source.name == "COMMANDLINE"
-    ]
-    if given:
-        raise typer.BadParameter(
-            f"Expected a stored run without options that describe another one, got {', '.join(given)}; "
-            "leave them out, or give a policy."
-        )
 
 
 def _recorded(spec: "RunSpec", stored: "RunRecord | None", seconds: float | None, frame_s: float | None) -> "Replay":

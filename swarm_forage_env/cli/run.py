@@ -1,13 +1,12 @@
 """The command `run`."""
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, Jobs, Out, Performance, no_picture
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, Jobs, Out, no_picture
 from swarm_forage_env.cli.terminal import notes, output
-from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
     from swarm_forage_env.runs.runner import Outcomes
@@ -15,23 +14,12 @@ if TYPE_CHECKING:
     from swarm_forage_env.runs.store import RunStore
 
 
-@takes_world()
+@takes_options
 def run(
-    described: World,
-    policy: Annotated[
-        str,
-        typer.Option(
-            "--policy",
-            "--controller",
-            help="One or more, separated by commas: names, files of trained policies, or a class in a Python file "
-            "(my_module.py:MyPolicy). A model that does not tell its interface can be told it: "
-            "model.zip:decision_ticks=5. mixed:dpo=10,crw=rest lets several drive one swarm.",
-        ),
-    ] = "crw",
+    policies: PolicyOptions,
+    described: WorldOptions,
     seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,
     first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first run.")] = 0,
-    horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
-    performance: Performance = None,
     out: Out = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
@@ -42,12 +30,11 @@ def run(
     Runs in parallel, shows a table, stores one record per run and draws performance over time. Runs that the folder
     holds already are not repeated, so an interrupted command can simply be given again.
     """
-    from swarm_forage_env.cli.scenario_options import default_folder, plan_runs, split_names
+    from swarm_forage_env.cli.scenario_options import default_folder, plan_runs
     from swarm_forage_env.runs.store import RunStore
 
-    options = replace(described, horizon=horizon, performance=performance)
-    specs = plan_runs(options, split_names(policy), n_seeds=seeds, first_seed=first_seed)
-    store = RunStore(out or default_folder(described.scenario))
+    specs = plan_runs(described, policies.names("crw"), n_seeds=seeds, first_seed=first_seed)
+    store = RunStore(out or default_folder(specs[0].scenario.name))
     if dry_run:
         _show_plan(specs, store, jobs, as_json=as_json)
     else:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import no_picture
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
+from swarm_forage_env.cli.options import Picture, no_picture
 from swarm_forage_env.cli.terminal import notes, output
-from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -16,19 +16,18 @@ if TYPE_CHECKING:
     from swarm_forage_env.inspect.saliency import Saliency
 
 
-@takes_world()
+@takes_options
 def saliency(
-    described: World,
-    policy: Annotated[str, typer.Argument(metavar="POLICY", help="A shipped network, or an .npz file of a training.")],
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Picture; default results/SCENARIO_POLICY.saliency.png.")
-    ] = None,
+    policies: PolicyOptions,
+    described: WorldOptions,
+    picture: Picture = None,
     seconds: Annotated[float | None, typer.Option(help="Simulated seconds to look at; default the whole run.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
 ) -> None:
     """Show what a trained network looks at: how much it acts otherwise when one part of what it sees is exchanged.
 
-    A robot gets, for example, the light readings of another robot. How often does it then decide otherwise?
+    A robot gets, for example, the light readings of another robot. How often does it then decide otherwise? The policy
+    is a shipped network, or an .npz file of a training.
     """
     from swarm_forage_env.cli.scenario_options import plan_runs
     from swarm_forage_env.inspect.saliency import GROUPS, open_network_of
@@ -36,23 +35,24 @@ def saliency(
     from swarm_forage_env.rendering.figures import check_picture
     from swarm_forage_env.rendering.plots import draw_saliency
 
+    policy = policies.one()
     network = open_network_of(policy)
     (spec,) = plan_runs(described, (policy,), n_seeds=1, first_seed=seed)
-    picture = out or Path("results", f"{spec.scenario.name}_{Path(policy).stem}.saliency.png")
-    check_picture(picture)
+    file = picture or Path("results", f"{spec.scenario.name}_{Path(policy).stem}.saliency.png")
+    check_picture(file)
     found = measured(network, spec, seconds=seconds)
     title = f"{Path(policy).stem} in {spec.scenario.name}, {spec.scenario.robots.n_robots} robots, seed {seed}"
     output().print(_table(found, title))
     bars = {group: found.changed[group] for group in GROUPS[1:] if found.n_rows[group]}
     try:
-        draw_saliency(picture, found.slices, bars, title=title, xlabel=_axis_words(found))
+        draw_saliency(file, found.slices, bars, title=title, xlabel=_axis_words(found))
     except ImportError as error:
         notes().print(str(error))
         return
     except OSError as error:  # the table is worth more than its picture
-        notes().print(no_picture(picture, error))
+        notes().print(no_picture(file, error))
         return
-    typer.echo(f"wrote {picture}")
+    typer.echo(f"wrote {file}")
 
 
 def _words(found: "Saliency") -> str:

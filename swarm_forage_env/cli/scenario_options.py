@@ -2,22 +2,22 @@
 
 import dataclasses
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_origin
 
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, whole
 from swarm_forage_env._internal.spelling import suggestion
-from swarm_forage_env.cli.config_file import read_config
+from swarm_forage_env.cli.option_groups import PlaceOptions, WorldOptions
+from swarm_forage_env.cli.scenario_file import ScenarioFile, read_scenario_file
 from swarm_forage_env.policies.mixture import leading_mixture
 from swarm_forage_env.policies.registry import split_interface
 from swarm_forage_env.runs.spec import RunSpec, plan_run
-from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.sizing import checked_density
-from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import parse_wrapper
+from swarm_forage_env.wrappers.world import World
 
 _FIELD = re.compile(r"[a-z_]+=[^/\\]*")
 _Number = TypeVar("_Number", int, float)
@@ -28,27 +28,6 @@ _EXAMPLES = {
     "object_positions_m": "places such as 10,4 or 10,4+20,4 (x, y in m)",
 }
 _TRUTH = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
-
-
-@dataclasses.dataclass(frozen=True, kw_only=True, slots=True)
-class ScenarioOptions:
-    """The options that describe a scenario; None = the preset's own value."""
-
-    scenario: str
-    robots: int | None = None
-    objects: int | None = None
-    side: float | None = None
-    density: str | None = None
-    """A share, "0.05" or "5%"."""
-    caches: str | None = None
-    horizon: float | None = None
-    performance: str | None = None
-    settings: tuple[str, ...] = ()
-    """Words of the form key=value."""
-    wrappers: tuple[str, ...] = ()
-    """Words of the form name:key=value,key=value."""
-    config_file: Path | None = None
-    """TOML file with scenario fields and wrappers; the other options override it."""
 
 
 def split_names(text: str) -> tuple[str, ...]:
@@ -95,39 +74,50 @@ def split_numbers(option: str, text: str, kind: Callable[[str], _Number]) -> tup
         raise ConfigError(f"Expected {option} as {whole} separated by commas, such as 5,20, got {text!r}.") from error
 
 
-def build_scenario(
-    options: ScenarioOptions, file_fields: Mapping[str, Any] | None = None
-) -> tuple[ScenarioConfig, str | None]:
-    """Return the scenario, and which caches were asked for (None = none given).
-
-    Args:
-        options: Options of the command line.
-        file_fields: Scenario fields of the file; options override them.
+def described_world(options: PlaceOptions) -> tuple[World, str | None]:
+    """Return the world that options describe, and which caches were asked for (None = nobody asked).
 
     Raises:
-        ConfigError: unknown names, values of a wrong type, or values that do not fit together.
+        ConfigError: unknown names, values of a wrong type or that do not fit together, or a file that cannot be used.
     """
-    overrides = scenario_overrides(options, file_fields)
-    return scenario(options.scenario, **overrides), overrides.get("caches")
+    described = described_fields(options)
+    config = scenario(described.preset, **described.fields)
+    return World(config, described.wrappers), described.fields.get("caches")
 
 
-def scenario_overrides(options: ScenarioOptions, file_fields: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the scenario fields that the options and the file set, by name; see `build_scenario`."""
-    overrides = dict(parse_setting(word) for word in options.settings)
-    named = {"n_robots": options.robots, "n_objects": options.objects, "horizon_s": options.horizon}
+def described_fields(options: PlaceOptions) -> ScenarioFile:
+    """Return what options describe as a file would say it; they override the fields and wrappers of the file.
+
+    Raises:
+        ConfigError: see `described_world`; names and values of fields are not looked at here.
+    """
+    is_file = Path(options.scenario).suffix == ".toml"
+    file = read_scenario_file(Path(options.scenario)) if is_file else ScenarioFile(preset=options.scenario)
+    fields = {**file.fields, **_fields_of(options, file.preset)}
+    wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
+    named = {wrapper.name for wrapper in wrappers}
+    left = (wrapper for wrapper in file.wrappers if wrapper.name not in named)
+    return ScenarioFile(preset=file.preset, fields=fields, wrappers=(*wrappers, *left))
+
+
+def _fields_of(options: PlaceOptions, preset: str) -> dict[str, Any]:
+    """Return the scenario fields that the options set, by name."""
+    fields = dict(parse_setting(word) for word in options.settings)
+    named = {"n_objects": options.objects, "horizon_s": options.horizon}
     named |= {"side_m": options.side, "caches": options.caches, "performance": options.performance}
-    named |= {"density": parsed_density(options.density)}
+    if isinstance(options, WorldOptions):
+        named |= {"n_robots": options.robots, "density": parsed_density(options.density)}
     for name, value in named.items():
-        if value is not None and name in overrides:
+        if value is not None and name in fields:
             raise ConfigError(f"Expected {name} once, got it from an option and from --set.")
         if value is not None:
-            overrides[name] = value
-    if options.side is not None and options.scenario != "search_and_rescue":
+            fields[name] = value
+    if options.side is not None and preset != "search_and_rescue":
         raise ConfigError(
-            f"Expected --side with search_and_rescue only, got it with {options.scenario}; "
+            f"Expected --side with search_and_rescue only, got it with {preset}; "
             "other arenas change by --set width_m=... and --set height_m=..."
         )
-    return {**(file_fields or {}), **overrides}
+    return fields
 
 
 def parsed_density(text: str | None) -> float | None:
@@ -178,41 +168,16 @@ def _parse_value(name: str, text: str, kind: Any) -> Any:
         raise ConfigError(f"Expected {name} to be {wanted}, got {text!r}.") from error
 
 
-def build_wrappers(options: ScenarioOptions, file_wrappers: Sequence[WrapperConfig] = ()) -> tuple[WrapperConfig, ...]:
-    """Return the wrappers of the options and those of the file that no option names.
-
-    Raises:
-        ConfigError: an unknown wrapper, or values that it refuses.
-    """
-    wrappers = tuple(parse_wrapper(word) for word in options.wrappers)
-    named = {wrapper.name for wrapper in wrappers}
-    return (*wrappers, *(wrapper for wrapper in file_wrappers if wrapper.name not in named))
-
-
-def described_world(options: ScenarioOptions) -> tuple[ScenarioConfig, str | None, tuple[WrapperConfig, ...]]:
-    """Return the scenario, which caches were asked for (None = nobody asked), and the wrappers.
-
-    Raises:
-        ConfigError: see `build_scenario`, `build_wrappers` and `read_config`.
-    """
-    file_fields, file_wrappers = ({}, ()) if options.config_file is None else read_config(options.config_file)
-    config, caches = build_scenario(options, file_fields)
-    return config, caches, build_wrappers(options, file_wrappers)
-
-
-def plan_runs(
-    options: ScenarioOptions, policies: Sequence[str], *, n_seeds: int, first_seed: int
-) -> tuple[RunSpec, ...]:
+def plan_runs(options: WorldOptions, policies: Sequence[str], *, n_seeds: int, first_seed: int) -> tuple[RunSpec, ...]:
     """Return one specification per policy and seed.
 
     Raises:
-        ConfigError: see `build_scenario` and `read_config`; an unknown policy or wrapper, or a policy file that
-            cannot be opened.
+        ConfigError: see `described_world`; an unknown policy, or a policy file that cannot be opened.
     """
     whole("--seeds", n_seeds, at_least=1, at_most=MOST_SEEDS)
-    config, caches, wrappers = described_world(options)
+    world, caches = described_world(options)
     try:
-        planned = [plan_run(config, name, caches=caches, wrappers=wrappers) for name in policies]
+        planned = [plan_run(world, name, caches=caches) for name in policies]
     except ValueError as error:  # of a policy or its file
         raise ConfigError(str(error)) from error
     return tuple(

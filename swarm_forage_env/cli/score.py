@@ -1,78 +1,73 @@
-"""The command `score`."""
-
-from pathlib import Path
-from typing import Annotated
+"""The commands `score` and `compare`, which are one: scores of several policies are compared."""
 
 import typer
 
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, refuse_others, takes_options
 from swarm_forage_env.cli.options import (
+    OF_RUNS,
     AsJson,
     Band,
     Budget,
+    Curves,
     Disturbance,
     DryRun,
     Forms,
     Jobs,
     Measures,
     Out,
-    ScoreHorizon,
+    Picture,
     ScoreSeeds,
     Variants,
-    refuse_options_of_runs,
 )
-from swarm_forage_env.cli.world_options import SCORED, World, takes_world
 
-_OF_CURVES = ("curves", "measures", "performance", "variant", "form", "band", "as_json")
-"""Options of `score` that go with --curves."""
+_OF_CURVES = ("curves", "measures", "performance", "variant", "form", "band", "picture", "as_json")
+"""Options that go with --curves."""
 
 
-@takes_world(*SCORED)
+@takes_options
 def score(
     context: typer.Context,
-    described: World,
-    policy: Annotated[str | None, typer.Option(help="Name, or file of a trained policy.")] = None,
-    curves: Annotated[
-        Path | None, typer.Option(help="Score curves from a CSV or Parquet file instead (docs/scoring.md).")
-    ] = None,
+    policies: PolicyOptions,
+    described: WorldOptions,
+    curves: Curves = None,
     measures: Measures = None,
     variant: Variants = "corrected",
     form: Forms = "marginal",
     band: Band = False,
     budget: Budget = "standard",
     seeds: ScoreSeeds = None,
-    horizon: ScoreHorizon = None,
     disturbance: Disturbance = "throttle",
     out: Out = None,
+    picture: Picture = None,
     jobs: Jobs = None,
     as_json: AsJson = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Run a policy in all experiments that the measures of swarm engineering need, and score it.
+    """Run policies in all experiments that the measures of swarm engineering need, score and compare them.
 
-    Swarms of several sizes, throttled, noisy and failing robots; one table with intervals and noise floors. Runs that
-    the folder holds already are not repeated.
+    Swarms of several sizes, throttled, noisy and failing robots; one table with intervals and noise floors. Several
+    policies are compared seed by seed, with the differences that are significant. Runs that the folder holds already
+    are not repeated. The budget says how long runs are, unless --horizon does.
     """
     from swarm_forage_env.cli.scenario_options import default_folder
     from swarm_forage_env.cli.score_options import ScoreOptions, build_question, score_forms, tables_of_file
     from swarm_forage_env.cli.score_report import run_and_show, show_scores
 
-    if (policy is None) == (curves is None):
-        raise typer.BadParameter("Expected either --policy or --curves.")
     if curves is not None:
-        refuse_options_of_runs(context, _OF_CURVES)
+        refuse_others(context, "--curves", _OF_CURVES, OF_RUNS)
         tables = tables_of_file(curves, measures, described.performance, score_forms(variant, form))
-        show_scores(tables, None, as_json=as_json, band=band)
+        show_scores(tables, picture, as_json=as_json, band=band)
         return
     options = ScoreOptions(
-        policies=policy or "",
+        policies=policies.names(),
         measures=measures,
         variants=variant,
         forms=form,
         budget=budget,
         seeds=seeds,
-        horizon=horizon,
         disturbance=disturbance,
     )
-    folder = out or default_folder(described.scenario)
-    question = build_question(described, options, at_most=1)
-    run_and_show(question, folder, "scores.png", jobs, as_json=as_json, dry_run=dry_run, band=band)
+    question = build_question(described, options)
+    folder = out or default_folder(question.world.scenario.name)
+    file = picture or folder / ("scores.png" if len(options.policies) == 1 else "comparison.png")
+    run_and_show(question, folder, file, jobs, as_json=as_json, dry_run=dry_run, band=band)

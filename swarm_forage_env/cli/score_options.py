@@ -1,42 +1,38 @@
-"""From the words after `score` and `compare` to a plan."""
+"""From the words after `score` to a question."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from metrics.scoring import ScoreForms, ScoreQuestion, score_curves, score_question
 from metrics.scoring.table import ScoreTable
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, parsed_density, split_names
+from swarm_forage_env.cli.option_groups import WorldOptions
+from swarm_forage_env.cli.scenario_options import described_fields, described_world, split_names
 
 _OF_THE_BUDGET = ("horizon_s", "interval_s")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ScoreOptions:
-    """The options of both commands that are not about the scenario."""
+    """The options that are not about the world."""
 
-    policies: str
-    """Names and files, separated by commas."""
+    policies: tuple[str, ...]
+    """Names and files."""
     measures: str | None = None
     variants: str = "corrected"
     forms: str = "marginal"
     budget: str = "standard"
     seeds: int | None = None
-    horizon: float | None = None
     disturbance: str = "throttle"
 
 
-def build_question(
-    described: ScenarioOptions, options: ScoreOptions, *, at_least: int = 1, at_most: int | None = None
-) -> ScoreQuestion:
+def build_question(described: WorldOptions, options: ScoreOptions) -> ScoreQuestion:
     """Return the question that the options describe.
 
     Args:
-        described: Options of the scenario; its horizon is that of the budget.
+        described: Options of the world.
         options: The other options.
-        at_least: How many policies there must be.
-        at_most: How many there may be, None = any number.
 
     Raises:
         ConfigError: whatever is wrong with the words.
@@ -45,23 +41,19 @@ def build_question(
     for word in described.settings:
         if word.partition("=")[0] in _OF_THE_BUDGET:
             raise ConfigError(f"Expected no --set {word}, which the budget sets; --horizon changes the length of runs.")
-    names = split_names(options.policies)
-    if len(names) < at_least:
-        raise ConfigError(f"Expected {at_least} or more policies to compare, separated by commas, got {names[0]!r}.")
-    if at_most is not None and len(names) > at_most:
-        raise ConfigError(f"Expected one policy to score, got {', '.join(names)}; compare scores more than one.")
-    scenario, caches = build_scenario(described)
+    fields = described_fields(described).fields
+    world, caches = described_world(replace(described, horizon=None))
     forms = score_forms(options.variants, options.forms)
     try:
         return score_question(
-            names,
-            scenario,
+            options.policies,
+            world,
             measures=None if options.measures is None else split_names(options.measures),
             budget=options.budget,
             seeds=options.seeds,
-            horizon_s=options.horizon,
+            horizon_s=described.horizon,
             caches=caches,
-            density=parsed_density(described.density),
+            density=fields.get("density"),
             disturbance=options.disturbance,
             forms=forms,
         )

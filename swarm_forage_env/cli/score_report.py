@@ -1,4 +1,4 @@
-"""How `score` and `compare` carry out a plan, and what they print: tables, JSON, a picture."""
+"""How `score` carries out a plan, and what they print: tables, JSON, a picture."""
 
 import json
 from collections import Counter
@@ -23,7 +23,7 @@ from swarm_forage_env.runs.workers import available_cores
 def run_and_show(
     question: ScoreQuestion,
     folder: Path,
-    picture: str,
+    picture: Path,
     jobs: int | None,
     *,
     as_json: bool,
@@ -34,8 +34,8 @@ def run_and_show(
 
     Args:
         question: What is asked.
-        folder: Where the records and the picture go.
-        picture: Name of the picture.
+        folder: Where the records go.
+        picture: File of the picture.
         jobs: Processes; None = one per core.
         as_json: Print JSON instead of tables.
         dry_run: Run nothing.
@@ -57,7 +57,7 @@ def run_and_show(
         return
     with resumable(folder):
         tables = ask(question, out=folder, jobs=jobs)
-    show_scores(tables, folder / picture, as_json=as_json, band=band)
+    show_scores(tables, picture, as_json=as_json, band=band)
     if any(table.failures for table in tables):
         raise typer.Exit(EXIT_FAILURE)
 

@@ -1,12 +1,11 @@
 """The command `stuck`."""
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
 from swarm_forage_env.cli.options import EXIT_FAILURE
-from swarm_forage_env.cli.world_options import World, takes_world
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -15,18 +14,12 @@ if TYPE_CHECKING:
     from swarm_forage_env.runs.spec import RunSpec
 
 
-@takes_world()
+@takes_options
 def stuck(
-    described: World,
-    policy: Annotated[
-        str,
-        typer.Option(
-            "--policy", "--controller", help="One or more, separated by commas: names, or files of trained ones."
-        ),
-    ] = "crw",
+    policies: PolicyOptions,
+    described: WorldOptions,
     seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,
     first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first of them.")] = 0,
-    horizon: Annotated[float | None, typer.Option(help="Simulated seconds per run, whole intervals of 200 s.")] = None,
     window: Annotated[float, typer.Option(help="Seconds in which every robot should get away.")] = 600.0,
     moved: Annotated[float, typer.Option(help="How far that is, in m.")] = 0.05,
 ) -> None:
@@ -35,13 +28,12 @@ def stuck(
 
     from swarm_forage_env._internal.fields import ConfigError
     from swarm_forage_env._internal.wording import counted
-    from swarm_forage_env.cli.scenario_options import plan_runs, split_names
+    from swarm_forage_env.cli.scenario_options import plan_runs
     from swarm_forage_env.inspect.stuck import find_stuck
 
     if not (window > 0.0 and moved > 0.0):
         raise ConfigError(f"Expected --window and --moved above 0, got {window:g} and {moved:g}.")
-    options = replace(described, horizon=horizon)
-    specs = plan_runs(options, split_names(policy), n_seeds=seeds, first_seed=first_seed)
+    specs = plan_runs(described, policies.names("crw"), n_seeds=seeds, first_seed=first_seed)
     found = [(spec, one) for spec in specs for one in find_stuck(spec, window_s=window, moved_m=moved)]
     if not found:
         typer.echo(f"nobody is stuck in {counted(len(specs), 'run')}")

@@ -5,20 +5,26 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import ConfigFile, Density, Objects, Robots, Settings, Side, Wrappers
+from swarm_forage_env.cli.option_groups import WorldOptions, given_options, refuse_others, takes_options
 from swarm_forage_env.training.defaults import (
     DECISION_TICKS,
     DEFAULT_ARENAS,
     DEFAULT_HIDDEN,
     DEFAULT_STEPS,
-    EPISODE_S,
     EVALUATE_EVERY,
 )
 
 _HIDDEN = ",".join(map(str, DEFAULT_HIDDEN))
+_OF_PLAN = ("plan", "out", "seed", "callbacks", "jobs", "resume")
+"""Options that go with --plan."""
+_OF_RESUMING = ("steps", "out", "callbacks", "jobs", "resume")
+"""Options that say nothing of the plan that is resumed."""
 
 
+@takes_options
 def train(  # long: one parameter per option
+    context: typer.Context,
+    described: WorldOptions,
     out: Annotated[Path | None, typer.Option(help="Folder of the training; default results/training/NAME.")] = None,
     plan: Annotated[
         str | None,
@@ -26,7 +32,6 @@ def train(  # long: one parameter per option
             help="TOML file with a training plan, or name of a shipped policy, instead of all below; but --seed counts."
         ),
     ] = None,
-    scenario: Annotated[str | None, typer.Option(help="Preset; default warehouse_small.")] = None,
     algorithm: Annotated[str | None, typer.Option("--algo", help="ppo, a2c, dqn or sac; default ppo.")] = None,
     steps: Annotated[
         int | None, typer.Option(min=1, help=f"Decisions of single robots; default {DEFAULT_STEPS:,}.")
@@ -83,18 +88,6 @@ def train(  # long: one parameter per option
         list[str] | None,
         typer.Option("--arg", metavar="KEY=NUMBER", help="Argument of the algorithm; may be repeated."),
     ] = None,
-    horizon: Annotated[
-        float | None,
-        typer.Option(help=f"Seconds per episode of the training; default {EPISODE_S:,.0f}, or as measured to be best."),
-    ] = None,
-    robots: Robots = None,
-    objects: Objects = None,
-    side: Side = None,
-    density: Density = None,
-    caches: Annotated[str | None, typer.Option(help="none, static or dynamic; default: those of the preset.")] = None,
-    settings: Settings = None,
-    wrappers: Wrappers = None,
-    config: ConfigFile = None,
     callbacks: Annotated[
         list[str] | None,
         typer.Option(
@@ -104,7 +97,7 @@ def train(  # long: one parameter per option
             "point. May be repeated.",
         ),
     ] = None,
-    processes: Annotated[int, typer.Option(min=0, help="Processes for the arenas; 0 = all in this process.")] = 0,
+    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes for the arenas; 1 = in this process.")] = 1,
     resume: Annotated[
         bool,
         typer.Option(
@@ -114,12 +107,12 @@ def train(  # long: one parameter per option
 ) -> None:
     """Train one policy that every robot shares, beside evaluations of it and of a scripted controller.
 
-    Rewards are fields of the scenario. Where deliveries count, training sets nest_progress=0.05 and first_pickup=1
-    unless --set or --config do, and begins in a smaller arena: deliveries alone are too rare to learn from. plan.json
-    holds all that was chosen. Ctrl-C keeps a checkpoint; swarm-forage --trust-models train --out
+    Episodes last --horizon, by default 1,000 s or as measured to be best. Rewards are fields of the scenario. Where
+    deliveries count, training sets nest_progress=0.05 and first_pickup=1 unless --set or the file of --scenario does,
+    and begins in a smaller arena: deliveries alone are too rare to learn from. plan.json holds
+    all that was chosen. Ctrl-C keeps a checkpoint; swarm-forage --trust-models train --out
     FOLDER --resume goes on.
     """
-    from swarm_forage_env.cli.scenario_options import ScenarioOptions
     from swarm_forage_env.cli.training_plan import TrainOptions, build_plan, named_plan, resumed_plan
     from swarm_forage_env.cli.training_report import run_training
 
@@ -138,31 +131,17 @@ def train(  # long: one parameter per option
         evaluation_horizon=evaluation_horizon,
         small_start=small_start,
         hidden=hidden,
-        horizon_s=horizon,
         arguments=tuple(arguments or ()),
     )
-    words = ScenarioOptions(
-        scenario=scenario or "warehouse_small",
-        robots=robots,
-        objects=objects,
-        side=side,
-        density=density,
-        caches=caches,
-        settings=tuple(settings or ()),
-        wrappers=tuple(wrappers or ()),
-        config_file=config,
-    )
-    plain = (None, ScenarioOptions(scenario=words.scenario))
-    says_more = (scenario, words) != plain or options != TrainOptions(steps=steps)
-    if plan is not None and ((scenario, words) != plain or options != TrainOptions(seed=seed)):
-        raise typer.BadParameter(
-            "Expected --plan without options that the plan decides, other than --seed; write them into its file."
-        )
-    chosen = build_plan(words, options) if plan is None else named_plan(plan, seed)
+    if plan is not None:
+        refuse_others(context, "--plan", _OF_PLAN, "which it decides; write them into its file")
+    says_more = bool(given_options(context, besides=_OF_RESUMING))
+    chosen = build_plan(described, options) if plan is None else named_plan(plan, seed)
     name = f"{chosen.scenario.name}_{chosen.algorithm}"
     if plan is not None:
         name = Path(plan).stem if seed is None else f"{Path(plan).stem}_seed_{seed}"
     folder = out or Path("results/training") / name
     if resume and plan is None:
         chosen = resumed_plan(folder, chosen if says_more else None, steps)
-    run_training(chosen, folder, n_processes=processes, resume=resume, callbacks=callbacks or ())
+    n_processes = 0 if jobs == 1 else min(jobs, chosen.n_arenas)
+    run_training(chosen, folder, n_processes=n_processes, resume=resume, callbacks=callbacks or ())

@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.config_file import read_config
-from swarm_forage_env.cli.scenario_options import ScenarioOptions, build_scenario, build_wrappers, scenario_overrides
+from swarm_forage_env.cli.option_groups import WorldOptions
+from swarm_forage_env.cli.scenario_options import described_fields
 from swarm_forage_env.policies.pretrained import plan_file
+from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.training.plan import TrainingPlan, read_plan
 from swarm_forage_env.training.recipe import recipe
 
@@ -31,23 +32,20 @@ class TrainOptions:
     evaluate_every: int | None = None
     evaluation_horizon: float | None = None
     small_start: bool | None = None
-    horizon_s: float | None = None
     hidden: str | None = None
     """Sizes of hidden layers, separated by commas."""
     arguments: tuple[str, ...] = ()
     """Words of the form key=number, for the algorithm."""
 
 
-def build_plan(words: ScenarioOptions, options: TrainOptions) -> TrainingPlan:
+def build_plan(words: WorldOptions, options: TrainOptions) -> TrainingPlan:
     """Return the plan that the command line describes, made by `training.recipe`.
 
     Raises:
         ConfigError: anything wrong with the options.
     """
-    fields, file_wrappers = ({}, ()) if words.config_file is None else read_config(words.config_file)
-    words = replace(words, horizon=options.horizon_s)
-    build_scenario(words, fields)  # refuses unknown fields, which the recipe could take for its own arguments
-    overrides = scenario_overrides(words, fields)
+    described = described_fields(words)
+    scenario(described.preset, **described.fields)  # or the recipe could take unknown fields for its own arguments
     interface = {name: getattr(options, name) for name in _INTERFACE_FIELDS}
     names = ("algorithm", "steps", "n_arenas", "small_start", "seed", "samples")
     chosen = {name: getattr(options, name) for name in names}
@@ -55,13 +53,13 @@ def build_plan(words: ScenarioOptions, options: TrainOptions) -> TrainingPlan:
         chosen["hidden"] = _layers(options.hidden)
     evaluation = {"every_steps": options.evaluate_every, "horizon_s": options.evaluation_horizon}
     return recipe(
-        words.scenario,
+        described.preset,
         interface=_given(interface),
-        wrappers=build_wrappers(words, file_wrappers),
+        wrappers=described.wrappers,
         options=dict(map(_argument, options.arguments)),
         evaluation=_given(evaluation),
         **_given(chosen),
-        **overrides,
+        **described.fields,
     )
 
 

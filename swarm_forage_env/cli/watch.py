@@ -4,13 +4,13 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.world_options import World, takes_world
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
 
 
-@takes_world()
+@takes_options
 def watch(
-    described: World,
-    policy: Annotated[str, typer.Argument(metavar="POLICY", help="Name, or file of a trained policy.")],
+    policies: PolicyOptions,
+    described: WorldOptions,
     speed: Annotated[float, typer.Option(help="Simulated seconds per second at first; arrow keys change it.")] = 10.0,
     size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
     theme: Annotated[str, typer.Option(help="dark or light.")] = "dark",
@@ -27,21 +27,22 @@ def watch(
     from swarm_forage_env.policies.registry import policy_class
     from swarm_forage_env.rendering.view import RenderError
 
-    world, asked_caches, disturbances = described_world(described)
+    policy = policies.one()
+    world, asked_caches = described_world(described)
     try:
         policy_class(policy)
     except ValueError as error:  # an unknown name is a mistake in the words; a ValueError of the run is not
         raise typer.BadParameter(str(error)) from error
     try:
         watched = watch_run(
-            world,
+            world.scenario,
             policy,
             seed=seed,
             speed=speed,
             size_px=size,
             theme=theme,
             caches=asked_caches,
-            wrappers=disturbances,
+            wrappers=world.wrappers,
         )
     except (RenderError, ModelError, NetworkError) as error:
         raise typer.BadParameter(str(error)) from error

@@ -34,7 +34,9 @@ def test_the_table_has_the_papers_number_and_each_swarms_own_mean(command):
 
 def test_the_page_shows_what_its_command_prints(command):
     page = PAGE.read_text()
-    (words,) = re.findall(r"^swarm-forage (availability .*?) --out docs/images/availability.png$", page, re.MULTILINE)
+    (words,) = re.findall(
+        r"^swarm-forage (availability .*?) --picture docs/images/availability.png$", page, re.MULTILINE
+    )
     _, out, _ = command(*words.split())
     lines = [line.rstrip() for line in out.rstrip().splitlines()]
     assert "\n".join(lines) in page
@@ -48,7 +50,7 @@ def test_sizes_teams_and_demands_are_chosen(command):
 
 
 def test_the_picture_is_written_beside_the_table(command, painted):
-    code, out, err = command("availability", "--robots", "4,9", "--teams", "2.5", "--out", "some/where.png")
+    code, out, err = command("availability", "--robots", "4,9", "--teams", "2.5", "--picture", "some/where.png")
     assert code == 0
     assert len(rows(out)) == 2
     assert err == "picture some/where.png\n"
@@ -56,7 +58,7 @@ def test_the_picture_is_written_beside_the_table(command, painted):
 
 
 def test_json_is_the_only_thing_on_stdout(command):
-    _, out, _ = command("availability", "--robots", "50", "--teams", "5", "--json", "--out", "curves.svg")
+    _, out, _ = command("availability", "--robots", "50", "--teams", "5", "--json", "--picture", "curves.svg")
     answer = json.loads(out)
     (curve,) = answer["curves"]
     assert answer["picture"] == "curves.svg"
@@ -77,7 +79,7 @@ def test_help_has_the_symbol_of_the_page(command):
         (("--teams", "5,x"), "--teams as numbers"),
         (("--teams", "0"), "more than 0 robots at work"),
         (("--needed", ""), "--needed as whole numbers"),
-        (("--out", "folder/curves.gif"), "'folder/curves.gif'"),
+        (("--picture", "folder/curves.gif"), "'folder/curves.gif'"),
     ],
 )
 def test_mistakes_are_one_line_and_leave_nothing(command, words, said):
@@ -90,6 +92,6 @@ def test_mistakes_are_one_line_and_leave_nothing(command, words, said):
 
 def test_without_matplotlib_the_table_comes_and_the_picture_is_missed(command, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    code, out, err = command("availability", "--out", "curves.png")
+    code, out, err = command("availability", "--picture", "curves.png")
     assert (code, len(rows(out))) == (1, 6)
     assert "No picture without matplotlib" in err

@@ -109,11 +109,11 @@ def test_several_controllers_and_their_worlds(command):
     assert [[cell.strip() for cell in row] for row in rows] == [["random", "static"], ["crw", "static"]]
 
 
-@pytest.mark.parametrize("words", [("run", "--controller", "crw,dpo"), ("compare", "--policies", "crw,dpo")])
-def test_policies_are_found_under_the_other_names_of_the_option_too(command, words):
-    code, out, _ = command(*words, "--dry-run")
+@pytest.mark.parametrize("words", [("crw,dpo",), ("crw", "dpo"), ("--policy", "crw", "dpo"), ("--policy", "crw,dpo")])
+def test_policies_are_words_or_an_option(command, words):
+    code, out, _ = command("run", *words, "--dry-run", "--json")
     assert code == 0
-    assert "to do" in out
+    assert {run["spec"]["policy"] for run in json.loads(out)["runs"]} == {"crw", "dpo"}
 
 
 def test_a_dry_run_plans_estimates_and_touches_nothing(command):
@@ -423,7 +423,9 @@ def test_help_loads_neither_physics_nor_tables():
         (("run", "--policy", "crw,gone.npz"), "gone.npz"),
         (("run", "--policy", ","), "Expected one or more names separated by commas"),
         (("run", "--bogus"), "No such option: --bogus"),
-        (("run", "extra"), "unexpected extra argument"),
+        (("list", "extra"), "unexpected extra argument"),
+        (("run", "extra"), "Unknown policy 'extra'"),
+        (("run", "--out", "a.json"), "Expected --out as a folder, got a.json"),
         (("run", "--seeds", "0"), "Expected --seeds to be a "),
         (("run", "--seeds", "many"), "Expected --seeds to be a "),
         (("run", "--first-seed", "-1"), "Expected --first-seed to be a "),
@@ -451,10 +453,10 @@ def test_help_loads_neither_physics_nor_tables():
         (("run", "--set", "n_robots=3", "--robots", "4"), "Expected n_robots once"),
         (("run", "--wrapper", "throtle:amplitude=1"), "Unknown wrapper 'throtle'. Did you mean 'throttle'?"),
         (("run", "--wrapper", "actuator_noise:sigma"), "Expected the settings of wrapper actuator_noise as key=value"),
-        (("record", "--out", "x.avi"), "to end in .gif or .mp4"),
+        (("record", "--file", "x.avi"), "to end in .gif or .mp4"),
         (("info", "crv"), "Did you mean 'crw'?"),
         (("record", "--policy", "crv"), "Did you mean 'crw'?"),
-        (("record", *("--wrapper", "throttle:waveform=constant,amplitude=0.2") * 2), "each at most once"),
+        (("record", *("--wrapper", "throttle:waveform=constant,amplitude=0.2") * 2), "each wrapper at most once"),
         (("rerun", "missing.parquet"), "Cannot read missing.parquet: No such file or directory"),
         (("rerun", "file"), "Cannot read file: it is no Parquet file or a damaged one"),
         (("bogus",), "No such command 'bogus'"),

@@ -45,7 +45,9 @@ def test_a_full_disk_is_told_before_anything_is_run(command, full_disk, monkeypa
     assert "Traceback" not in err
 
 
-@pytest.mark.parametrize("words", [("record", "--out", "taken.gif", *FILMED), ("replay", "random", "-o", "taken.gif")])
+@pytest.mark.parametrize(
+    "words", [("record", "--file", "taken.gif", *FILMED), ("replay", "random", "--file", "taken.gif")]
+)
 def test_a_folder_in_the_place_of_the_file_is_told_before_anything_is_run(command, monkeypatch, words):
     Path("taken.gif").mkdir()
     monkeypatch.setattr(ForageEnv, "reset_batch", lambda *_, **__: pytest.fail("a run was started"))

@@ -9,8 +9,8 @@ import pytest
 def test_maps_draws_runs_and_differences(command, painted):
     pytest.importorskip("matplotlib")
     words = ("--robots", "3", "--seconds", "4")
-    assert command("replay", "random", "--beside", "crw", *words, "-o", "two.html")[0] == 0
-    code, out, err = command("maps", "two.html", "--side", "1")
+    assert command("replay", "random", "crw", *words, "--file", "two.html")[0] == 0
+    code, out, err = command("maps", "two.html", "--square", "1")
     assert (code, err) == (0, "")
     assert out == "wrote maps of 2 runs to two.maps.png and .npz files beside it\n"
     assert {path.name for path in Path().iterdir()} == {

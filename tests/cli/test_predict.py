@@ -83,14 +83,14 @@ def test_a_dry_run_shows_sizes_and_runs_nothing(command):
     assert len(json.loads(out)["runs"]) == 10
 
 
-def test_curves_of_others_are_predicted_and_drawn_where_a_folder_is_given(command, curves, tmp_path):
+def test_curves_of_others_are_predicted_and_drawn_where_a_picture_is_asked_for(command, curves, tmp_path):
     file = curves()
     code, out, err = command("predict", "--curves", file, "--hold", "32")
     assert (code, err) == (0, "")
     assert "law: contention, P(N) = 5.0" in out
     assert "1 of 1 held-back mean inside" in out
     assert not list(tmp_path.glob("*.png"))
-    code, _, err = command("predict", "--curves", file, "--out", "here")
+    code, _, err = command("predict", "--curves", file, "--picture", "here/prediction.png")
     assert (code, "picture here/prediction.png" in err) == (0, True)
     assert Path("here/prediction.png").is_file()
 
@@ -115,7 +115,7 @@ def test_search_and_rescue_has_sizes_of_its_own(command):
 
 def test_without_matplotlib_there_is_a_table_and_a_hint(command, curves, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
-    code, out, err = command("predict", "--curves", curves(), "--out", "here", "--json")
+    code, out, err = command("predict", "--curves", curves(), "--picture", "here/prediction.png", "--json")
     assert code == 0
     assert json.loads(out)["picture"] is None
     assert "No picture without matplotlib" in err
@@ -153,19 +153,17 @@ def test_runs_that_leave_nothing_to_predict_end_with_one_line(command):
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
-        ((), "Expected either --policy or --curves"),
-        (("--policy", "crw", "--curves", "x.csv"), "Expected either --policy or --curves"),
+        ((), "Expected a policy, by name or file"),
+        (("--policy", "crw", "--curves", "x.csv"), "Expected --curves without --policy, which are about runs"),
         (("--curves", "gone.csv"), "Cannot read gone.csv"),
-        (
-            ("--curves", "x.csv", "--seeds", "3"),
-            "no other options than --fit, --hold, --performance, --out and --json, got --seeds",
-        ),
+        (("--curves", "x.csv", "--seeds", "3"), "Expected --curves without --seeds, which are about runs"),
+        (("--policy", "crw", "--robots", "9"), "No such option: --robots; for this command it is --fit."),
         (("--policy", "crww"), "Did you mean 'crw'?"),
         (("--policy", "crw", "--fit", "1,2,4"), "4 or more different swarm sizes to fit, got 1, 2, 4"),
         (("--policy", "crw", "--fit", "1,two"), "Expected --fit as whole numbers separated by commas, such as 5,20"),
         (("--policy", "crw", "--hold", "16"), "larger swarms than the fitted 32 robots, got 16"),
         (("--policy", "crw", "--seeds", "1"), "seeds"),
-        (("--policy", "crw", "--set", "n_robots=9"), "give them by --fit and --hold"),
+        (("--policy", "crw", "--set", "n_robots=9"), "use --fit and --hold"),
         (("--policy", "crw", "--scenario", "warehouse"), "Unknown scenario 'warehouse'"),
     ],
 )

@@ -17,7 +17,7 @@ SHORT_FILM = ("--robots", "3", "--seconds", "4", "--size", "240", "--fps", "5")
 def test_record_films_a_run(command):
     pytest.importorskip("PIL")
     words = ("--policy", "random", "--robots", "3", "--seconds", "8", "--size", "240", "--fps", "5")
-    code, out, _ = command("record", "--out", "film.gif", *words)
+    code, out, _ = command("record", "--file", "film.gif", *words)
     assert (code, out) == (0, "wrote film.gif\n")
     assert Path("film.gif").read_bytes().startswith(b"GIF8")
     assert command("record", *words)[1] == "wrote results/warehouse_small_random.gif\n"
@@ -78,7 +78,7 @@ def test_record_draws_one_picture_of_the_run_it_films(command, monkeypatch):
     words = ("--policy", "random", "--robots", "3", "--size", "240")
     assert command("record", *words, "--seconds", "8", "--fps", "20")[0] == 0
     monkeypatch.setattr(film, "render_frame", note)
-    code, out, err = command("record", *words, "--at", "8", "--out", "new/at.png")
+    code, out, err = command("record", *words, "--at", "8", "--file", "new/at.png")
     assert (code, out, err) == (0, "wrote new/at.png\n", "")
     assert list(filmed) == [40]
     with image.open("new/at.png") as picture:
@@ -93,8 +93,8 @@ def test_record_draws_one_picture_of_the_run_it_films(command, monkeypatch):
 def test_record_says_how_pictures_and_films_are_asked_for(command):
     pytest.importorskip("PIL")
     for words, said in (
-        (("--out", "x.png"), "one picture is made by --at SECONDS"),
-        (("--out", "x.gif", "--at", "3"), "for a film, leave --at out"),
+        (("--file", "x.png"), "one picture is made by --at SECONDS"),
+        (("--file", "x.gif", "--at", "3"), "for a film, leave --at out"),
         (("--at", "-1"), "at_s"),
         (("--at", "20000"), "at_s"),
     ):

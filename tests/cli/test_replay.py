@@ -14,7 +14,7 @@ SHORT = ("--robots", "3", "--seconds", "4")
 
 
 def test_replay_writes_a_page(command):
-    code, out, err = command("replay", "random", *SHORT, "-o", "new/run.html")
+    code, out, err = command("replay", "random", *SHORT, "--file", "new/run.html")
     assert (code, err) == (0, "")
     assert out.startswith("wrote new/run.html (0.1 MB)")
     (replay,) = read_replays("new/run.html")
@@ -25,9 +25,7 @@ def test_replay_writes_a_page(command):
 def test_replay_shows_runs_of_one_world_and_seed_side_by_side(command):
     shutil.copy(Path(pretrained.__file__).with_name("ppo_warehouse_small.npz"), "mine.npz")
     words = ("--seed", "7", "--wrapper", "throttle:waveform=constant,amplitude=0.2")
-    code, _, err = command(
-        "replay", "stochm", "--beside", "crw", "--beside", "mine.npz", *SHORT, *words, "-o", "a.html"
-    )
+    code, _, err = command("replay", "stochm", "crw", "mine.npz", *SHORT, *words, "--file", "a.html")
     assert (code, err) == (0, "")
     replays = read_replays("a.html")
     assert [replay.label for replay in replays] == ["stochm", "crw", "mine"]
@@ -49,7 +47,7 @@ def stored(command):
 
 def test_replay_makes_a_stored_run_again(command, stored):
     for word in (stored.run_id, f"results/warehouse_small/{stored.run_id}.parquet"):
-        code, _, err = command("replay", word, "--beside", "crw", "-o", "run.html")
+        code, _, err = command("replay", word, "crw", "--file", "run.html")
         assert (code, err) == (0, "")
         mine, beside = read_replays("run.html")
         assert mine.spec.run_id == stored.run_id
@@ -58,10 +56,10 @@ def test_replay_makes_a_stored_run_again(command, stored):
 
 
 def test_what_is_beside_a_stored_run_must_be_a_policy(command, stored):
-    for words in (("--beside", "crv"), ("--beside", "gone.npz")):
-        code, out, err = command("replay", stored.run_id, *words)
+    for word in ("crv", "gone.npz"):
+        code, out, err = command("replay", stored.run_id, word)
         assert (code, out) == (2, "")
-        assert words[1] in err
+        assert word in err
         assert err.count("\n") == 1
 
 
@@ -81,7 +79,7 @@ def test_replay_says_when_a_stored_run_comes_out_different(command, stored):
 
     other = dataclasses.replace(stored, n_carrying=stored.n_carrying + 1.0)
     other.write("results/other.parquet")
-    code, _, err = command("replay", "results/other.parquet", "-o", "run.html")
+    code, _, err = command("replay", "results/other.parquet", "--file", "run.html")
     assert code == 0
     assert "comes out different from its record" in err
 
@@ -95,7 +93,7 @@ def test_replay_says_when_a_stored_run_comes_out_different(command, stored):
         (("folder.parquet",), "Cannot read folder.parquet"),
         ((".",), "Unknown policy '.'"),
         (("crv",), "Unknown policy 'crv'"),
-        (("crw", "--beside", "crv"), "Unknown policy 'crv'"),
+        (("crw", "crv"), "Unknown policy 'crv'"),
         (("crw", "--seconds", "1e9"), "Expected seconds <= 10000"),
         (("crw", "--seconds", "2", "--frame", "0.01"), "frame_s"),
     ],
@@ -112,7 +110,7 @@ def test_wrong_words_are_one_line(command, words, expected):
 def test_a_stored_run_takes_no_options_of_another_one(command, stored):
     code, _, err = command("replay", stored.run_id, "--robots", "5", "--seed", "1")
     assert code == 2
-    assert "got --robots, --seed" in err
+    assert "Expected a stored run without --robots, --seed, which describe another one" in err
 
 
 def test_an_interrupt_leaves_no_file(command, monkeypatch):
@@ -121,5 +119,5 @@ def test_an_interrupt_leaves_no_file(command, monkeypatch):
 
     monkeypatch.setattr("swarm_forage_env.runs.run.LiveRun.advance", interrupted)
     told = "swarm-forage: Interrupted. What was under way is not kept; the same command starts it again.\n"
-    assert command("replay", "random", *SHORT, "-o", "run.html") == (130, "", told)
+    assert command("replay", "random", *SHORT, "--file", "run.html") == (130, "", told)
     assert not list(Path().iterdir())

@@ -21,7 +21,7 @@ def test_saliency_is_told_and_drawn(command, monkeypatch):
     assert out.endswith(f"wrote {picture}\n")
     assert picture.read_bytes().startswith(b"\x89PNG")
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    code, out, err = command("saliency", "ppo_warehouse_small", *WORDS, "-o", "other.png")
+    code, out, err = command("saliency", "ppo_warehouse_small", *WORDS, "--picture", "other.png")
     assert code == 0
     assert "No picture without matplotlib" in err
     assert not Path("other.png").exists()
@@ -64,7 +64,7 @@ def test_saliency_is_shown_even_if_its_picture_cannot_be_written(command, monkey
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("swarm_forage_env.rendering.plots.draw_saliency", full)
-    code, out, err = command("saliency", "ppo_warehouse_small", *WORDS, "-o", "a.png")
+    code, out, err = command("saliency", "ppo_warehouse_small", *WORDS, "--picture", "a.png")
     assert code == 0
     assert "cos, sin of the heading" in out
     assert err == "No picture a.png: No space left on device.\n"
@@ -74,4 +74,4 @@ def test_the_place_of_the_picture_is_looked_at_before_anything_is_run(command, m
     Path("taken.png").mkdir()
     monkeypatch.setattr("swarm_forage_env.inspect.saliency.saliency", lambda *_, **__: pytest.fail("a run was started"))
     told = "swarm-forage: Expected a file to write, got a folder: taken.png\n"
-    assert command("saliency", "ppo_warehouse_small", *WORDS, "-o", "taken.png") == (1, "", told)
+    assert command("saliency", "ppo_warehouse_small", *WORDS, "--picture", "taken.png") == (1, "", told)

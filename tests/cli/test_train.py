@@ -15,7 +15,7 @@ import pytest
 from swarm_forage_env._internal.extras import install_command
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.cli import training_report
-from swarm_forage_env.cli.scenario_options import ScenarioOptions
+from swarm_forage_env.cli.option_groups import WorldOptions
 from swarm_forage_env.cli.train import train
 from swarm_forage_env.cli.training_plan import TrainOptions, build_plan
 from swarm_forage_env.training.defaults import DEFAULT_REWARDS
@@ -131,9 +131,7 @@ def test_without_the_training_library_the_message_says_what_to_install(command, 
         (("--arg", "policy_kwargs=1"), "Expected the network as --hidden 128,128"),
         (("--hidden", "big"), "sizes of layers, such as 128,128, got 'big'"),
         (("--hidden", "0"), "hidden to be a whole number from 1 to 10,000, got 0"),
-        pytest.param(
-            ("--arenas", "2", "--processes", "9"), "processes from 0 to n_arenas = 2, got 9", marks=needs_training
-        ),
+        (("--jobs", "0"), "Expected --jobs to be a number >= 1"),
         (("--objects", "800"), "(small_start) of 12.8 x 16.0 m: Expected at most 392 objects"),
         (NARROW, "(small_start) of 4.8 x 16.0 m: Expected an arena larger than"),
         (("--algo", "dqn", "--actions", "continuous"), "dqn can choose"),
@@ -208,19 +206,19 @@ def test_a_callback_of_the_user_runs_beside_the_training_and_can_end_it(command)
 
 @pytest.mark.parametrize("name", ["warehouse_small", "search_and_rescue"])
 def test_the_plan_of_the_command_is_the_recipe(name):
-    assert build_plan(ScenarioOptions(scenario=name), TrainOptions()) == recipe(name)
+    assert build_plan(WorldOptions(scenario=name), TrainOptions()) == recipe(name)
 
 
 def test_words_are_arguments_of_the_recipe(tmp_path):
     path = tmp_path / "world.toml"
     path.write_text("[scenario]\nn_robots = 7\nnest_progress = 0.0\n[sensor_noise]\nsigma = 0.01\n")
-    words = ScenarioOptions(
-        scenario="warehouse_small",
+    words = WorldOptions(
+        scenario=str(path),
         objects=60,
+        horizon=400.0,
         caches="static",
         settings=("first_pickup=0.5",),
         wrappers=("actuator_noise:sigma=0.1",),
-        config_file=path,
     )
     options = TrainOptions(
         algorithm="sac",
@@ -235,7 +233,6 @@ def test_words_are_arguments_of_the_recipe(tmp_path):
         evaluate_every=50,
         evaluation_horizon=200.0,
         small_start=False,
-        horizon_s=400.0,
         hidden="128,32",
         arguments=("batch_size=8", "gamma=0.9"),
     )
@@ -266,7 +263,7 @@ def test_what_people_set_goes_before_the_recipe(tmp_path, by_file):
     path = tmp_path / "world.toml"
     path.write_text("[scenario]\nnest_progress = 0.0\nhorizon_s = 400.0\n" if by_file else "")
     settings = () if by_file else ("nest_progress=0.0", "horizon_s=400")
-    plan = build_plan(ScenarioOptions(scenario="warehouse_small", settings=settings, config_file=path), TrainOptions())
+    plan = build_plan(WorldOptions(scenario=str(path), settings=settings), TrainOptions())
     assert (plan.scenario.reward.nest_progress, plan.scenario.reward.first_pickup) == (0.0, 1.0)
     assert {stage.scenario["horizon_s"] for stage in plan.stages} == {400.0}
 
@@ -284,12 +281,12 @@ def test_a_file_sets_fields_of_the_scenario_and_no_arguments_of_the_recipe(tmp_p
     path = tmp_path / "world.toml"
     path.write_text(f"[scenario]\n{name} = 3\n")
     with pytest.raises(ConfigError, match=f"Unknown scenario field '{name}'"):
-        build_plan(ScenarioOptions(scenario="warehouse_small", config_file=path), TrainOptions())
+        build_plan(WorldOptions(scenario=str(path)), TrainOptions())
 
 
 def test_a_wrapper_option_goes_before_the_same_wrapper_in_the_file(tmp_path):
     path = tmp_path / "world.toml"
     path.write_text("[sensor_noise]\nsigma = 0.01\n")
-    words = ScenarioOptions(scenario="warehouse_small", config_file=path, wrappers=("sensor_noise:sigma=0.02",))
+    words = WorldOptions(scenario=str(path), wrappers=("sensor_noise:sigma=0.02",))
     (config,) = build_plan(words, TrainOptions()).wrappers
     assert config.to_mapping()["sigma"] == 0.02

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.scenario_options import ScenarioOptions, plan_runs
+from swarm_forage_env.cli.option_groups import WorldOptions
+from swarm_forage_env.cli.scenario_options import plan_runs
 from swarm_forage_env.policies import model_files
 from swarm_forage_env.policies.interface import InterfaceConfig
 from swarm_forage_env.policies.model_files import file_digest
@@ -275,5 +276,5 @@ def test_runs_of_a_file_open_it_once(tmp_path, monkeypatch):
     opened = []
     monkeypatch.setattr(model_files, "file_digest", lambda path: opened.append(path) or file_digest(path))
     path = str(network_file(tmp_path / "net.npz"))
-    plan_runs(ScenarioOptions(scenario="warehouse_small"), [path], n_seeds=3, first_seed=5)
+    plan_runs(WorldOptions(), [path], n_seeds=3, first_seed=5)
     assert opened == [path, path]  # once to pin it, once to try it

@@ -114,7 +114,6 @@ GOOD_WORDS: dict[str, tuple[str, ...]] = {
     "form": ("marginal", "both"),
     "seconds": ("2",),
     "quirks": ("all", "none"),
-    "run": ("crw",),
 }
 """Values that make sense, by the name of a parameter."""
 
@@ -199,11 +198,13 @@ def _value(random: Random, item: Any, folder: Path) -> str:
     if random.random() < 0.12:
         return random.choice(BAD_WORDS)
     name = str(item.name)
-    name = {"policies": "policy", "beside": "policy", "stored": "policy"}.get(name, name)
-    of_files = {"config": _config, "curves": _table, "place": _table, "plan": _plan, "page": _page, "file": _stored}
+    name = {"policies": "policy", "named_policies": "policy", "beside": "policy"}.get(name, name)
+    of_files = {"curves": _table, "place": _table, "plan": _plan, "page": _page, "file": _stored}
     if name in of_files or (name == "name" and random.random() < 0.6):
         return str(of_files.get(name, _study)(random, folder))
-    if name in ("policy", "run") and random.random() < 0.3:
+    if name == "scenario" and random.random() < 0.4:
+        return str(_scenario(random, folder))
+    if name == "policy" and random.random() < 0.3:
         return str(_network(random, folder))
     if name in ("settings", "wrappers", "arguments") and random.random() < 0.5:
         return _changed_setting(random, random.choice(GOOD_WORDS[name]))
@@ -211,6 +212,8 @@ def _value(random: Random, item: Any, folder: Path) -> str:
         return random.choice(GOOD_WORDS[name])
     if name == "out":
         return random.choice(("out", "out.gif", "out.png", "out/deep/er", "out.html", "out.parquet"))
+    if name == "picture":
+        return random.choice(("out.png", "out.svg", "out/deep.pdf", "out"))
     return random.choice(("2", "2.0", "x"))
 
 
@@ -237,8 +240,9 @@ def _written(random: Random, folder: Path, suffix: str, text: str) -> Path:
     return file
 
 
-def _config(random: Random, folder: Path) -> Path:
-    text = "[scenario]\nn_robots = 3\nn_objects = 20\nnest_size_m = [2.0, 4.0]\nphysics_substeps = [0.2, 0.8]\n"
+def _scenario(random: Random, folder: Path) -> Path:
+    head = random.choice(("[scenario]\n", 'scenario = "warehouse_small"\n[set]\n'))
+    text = f"{head}n_robots = 3\nn_objects = 20\nnest_size_m = [2.0, 4.0]\nphysics_substeps = [0.2, 0.8]\n"
     text += '[throttle]\nwaveform = "square"\namplitude = 0.2\nperiod_s = 500.0\n[sensor_noise]\nsigma = 0.1\n'
     text += "[sensor_noise.sigmas]\nposition = 0.1\n[population]\ndeath_per_tick = 0.1\n"
     return _written(random, folder, ".toml", _broken_lines(random, text))

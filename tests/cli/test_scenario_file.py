@@ -1,4 +1,4 @@
-"""`swarm-forage run --config FILE.toml`: scenario fields and wrappers from a file."""
+"""`swarm-forage run --scenario FILE.toml`: scenario fields and wrappers from a file."""
 
 import json
 from pathlib import Path
@@ -8,20 +8,24 @@ import pytest
 from swarm_forage_env.runs.store import load
 
 CONFIG = """
-[scenario]
+scenario = "warehouse_small"
+
+[set]
 n_robots = 3
 n_objects = 20
 horizon_s = 4.0
 interval_s = 2
 physics_substeps = [0.2, 0.2, 0.2, 0.2, 0.2]
 
-[throttle]
+[wrappers.throttle]
 waveform = "constant"
 amplitude = 0.2
 
-[actuator_noise]
+[wrappers.actuator_noise]
 sigma = 0.1
 """
+EARLIER = CONFIG.replace('scenario = "warehouse_small"\n', "").replace("[set]", "[scenario]").replace("[wrappers.", "[")
+"""As such files were before they said the same as files of studies."""
 
 
 @pytest.fixture
@@ -41,8 +45,9 @@ def stored_spec() -> dict:
     return json.loads(record.spec)
 
 
-def test_a_file_gives_scenario_fields_and_wrappers(command):
-    assert command(CONFIG, "--config", "world.toml")[0] == 0
+@pytest.mark.parametrize("text", [CONFIG, EARLIER])
+def test_a_file_gives_scenario_fields_and_wrappers(command, text):
+    assert command(text, "--scenario", "world.toml")[0] == 0
     world, wrappers = stored_spec()["scenario"], stored_spec()["wrappers"]
     assert (world["robots"]["n_robots"], world["objects"]["n_objects"], world["horizon_s"]) == (3, 20, 4.0)
     assert world["physics_substeps"] == [0.2] * 5
@@ -54,7 +59,7 @@ def test_a_file_gives_scenario_fields_and_wrappers(command):
 
 def test_other_options_go_before_the_file(command):
     words = ("--robots", "2", "--set", "n_objects=9", "--wrapper", "actuator_noise:sigma=0.3")
-    assert command(CONFIG, "--config", "world.toml", *words)[0] == 0
+    assert command(CONFIG, "--scenario", "world.toml", *words)[0] == 0
     world, wrappers = stored_spec()["scenario"], stored_spec()["wrappers"]
     assert (world["robots"]["n_robots"], world["objects"]["n_objects"], world["horizon_s"]) == (2, 9, 4.0)
     assert [(wrapper["wrapper"], wrapper.get("sigma")) for wrapper in wrappers] == [
@@ -68,6 +73,8 @@ def test_other_options_go_before_the_file(command):
     [
         ("n_robots =", "Cannot use world.toml: Invalid value"),
         ("scenario = 3", "Cannot use world.toml: Expected scenario to be a table of values by name, got 3"),
+        ('scenario = "warehouse_smal"', "Unknown scenario 'warehouse_smal'. Did you mean 'warehouse_small'?"),
+        ("[set]\nn_robot = 3", "Unknown scenario field 'n_robot'. Did you mean 'n_robots'?"),
         ("[scenario]\nn_robot = 3", "Unknown scenario field 'n_robot'. Did you mean 'n_robots'?"),
         ("[throtle]\namplitude = 1", "Cannot use world.toml: Unknown wrapper 'throtle'. Did you mean 'throttle'?"),
         (
@@ -77,14 +84,14 @@ def test_other_options_go_before_the_file(command):
     ],
 )
 def test_a_mistake_in_the_file_is_one_line_and_exit_code_2(command, text, complaint):
-    code, out, err = command(text, "--config", "world.toml")
+    code, out, err = command(text, "--scenario", "world.toml")
     assert (code, out) == (2, "")
     assert complaint in err
     assert len(err.splitlines()) == 1
 
 
 def test_a_missing_file_is_one_line(command):
-    code, _, err = command(CONFIG, "--config", "nowhere.toml")
+    code, _, err = command(CONFIG, "--scenario", "nowhere.toml")
     assert code == 2
     assert "Cannot use nowhere.toml: No such file or directory" in err
     assert len(err.splitlines()) == 1

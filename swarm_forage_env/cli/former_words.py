@@ -1,0 +1,49 @@
+"""Words that commands had once, or that people try: what to type instead.
+
+The parser refuses them like any other wrong word; they are only looked up to say what is right.
+"""
+
+from collections.abc import Collection
+
+OPTIONS = {
+    "--agent": ("--policy",),
+    "--algorithm": ("--algo",),
+    "--beside": ("--policy",),
+    "--config": ("--scenario",),
+    "--controller": ("--policy",),
+    "--duration": ("--horizon",),
+    "--env": ("--scenario",),
+    "--file": ("--picture", "--out"),
+    "--format": ("--json",),
+    "--into": ("--file",),
+    "--jobs": ("--workers",),
+    "--model": ("--policy",),
+    "--n-jobs": ("--jobs",),
+    "--n-robots": ("--robots",),
+    "--out": ("--file", "--picture"),
+    "--output": ("--file", "--out", "--picture"),
+    "--picture": ("--file", "--out"),
+    "--plot": ("--picture",),
+    "--policies": ("--policy",),
+    "--population": ("--robots",),
+    "--processes": ("--jobs",),
+    "--records": ("--out",),
+    "--robots": ("--fit",),
+    "--seconds": ("--horizon",),
+    "--seed": ("--seeds", "--first-seed"),
+    "--seeds": ("--seed",),
+    "--side": ("--square",),
+    "--size": ("--robots",),
+    "--workers": ("--jobs",),
+    "--world": ("--scenario",),
+    "--wrappers": ("--wrapper",),
+    "-j": ("--jobs",),
+    "-n": ("--robots",),
+    "-o": ("--file", "--picture", "--out"),
+}
+"""Option -> options that may be meant; the first of them that a command has is."""
+
+
+def right_option(word: str, known: Collection[str]) -> str:
+    """Return the option of a command that a wrong one stands for; empty if none is known."""
+    return next((right for right in OPTIONS.get(word, ()) if right in known), "")

@@ -1,0 +1,87 @@
+"""One word means one thing in all commands: which options they have, and what is said of former and wrong words."""
+
+from pathlib import Path
+
+import pytest
+import typer
+
+from swarm_forage_env.cli import app as application
+from swarm_forage_env.cli.former_words import OPTIONS, right_option
+
+MAKE_RUNS = ("run", "score", "compare", "predict", "choose", "ablate")
+"""Commands that make many runs."""
+ONE_RUN = ("record", "replay", "watch", "saliency")
+"""Commands that look into one run, or into one of each policy."""
+
+
+def walk(command, words=()):
+    """All commands: words -> command."""
+    below = getattr(command, "commands", {})
+    found = {} if below and words == () else {words: command}
+    for name, one in below.items():
+        found |= walk(one, (*words, name))
+    return found
+
+
+ALL = {" ".join(words): command for words, command in walk(typer.main.get_command(application.app)).items()}
+WITH_SCENARIO = [words for words, command in ALL.items() if any("--scenario" in one.opts for one in command.params)]
+
+
+def options_of(words):
+    return {option for param in ALL[words].params for option in param.opts}
+
+
+def test_commands_that_have_a_scenario_are_those_that_we_mean():
+    assert {*MAKE_RUNS, *ONE_RUN, "train", "dataset"} <= {*WITH_SCENARIO}
+
+
+@pytest.mark.parametrize("words", WITH_SCENARIO)
+def test_whatever_has_a_scenario_takes_all_that_describes_a_world(words):
+    wanted = {"--scenario", "--wrapper", "--set", "--objects", "--side", "--caches", "--horizon", "--performance"}
+    assert wanted <= options_of(words)
+
+
+@pytest.mark.parametrize("words", WITH_SCENARIO)
+def test_whatever_has_a_scenario_takes_a_file_of_it(command, words):
+    Path("world.toml").write_text('scenario = "warehouse_smal"\n')
+    needed = {"choose": ("--deliver", "4")}.get(words, ())
+    policies = () if words == "train" else ("ppo_warehouse_small",)
+    code, out, err = command(*words.split(), *policies, "--scenario", "world.toml", *needed)
+    assert (code, out) == (2, "")
+    assert "Unknown scenario 'warehouse_smal'. Did you mean 'warehouse_small'?" in err
+
+
+@pytest.mark.parametrize("words", MAKE_RUNS)
+def test_whatever_makes_runs_says_where_how_many_and_in_what_form(words):
+    assert {"--jobs", "--seeds", "--out", "--json", "--dry-run", "--policy"} <= options_of(words)
+
+
+def test_an_option_takes_a_value_in_all_commands_or_in_none():
+    found: dict[str, set[bool]] = {}
+    for command in ALL.values():
+        for option in command.params:
+            for word in option.opts:
+                found.setdefault(word, set()).add(bool(getattr(option, "is_flag", False)))
+    assert [word for word, flags in found.items() if len(flags) > 1 and word not in ("--json", "--band")] == []
+
+
+@pytest.mark.parametrize("word", OPTIONS)
+def test_a_former_option_is_answered_where_a_command_has_the_right_one(command, word):
+    answered = 0
+    for words, one in ALL.items():
+        known = {option for param in one.params for option in param.opts}
+        right = right_option(word, known)
+        if not right or word in known:
+            continue
+        answered += 1
+        if answered == 1:
+            code, out, err = command(*words.split(), word, "x")
+            assert (code, out) == (2, "")
+            assert err == f"swarm-forage: No such option: {word}; for this command it is {right}.\n"
+    assert answered, f"no command answers {word}"
+
+
+def test_a_folder_is_no_file(command):
+    code, _, err = command("run", "crw", "--out", "film.gif")
+    assert code == 2
+    assert "Expected --out as a folder, got film.gif; --file and --picture take files." in err
