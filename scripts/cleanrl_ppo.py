@@ -3,7 +3,7 @@
 
     pip install . "torch==2.13.0"  # in a checkout
     python scripts/cleanrl_ppo.py --total-timesteps 3000000 --out cleanrl_ppo.npz
-    swarm-forage run --policy crw,cleanrl_ppo.npz
+    swarm-forage run crw,cleanrl_ppo.npz
 
 It differs from the textbook in two places, because sub-environments are robots. Arenas start anew within the step that
 ends them, so the value of the last observation is added where an episode was truncated. And steps of robots that are

@@ -3,7 +3,7 @@
 
     pip install ".[train]" "torch==2.13.0" "sb3-contrib==2.9.2"  # in a checkout
     python scripts/recurrent_ppo.py --plan docs/benchmark/plans/recurrent_ppo.toml --out recurrent_ppo.zip
-    swarm-forage --trust-models run --policy crw,recurrent_ppo.zip
+    swarm-forage --trust-models run crw,recurrent_ppo.zip
 
 It carries out a plan of `swarm-forage train`: its worlds, its stages, its options of PPO. The algorithm has a buffer of
 its own, so it would also learn from rows that stand for no robot. `UsedRows` leaves these out.

@@ -3,7 +3,7 @@
 
     pip install . "torchrl==0.14.1" "torch==2.13.0"  # in a checkout
     python scripts/torchrl_mappo.py --plan docs/benchmark/plans/ippo.toml --out mappo.npz
-    swarm-forage run --policy crw,mappo.npz
+    swarm-forage run crw,mappo.npz
 
 It carries out a plan of `swarm-forage train`: its worlds, its stages, its options of PPO. Our vector environment
 collects, TorchRL's modules and losses learn. The critic gets a robot's own row, and the mean and the largest of each

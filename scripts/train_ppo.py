@@ -3,7 +3,7 @@
 
 pip install ".[train]" "torch==2.13.0"  # in a checkout
 python scripts/train_ppo.py --out ppo_example.npz
-swarm-forage run --policy crw,ppo_example.npz
+swarm-forage run crw,ppo_example.npz
 
 This is `swarm-forage train` without its checkpoints and evaluations: the same recipe gives the same last weights.
 """

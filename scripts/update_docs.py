@@ -47,28 +47,28 @@ LIKELIEST = (
 )
 """The same weights, with the likeliest action in the place of one that is drawn."""
 SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "run": ((f"swarm-forage run --scenario warehouse_small --policy {','.join(FIVE)} --robots 50 --seeds 4",), FIVE),
+    "run": ((f"swarm-forage run {','.join(FIVE)} --scenario warehouse_small --robots 50 --seeds 4",), FIVE),
     "medium": (
-        ("swarm-forage run --scenario warehouse_medium --policy crw,ppo_warehouse_small --seeds 4",),
+        ("swarm-forage run crw,ppo_warehouse_small --scenario warehouse_medium --seeds 4",),
         ("crw", "ppo_warehouse_small"),
     ),
     "trained": (
         (
             "swarm-forage train --scenario warehouse_small --algo ppo",
-            "swarm-forage run --policy crw,results/training/warehouse_small_ppo/policy.npz --seeds 4",
+            "swarm-forage run crw,results/training/warehouse_small_ppo/policy.npz --seeds 4",
         ),
         ("crw", "policy"),
     ),
     "cleanrl": (
         (
             f"python {ROOT}/scripts/cleanrl_ppo.py --total-timesteps 3000000 --out cleanrl_ppo.npz",
-            "swarm-forage run --policy crw,cleanrl_ppo.npz --seeds 4",
+            "swarm-forage run crw,cleanrl_ppo.npz --seeds 4",
         ),
         ("crw", "policy"),
     ),
     **{
         f"generalist_{short}": (
-            (f"swarm-forage run --scenario {name} --policy {','.join(WITH_ALL)} --seeds 4 {COMPILED}",),
+            (f"swarm-forage run {','.join(WITH_ALL)} --scenario {name} --seeds 4 {COMPILED}",),
             WITH_ALL,
         )
         for short, name in SCENARIOS.items()
@@ -80,7 +80,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         f"recipe_{short}_{seed}": (
             (
                 f"swarm-forage train --scenario {name} --seed {seed} {COMPILED} --out trained",
-                f"swarm-forage run --scenario {name} --policy trained/policy.npz --seeds 4 {COMPILED}",
+                f"swarm-forage run trained/policy.npz --scenario {name} --seeds 4 {COMPILED}",
             ),
             ("policy",),
         )
@@ -91,8 +91,7 @@ SOURCES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "drawn": (
         (
             f'python -c "{LIKELIEST}"',
-            "swarm-forage run --scenario search_and_rescue --robots 64 --policy generalist,likeliest.npz --seeds 4 "
-            f"{COMPILED}",
+            f"swarm-forage run generalist,likeliest.npz --scenario search_and_rescue --robots 64 --seeds 4 {COMPILED}",
         ),
         ("generalist", "likeliest"),
     ),
