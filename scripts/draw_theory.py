@@ -8,7 +8,7 @@ No run is needed. `swarm-forage study plot` and `report` draw the same figures. 
 import sys
 from pathlib import Path
 
-from swarm_forage_env.cli.theory import theory_figures
+from metrics.scoring.theory import theory_figures
 from swarm_forage_env.rendering.figures import SCREEN
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"

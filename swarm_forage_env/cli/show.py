@@ -4,23 +4,20 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.terminal import output
-
 
 def list_everything() -> None:
     """List scenarios and policies."""
-    from swarm_forage_env.cli.descriptions import overview
+    from swarm_forage_env.inspect.descriptions import overview
 
-    for table in overview():
-        output().print(table)
+    typer.echo(overview().text())
 
 
 def info(name: Annotated[str, typer.Argument(help="A scenario, an environment id, a policy or its file.")]) -> None:
     """Show all fields and spaces of a scenario, or what a policy is."""
     from swarm_forage_env._internal.printable import printable
-    from swarm_forage_env.cli.descriptions import information
+    from swarm_forage_env.inspect.descriptions import describe
 
-    typer.echo(printable(information(name)))  # a file may hold anything
+    typer.echo(printable(describe(name).text()))  # a file may hold anything
 
 
 def schema() -> None:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.maps import OwnScales, with_differences, write_maps
+from swarm_forage_env.cli.maps import OwnScales, write_maps
 
 PICTURE_FILE = "maps.png"
 
@@ -36,6 +36,7 @@ def maps(
     from swarm_forage_env._internal.files import check_file
     from swarm_forage_env._internal.wording import counted
     from swarm_forage_env.cli.terminal import notes, progress_bar
+    from swarm_forage_env.inspect.maps import ComparedMaps
     from swarm_forage_env.inspect.study_maps import choose_cells, maps_of_cells, robot_ticks
     from swarm_forage_env.studies.study_table import read_study
 
@@ -45,12 +46,11 @@ def maps(
     check_file(picture)
     with progress_bar("making the runs again", robot_ticks(table.spec, chosen, seeds)) as advance:
         found, changed = maps_of_cells(table, chosen, n_seeds=seeds, side_m=side, advance=advance)
-    if per_robot:
-        found = [one.per_robot() for one in found]
+    compared = ComparedMaps(maps=tuple(found))
     if changed:
         notes().print(
             f"Runs that come out different from their records, which other versions made: {', '.join(changed)}; "
             "the maps show them as they are now."
         )
-    write_maps(with_differences(found), picture, per="robot" if per_robot else "", own_scales=own_scales)
+    write_maps(compared.per_robot() if per_robot else compared, picture, own_scales=own_scales)
     typer.echo(f"wrote maps of {counted(len(found), 'cell')} to {picture} and .npz files beside it")

@@ -264,7 +264,7 @@ def _model(figure: "ModelFigure") -> dict[str, Any]:
 
 def _theory(tables: "Sequence[StudyTable]", judged: "Sequence[Judged]") -> list[dict[str, Any]]:
     """Return the figures that need no runs, all of them where claims are judged, with the claims about formulas."""
-    from swarm_forage_env.cli.theory import theory_figures, theory_of
+    from metrics.scoring.theory import theory_figures, theory_of
 
     figures = theory_figures() if judged else [figure for table in tables for figure in theory_of(table.spec)]
     formulas = [one for one in judged if not one.claim.panels]

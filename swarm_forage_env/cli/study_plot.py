@@ -47,10 +47,10 @@ def plot(
     from metrics.scoring.figure_panels import study_panels
     from metrics.scoring.model_plots import draw_models
     from metrics.scoring.study_models import model_figures
+    from metrics.scoring.theory import theory_of
     from swarm_forage_env._internal.fields import known_name
     from swarm_forage_env.cli.scenario_options import split_names
     from swarm_forage_env.cli.score_options import score_forms
-    from swarm_forage_env.cli.theory import theory_of
     from swarm_forage_env.rendering.figures import FORMATS, FigureStyle
     from swarm_forage_env.studies.study_table import read_study
 

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, number
-from swarm_forage_env._internal.files import replacing
+from swarm_forage_env._internal.files import as_file_name, replacing
 from swarm_forage_env.contract.types import FloatArray
-from swarm_forage_env.inspect.replay.frames import Replay, Status
+from swarm_forage_env.inspect.replay.files import read_replays
+from swarm_forage_env.inspect.replay.frames import Replay, ReplayError, Status
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.scenarios.obstacles import Rectangle
 from swarm_forage_env.scenarios.units import CELL_M
 
@@ -124,6 +126,66 @@ def floor_maps(replay: Replay, *, side_m: float = 2 * CELL_M) -> FloorMaps:
             "drops": count(places_m[signs < 0]) * of_events,
         },
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ComparedMaps:
+    """Maps of several swarms, and what is more in each after the first than in the first."""
+
+    maps: tuple[FloorMaps, ...]
+    per: str = ""
+    """What everything is divided by, for the units."""
+
+    @property
+    def rows(self) -> tuple[FloorMaps, ...]:
+        """Maps and differences."""
+        return (*self.maps, *(one.minus(self.maps[0]) for one in self.maps[1:]))
+
+    def per_robot(self) -> "ComparedMaps":
+        """Return everything divided by the swarm sizes."""
+        return ComparedMaps(maps=tuple(one.per_robot() for one in self.maps), per="robot")
+
+    def write(self, picture: str | Path, *, own_scales: bool = False, style: FigureStyle = SCREEN) -> None:
+        """Write arrays to .npz files beside a picture, and then draw it.
+
+        Args:
+            picture: File to write.
+            own_scales: See `rendering.plots.draw_maps`.
+            style: Of the figure.
+
+        Raises:
+            ImportError: matplotlib is not installed; the arrays are written.
+        """
+        from swarm_forage_env.rendering.plots import draw_maps
+
+        rows = self.rows
+        for one in rows:
+            one.write(Path(picture).with_suffix(f".{as_file_name(one.label)}.npz"))
+        columns = {
+            name: (what, f"{unit}, per {self.per}" if self.per else unit) for name, (what, unit) in MEANINGS.items()
+        }
+        shown = [(one.label, one.arrays, one.is_difference, one.size_m, one.obstacles_m) for one in rows]
+        draw_maps(picture, shown, columns, own_scales=own_scales, style=style)
+
+
+def maps_of_page(page: str | Path, *, side_m: float = 2 * CELL_M) -> ComparedMaps:
+    """Return maps of all runs of a replay page.
+
+    Args:
+        page: A file that `swarm-forage replay` has written.
+        side_m: As in `floor_maps`.
+
+    Raises:
+        ReplayError: it is none.
+        ConfigError: see `floor_maps`.
+    """
+    file = Path(page)
+    if file.suffix == ".parquet":
+        raise ReplayError(
+            f"Expected a page that 'swarm-forage replay' has written, got {file}; records of runs hold no positions. "
+            f"'swarm-forage replay {file}' makes the page of a run, and 'swarm-forage study maps' the maps of a study."
+        )
+    return ComparedMaps(maps=tuple(floor_maps(replay, side_m=side_m) for replay in read_replays(file)))
 
 
 def _sides(side_m: float, n: int, extent_m: float) -> FloatArray:

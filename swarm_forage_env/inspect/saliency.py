@@ -8,21 +8,25 @@ or of itself at another moment: values that occur, but do not belong to the rest
 actions in place of the loss of accuracy.
 """
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.spelling import suggestion
+from swarm_forage_env._internal.wording import plain
 from swarm_forage_env.contract.layout import ObservationLayout
 from swarm_forage_env.contract.types import BoolArray, FloatArray, ObsArray
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file, network_names
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
+from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.runs.spec import RunSpec
 
@@ -37,7 +41,7 @@ GROUPS: tuple[Group, ...] = get_args(Group)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Saliency:
+class Saliency(Answer):
     """What a network looked at in a run, by slice of its observations (S of them) and by group of robots."""
 
     slices: tuple[str, ...]
@@ -54,11 +58,66 @@ class Saliency:
     moved: dict[Group, FloatArray] | None
     """Group -> (S,) mean total variation distance between the probabilities of actions before and after, in [0, 1]; as
     if outputs were logits, which they are in ppo and a2c. None for continuous actions."""
+    title: str = ""
+    """What it is about: policy and run."""
 
     @property
     def ranked(self) -> tuple[int, ...]:
         """Rows of slices, that with the largest change over all robots first."""
         return tuple(np.argsort(-self.changed["all"], kind="stable").tolist())
+
+    @property
+    def _words(self) -> str:
+        return "share of decisions that change" if self.moved is not None else "mean change of the commands"
+
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return one row per slice, in the order of `ranked`."""
+        counts = [f"{group} ({self.n_rows[group]:,} seen)" for group in GROUPS]
+        moved = [] if self.moved is None else ["probability moved"]
+        return (
+            Sheet(
+                title=self.title,
+                header=("slice", "columns", *counts, *moved, "what it holds"),
+                rows=[self._row(row) for row in self.ranked],
+                notes=(f"{self._words} when a slice comes from another observation",),
+            ),
+        )
+
+    def _row(self, row: int) -> tuple[str, ...]:
+        numbers = [self.changed[group][row] for group in GROUPS]
+        numbers += [] if self.moved is None else [self.moved["all"][row]]
+        told = ("" if math.isnan(number) else f"{number:.3f}" for number in numbers)
+        return (self.slices[row], str(self.n_columns[row]), *told, self.meanings[row])
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return all numbers as plain values, by slice."""
+        return {
+            "what": self.title,
+            "seen": dict(self.n_rows),
+            "slices": {
+                self.slices[row]: {
+                    "columns": self.n_columns[row],
+                    "changed": {group: plain(float(self.changed[group][row])) for group in GROUPS},
+                    "moved": None
+                    if self.moved is None
+                    else {group: plain(float(self.moved[group][row])) for group in GROUPS},
+                }
+                for row in self.ranked
+            },
+        }
+
+    def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
+        """Draw a group of bars per slice; see `rendering.plots.draw_saliency`."""
+        from swarm_forage_env.rendering.plots import draw_saliency
+
+        exchanged = f"{self._words} when the slice comes from another observation"
+        ends = (
+            "(0: it is not looked at, 1: every decision changes)"
+            if self.moved is not None
+            else "(0: it is not looked at; commands lie in [-1, 1], so at most 2)"
+        )
+        bars = {group: self.changed[group] for group in GROUPS[1:] if self.n_rows[group]}
+        draw_saliency(path, self.slices, bars, title=self.title, xlabel=f"{exchanged}\n{ends}", style=style)
 
 
 def open_network_of(policy: str) -> Network:
@@ -115,7 +174,9 @@ def saliency(
     rows = seen[seen[:, policy.interface.active_column] > 0.5]
     if not len(rows):
         raise ConfigError("Expected robots at work, got a run in which no robot decided anything; choose another seed.")
-    return saliency_of_rows(network, policy.interface.layout, rows, np.random.default_rng(spec.seed))
+    found = saliency_of_rows(network, policy.interface.layout, rows, np.random.default_rng(spec.seed))
+    about = f"{scenario.name}, {scenario.robots.n_robots} robots, seed {spec.seed}"
+    return replace(found, title=f"{Path(spec.policy).stem} in {about}")
 
 
 def saliency_of_rows(network: Network, layout: ObservationLayout, rows: ObsArray, rng: np.random.Generator) -> Saliency:

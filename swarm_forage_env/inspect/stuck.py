@@ -1,18 +1,20 @@
 """Which robots of a run get stuck: active, hardly moved for minutes, and not waiting by rule."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import cast
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.wording import counted, plain
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.contract.types import BoolArray, FloatArray
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.registry import load_policy
+from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.run import LiveRun, build_env
 from swarm_forage_env.runs.spec import RunSpec
 
@@ -91,6 +93,52 @@ class StillnessWatch:
             self.open[robot] = replace(known, to_s=time_s)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StuckRobots(Answer):
+    """The robots that got stuck in several runs."""
+
+    found: tuple[tuple[RunSpec, StuckRobot], ...]
+    n_runs: int
+
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return one row per stretch of time."""
+        if not self.found:
+            return (Sheet(title=f"nobody is stuck in {counted(self.n_runs, 'run')}"),)
+        header = ("policy", "seed", "robot", "from s", "to s", "place m", "wheels m/s", "near m", "what it does")
+        return (Sheet(header=header, rows=[_row(spec, one) for spec, one in self.found]),)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return all stretches as plain values."""
+        found = [
+            {"policy": spec.policy, "seed": spec.seed, **asdict(one), "neighbour_m": plain(one.neighbour_m)}
+            for spec, one in self.found
+        ]
+        return {"runs": self.n_runs, "stuck": found}
+
+
+def _row(spec: RunSpec, one: StuckRobot) -> tuple[str, ...]:
+    x, y = one.place_m
+    left, right = one.wheels_mps
+    signs = [sign for sign, is_so in (("carrying", one.carrying), ("obstacle", one.interfering)) if is_so]
+    return (
+        spec.policy,
+        str(spec.seed),
+        str(one.robot),
+        f"{one.from_s:g}",
+        f"{one.to_s:g}",
+        f"{x:.2f}, {y:.2f}",
+        f"{left:.2f}, {right:.2f}",
+        f"{one.neighbour_m:.2f}",
+        "; ".join(filter(None, [*signs, one.task, one.state])),
+    )
+
+
+def find_stuck_in(specs: Sequence[RunSpec], *, window_s: float = 600.0, moved_m: float = 0.05) -> StuckRobots:
+    """Find the robots that get stuck in several runs; arguments and errors as in `find_stuck`."""
+    found = [(spec, one) for spec in specs for one in find_stuck(spec, window_s=window_s, moved_m=moved_m)]
+    return StuckRobots(found=tuple(found), n_runs=len(specs))
+
+
 def find_stuck(spec: RunSpec, *, window_s: float = 600.0, moved_m: float = 0.05) -> tuple[StuckRobot, ...]:
     """Run a specification and find the robots that get stuck.
 
@@ -118,7 +166,7 @@ def find_stuck_under(
 ) -> tuple[StuckRobot, ...]:
     """As `find_stuck`, for a policy object, which must be fresh; `spec.policy` does not matter."""
     if not (window_s > 0.0 and moved_m > 0.0):
-        raise ValueError(f"Expected window_s > 0 and moved_m > 0, got {window_s} and {moved_m}.")
+        raise ConfigError(f"Expected window_s > 0 and moved_m > 0, got {window_s} and {moved_m}.")
     longest_s = spec.scenario.horizon_s - SAMPLE_S
     if window_s > longest_s:
         raise ConfigError(

@@ -4,7 +4,7 @@ The curves are laws and measures of `metrics`, the graph is that of the controll
 table. Drawing needs matplotlib (the optional extra "plots").
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,19 +12,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from baselines.tasks import DESTINATION, SOURCE, TAB_CHILDREN, TAB_ROOT, Goal
-from metrics import adaptability, availability_curves, environment_scaling, reactivity, task_emergence, waveform
-from metrics.laws import SizeLaw
 from swarm_forage_env.contract.codes import Task
 from swarm_forage_env.rendering.figures import (
     COLOURS,
+    SCREEN,
     FigureStyle,
     legend_below,
     saved_figure,
     saved_panels,
     size_axis,
 )
+from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.scenarios.presets import warehouse_small
-from swarm_forage_env.studies.study import SIZE, StudySpec
+from swarm_forage_env.studies.study import StudySpec
+
+from ..curves import FloatArray
+from ..emergence import task_emergence
+from ..environment import environment_scaling, waveform
+from ..flexibility import adaptability, reactivity
+from ..laws import SizeLaw
+from ..population import availability_curves, ratio_for_team
+from ..queues import PopulationRates, queue_statistics
+from .columns import SIZE
 
 if TYPE_CHECKING:
     import polars as pl
@@ -178,6 +187,77 @@ def availability_figure(sizes: Sequence[int], teams: Sequence[float] = AVAILABIL
 
     title = "Theory: availability, how likely enough robots are at work (no runs)"
     return TheoryFigure(kind="availability", title=title, numbers=frame, draw=draw)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Availability(Answer):
+    """How likely enough robots are at work; computed in equilibrium, without runs."""
+
+    sizes: tuple[int, ...]
+    teams: tuple[float, ...]
+    """Mean numbers of robots at work."""
+    needed: tuple[int, ...]
+    curves: FloatArray
+    """(sizes, teams, needed) probability that at least so many are at work."""
+
+    def at_work(self, size: int, team: float) -> float:
+        """Return the mean number at work of a swarm, which cannot have more than its size there."""
+        away = queue_statistics(PopulationRates(lambda_bd=ratio_for_team(team), mu_bd=1.0), size).truncated_length
+        assert away is not None, "it is there whenever a size is given"
+        return size - away
+
+    def _rows(self) -> Iterator[tuple[int, float, list[float]]]:
+        for size, of_size in zip(self.sizes, self.curves.tolist(), strict=True):
+            for team, curve in zip(self.teams, of_size, strict=True):
+                yield size, team, curve
+
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return one row per swarm size and team."""
+        rows = [
+            (str(size), f"{team:g}", f"{self.at_work(size, team):.1f}", *(f"{value:.3f}" for value in curve))
+            for size, team, curve in self._rows()
+        ]
+        header = ("robots", "mean team", "mean at work", *map(str, self.needed))
+        return (Sheet(title="probability that at least so many robots are at work", header=header, rows=rows),)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return all curves as plain values."""
+        needed = list(self.needed)
+        return {
+            "curves": [
+                {
+                    "robots": size,
+                    "team": team,
+                    "at_work": self.at_work(size, team),
+                    "needed": needed,
+                    "availability": curve,
+                }
+                for size, team, curve in self._rows()
+            ]
+        }
+
+    def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
+        """Draw a panel per swarm size, over all numbers needed; see `saved_figure` for errors."""
+        availability_figure(self.sizes, self.teams).draw([Path(path)], style)
+
+
+def availability(
+    sizes: Sequence[int] = AVAILABILITY_SIZES,
+    teams: Sequence[float] = AVAILABILITY_TEAMS,
+    needed: Sequence[int] = (1, 5, 10, 20, 40),
+) -> Availability:
+    """Return how likely enough robots are at work.
+
+    Args:
+        sizes: Swarm sizes.
+        teams: Mean teams, robots at work on average.
+        needed: Numbers of robots needed.
+
+    Raises:
+        ValueError: a size or a team that cannot be.
+    """
+    curves = np.array([availability_curves(size, teams, needed) for size in sizes])
+    return Availability(sizes=tuple(sizes), teams=tuple(teams), needed=tuple(needed), curves=curves)
 
 
 def task_graph() -> TheoryFigure:

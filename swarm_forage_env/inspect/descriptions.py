@@ -1,13 +1,12 @@
-"""The texts of `list` and `info`: which scenarios and policies there are, and their fields."""
+"""Which scenarios and policies there are, and everything about one of them."""
 
 import dataclasses
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from rich.table import Table
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.spelling import suggestion
@@ -18,44 +17,93 @@ from swarm_forage_env.policies.network import Network
 from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.python_files import classes_of
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_names
+from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.spec import stated_caches
 from swarm_forage_env.scenarios import presets
 from swarm_forage_env.scenarios.config import ScenarioConfig
 
 
-def overview() -> tuple[Table, Table]:
-    """Return the tables of scenarios and of policies."""
-    scenarios = Table("scenario", "robots", "objects", "arena", "what it is", title="scenarios")
-    for name in presets.SCENARIO_NAMES:
-        config = presets.scenario(name)
-        size = f"{config.arena.width_m:g} x {config.arena.height_m:g} m"
-        counts = (str(config.robots.n_robots), str(config.objects.n_objects))
-        scenarios.add_row(name, *counts, size, _first_line(getattr(presets, name)))
-    policies = Table("policy", "caches", "what it is", title="policies")
-    for name in policy_names():
-        policy = policy_class(name)
-        policies.add_row(name, _caches(policy), _first_line(policy))
-    return scenarios, policies
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Overview(Answer):
+    """Which scenarios and policies there are."""
+
+    scenarios: tuple[tuple[ScenarioConfig, str], ...]
+    """Each with what it is, in a line."""
+    policies: tuple[tuple[str, str, str], ...]
+    """Name, the caches it is made for, and what it is."""
+
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return the tables of scenarios and of policies."""
+        rows = [
+            (
+                config.name,
+                str(config.robots.n_robots),
+                str(config.objects.n_objects),
+                f"{config.arena.width_m:g} x {config.arena.height_m:g} m",
+                words,
+            )
+            for config, words in self.scenarios
+        ]
+        return (
+            Sheet(title="scenarios", header=("scenario", "robots", "objects", "arena", "what it is"), rows=rows),
+            Sheet(title="policies", header=("policy", "caches", "what it is"), rows=self.policies),
+        )
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return the names with what they are."""
+        return {
+            "scenarios": {config.name: words for config, words in self.scenarios},
+            "policies": {name: {"caches": caches, "what": words} for name, caches, words in self.policies},
+        }
 
 
-def information(name: str) -> str:
-    """Return everything about a scenario (by name or environment id) or a policy (by name or file) as text.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Description(Answer):
+    """Everything about a scenario or a policy."""
+
+    name: str
+    lines: tuple[str, ...]
+
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return the text."""
+        return (Sheet(notes=self.lines),)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return name and text."""
+        return {"name": self.name, "text": self.text()}
+
+
+def overview() -> Overview:
+    """Return which scenarios and policies there are."""
+    classes = {name: policy_class(name) for name in policy_names()}
+    return Overview(
+        scenarios=tuple((presets.scenario(name), _first_line(made)) for name, made in presets.PRESETS.items()),
+        policies=tuple((name, _caches(policy), _first_line(policy)) for name, policy in classes.items()),
+    )
+
+
+def describe(name: str) -> Description:
+    """Return everything about a scenario (by name or environment id) or a policy (by name or file).
 
     Of a mixed swarm that is everything about the policies in it.
 
     Raises:
         ConfigError: neither a scenario nor a policy has that name, or the file holds none.
     """
+    return Description(name=name, lines=tuple(_lines(name)))
+
+
+def _lines(name: str) -> Iterable[str]:
     name = re.sub(r"^swarm_forage/(\w+)-v\d+$", r"\1", name)
     if name in presets.SCENARIO_NAMES:
-        return "\n".join(_scenario_lines(presets.scenario(name), _first_line(getattr(presets, name))))
+        return _scenario_lines(presets.scenario(name), _first_line(presets.PRESETS[name]))
     if name in policy_names():
         network = network_file(name)
-        return "\n".join([*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])])
+        return [*_policy_lines(name), *([] if network is None else ["", *_file_lines(network)])]
     if is_policy_file(name):
-        return "\n".join(_file_lines(Path(file_of(name))))
+        return _file_lines(Path(file_of(name)))
     if is_mixture(name):
-        return "\n\n".join(information(part.policy) for part in mixture_parts(name))
+        return "\n\n".join("\n".join(_lines(part.policy)) for part in mixture_parts(name)).splitlines()
     known = (*presets.SCENARIO_NAMES, *policy_names())
     raise ConfigError(f"Unknown scenario or policy {name!r}.{suggestion(name, known)} Known: {', '.join(known)}.")
 
