@@ -17,7 +17,7 @@ from swarm_forage_env._internal.wording import plain
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 from swarm_forage_env.runs.answer import Answer, Sheet
 
-from .. import PAPER_POLICIES
+from ..controllers import PAPER_POLICIES
 from ..statistics import Estimate
 from .entry import Entry
 from .figure import draw_benchmark

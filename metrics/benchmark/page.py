@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from swarm_forage_env._internal.wording import number, percent
 from swarm_forage_env.runs.answer import Sheet
 
-from .. import PAPER_POLICIES
+from ..controllers import PAPER_POLICIES
 from ..statistics import Estimate
 from .entry import Entry, EntryMeasure
 from .protocol import BenchmarkError, Protocol, scenario_fields

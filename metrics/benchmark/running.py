@@ -18,7 +18,7 @@ from swarm_forage_env.runs.record import RunRecord, software_versions
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import performance_of
 
-from .. import PAPER_POLICIES
+from ..controllers import PAPER_POLICIES
 from ..scoring.columns import INTERVAL_COLUMNS
 from ..scoring.question import Question, ask
 from ..scoring.runs import run_curves, study_curves

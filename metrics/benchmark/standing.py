@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import PAPER_POLICIES
+from ..controllers import PAPER_POLICIES
 from ..curves import FloatArray
 from ..distributions import interquartile_mean, probability_of_improvement
 from ..statistics import Estimate

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from .. import PAPER_POLICIES as POLICIES
+from ..controllers import PAPER_POLICIES as POLICIES
 from ..curves import Form
 from .checking import Place, Statement, named
 from .outcomes import Outcome

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from metrics import PAPER_POLICIES
+from metrics.controllers import PAPER_POLICIES
 from swarm_forage_env.cli.options import EXIT_FAILURE, Jobs, complain, no_picture
 
 PICTURE_FILE = "curves.png"

@@ -46,7 +46,9 @@ def baseline_runs(plan: TrainingPlan) -> Plan:
 
 
 def _baselines_of(world: World, plan: TrainingPlan) -> list[Condition]:
-    from metrics import PAPER_POLICIES  # late: a user's own metrics.py must not keep a training from running
+    from metrics.controllers import (
+        PAPER_POLICIES,  # late: a user's own metrics.py must not keep a training from running
+    )
 
     if not isinstance(world, EvaluationWorld):
         return [Condition(replace(_called(plan.evaluation.baseline), caches=None), world)]

@@ -11,6 +11,7 @@ import pytest
 
 import metrics
 from metrics import METRICS
+from tests.support.public_names import homes_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs/equations.md").read_text()
@@ -100,7 +101,7 @@ def test_the_catalog_cites_the_equations_of_the_page(name):
     assert cited(source) == numbers_of(name) if numbers_of(name) else not source.startswith("Eq")
 
 
-@pytest.mark.parametrize("name", sorted({metrics._HOMES[function] for function in FUNCTIONS}))
+@pytest.mark.parametrize("name", sorted({homes_of(metrics)[function] for function in FUNCTIONS}))
 def test_modules_cite_what_their_functions_define(name):
     """A module's own docstring names no equation that none of its functions cites."""
     tree = ast.parse((ROOT / f"metrics/{name}.py").read_text())

@@ -1,6 +1,5 @@
 """What an installed package promises: light imports, complete names, one version, commands that are pinned."""
 
-import ast
 import os
 import re
 import subprocess
@@ -16,6 +15,7 @@ import pytest
 import swarm_forage_env
 from swarm_forage_env.contract.policy import Policy
 from swarm_forage_env.policies.registry import POLICY_ENTRY_POINTS
+from tests.support.public_names import homes_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -44,21 +44,12 @@ def test_every_public_name_loads(name):
     assert getattr(swarm_forage_env, name) is not None
 
 
-def test_type_checkers_and_the_interpreter_see_the_same_names():
-    tree = ast.parse(Path(swarm_forage_env.__file__).read_text())
-    block = next(node for node in tree.body if isinstance(node, ast.If))
-    homes = {
-        alias.name: (node.module or "").removeprefix("swarm_forage_env.")
-        for node in block.body
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-    }
-    assert homes == swarm_forage_env._HOMES
-    assert {*homes, "SCENARIO_NAMES", "scenario"} == set(swarm_forage_env.__all__)
+def test_each_public_name_is_written_once():
+    assert sorted(homes_of(swarm_forage_env)) == sorted(swarm_forage_env.__all__)
 
 
 def test_unknown_names_are_refused():
-    with pytest.raises(AttributeError, match="no attribute 'ForageEnvironment'"):
+    with pytest.raises(AttributeError, match="No swarm_forage_env attribute ForageEnvironment"):
         swarm_forage_env.ForageEnvironment  # noqa: B018 - the access is the test
 
 

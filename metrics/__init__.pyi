@@ -1,0 +1,125 @@
+# Public names, each written once, those first that are needed first; `__init__.py` loads them when they are first used.
+
+# from policies and files of curves to tables of scores
+from .scoring import score_policy as score_policy
+from .scoring import compare_policies as compare_policies
+from .scoring import score_curves as score_curves
+from .scoring import compare_tables as compare_tables
+from .scoring import Score as Score
+from .scoring import ScoreTable as ScoreTable
+from .scoring import ScoreForms as ScoreForms
+from .scoring import Comparison as Comparison
+from .scoring import Performance as Performance
+
+# decisions: larger swarms, and which policy
+from .scoring import predict_policy as predict_policy
+from .scoring import predict_curves as predict_curves
+from .scoring import choose_policy as choose_policy
+from .scoring import PredictionTable as PredictionTable
+from .scoring import Choice as Choice
+
+# interference
+from .interference import t_lost_fraction as t_lost_fraction
+from .interference import performance_lost as performance_lost
+from .interference import fractional_loss as fractional_loss
+
+# emergence
+from .emergence import spatial_emergence as spatial_emergence
+from .emergence import time_emergence as time_emergence
+from .emergence import task_emergence as task_emergence
+from .emergence import interference_gain as interference_gain
+from .emergence import undisturbed_gain as undisturbed_gain
+
+# scalability
+from .scaling import scalability as scalability
+from .scaling import skipped_intervals as skipped_intervals
+from .scaling import efficiency as efficiency
+from .scaling import raw_performance as raw_performance
+
+# distance
+from .distance import dtw as dtw
+from .distance import aligned_l1 as aligned_l1
+from .distance import noise_floor as noise_floor
+
+# environment
+from .environment import waveform as waveform
+from .environment import environment_scaling as environment_scaling
+from .environment import environment_distance as environment_distance
+
+# flexibility
+from .flexibility import reactivity as reactivity
+from .flexibility import adaptability as adaptability
+
+# robustness
+from .robustness import noise_robustness as noise_robustness
+from .robustness import mean_signed_difference as mean_signed_difference
+
+# queues and population
+from .queues import PopulationRates as PopulationRates
+from .checks import PopulationError as PopulationError
+from .queues import QueueStats as QueueStats
+from .queues import queue_statistics as queue_statistics
+from .queues import mean_away as mean_away
+from .queues import robots_at_work as robots_at_work
+from .queues import compare_population as compare_population
+from .queues import PopulationComparison as PopulationComparison
+from .population import population_robustness as population_robustness
+from .population import recorded_population_robustness as recorded_population_robustness
+from .population import population_weight as population_weight
+from .population import availability as availability
+from .population import availability_curves as availability_curves
+from .population import ratio_for_availability as ratio_for_availability
+from .population import ratio_for_team as ratio_for_team
+
+# laws of swarm size, and prediction of larger swarms
+from .ladder import fit_ladder as fit_ladder
+from .ladder import Ladder as Ladder
+from .ladder import LawFit as LawFit
+from .prediction import predict_performance as predict_performance
+from .laws import fit_law as fit_law
+from .prediction import forward_error as forward_error
+from .laws import SizeLaw as SizeLaw
+from .prediction import SizePrediction as SizePrediction
+
+# mean-field model of foraging
+from .foraging_model import estimate_rates as estimate_rates
+from .foraging_model import mean_field as mean_field
+from .foraging_model import steady_state as steady_state
+from .foraging_model import ForagingRates as ForagingRates
+from .foraging_model import MeanField as MeanField
+from .foraging_model import SteadyState as SteadyState
+
+# statistics
+from .statistics import normalize as normalize
+from .statistics import Summary as Summary
+from .statistics import aggregate as aggregate
+from .statistics import bootstrap_measure as bootstrap_measure
+from .statistics import Estimate as Estimate
+from .distributions import interquartile_mean as interquartile_mean
+from .distributions import probability_of_improvement as probability_of_improvement
+from .significance import paired_tests as paired_tests
+
+# runs that break down
+from .breakdown import find_breakdowns as find_breakdowns
+from .breakdown import breakdown_probability as breakdown_probability
+from .breakdown import time_to_breakdown as time_to_breakdown
+from .breakdown import Breakdowns as Breakdowns
+from .breakdown import Survival as Survival
+
+# claims of the paper
+from .controllers import PAPER_POLICIES as PAPER_POLICIES
+from .claims import CLAIMS as CLAIMS
+from .claims import check_claim as check_claim
+from .claims import Claim as Claim
+from .claims import Panel as Panel
+from .claims import Verdict as Verdict
+
+# measures of earlier papers
+from .earlier_papers import fractional_maintenance as fractional_maintenance
+from .earlier_papers import projective_performance as projective_performance
+from .earlier_papers import weighted_combination as weighted_combination
+
+# overview and errors
+from .catalog import METRICS as METRICS
+from .catalog import Measure as Measure
+from .checks import CurveError as CurveError
