@@ -176,7 +176,9 @@ def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[st
     _check_alike(first, second)
     unknown = [name for name in columns if name not in first.frame.columns or name not in second.frame.columns]
     if unknown:
-        raise CurveError(f"Expected columns that both studies have, got {unknown[0]!r}; see 'swarm-forage schema'.")
+        raise CurveError(
+            f"Expected columns that both studies have, got {unknown[0]!r}; see 'swarm-forage list columns'."
+        )
     cells: list[_Compared] = []
     lacking: list[Lacking] = []
     places = first.spec.place_words(second.spec)

@@ -17,6 +17,7 @@ import typer
 from swarm_forage_env.cli.ablate import ablate
 from swarm_forage_env.cli.availability import availability
 from swarm_forage_env.cli.benchmark import benchmark
+from swarm_forage_env.cli.check import check
 from swarm_forage_env.cli.choose import choose
 from swarm_forage_env.cli.curves import curves
 from swarm_forage_env.cli.dataset import dataset
@@ -30,8 +31,7 @@ from swarm_forage_env.cli.rerun import rerun
 from swarm_forage_env.cli.run import run
 from swarm_forage_env.cli.saliency import saliency
 from swarm_forage_env.cli.score import score
-from swarm_forage_env.cli.show import info, list_everything, schema
-from swarm_forage_env.cli.stuck import stuck
+from swarm_forage_env.cli.show import info, list_everything
 from swarm_forage_env.cli.study import study
 from swarm_forage_env.cli.terminal import show_any_text
 from swarm_forage_env.cli.train import train
@@ -81,7 +81,7 @@ for command in (predict, choose, train, curves, dataset):
 app.add_typer(study, name="study")
 app.add_typer(benchmark, name="benchmark")
 app.command("list")(list_everything)
-for command in (info, schema, rerun, watch, record, replay, maps, saliency, stuck, ablate, availability):
+for command in (info, rerun, watch, record, replay, maps, saliency, check, ablate, availability):
     app.command()(command)
 
 

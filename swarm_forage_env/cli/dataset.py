@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
-from swarm_forage_env.cli.options import EXIT_INTERRUPTED, DryRun, complain
+from swarm_forage_env.cli.options import EXIT_INTERRUPTED, DryRun, FirstSeed, complain
 
 if TYPE_CHECKING:
     from swarm_forage_env.training.datasets.recording import DatasetPlan
@@ -17,7 +17,7 @@ def dataset(  # long: one parameter per option
     policies: PolicyOptions,
     described: WorldOptions,
     seeds: Annotated[int, typer.Option(min=1, help="Number of runs.")] = 1,
-    first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first run.")] = 0,
+    first_seed: FirstSeed = 0,
     observation: Annotated[
         str | None,
         typer.Option(help="full or compact; default what a learned policy sees, else full."),

@@ -49,13 +49,15 @@ Performance = Annotated[
     typer.Option(
         "--performance",
         metavar="COLUMN",
-        help="What performance is: a recorded column (see 'swarm-forage schema'), 1/COLUMN where less is better, "
+        help="What performance is: a recorded column (see 'swarm-forage list columns'), 1/COLUMN where less is better, "
         "task_balance or cache_load; default the scenario's. Stored runs are read again, not repeated.",
     ),
 ]
 Horizon = Annotated[
     float | None, typer.Option("--horizon", help="Simulated seconds per run, whole intervals of 200 s.")
 ]
+FirstSeed = Annotated[int, typer.Option("--first-seed", min=0, help="Seed of the first run.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the run.")]
 Settings = Annotated[
     tuple[str, ...], typer.Option("--set", metavar="KEY=VALUE", help="Any scenario field; may be repeated.")
 ]

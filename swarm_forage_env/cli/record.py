@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
+from swarm_forage_env.cli.options import Seed
 from swarm_forage_env.cli.terminal import progress_bar
 
 
@@ -27,7 +28,7 @@ def record(
     fps: Annotated[float, typer.Option(help="Pictures per second.")] = 20.0,
     size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
     theme: Annotated[str, typer.Option(help="dark or light.")] = "dark",
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
+    seed: Seed = 0,
 ) -> None:
     """Film a run, or draw it at one time.
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, refuse_others, takes_options
+from swarm_forage_env.cli.options import Seed
 from swarm_forage_env.cli.terminal import notes, progress_bar
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def replay(
         float | None,
         typer.Option(help="Simulated seconds between frames; default 1, or more for large swarms."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
+    seed: Seed = 0,
 ) -> None:
     """Look into a run: write it as one HTML file, with play, zoom, every robot's state, and curves.
 

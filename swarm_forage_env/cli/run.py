@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
-from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, Jobs, Out, no_picture
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, FirstSeed, Jobs, Out, no_picture
 from swarm_forage_env.cli.terminal import notes, output
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ def run(
     policies: PolicyOptions,
     described: WorldOptions,
     seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,
-    first_seed: Annotated[int, typer.Option(min=0, help="Seed of the first run.")] = 0,
+    first_seed: FirstSeed = 0,
     out: Out = None,
     jobs: Jobs = None,
     as_json: AsJson = False,

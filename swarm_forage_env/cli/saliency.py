@@ -7,7 +7,7 @@ import typer
 
 from swarm_forage_env._internal.printable import printable
 from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
-from swarm_forage_env.cli.options import Picture, no_picture
+from swarm_forage_env.cli.options import AsJson, Picture, Seed, no_picture
 from swarm_forage_env.cli.terminal import notes
 
 
@@ -17,7 +17,8 @@ def saliency(
     described: WorldOptions,
     picture: Picture = None,
     seconds: Annotated[float | None, typer.Option(help="Simulated seconds to look at; default the whole run.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
+    seed: Seed = 0,
+    as_json: AsJson = False,
 ) -> None:
     """Show what a trained network looks at: how much it acts otherwise when one part of what it sees is exchanged.
 
@@ -35,7 +36,7 @@ def saliency(
     file = picture or Path("results", f"{spec.scenario.name}_{Path(policy).stem}.saliency.png")
     check_picture(file)
     found = measured(network, spec, seconds=seconds)
-    typer.echo(printable(found.text()))
+    typer.echo(found.json() if as_json else printable(found.text()))
     try:
         found.draw(file)
     except ImportError as error:
@@ -44,4 +45,4 @@ def saliency(
     except OSError as error:  # the table is worth more than its picture
         notes().print(no_picture(file, error))
         return
-    typer.echo(f"wrote {file}")
+    notes().print(f"picture {file}")

@@ -21,7 +21,9 @@ def diff(
     second: Annotated[Path, typer.Argument(metavar="B", help="The same of the other study.")],
     columns: Annotated[
         str | None,
-        typer.Option("--columns", help="Recorded columns to test, separated by commas; see 'swarm-forage schema'."),
+        typer.Option(
+            "--columns", help="Recorded columns to test, separated by commas; see 'swarm-forage list columns'."
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
+from swarm_forage_env.cli.options import Seed
 
 
 @takes_options
@@ -14,7 +15,7 @@ def watch(
     speed: Annotated[float, typer.Option(help="Simulated seconds per second at first; arrow keys change it.")] = 10.0,
     size: Annotated[int, typer.Option(help="Longer side of the arena in pixels.")] = 900,
     theme: Annotated[str, typer.Option(help="dark or light.")] = "dark",
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the run.")] = 0,
+    seed: Seed = 0,
 ) -> None:
     """Watch a run in a window: pause, choose robots, raise noise, kill.
 

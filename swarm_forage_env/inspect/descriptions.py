@@ -1,14 +1,14 @@
-"""Which scenarios and policies there are, and everything about one of them."""
+"""Which scenarios, policies, wrappers and columns there are, and everything about one scenario or policy."""
 
 import dataclasses
 import inspect
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.fields import ConfigError, known_name
 from swarm_forage_env._internal.spelling import suggestion
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
@@ -18,43 +18,26 @@ from swarm_forage_env.policies.pretrained import network_file
 from swarm_forage_env.policies.python_files import classes_of
 from swarm_forage_env.policies.registry import file_of, is_policy_file, policy_class, policy_names
 from swarm_forage_env.runs.answer import Answer, Sheet
+from swarm_forage_env.runs.record import record_columns
 from swarm_forage_env.runs.spec import stated_caches
 from swarm_forage_env.scenarios import presets
 from swarm_forage_env.scenarios.config import ScenarioConfig
+from swarm_forage_env.wrappers.registry import WRAPPERS, wrapper_config_class
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Overview(Answer):
-    """Which scenarios and policies there are."""
+    """What there is to choose from."""
 
-    scenarios: tuple[tuple[ScenarioConfig, str], ...]
-    """Each with what it is, in a line."""
-    policies: tuple[tuple[str, str, str], ...]
-    """Name, the caches it is made for, and what it is."""
+    tables: tuple[Sheet, ...]
 
     def sheets(self) -> tuple[Sheet, ...]:
-        """Return the tables of scenarios and of policies."""
-        rows = [
-            (
-                config.name,
-                str(config.robots.n_robots),
-                str(config.objects.n_objects),
-                f"{config.arena.width_m:g} x {config.arena.height_m:g} m",
-                words,
-            )
-            for config, words in self.scenarios
-        ]
-        return (
-            Sheet(title="scenarios", header=("scenario", "robots", "objects", "arena", "what it is"), rows=rows),
-            Sheet(title="policies", header=("policy", "caches", "what it is"), rows=self.policies),
-        )
+        """Return one table per kind of thing."""
+        return self.tables
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return the names with what they are."""
-        return {
-            "scenarios": {config.name: words for config, words in self.scenarios},
-            "policies": {name: {"caches": caches, "what": words} for name, caches, words in self.policies},
-        }
+        """Return the rows by their columns."""
+        return {table.title: [dict(zip(table.header, row, strict=True)) for row in table.rows] for table in self.tables}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,13 +56,54 @@ class Description(Answer):
         return {"name": self.name, "text": self.text()}
 
 
-def overview() -> Overview:
-    """Return which scenarios and policies there are."""
+def overview(what: str | None = None) -> Overview:
+    """Return which scenarios and policies there are, or what else `LISTS` has.
+
+    Raises:
+        ConfigError: there is no such list.
+    """
+    if what is not None:
+        known_name("list", what, LISTS)
+    return Overview(tables=tuple(LISTS[name]() for name in ((what,) if what else ("scenarios", "policies"))))
+
+
+def _scenarios() -> Sheet:
+    configs = {presets.scenario(name): _first_line(made) for name, made in presets.PRESETS.items()}
+    rows = [
+        (
+            config.name,
+            str(config.robots.n_robots),
+            str(config.objects.n_objects),
+            f"{config.arena.width_m:g} x {config.arena.height_m:g} m",
+            words,
+        )
+        for config, words in configs.items()
+    ]
+    return Sheet(title="scenarios", header=("scenario", "robots", "objects", "arena", "what it is"), rows=rows)
+
+
+def _policies() -> Sheet:
     classes = {name: policy_class(name) for name in policy_names()}
-    return Overview(
-        scenarios=tuple((presets.scenario(name), _first_line(made)) for name, made in presets.PRESETS.items()),
-        policies=tuple((name, _caches(policy), _first_line(policy)) for name, policy in classes.items()),
-    )
+    rows = [(name, _caches(policy), _first_line(policy)) for name, policy in classes.items()]
+    return Sheet(title="policies", header=("policy", "caches", "what it is"), rows=rows)
+
+
+def _wrappers() -> Sheet:
+    classes = {name: wrapper_config_class(name) for name in WRAPPERS}
+    rows = [
+        (name, f"{name}:{config.example}", ", ".join(field.name for field in dataclasses.fields(config)))
+        for name, config in classes.items()
+    ]
+    return Sheet(title="wrappers", header=("wrapper", "example", "fields"), rows=rows)
+
+
+LISTS: dict[str, Callable[[], Sheet]] = {
+    "scenarios": _scenarios,
+    "policies": _policies,
+    "wrappers": _wrappers,
+    "columns": record_columns,
+}
+"""What can be listed -> its table."""
 
 
 def describe(name: str) -> Description:
@@ -88,7 +112,7 @@ def describe(name: str) -> Description:
     Of a mixed swarm that is everything about the policies in it.
 
     Raises:
-        ConfigError: neither a scenario nor a policy has that name, or the file holds none.
+        ConfigError: nothing has that name, or the file holds none.
     """
     return Description(name=name, lines=tuple(_lines(name)))
 

@@ -1,7 +1,7 @@
 """RunRecord: one run as columns over recording intervals, and the Parquet file that holds it.
 
-The fields of `RunRecord` are the schema. Units and meanings stand in `scenarios.columns`; `schema_table()` returns all
-as text. A file is self-contained: its metadata hold the complete specification of the run, the versions that made it,
+The fields of `RunRecord` are the schema. Units and meanings stand in `scenarios.columns`; `record_columns()` lists all
+of them. A file is self-contained: its metadata hold the complete specification of the run, the versions that made it,
 and a digest by which a damaged file is noticed.
 """
 
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json
 from swarm_forage_env.contract.types import FloatArray, IntArray
+from swarm_forage_env.runs.answer import Sheet
 from swarm_forage_env.scenarios.columns import ALL_COLUMNS, INTERVAL_COLUMNS, KEY_COLUMNS
 from swarm_forage_env.scenarios.performance import performance_curve
 
@@ -248,8 +249,8 @@ _KEY_DTYPES = {name: _DTYPES[_HINTS[name]] for name in KEY_COLUMNS}
 _COLUMN_DTYPES = {name: _DTYPES[_HINTS[name]] for name in INTERVAL_COLUMNS}
 
 
-def schema_table() -> str:
-    """Return the schema as a text table: name, type, unit, meaning; contributed columns last."""
+def record_columns() -> Sheet:
+    """Return the schema as a table: name, type, unit, meaning; contributed columns last."""
     dtypes = _KEY_DTYPES | _COLUMN_DTYPES
     rows = [
         (name, dtypes[name].__name__, column.unit or "-", column.meaning)
@@ -257,11 +258,7 @@ def schema_table() -> str:
         else (name, "float64", column.unit, column.meaning + " (optional)")
         for name, column in ALL_COLUMNS.items()
     ]
-    width = max(len(name) for name, *_ in rows) + 2
-    header = f"{'column':<{width}}{'type':<9}{'unit':<13}meaning"
-    return "\n".join(
-        [header, *(f"{name:<{width}}{dtype:<9}{unit:<13}{meaning}" for name, dtype, unit, meaning in rows)]
-    )
+    return Sheet(title="columns", header=("column", "type", "unit", "meaning"), rows=rows)
 
 
 @lru_cache(maxsize=1)

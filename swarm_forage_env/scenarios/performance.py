@@ -59,7 +59,7 @@ class Performance:
     shares and ratios; measures that compare with growth in proportion then have a note. None = as the unit says: counts
     do; a function does."""
     function: "Callable[[pl.DataFrame], ArrayLike] | None" = field(default=None, compare=False)
-    """Takes the record of one run, a table with one row per interval (its columns: `swarm-forage schema`). Returns (T,)
+    """Takes the record of one run, a table with one row per interval (`swarm-forage list columns`). Returns (T,)
     numbers >= 0, larger is better; turn round what should be small, 1/x with 1/0 = 0. None = `performance_curve` of the
     name."""
 
@@ -181,8 +181,8 @@ def performance_of(name: str) -> Performance:
         known = [sign + each for each in (*PERFORMANCE_COLUMNS, *_FORMULAS)]
         meant = sign + _NAME_OF_WORDS.get(own, own)
         raise ConfigError(
-            f"Expected performance to be a recorded column (swarm-forage schema), {', '.join(_FORMULAS)}, or one of "
-            f"them after {INVERTED!r}, got {name!r}.{suggestion(meant, known)}"
+            f"Expected performance to be a recorded column (swarm-forage list columns), {', '.join(_FORMULAS)}, or one "
+            f"of them after {INVERTED!r}, got {name!r}.{suggestion(meant, known)}"
         )
     if not sign:
         return found

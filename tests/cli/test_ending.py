@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from swarm_forage_env.cli import show
 from swarm_forage_env.cli.ending import DEBUG_VARIABLE, end
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_UNFORESEEN, EXIT_USAGE, complain
 from swarm_forage_env.policies.pretrained import network_file
@@ -19,29 +18,29 @@ SHORT = ("--robots", "2", "--objects", "10", "--horizon", "4", "--set", "interva
 
 @pytest.fixture
 def broken(monkeypatch):
-    """Let `swarm-forage schema` fail as nobody foresaw."""
+    """Let `swarm-forage list` fail as nobody foresaw."""
 
-    def fail():
+    def fail(_):
         raise ZeroDivisionError("a fault of ours")
 
-    monkeypatch.setattr("swarm_forage_env.runs.record.schema_table", fail)
+    monkeypatch.setattr("swarm_forage_env.inspect.descriptions.overview", fail)
 
 
 @pytest.mark.usefixtures("broken")
 def test_what_nobody_foresaw_is_one_line_and_a_file_with_the_details(command, tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    code, out, err = command("schema")
+    code, out, err = command("list")
     assert (code, out, err.count("\n")) == (EXIT_UNFORESEEN, "", 1)
     assert "an error that should not happen: ZeroDivisionError: a fault of ours" in err
     kept = Path(re.search(r"Details: (\S+);", err)[1]).read_text(encoding="utf-8")
-    for words in ("command: swarm-forage schema", "numpy: ", "Traceback", "show.py", "a fault of ours"):
+    for words in ("command: swarm-forage list", "numpy: ", "Traceback", "show.py", "a fault of ours"):
         assert words in kept
 
 
 @pytest.mark.usefixtures("broken")
 def test_the_line_says_so_where_the_details_cannot_be_kept(command, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", "/nowhere")
-    code, _, err = command("schema")
+    code, _, err = command("list")
     assert (code, err.count("\n")) == (EXIT_UNFORESEEN, 1)
     assert f"with {DEBUG_VARIABLE}=1 the command shows them" in err
 
@@ -50,7 +49,7 @@ def test_the_line_says_so_where_the_details_cannot_be_kept(command, monkeypatch)
 def test_the_debug_variable_shows_the_traceback(command, monkeypatch):
     monkeypatch.setenv(DEBUG_VARIABLE, "1")
     with pytest.raises(ZeroDivisionError):
-        command("schema")
+        command("list")
 
 
 @pytest.mark.parametrize(
@@ -115,5 +114,5 @@ def test_whoever_reads_the_output_may_stop(tmp_path):
 
 def test_the_guard_is_around_every_command(command, monkeypatch, tmp_path):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr(show, "output", lambda: [].pop())
+    monkeypatch.setattr("swarm_forage_env.inspect.descriptions.overview", lambda _: [].pop())
     assert command("list")[0] == EXIT_UNFORESEEN

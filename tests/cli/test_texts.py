@@ -74,7 +74,7 @@ CASES = {
     "run_plan.txt": f"{RUN} --first-seed 7 --dry-run",
     "run_plan.json": f"{RUN} --first-seed 7 --dry-run --json",
     "rerun.txt": "rerun record.parquet",
-    "stuck.txt": f"stuck --policy crw --window 40 --moved 1.5 {SMALL} --robots 6 {SECONDS}",
+    "check.txt": f"check crw --window 40 --moved 1.5 {SMALL} --robots 6 {SECONDS}",
     "score.txt": SCORE,
     "score.json": f"{SCORE} --json",
     "score_forms.txt": f"{SCORE} {FORMS}",
@@ -135,7 +135,8 @@ CASES = {
     "list.txt": "list",
     "info_policy.txt": "info crw",
     "info_scenario.txt": "info search_and_rescue",
-    "schema.txt": "schema",
+    "list_columns.txt": "list columns",
+    "list_wrappers.json": "list wrappers --json",
 }
 """File with what is said -> words of the command."""
 

@@ -12,7 +12,7 @@ import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs import record as recording
-from swarm_forage_env.runs.record import RecordError, RunRecord, schema_table, software_versions
+from swarm_forage_env.runs.record import RecordError, RunRecord, record_columns, software_versions
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.presets import scenario
@@ -252,8 +252,8 @@ def test_describe_names_the_run_and_its_numbers(record):
         assert part in text
 
 
-def test_the_schema_table_lists_every_column_once(record):
-    names = [line.split()[0] for line in schema_table().splitlines()[1:]]
+def test_the_table_of_columns_lists_every_column_once(record):
+    names = [line.split()[0] for line in record_columns().text().splitlines()[2:]]
     assert names[: len(record.keys()) + len(recording._COLUMN_DTYPES)] == [*record.keys(), *recording._COLUMN_DTYPES]
     assert len(set(names)) == len(names)
 

@@ -10,7 +10,7 @@ from metrics import CurveError, Performance, compare_policies, compare_tables, s
 from metrics.scoring.performance import checked_performance
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs import workers
-from swarm_forage_env.runs.record import schema_table
+from swarm_forage_env.runs.record import record_columns
 from swarm_forage_env.runs.store import load
 from swarm_forage_env.scenarios.performance import DERIVED_PERFORMANCES, PERFORMANCE_COLUMNS
 from swarm_forage_env.scenarios.presets import scenario
@@ -50,7 +50,7 @@ def no_runs(monkeypatch):
 
 def recorded() -> set[str]:
     """Columns of every record that hold a number per interval, but for the clock and performance itself."""
-    lines = [line.split() for line in schema_table().splitlines()[1:]]
+    lines = [line.split() for line in record_columns().text().splitlines()[2:]]
     keys = {"run_id", "scenario", "controller", "n_robots", "criterion", "criterion_value", "seed"}
     names = {name for name, *_ in lines if not name.startswith("part_K_")}  # those are of mixed swarms alone
     return names - keys - {"interval", "t_end_s", "performance"}

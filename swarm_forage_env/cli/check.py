@@ -1,0 +1,51 @@
+"""The command `check`."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from swarm_forage_env._internal.printable import printable
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, FirstSeed, complain
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from swarm_forage_env.runs.spec import RunSpec
+
+
+@takes_options
+def check(
+    policies: PolicyOptions,
+    described: WorldOptions,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs per policy.")] = 1,
+    first_seed: FirstSeed = 0,
+    window: Annotated[float, typer.Option("--window", help="Seconds in which every robot should get away.")] = 600.0,
+    moved: Annotated[float, typer.Option("--moved", help="How far that is, in m.")] = 0.05,
+    as_json: AsJson = False,
+) -> None:
+    """Check that policies keep the rules, and find robots that get stuck; exits with 1 if something is wrong.
+
+    Rules are those of swarm_forage_env.checks.check_policy. A robot is stuck that is active, hardly moved for minutes,
+    and does not wait by rule.
+    """
+    from swarm_forage_env.cli.scenario_options import plan_runs
+    from swarm_forage_env.inspect.stuck import find_stuck_in
+
+    specs = plan_runs(described, policies.names("crw"), n_seeds=seeds, first_seed=first_seed)
+    _check_rules(specs)
+    found = find_stuck_in(specs, window_s=window, moved_m=moved)
+    typer.echo(found.json() if as_json else printable(found.text()))
+    if found.found:
+        raise typer.Exit(EXIT_FAILURE)
+
+
+def _check_rules(specs: "Sequence[RunSpec]") -> None:
+    """Check each policy once, in its world without wrappers; the first fault ends the command."""
+    from swarm_forage_env.checks import CheckError, check_policy
+
+    for spec in {spec.policy: spec for spec in specs}.values():
+        try:
+            check_policy(spec.policy, spec.scenario, seed=spec.seed)
+        except CheckError as error:
+            raise typer.Exit(complain(f"{spec.policy} breaks a rule: {error}", EXIT_FAILURE)) from None
