@@ -22,9 +22,9 @@ from swarm_forage_env.policies.kernels.sites import SiteMemory
 from swarm_forage_env.scenarios.config import SECTIONS
 from swarm_forage_env.scenarios.overrides import field_sections
 from swarm_forage_env.views.plans import ArenaPlan
-from swarm_forage_env.views.sampler import DrawnWorld
 from swarm_forage_env.world.snapshots import Snapshot, SnapshotError
 from swarm_forage_env.wrappers.base import SwarmWrapper
+from swarm_forage_env.wrappers.world import World
 
 SCENARIO_OPTION = "scenario"
 """The only reset option."""
@@ -39,7 +39,7 @@ class LearnerSnapshot:
     interface: InterfaceConfig
     overrides: Mapping[str, Any]
     """Scenario fields that a reset has overridden."""
-    world: DrawnWorld | None
+    world: World | None
     """What the sampler drew for the run; None without a sampler."""
     seeds: Mapping[str, Any]
     """State of the generator of the next seeds."""
@@ -76,7 +76,7 @@ class LearnerArena:
         self._share = share
         self.n_rows = plan.scenario.robots.n_robots
         self._overrides: dict[str, Any] = {}
-        self._world: DrawnWorld | None = None
+        self._world: World | None = None
         self._seeds = np.random.default_rng()
         self._adopt(*self._built({}, None))
 
@@ -86,7 +86,7 @@ class LearnerArena:
         return self.forage_env.scenario.robots.n_robots
 
     def _built(
-        self, overrides: Mapping[str, Any], world: DrawnWorld | None
+        self, overrides: Mapping[str, Any], world: World | None
     ) -> tuple[ForageEnv | SwarmWrapper, LearnerInterface]:
         """Build an environment and its interface, of which one may be refused; the arena stays as it is."""
         env = self._plan.build(overrides, world)
@@ -121,7 +121,7 @@ class LearnerArena:
         self.env.reset_batch(seed)
         self.interface.forget()
 
-    def _change(self, overrides: dict[str, Any], world: DrawnWorld | None) -> None:
+    def _change(self, overrides: dict[str, Any], world: World | None) -> None:
         """Build another environment, if the one that there is has another world."""
         if (overrides, world) != (self._overrides, self._world):
             before = self.env

@@ -12,9 +12,10 @@ from swarm_forage_env.policies.interface import GivenInterface, InterfaceConfig,
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.overrides import scenario_of_same_size
 from swarm_forage_env.scenarios.presets import chosen_scenario
-from swarm_forage_env.views.sampler import DrawnWorld, ScenarioSampler
+from swarm_forage_env.views.sampler import ScenarioSampler
 from swarm_forage_env.wrappers.base import SwarmWrapper, WrapperConfig, wrap_in_order
 from swarm_forage_env.wrappers.registry import wrapper_configs
+from swarm_forage_env.wrappers.world import World
 
 Options = ParamSpec("Options")
 Result = TypeVar("Result")
@@ -38,7 +39,7 @@ class ArenaPlan:
     snapshots: bool = False
     """Keep what copies and snapshots need; see `ForageEnv`."""
 
-    def build(self, overrides: Mapping[str, Any], world: DrawnWorld | None = None) -> ForageEnv | SwarmWrapper:
+    def build(self, overrides: Mapping[str, Any], world: World | None = None) -> ForageEnv | SwarmWrapper:
         """Build the environment with its wrappers.
 
         Args:
@@ -49,8 +50,8 @@ class ArenaPlan:
             ConfigError: unknown fields, values that do not fit together, another number of robots, or more robots or
                 objects than the largest worlds of the sampler have.
         """
-        given, wrappers = (self.scenario, self.wrappers) if world is None else world
-        scenario = scenario_of_same_size(given, overrides)
+        given = world or World(self.scenario, self.wrappers)
+        scenario = scenario_of_same_size(given.scenario, overrides)
         if self.sampler is not None:
             self._check_room(scenario, self.sampler)
         env = ForageEnv(
@@ -60,7 +61,7 @@ class ArenaPlan:
             reads=self.interface.reads,
             snapshots=self.snapshots,
         )
-        return wrap_in_order(env, wrappers)
+        return wrap_in_order(env, given.wrappers)
 
     @staticmethod
     def _check_room(scenario: ScenarioConfig, sampler: ScenarioSampler) -> None:

@@ -23,7 +23,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any, TypeAlias, get_type_hints
+from typing import Any, get_type_hints
 
 import numpy as np
 
@@ -39,11 +39,8 @@ from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.scenarios.sensors import WINDOWS_CELLS
 from swarm_forage_env.scenarios.units import CELL_M
 from swarm_forage_env.world.placement import static_cache_centres
-from swarm_forage_env.wrappers.base import WrapperConfig
 from swarm_forage_env.wrappers.registry import wrapper_config_class, wrappers_from_mapping
-
-DrawnWorld: TypeAlias = tuple[ScenarioConfig, tuple[WrapperConfig, ...]]
-"""A scenario, and what disturbs the swarm in it."""
+from swarm_forage_env.wrappers.world import World
 
 MOST_CORNERS = 1024
 """Combinations of ends that a world may have. All are built when the sampler is made; our choice: about a second."""
@@ -169,7 +166,7 @@ class ScenarioSampler:
     corners: tuple[ScenarioConfig, ...] = field(init=False, repr=False, compare=False)
     """The scenarios that bound the distribution: all combinations of the ends of ranges and of choices."""
 
-    def draw(self, rng: np.random.Generator, share: float | None = None) -> DrawnWorld:
+    def draw(self, rng: np.random.Generator, share: float | None = None) -> World:
         """Return a world.
 
         Args:
@@ -192,13 +189,13 @@ class ScenarioSampler:
             if is_there:
                 drawn[name] = filled
         try:
-            return self._built(chosen, values), wrappers_from_mapping(drawn)
+            return World(self._built(chosen, values), wrappers_from_mapping(drawn))
         except ConfigError as error:
             raise ConfigError(
                 f"{self._title(chosen)} cannot be, as it was drawn with {_said(fields, values)}: {error}"
             ) from error
 
-    def world_of(self, seed: int, share: float | None = None) -> DrawnWorld:
+    def world_of(self, seed: int, share: float | None = None) -> World:
         """Return the world of the run with this seed; see `draw`."""
         return self.draw(stream_rng(seed, Stream.SCENARIO), share)
 

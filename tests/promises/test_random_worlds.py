@@ -11,6 +11,7 @@ import pytest
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.contract.layout import MESSAGES, NEIGHBOURS
 from swarm_forage_env.contract.policy import layout_for
+from swarm_forage_env.wrappers.world import World
 from tests.support.random_scenarios import random_scenario, random_wrappers
 from tests.support.random_worlds import random_world, visit
 
@@ -61,4 +62,4 @@ def _slices(config):
 def test_a_world_may_come_from_a_sampler():
     world = next(world for world in map(random_world, map(Random, range(400))) if world.sampler)
     assert world.sampler is not None
-    assert world.sampler.world_of(world.seed) == (world.scenario, world.wrappers)
+    assert world.sampler.world_of(world.seed) == World(world.scenario, world.wrappers)

@@ -155,8 +155,8 @@ def test_kinds_can_be_drawn():
     world = SampledWorld(scenario={"preset": "warehouse_small", "robot_kinds": kinds})
     worlds = ScenarioSampler(worlds=(world,))
     again = ScenarioSampler.from_mapping(json.loads(json.dumps(worlds.to_mapping())))
-    found = [worlds.world_of(seed)[0].robots.robot_kinds for seed in range(20)]
-    assert found == [again.world_of(seed)[0].robots.robot_kinds for seed in range(20)]
+    found = [worlds.world_of(seed).scenario.robots.robot_kinds for seed in range(20)]
+    assert found == [again.world_of(seed).scenario.robots.robot_kinds for seed in range(20)]
     assert {hauler for _, hauler in found} == {HAULER}
     shares, speeds = zip(*((slow.share, slow.speed) for slow, _ in found), strict=True)
     assert len(set(shares)) == len(set(speeds)) == 20
@@ -178,4 +178,4 @@ def test_windows_are_drawn_from_a_choice(window):
         ScenarioSampler(worlds=(SampledWorld(scenario="warehouse_small"),), scenario=shared)
     chosen = [{**kinds[0], "window_cells": {"choice": [1, 3, 5]}}, HAULER]
     worlds = ScenarioSampler(worlds=(SampledWorld(scenario={"preset": "warehouse_small", "robot_kinds": chosen}),))
-    assert {worlds.world_of(seed)[0].robots.robot_kinds[0].window_cells for seed in range(20)} == {1, 3, 5}
+    assert {worlds.world_of(seed).scenario.robots.robot_kinds[0].window_cells for seed in range(20)} == {1, 3, 5}

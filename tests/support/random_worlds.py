@@ -103,7 +103,8 @@ def _drawn(random: Random, driver: str, most_ticks: int) -> RandomWorld:
     seed = random.choice((0, 1, 2**63 - 1, random.randrange(2**31)))
     if driver not in SCRIPTED and random.random() < 0.15:
         sampler = random_sampler(random, config, most_ticks)
-        config, wrappers = sampler.world_of(seed)
+        drawn = sampler.world_of(seed)
+        config, wrappers = drawn.scenario, drawn.wrappers
         if any(corner.objects.placement == "power_law" for corner in sampler.corners):
             _steps_of_batch(sampler, seed % 2**31)  # refuses clusters without room
     return RandomWorld(
@@ -136,7 +137,7 @@ def _look_at_sampler(sampler: ScenarioSampler, world: RandomWorld, seen: Visit) 
     """Check that a sampler comes back from its text with the same worlds, and step a batch of them twice."""
     again = ScenarioSampler.from_mapping(json.loads(json.dumps(sampler.to_mapping())))
     assert again == sampler, "a sampler comes back from its text"
-    assert again.world_of(world.seed) == (world.scenario, world.wrappers), "a seed is a world"
+    assert again.world_of(world.seed) == World(world.scenario, world.wrappers), "a seed is a world"
     first, second = (_steps_of_batch(each, world.seed % 2**31) for each in (sampler, again))
     assert first == second, "the same batch of drawn worlds goes another way"
     seen.figures["steps of drawn batches"] += len(first) + len(second)

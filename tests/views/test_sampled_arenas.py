@@ -34,7 +34,7 @@ def drawn(seeds=SEEDS):
 
 
 def sizes(seeds=SEEDS):
-    return [config.robots.n_robots for config, _ in drawn(seeds)]
+    return [world.n_robots for world in drawn(seeds)]
 
 
 def worlds_of(**fields):
@@ -52,9 +52,10 @@ def test_each_arena_is_bit_for_bit_that_of_its_world_alone():
     batch = ArenaBatch(PLAN, len(SEEDS))
     obs, _ = batch.reset(SEEDS, [None] * len(SEEDS))
     rng = np.random.default_rng(0)
-    alone = []
-    for config, wrappers in drawn():
-        alone.append(ArenaBatch(plan_arena(config, wrappers=wrappers, interface=COMPACT, max_cycles=20), 1))
+    alone = [
+        ArenaBatch(plan_arena(world.scenario, wrappers=world.wrappers, interface=COMPACT, max_cycles=20), 1)
+        for world in drawn()
+    ]
     first = [one.reset([seed], [None])[0] for one, seed in zip(alone, SEEDS, strict=True)]
     for arena, own in enumerate(first):
         np.testing.assert_array_equal(obs.reshape(3, 6, -1)[arena, : len(own)], own)

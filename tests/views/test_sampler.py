@@ -11,6 +11,7 @@ from swarm_forage_env.contract.own import register_sensor
 from swarm_forage_env.scenarios.draws import Drawn
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
+from swarm_forage_env.wrappers.world import World
 from tests.support.sampled import TWO_WORLDS, sampler
 
 
@@ -21,23 +22,24 @@ def drawn(worlds: ScenarioSampler, n_seeds: int = 200):
 def test_a_seed_gives_the_same_world_and_others_give_others():
     again = ScenarioSampler.from_mapping(TWO_WORLDS)
     assert [again.world_of(seed) for seed in range(20)] == drawn(sampler(), 20)
-    assert len({config.robots.n_robots for config, _ in drawn(sampler(), 20)}) > 2
+    assert len({world.n_robots for world in drawn(sampler(), 20)}) > 2
 
 
 def test_worlds_come_as_often_as_their_weights_say_and_wrappers_as_their_probability():
     found = drawn(sampler())
-    names = Counter(config.name for config, _ in found)
+    names = Counter(world.scenario.name for world in found)
     assert names["search_and_rescue"] / len(found) == pytest.approx(0.25, abs=0.1)
-    with_noise = sum("sensor_noise" in [wrapper.name for wrapper in wrappers] for _, wrappers in found)
+    with_noise = sum("sensor_noise" in [wrapper.name for wrapper in world.wrappers] for world in found)
     assert with_noise / len(found) == pytest.approx(0.5, abs=0.12)
 
 
 def test_values_lie_within_their_ranges_and_are_whole_where_the_field_is():
-    for config, wrappers in drawn(sampler()):
+    for world in drawn(sampler()):
+        config = world.scenario
         assert isinstance(config.robots.n_robots, int)
         assert 2 <= config.robots.n_robots <= 6
         assert config.reward.delivery == (0.0 if config.name == "search_and_rescue" else 1.0)
-        for wrapper in wrappers:
+        for wrapper in world.wrappers:
             if wrapper.name == "throttle":
                 assert 0.1 <= wrapper.waveform.amplitude <= 0.4
                 assert wrapper.waveform.offset == wrapper.waveform.amplitude
@@ -46,7 +48,7 @@ def test_values_lie_within_their_ranges_and_are_whole_where_the_field_is():
 def test_a_density_chooses_the_arena_of_each_swarm():
     config = {"preset": "warehouse_small", "n_robots": {"log_uniform": [8, 64]}, "density": {"uniform": [0.02, 0.1]}}
     worlds = ScenarioSampler(worlds=(SampledWorld(scenario=config),))
-    for made, _ in drawn(worlds, 30):
+    for made in (world.scenario for world in drawn(worlds, 30)):
         assert 0.015 < made.robots.n_robots / (made.arena.width_m * made.arena.height_m) <= 0.1
     assert worlds.n_robots == worlds.largest.robots.n_robots == 64
     assert worlds.n_objects == max(made.objects.n_objects for made in worlds.corners)
@@ -93,7 +95,7 @@ def test_a_sampler_is_read_back_from_json():
     assert ScenarioSampler.from_mapping(json.loads(json.dumps(worlds.to_mapping()))) == worlds
     whole = ScenarioSampler(worlds=(SampledWorld(scenario=scenario("warehouse_small", n_robots=3)),))
     assert ScenarioSampler.from_mapping(json.loads(json.dumps(whole.to_mapping()))) == whole
-    assert whole.world_of(0) == (scenario("warehouse_small", n_robots=3), ())
+    assert whole.world_of(0) == World(scenario("warehouse_small", n_robots=3))
 
 
 def changed(**fields):
