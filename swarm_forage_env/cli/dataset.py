@@ -1,15 +1,12 @@
 """The command `dataset`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
 from swarm_forage_env.cli.options import EXIT_INTERRUPTED, DryRun, FirstSeed, complain
-
-if TYPE_CHECKING:
-    from swarm_forage_env.training.datasets.recording import DatasetPlan
 
 
 @takes_options
@@ -56,7 +53,7 @@ def dataset(  # long: one parameter per option
         compress=compress,
     )
     folder = out or Path("results", "datasets", as_file_name(f"{spec.scenario.name}_{policy_label(spec.policy)}"))
-    typer.echo(_described(plan, folder))
+    typer.echo(plan.describe(folder).text())
     if dry_run:
         return
     if minari is not None:
@@ -75,25 +72,3 @@ def dataset(  # long: one parameter per option
         from swarm_forage_env.training.datasets.minari_export import export_minari
 
         typer.echo(f"wrote the Minari data set {export_minari(folder, minari).spec.dataset_id}")
-
-
-def _described(plan: "DatasetPlan", folder: Path) -> str:
-    """Return what is to be recorded and how much room it takes."""
-    from swarm_forage_env._internal.wording import counted
-    from swarm_forage_env.policies.registry import policy_label
-
-    scenario, config, n_todo = plan.spec.scenario, plan.card.interface, len(plan.missing(folder))
-    actions = "commands of three numbers" if len(plan.action_shape) == 2 else f"{plan.card.n_actions} discrete actions"
-    if len(plan.action_shape) == 2 and plan.action_shape[-1] == 2:
-        actions = "commands of two numbers"
-    room = f"{'at most' if plan.compress else 'about'} {n_todo * plan.run_bytes / 1e6:,.1f} MB"
-    each = counted(plan.n_decisions, "decision") + f" of {counted(scenario.robots.n_robots, 'robot')}"
-    return "\n".join(
-        [
-            f"policy        {policy_label(plan.spec.policy)} in {scenario.name}, {scenario.horizon_s:g} s",
-            f"runs          {len(plan.card.seeds)}, of which {n_todo} to do; {each} each",
-            f"observations  {config.observation}, {len(plan.card.columns)} columns",
-            f"actions       {actions}, one per {counted(config.decision_ticks, 'tick')}",
-            f"room          {room} in {folder}",
-        ]
-    )

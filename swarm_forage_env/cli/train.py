@@ -113,33 +113,38 @@ def train(  # long: one parameter per option
     all that was chosen. Ctrl-C keeps a checkpoint; swarm-forage --trust-models train --out
     FOLDER --resume goes on.
     """
-    from swarm_forage_env.cli.training_plan import TrainOptions, build_plan, named_plan, resumed_plan
+    from swarm_forage_env.cli.training_plan import build_plan
     from swarm_forage_env.cli.training_report import run_training
+    from swarm_forage_env.training.evaluations import resumed_plan
+    from swarm_forage_env.training.plan import named_plan
 
-    options = TrainOptions(
-        algorithm=algorithm,
-        steps=steps,
-        n_arenas=arenas,
-        seed=seed,
-        observation=observation,
-        actions=actions,
-        automatic_gripper=automatic_gripper,
-        decision_ticks=decision_ticks,
-        site_memory=site_memory,
-        samples=samples,
-        evaluate_every=evaluate_every,
-        evaluation_horizon=evaluation_horizon,
-        small_start=small_start,
-        hidden=hidden,
-        arguments=tuple(arguments or ()),
-    )
     if plan is not None:
         refuse_others(context, "--plan", _OF_PLAN, "which it decides; write them into its file")
     says_more = bool(given_options(context, besides=_OF_RESUMING))
-    chosen = build_plan(described, options) if plan is None else named_plan(plan, seed)
-    name = f"{chosen.scenario.name}_{chosen.algorithm}"
     if plan is not None:
+        chosen = named_plan(plan, seed)
         name = Path(plan).stem if seed is None else f"{Path(plan).stem}_seed_{seed}"
+    else:
+        chosen = build_plan(
+            described,
+            interface={
+                "observation": observation,
+                "actions": actions,
+                "automatic_gripper": automatic_gripper,
+                "decision_ticks": decision_ticks,
+                "site_memory": site_memory,
+            },
+            evaluation={"every_steps": evaluate_every, "horizon_s": evaluation_horizon},
+            hidden=hidden,
+            arguments=arguments or (),
+            algorithm=algorithm,
+            steps=steps,
+            n_arenas=arenas,
+            small_start=small_start,
+            seed=seed,
+            samples=samples,
+        )
+        name = f"{chosen.scenario.name}_{chosen.algorithm}"
     folder = out or Path("results/training") / name
     if resume and plan is None:
         chosen = resumed_plan(folder, chosen if says_more else None, steps)

@@ -10,7 +10,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from swarm_forage_env.cli.options import EXIT_INTERRUPTED, complain, no_picture
 from swarm_forage_env.training.curves import curve_of_training
-from swarm_forage_env.training.evaluations import TrainingCurve
+from swarm_forage_env.training.evaluations import MODEL_FILE, TrainingCurve
 from swarm_forage_env.training.lines import evaluation_lines, heading, progress_line
 from swarm_forage_env.training.plan import TrainingPlan
 from swarm_forage_env.training.status import Evaluation, TrainingStatus
@@ -30,7 +30,7 @@ def run_training(
         ConfigError: see `training.sb3.training.train` and `training.sb3.callbacks.named_callbacks`.
     """
     from swarm_forage_env.training.sb3.callbacks import named_callbacks
-    from swarm_forage_env.training.sb3.training import MODEL_FILE, train
+    from swarm_forage_env.training.sb3.training import train
 
     added = named_callbacks(callbacks)
 

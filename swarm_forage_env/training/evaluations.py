@@ -6,7 +6,7 @@ for all.
 
 import csv
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from swarm_forage_env.training.status import Evaluation, WorldEvaluation
 
 PLAN_FILE = "plan.json"
 EVALUATIONS_FILE = "evaluations.csv"
+MODEL_FILE = "model.zip"
 _TOLD_ONCE = ("steps", "wall_time_s")
 """Columns that are the same in the rows of all worlds of an evaluation."""
 _COLUMNS = tuple(item.name for item in fields(Evaluation) if item.name != "worlds")
@@ -51,6 +52,47 @@ def read_training(folder: Path) -> TrainingCurve:
     return TrainingCurve(
         label=folder.resolve().name, plan=read_plan(folder / PLAN_FILE), evaluations=tuple(evaluations)
     )
+
+
+def kept_plan(folder: Path) -> TrainingPlan:
+    """Return the plan of the training that a folder holds.
+
+    Raises:
+        ConfigError: it does not hold a training that can be resumed.
+    """
+    for name in (PLAN_FILE, MODEL_FILE):
+        if not (folder / name).exists():
+            raise ConfigError(
+                f"Expected {folder} to hold a training to resume, {PLAN_FILE} and the checkpoint {MODEL_FILE}, found "
+                f"no {name}; without resume a new one starts."
+            )
+    return read_plan(folder / PLAN_FILE)
+
+
+def resumed_plan(folder: Path, described: TrainingPlan | None = None, steps: int | None = None) -> TrainingPlan:
+    """Return the plan of the training in a folder, to resume it; `steps` can make it longer.
+
+    Args:
+        folder: Folder of the training.
+        described: Plan that must agree with it but for the number of steps; None if there is none.
+        steps: Decisions in all; None = those of the plan.
+
+    Raises:
+        ConfigError: no training in the folder, options that differ from its plan, or fewer steps.
+    """
+    kept = kept_plan(folder)
+    plan = kept if steps is None else kept.longer(steps)
+    if described is not None:
+        begun, wanted = ([(stage.scenario, stage.options) for stage in each.stages] for each in (kept, described))
+        # The options would divide the steps into other stages; a training keeps its own stages.
+        wanted_plan = replace(described, stages=plan.stages) if begun == wanted else described
+        differences = wanted_plan.differences(kept)
+        if differences:
+            raise ConfigError(
+                f"Expected options that agree with {folder / PLAN_FILE}, got others: {'; '.join(differences)}. "
+                "Without options but --out and --steps, --resume goes on by that plan."
+            )
+    return plan
 
 
 def write_evaluations(path: Path, evaluations: Sequence[Evaluation]) -> None:

@@ -22,6 +22,7 @@ from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json, parse_toml
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.policies.interface import InterfaceConfig, interface_from_mapping, learner_layout
+from swarm_forage_env.policies.pretrained import plan_file
 from swarm_forage_env.policies.registry import policy_class
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.policy_spec import PolicySpec
@@ -393,6 +394,17 @@ def read_plan(path: Path) -> TrainingPlan:
         raise ConfigError(f"Cannot read the plan {path}: {error.strerror or error}.") from error
     except (ValueError, TypeError) as error:  # ConfigError, and what the two parsers raise
         raise ConfigError(f"Cannot use the plan {path}: {error}") from error
+
+
+def named_plan(name: str, seed: int | None = None) -> TrainingPlan:
+    """Return the plan of a file, or of a shipped policy by its name, with another seed if one is given.
+
+    Raises:
+        ConfigError: there is none, or it cannot be used.
+    """
+    shipped = plan_file(name)
+    plan = read_plan(Path(name) if shipped is None else shipped)
+    return plan if seed is None else dataclasses.replace(plan, seed=seed)
 
 
 def _common(config: ScenarioConfig) -> tuple[Any, ...]:

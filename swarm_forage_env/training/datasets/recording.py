@@ -14,6 +14,7 @@ from gymnasium import spaces
 from swarm_forage_env._internal.fields import MOST_SEEDS, ConfigError, several, whole
 from swarm_forage_env._internal.files import alone_in, check_folder, replacing
 from swarm_forage_env._internal.rng import Stream, stream_rng
+from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.contract.codes import Counter
 from swarm_forage_env.contract.policy import COMMANDS, Policy, SwarmSpec
 from swarm_forage_env.policies import trust
@@ -21,7 +22,8 @@ from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterfac
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.mixture import is_mixture, part_sizes
 from swarm_forage_env.policies.model_files import look_at_file
-from swarm_forage_env.policies.registry import file_of, is_policy_file, load_policy, part_labels
+from swarm_forage_env.policies.registry import file_of, is_policy_file, load_policy, part_labels, policy_label
+from swarm_forage_env.runs.answer import Sheet
 from swarm_forage_env.runs.record import software_versions
 from swarm_forage_env.runs.run import build_env
 from swarm_forage_env.runs.spec import RunSpec
@@ -86,6 +88,24 @@ class DatasetPlan:
     def missing(self, folder: Path) -> tuple[int, ...]:
         """Return the seeds whose runs are not yet whole in a folder."""
         return tuple(seed for seed in self.card.seeds if not summary_file(folder, seed).exists())
+
+    def describe(self, folder: Path) -> Sheet:
+        """Return what is to be recorded, and how much room it takes in a folder."""
+        scenario, config, n_todo = self.spec.scenario, self.card.interface, len(self.missing(folder))
+        actions = f"{self.card.n_actions} discrete actions"
+        if len(self.action_shape) == 2:
+            actions = f"commands of {'two' if self.action_shape[-1] == 2 else 'three'} numbers"
+        room = f"{'at most' if self.compress else 'about'} {n_todo * self.run_bytes / 1e6:,.1f} MB"
+        each = counted(self.n_decisions, "decision") + f" of {counted(scenario.robots.n_robots, 'robot')}"
+        return Sheet(
+            rows=[
+                ("policy", f"{policy_label(self.spec.policy)} in {scenario.name}, {scenario.horizon_s:g} s"),
+                ("runs", f"{len(self.card.seeds)}, of which {n_todo} to do; {each} each"),
+                ("observations", f"{config.observation}, {len(self.card.columns)} columns"),
+                ("actions", f"{actions}, one per {counted(config.decision_ticks, 'tick')}"),
+                ("room", f"{room} in {folder}"),
+            ]
+        )
 
 
 def plan_dataset(

@@ -37,7 +37,14 @@ from swarm_forage_env.runs.first_compilation import compile_world
 from swarm_forage_env.runs.record import software_versions
 from swarm_forage_env.runs.workers import available_cores
 from swarm_forage_env.training.evaluation_worlds import BEST
-from swarm_forage_env.training.evaluations import EVALUATIONS_FILE, PLAN_FILE, read_evaluations, write_evaluations
+from swarm_forage_env.training.evaluations import (
+    EVALUATIONS_FILE,
+    MODEL_FILE,
+    PLAN_FILE,
+    kept_plan,
+    read_evaluations,
+    write_evaluations,
+)
 from swarm_forage_env.training.judging import (
     baseline_runs,
     best_baselines,
@@ -46,7 +53,7 @@ from swarm_forage_env.training.judging import (
     judged,
     known_baselines,
 )
-from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan, read_plan
+from swarm_forage_env.training.plan import LEARNING, Stage, TrainingPlan
 from swarm_forage_env.training.sb3.buffers import ActiveRolloutBuffer, EmptyRolloutError, PresentReplayBuffer
 from swarm_forage_env.training.sb3.export import export_network, note_interface
 from swarm_forage_env.training.status import Evaluation, TrainingStatus
@@ -55,7 +62,6 @@ from swarm_forage_env.views.stable_baselines3 import SwarmVecEnv
 ALGORITHM_CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC}
 ON_POLICY = ("ppo", "a2c")
 EXPORTABLE = ("ppo", "a2c", "dqn")
-MODEL_FILE = "model.zip"
 POLICY_FILE = "policy.npz"
 _REPORT_EVERY_S = 1.0
 _TOLD = ("algorithm", "seed", "n_arenas", "hidden", "interface", "options", "stages", "scenario.reward",
@@ -213,21 +219,6 @@ def _check_baseline(plan: TrainingPlan) -> None:
             load_policy(baseline)
         except (ValueError, OSError) as error:
             raise ConfigError(f"Expected {where} to be a controller: {error}") from error
-
-
-def kept_plan(folder: Path) -> TrainingPlan:
-    """Return the plan of the training that a folder holds.
-
-    Raises:
-        ConfigError: it does not hold a training that can be resumed.
-    """
-    for name in (PLAN_FILE, MODEL_FILE):
-        if not (folder / name).exists():
-            raise ConfigError(
-                f"Expected {folder} to hold a training to resume, {PLAN_FILE} and the checkpoint {MODEL_FILE}, found "
-                f"no {name}; without resume a new one starts."
-            )
-    return read_plan(folder / PLAN_FILE)
 
 
 def _checkpoint(plan: TrainingPlan, folder: Path, env: SwarmVecEnv) -> BaseAlgorithm:
