@@ -6,19 +6,18 @@ from typing import Annotated
 import typer
 
 from metrics.controllers import PAPER_POLICIES
-from swarm_forage_env.cli.options import EXIT_FAILURE, Jobs, complain, no_picture
+from swarm_forage_env.cli.options import EXIT_FAILURE, Jobs, Picture, complain, no_picture
 
 PICTURE_FILE = "curves.png"
 
 
 def curves(
     folders: Annotated[list[Path], typer.Argument(metavar="DIR ...", help="Folders of trainings in one scenario.")],
-    beside: Annotated[
-        str, typer.Option("--beside", help="Policies to compare with, separated by commas; none for no others.")
+    policies: Annotated[
+        str,
+        typer.Option("--policy", help="Policies to compare with, separated by commas; none for no others."),
     ] = ",".join(PAPER_POLICIES),
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help=f"Picture; default {PICTURE_FILE} in the first folder.")
-    ] = None,
+    picture: Picture = None,
     jobs: Jobs = None,
 ) -> None:
     """Draw how trainings went, beside the scripted controllers on the same axes.
@@ -30,15 +29,15 @@ def curves(
     from swarm_forage_env.training.curves import curves as curves_of
     from swarm_forage_env.training.curves import read_trainings
 
-    picture = out or folders[0] / PICTURE_FILE
+    file = picture or folders[0] / PICTURE_FILE
     read_trainings(folders)  # refuses folders before it looks at the place of the picture
-    check_picture(picture)
-    found = curves_of(folders, beside=() if beside == "none" else split_names(beside), jobs=jobs)
+    check_picture(file)
+    found = curves_of(folders, beside=() if policies == "none" else split_names(policies), jobs=jobs)
     typer.echo(found.text())
     try:
-        found.draw(picture)
+        found.draw(file)
     except ImportError as error:
         raise typer.Exit(complain(str(error), EXIT_FAILURE)) from None
     except OSError as error:  # the table was shown, but a picture was asked for
-        raise typer.Exit(complain(no_picture(picture, error), EXIT_FAILURE)) from None
-    typer.echo(f"wrote {picture}")
+        raise typer.Exit(complain(no_picture(file, error), EXIT_FAILURE)) from None
+    typer.echo(f"wrote {file}")

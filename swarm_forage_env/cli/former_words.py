@@ -32,7 +32,6 @@ OPTIONS = {
     "--seconds": ("--horizon",),
     "--seed": ("--seeds", "--first-seed"),
     "--seeds": ("--seed",),
-    "--side": ("--square",),
     "--size": ("--robots",),
     "--workers": ("--jobs",),
     "--world": ("--scenario",),

@@ -1,7 +1,7 @@
 """Maps of the floor: where robots were, where they took and left objects, where they got in each other's way."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,12 @@ import numpy as np
 from swarm_forage_env._internal.fields import ConfigError, number
 from swarm_forage_env._internal.files import as_file_name, replacing
 from swarm_forage_env.contract.types import FloatArray
+from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.inspect.replay.files import read_replays
 from swarm_forage_env.inspect.replay.frames import Replay, ReplayError, Status
+from swarm_forage_env.policies.registry import policy_label
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
+from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.scenarios.obstacles import Rectangle
 from swarm_forage_env.scenarios.units import CELL_M
 
@@ -186,6 +189,34 @@ def maps_of_page(page: str | Path, *, side_m: float = 2 * CELL_M) -> ComparedMap
             f"'swarm-forage replay {file}' makes the page of a run, and 'swarm-forage study maps' the maps of a study."
         )
     return ComparedMaps(maps=tuple(floor_maps(replay, side_m=side_m) for replay in read_replays(file)))
+
+
+def maps_of_runs(
+    specs: Sequence[RunSpec], *, side_m: float = 2 * CELL_M, advance: Callable[[float], None] | None = None
+) -> ComparedMaps:
+    """Make runs and return the mean of the maps of each policy.
+
+    Args:
+        specs: The runs; those of a policy differ in their seeds, and all arenas are of one size.
+        side_m: As in `floor_maps`.
+        advance: Called after every frame, with the robot-ticks that are done.
+
+    Raises:
+        ConfigError: see `floor_maps`.
+        ValueError: a policy that is not installed, or refuses its file.
+    """
+    made: dict[str, list[FloorMaps]] = {}
+    done = 0.0
+    for spec in specs:
+
+        def tell(tick: int, end: int, before: float = done, ticks: float = spec.robot_ticks) -> None:
+            if advance is not None:
+                advance(before + ticks * tick / end)
+
+        replay, _ = record_replay(spec, progress=tell)
+        made.setdefault(policy_label(spec.policy), []).append(floor_maps(replay, side_m=side_m))
+        done += spec.robot_ticks
+    return ComparedMaps(maps=tuple(mean_maps(maps, label) for label, maps in made.items()))
 
 
 def _sides(side_m: float, n: int, extent_m: float) -> FloatArray:

@@ -12,7 +12,7 @@ def test_maps_draws_runs_and_differences(command, painted):
     assert command("replay", "random", "crw", *words, "--file", "two.html")[0] == 0
     code, out, err = command("maps", "two.html", "--square", "1")
     assert (code, err) == (0, "")
-    assert out == "wrote maps of 2 runs to two.maps.png and .npz files beside it\n"
+    assert out == "wrote maps to two.maps.png and .npz files beside it\n"
     assert {path.name for path in Path().iterdir()} == {
         "two.html",
         "two.maps.png",
@@ -23,6 +23,27 @@ def test_maps_draws_runs_and_differences(command, painted):
     assert Path("two.maps.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.compiled
+def test_maps_of_policies_need_no_page(command):
+    pytest.importorskip("matplotlib")
+    words = ("--robots", "3", "--horizon", "4", "--set", "interval_s=2", "--seeds", "2", "--square", "1")
+    code, out, err = command("maps", "random", "crw", *words, "--per-robot")
+    assert (code, err) == (0, "")
+    assert out == "wrote maps to results/maps/warehouse_small/maps.png and .npz files beside it\n"
+    folder = Path("results/maps/warehouse_small")
+    assert {path.name for path in folder.glob("*.npz")} == {
+        "maps.random.npz",
+        "maps.crw.npz",
+        "maps.crw_minus_random.npz",
+    }
+
+
+def test_a_page_takes_no_options_of_runs(command):
+    code, _, err = command("maps", "page.html", "--robots", "3")
+    assert code == 2
+    assert "Expected a page without --robots, which describe runs" in err
+
+
 def test_maps_refuses_other_files(command):
     Path("page.html").write_text("<p>")
     Path("bytes.html").write_bytes(b"\xff\xfe\x00")
@@ -31,7 +52,6 @@ def test_maps_refuses_other_files(command):
     for name, message in (
         ("page.html", "Cannot read page.html: it is no replay page"),
         ("bytes.html", "Cannot read bytes.html: it is no text, so no replay page."),
-        ("folder", "Cannot read folder: Is a directory"),
         ("gone.html", "Cannot read gone.html: No such file"),
         ("run.parquet", "records of runs hold no positions. 'swarm-forage replay run.parquet' makes the page"),
     ):
