@@ -214,7 +214,7 @@ def import_seconds(_engine: str, _effort: float) -> float:
 
 def first_run(engine: str, _effort: float) -> float:
     """Seconds by the clock, because two processes compile."""
-    words = ["run", "--policy", "crw", "--robots", "50", "--horizon", "200"]
+    words = ["run", "crw", "--robots", "50", "--horizon", "200"]
     words += ["--set", f"physics={engine}"] if engine == "compiled" else []
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:

@@ -28,7 +28,7 @@ VARIED = ("numpy", "gymnasium", "pettingzoo")
 SHOWN = (*VARIED, "numba")
 ENDS = ("oldest", "newest")
 TESTS = ("tests/contract", "tests/scenarios", "tests/promises/test_packaging.py")
-RUN = ("run", "--scenario", "warehouse_small", "--policy", "crw", "--robots", "10", "--horizon", "200", "--seeds", "1")
+RUN = ("run", "crw", "--scenario", "warehouse_small", "--robots", "10", "--horizon", "200", "--seeds", "1")
 BLOCK = re.compile(r"(<!-- table by scripts/matrix -->\n).*?(<!-- end of table -->)", re.DOTALL)
 HEADINGS = ("Python", "dependencies", *SHOWN, "a run", "tests", "on")
 

@@ -1,6 +1,9 @@
-"""Settings shared by all tests, and rules for skipped tests."""
+"""Settings shared by all tests, kernels that they share, and rules for skipped tests."""
 
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Generator
 from pathlib import Path
 
@@ -59,6 +62,23 @@ pytest_runtest_logreport = _note
 pytest_collectreport = _note
 
 
+def _is_worker(config: pytest.Config) -> bool:
+    """Whether this is one of several processes over which another one spreads the tests."""
+    return hasattr(config, "workerinput")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile what most tests need before several processes begin with them: each would compile it for itself."""
+    config = session.config
+    if _is_worker(config) or not config.getoption("numprocesses", None) or os.environ.get("NUMBA_DISABLE_JIT") == "1":
+        return
+    command = [sys.executable, "-m", "tests.support.first_kernels"]
+    compiling = [subprocess.Popen([*command, engine], cwd=config.rootpath) for engine in ("chipmunk", "compiled")]
+    for process in compiling:
+        process.wait()  # where one fails, the tests will say why
+
+
 def _unnamed() -> dict[str, str]:
     return {
         test: reason
@@ -70,6 +90,8 @@ def _unnamed() -> dict[str, str]:
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Write the list, and make a good end a bad one where something was skipped that should not be."""
     config = session.config
+    if _is_worker(config):
+        return
     if config.getoption("skips_to") is not None:
         config.getoption("skips_to").write_text("".join(f"{test}\n" for test in _unnamed()))
     if config.getoption("no_skips") and _unnamed() and session.exitstatus == pytest.ExitCode.OK:

@@ -394,7 +394,7 @@ def test_long_sequences_approach_the_exact_chain(controller, is_integer, estimat
     for name, task in NAMES.items():
         robot.a.estimate[0, task] = estimates[name]
     counts = np.zeros(len(Task))
-    n = 20_000
+    n = 10_000
     for now, draws in enumerate(np.random.default_rng(7).random((n + 200, 3)).tolist()):
         if robot.task is not Task.NONE:
             stoch_n1.end_task(robot.a, 0, now, robot.c)

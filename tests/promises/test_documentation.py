@@ -34,6 +34,7 @@ def run_all(blocks, page):
 )
 def test_python_examples_run(page, tmp_path, monkeypatch):
     """The examples of a page run one after the other, as a user would type them, without any extra."""
+    monkeypatch.setattr("swarm_forage_env.runs.workers.available_cores", lambda: 1)  # a process takes longer to start
     monkeypatch.chdir(tmp_path)
     run_all([block for needs, block in examples(page) if not needs], page)
 

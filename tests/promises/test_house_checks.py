@@ -89,12 +89,14 @@ NAMED = "def test_named(): pytest.skip('needs ray: scripts/test_bridges')\n"
 UNNAMED = "def test_unnamed(): pytest.skip('no time')\n"
 
 
-def test_a_skip_without_a_name_fails_and_is_listed(tmp_path):
-    """That of one test, and that of a file as a whole."""
+@pytest.mark.parametrize("spread", [(), ("-n", "2")], ids=["alone", "spread"])
+def test_a_skip_without_a_name_fails_and_is_listed(tmp_path, monkeypatch, spread):
+    """That of one test, and that of a file as a whole; also where two processes have them."""
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")  # nothing is compiled first
     (tmp_path / "test_all_of_it.py").write_text(f"import pytest\npytest.importorskip('no_such_module')\n{PASSES}")
-    done = run_tests(tmp_path, PASSES + NAMED + UNNAMED, "--no-skips", "--skips-to", "list")
+    done = run_tests(tmp_path, PASSES + NAMED + UNNAMED, "--no-skips", "--skips-to", "list", *spread)
     assert done.returncode == pytest.ExitCode.TESTS_FAILED, done.stdout
-    assert (tmp_path / "list").read_text() == "test_all_of_it.py\ntest_it.py::test_unnamed\n"
+    assert sorted((tmp_path / "list").read_text().split()) == ["test_all_of_it.py", "test_it.py::test_unnamed"]
     assert "skipped, which --no-skips forbids: test_it.py::test_unnamed: no time" in done.stdout
     assert "skipped, and named: 1 x needs ray: scripts/test_bridges" in done.stdout
 
