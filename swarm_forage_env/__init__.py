@@ -1,17 +1,16 @@
 """Swarm foraging as a PettingZoo environment.
 
-Public names stand in `__init__.pyi`. They load on first use: importing the package compiles nothing and loads neither
-the physics nor numba. It registers every scenario with PettingZoo and Gymnasium under ids such as
+Public names stand in `__init__.pyi`. They load on first use: importing the package loads next to nothing. Every
+scenario is registered with PettingZoo and Gymnasium, as soon as they are imported, under ids such as
 `swarm_forage/warehouse_small-v1`.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
-import gymnasium
 import lazy_loader
-import pettingzoo
 
-from swarm_forage_env.scenarios.presets import SCENARIO_NAMES
+from swarm_forage_env._internal.importing import when_imported
 
 _load, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
@@ -24,12 +23,25 @@ def __getattr__(name: str) -> Any:
     return _load(name)
 
 
-def _register_environments() -> None:
+def _ids() -> Iterator[tuple[str, dict[str, str]]]:
+    from swarm_forage_env.scenarios.presets import SCENARIO_NAMES
+
     for name in (*SCENARIO_NAMES, "sampled"):
-        env_id = f"swarm_forage/{name}-v1"
-        kwargs = {"scenario": name}
+        yield f"swarm_forage/{name}-v1", {"scenario": name}
+
+
+def _register_with_pettingzoo() -> None:
+    import pettingzoo
+
+    for env_id, kwargs in _ids():
         pettingzoo.register("parallel", env_id, "swarm_forage_env.views.pettingzoo:parallel_env", kwargs=kwargs)
         pettingzoo.register("aec", env_id, "swarm_forage_env.views.pettingzoo:env", kwargs=kwargs)
+
+
+def _register_with_gymnasium() -> None:
+    import gymnasium
+
+    for env_id, kwargs in _ids():
         gymnasium.register(
             env_id,
             "swarm_forage_env.views.gymnasium:JointForageEnv",
@@ -38,4 +50,5 @@ def _register_environments() -> None:
         )
 
 
-_register_environments()
+when_imported("pettingzoo", _register_with_pettingzoo)
+when_imported("gymnasium", _register_with_gymnasium)

@@ -19,7 +19,20 @@ from tests.support.public_names import homes_of
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-HEAVY = ("numba", "pymunk", "polars", "scipy", "matplotlib", "torch", "swarm_forage_env.env", "baselines", "metrics")
+HEAVY = (
+    "numpy",
+    "gymnasium",
+    "pettingzoo",
+    "numba",
+    "pymunk",
+    "polars",
+    "scipy",
+    "matplotlib",
+    "torch",
+    "swarm_forage_env.env",
+    "baselines",
+    "metrics",
+)
 
 
 def run_python(code: str, *arguments: str, **environment: str) -> str:
@@ -79,6 +92,22 @@ def test_every_scenario_is_registered(name):
     turn_based.reset(seed=0)
     assert turn_based.agents == ["robot_0", "robot_1"]
     assert gymnasium.spec(env_id).kwargs == {"scenario": name}
+
+
+@pytest.mark.parametrize("order", ["swarm_forage_env, {}", "{}, swarm_forage_env"])
+def test_ids_are_registered_in_any_order_of_imports(order):
+    """Also where the first attempt to import the other package fails."""
+    registries = "gymnasium", "gymnasium.registry", "pettingzoo", "{**pettingzoo.parallel_registry}"
+    for package, registry in zip(registries[::2], registries[1::2], strict=True):
+        imports = f"import {order.format(package)}"
+        late = f"import sys, swarm_forage_env; sys.modules['numpy'] = None\ntry: import {package}\nexcept ImportError: "
+        for code in (imports, f"{late}del sys.modules['numpy']\nimport {package}"):
+            assert run_python(f"{code}\nprint('swarm_forage/warehouse_small-v1' in {registry})").strip() == "True"
+
+
+def test_whoever_only_asks_where_a_package_is_changes_nothing():
+    code = "import importlib.util, swarm_forage_env; importlib.util.find_spec('gymnasium'); import gymnasium; "
+    assert run_python(f"{code}print('swarm_forage/warehouse_small-v1' in gymnasium.registry)").strip() == "True"
 
 
 def test_installed_policies_are_those_of_this_checkout():
