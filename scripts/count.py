@@ -27,12 +27,18 @@ PACKAGES = ("swarm_forage_env", "baselines", "metrics")
 LONG, SHORT = (500, 300), (100, 50)
 """Lengths of files, in lines: over and under so many."""
 COMMANDS = """
-import typer
-from swarm_forage_env.cli.app import app
 def walk(command):
     for each in getattr(command, "commands", {}).values():
         yield from walk(each) if hasattr(each, "commands") else [each]
-commands = list(walk(typer.main.get_command(app)))
+try:
+    from swarm_forage_env.cli.commands import COMMANDS
+except ImportError:  # an earlier checkout
+    import typer
+    from swarm_forage_env.cli.app import app
+    commands = list(walk(typer.main.get_command(app)))
+else:
+    from swarm_forage_env.cli.app import loaded
+    commands = [loaded(each) for group in COMMANDS.values() for each in group if each.place]
 words = [option.opts[0] for command in commands for option in command.params]
 options = [word for word in words if word.startswith("-") and word != "--help"]
 print(len(commands), len(words), len(options), len(set(options)))

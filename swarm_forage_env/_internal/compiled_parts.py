@@ -9,6 +9,10 @@ of numba's compiler; it has no public way to leave these steps out.
 from typing import Any
 
 from llvmlite import binding
+
+from swarm_forage_env._internal import numba_settings  # noqa: F401  (before numba)
+
+# isort: split
 from numba.core.caching import CompileResultCacheImpl
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult

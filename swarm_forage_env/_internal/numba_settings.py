@@ -39,7 +39,8 @@ def _read_environment_only() -> None:
     with _without_yaml() if lies_there else nullcontext():
         from numba.core import config as settings
     config: Any = settings
-    if lies_there and config._config_fname != os.devnull and multiprocessing.parent_process() is None:
+    is_worker = multiprocessing.current_process().name != "MainProcess"
+    if lies_there and config._config_fname != os.devnull and not is_worker:
         told = f"{_FILE} in the current folder is not read: numba has its settings from the environment alone."
         logging.getLogger(__name__.partition(".")[0]).warning(told)
     config._config_fname = os.devnull  # which is no file to numba

@@ -91,7 +91,7 @@ def _show_plan(plan: "Ablation", store: "RunStore", seeds: int, jobs: int | None
 
 def _run(plan: "Ablation", store: "RunStore", jobs: int | None, *, as_json: bool) -> None:
     from swarm_forage_env.cli.ablation_report import ablation_json, ablation_pages
-    from swarm_forage_env.cli.interrupts import resumable
+    from swarm_forage_env.cli.errors import resumable
     from swarm_forage_env.scenarios.performance import performance_of
     from swarm_forage_env.studies.ablation import run_ablation
 

@@ -1,165 +1,217 @@
-"""The application: its commands, its own options, and how it ends.
+"""From the words of a command line to its function: the command that they name is imported, and no other."""
 
-A command has a file of its own and imports what it needs when it runs, so that `--help` answers at once.
-"""
-
-import logging
-import signal
+import io
 import sys
-import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from functools import cache
-from typing import Annotated, Any
+from importlib import import_module
+from itertools import takewhile
+from typing import Any
 
-import typer
+from swarm_forage_env.cli.commands import COMMANDS, Command
 
-from swarm_forage_env.cli.ablate import ablate
-from swarm_forage_env.cli.availability import availability
-from swarm_forage_env.cli.benchmark import benchmark
-from swarm_forage_env.cli.check import check
-from swarm_forage_env.cli.choose import choose
-from swarm_forage_env.cli.curves import curves
-from swarm_forage_env.cli.dataset import dataset
-from swarm_forage_env.cli.ending import end
-from swarm_forage_env.cli.maps import maps
-from swarm_forage_env.cli.options import EXIT_INTERRUPTED, EXIT_TERMINATED, complain
-from swarm_forage_env.cli.predict import predict
-from swarm_forage_env.cli.record import record
-from swarm_forage_env.cli.replay import replay
-from swarm_forage_env.cli.rerun import rerun
-from swarm_forage_env.cli.run import run
-from swarm_forage_env.cli.saliency import saliency
-from swarm_forage_env.cli.score import score
-from swarm_forage_env.cli.show import info, list_everything
-from swarm_forage_env.cli.study import study
-from swarm_forage_env.cli.terminal import show_any_text
-from swarm_forage_env.cli.train import train
-from swarm_forage_env.cli.trusting import trust_of
-from swarm_forage_env.cli.watch import watch
-
-app = typer.Typer(
-    help="Swarm foraging: run, film, train and score policies, inspect scenarios.",
-    add_completion=False,
-    invoke_without_command=True,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
+_OPTIONS = {
+    "--version": "Print the version and exit.",
+    "--trust-models": "Open models (.zip) and Python (.py) that files\nname: this runs code in them (SECURITY.md).",
+    "--help": "Show this message and exit.",
+}
+PACKAGES = ("swarm_forage_env", "baselines", "metrics")
+"""What speaks to users: by subclasses of ValueError such as ConfigError and ModelError, by warnings and loggers."""
+_BY_WORDS = {command.words: command for group in COMMANDS.values() for command in group}
 
 
-@app.callback()
-def _options(
-    context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
-    trust_models: Annotated[
-        bool,
-        typer.Option(
-            "--trust-models",
-            help="Also open models (.zip) and Python (.py) that files name: this runs code in them (SECURITY.md).",
-        ),
-    ] = False,
-) -> None:
-    if trust_models:
-        from swarm_forage_env.policies.trust import trusting
-
-        context.with_resource(trusting())
-    if version:
-        from importlib.metadata import version as installed_version
-
-        typer.echo(f"swarm-forage {installed_version('swarm-forage-env')}")
-        raise typer.Exit
-    if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
+class WrongWordsError(ValueError):
+    """Words of a command line that mean nothing."""
 
 
-# `--help` lists them in this order.
-for command in (run, score):
-    app.command()(command)
-app.command("compare")(score)
-for command in (predict, choose, train, curves, dataset):
-    app.command()(command)
-app.add_typer(study, name="study")
-app.add_typer(benchmark, name="benchmark")
-app.command("list")(list_everything)
-for command in (info, rerun, watch, record, replay, maps, saliency, check, ablate, availability):
-    app.command()(command)
-
-
-_show_in_full = warnings.showwarning
-
-
-def _show_warning(message: Warning | str, category: type[Warning], *rest: Any) -> None:
-    """Print a warning that is meant for users as one line; those for programmers as Python does."""
-    if category.__module__.partition(".")[0] == __name__.partition(".")[0]:
-        complain(str(message), 0)
-    else:
-        _show_in_full(message, category, *rest)
-
-
-@contextmanager
-def _news_shown() -> Iterator[None]:
-    """Have the package print on stderr what is no warning, such as that it compiles; Python leaves that out."""
-    tellers = [logging.getLogger(__name__.partition(".")[0]), *([logging.lastResort] if logging.lastResort else [])]
-    levels = [teller.level for teller in tellers]
-    for teller in tellers:
-        teller.setLevel(logging.INFO)
-    try:
-        yield
-    finally:
-        for teller, level in zip(tellers, levels, strict=True):
-            teller.setLevel(level)
-
-
-def main() -> None:
-    """Run the command line and exit; an error is one line on stderr, and `ending` says which exit code it has."""
-    from swarm_forage_env.cli.interrupts import heard
-
-    show_any_text()
-    with heard() as came, _news_shown():
-        code = _outcome(came)
-    if signal.SIGTERM in came and code == EXIT_INTERRUPTED:
-        code = EXIT_TERMINATED
-    sys.exit(code)
-
-
-def _outcome(came: Sequence[int]) -> int | str | None:
-    """Carry out the command and return its exit code; `came` has the interrupts so far, see `heard`."""
-    try:
-        _refuse_unreadable(sys.argv[1:])
-        with trust_of(sys.argv[1:]), warnings.catch_warnings():
-            warnings.showwarning = _show_warning
-            return _carry_out(sys.argv[1:])
-    except SystemExit as ending:
-        return ending.code
-    except BaseException as error:  # noqa: BLE001 - the last guard: whatever happens ends in one line
-        return end(KeyboardInterrupt() if came else error)
-
-
-def _carry_out(words: list[str]) -> int | None:
+def carry_out(words: Sequence[str]) -> int:
     """Carry out the command that words name; returns its exit code.
 
-    Not by `app(...)`: typer turns Ctrl-C into an exit code there, and nobody would say what is kept.
+    Raises:
+        WrongWordsError: there is no such command or option.
+        BaseException: whatever the command raises.
     """
-    command = _command()
-    try:
-        with command.make_context("swarm-forage", words) as context:
-            return command.invoke(context)
-    except typer.Exit as ending:
-        return ending.exit_code
+    _show_any_text()
+    _check_readable(words)
+    options = list(takewhile(lambda word: word.startswith("-"), words))
+    named = list(words[len(options) :])
+    _check_known("option:", options, _OPTIONS)
+    if "--version" in options:
+        from importlib.metadata import version
+
+        _say(f"swarm-forage {version('swarm-forage-env')}")
+    elif "--help" in options or not named:
+        _say(_help())
+    else:
+        command = _named(named)
+        rest = named[len(command.words.split()) :]
+        if command.place:
+            return _run(command, rest, trusts="--trust-models" in options)
+        _check_known("option:", rest, ["--help"])
+        _say(_help_of_group(command))
+    return 0
 
 
-@cache
-def _command() -> Any:
-    """Return all commands with their options; to make them takes longer than many a command."""
-    return typer.main.get_command(app)
+def _named(words: Sequence[str]) -> Command:
+    """Return the command that the first word, or the first two, name."""
+    _check_known("command", words[:1], [name for name in _BY_WORDS if " " not in name])
+    below = _below(words[0])
+    if below and words[1:] and not words[1].startswith("-"):
+        _check_known(f"command of {words[0]}:", words[1:2], below)
+        return below[words[1]]
+    return _BY_WORDS[words[0]]
 
 
-def _refuse_unreadable(words: Sequence[str]) -> None:
+def _below(word: str) -> dict[str, Command]:
+    """Return the commands of two words of which this is the first, by the second."""
+    return {name.split()[1]: command for name, command in _BY_WORDS.items() if name.startswith(f"{word} ")}
+
+
+def _check_known(what: str, words: Iterable[str], known: Iterable[str]) -> None:
+    for word in words:
+        if word not in known:
+            from swarm_forage_env._internal.spelling import suggestion
+
+            raise WrongWordsError(f"No such {what} {word!r}.{suggestion(word, known)}")
+
+
+def _check_readable(words: Iterable[str]) -> None:
     """Refuse words that are no text: records, pages and pictures could not hold such a name."""
     for word in words:
         try:
             word.encode("utf-8")
         except UnicodeEncodeError as error:
-            raise typer.BadParameter(
+            raise WrongWordsError(
                 f"Expected words in UTF-8, got {word!r}; rename the file, or check the locale of the terminal."
             ) from error
+
+
+def _help() -> str:
+    """Return what `swarm-forage --help` shows."""
+    groups = {heading: [one for one in group if " " not in one.words] for heading, group in COMMANDS.items()}
+    return "\n\n".join(
+        [
+            "Usage: swarm-forage [OPTIONS] COMMAND [ARGS]...",
+            "  Swarm foraging: run, film, train and score policies, inspect scenarios.",
+            _listed("Options", list(_OPTIONS.items())),
+            *(_listed(heading, [(one.words, one.about) for one in group]) for heading, group in groups.items()),
+        ]
+    )
+
+
+def _help_of_group(command: Command) -> str:
+    """Return what the help of a first word shows."""
+    usage = f"Usage: swarm-forage {command.words} COMMAND [ARGS]..."
+    return f"{usage}\n\n  {command.about}\n\n{_listed_below(command)}"
+
+
+def _listed_below(command: Command) -> str:
+    return _listed("Commands", [(word, one.about) for word, one in _below(command.words).items()])
+
+
+def _listed(heading: str, rows: Sequence[tuple[str, str]]) -> str:
+    width = max(15, *(len(name) + 2 for name, _ in rows))
+    lines = (f"  {name:{width}}" + about.replace("\n", "\n" + " " * (width + 2)) for name, about in rows)
+    return "\n".join([f"{heading}:", *lines])
+
+
+@cache
+def loaded(command: Command) -> Any:
+    """Import a command; returns what typer makes of it."""
+    import typer
+
+    module, _, function = command.place.partition(":")
+    app = typer.Typer(add_completion=False, rich_markup_mode=None)
+    app.command()(getattr(import_module(f"swarm_forage_env.cli.{module}"), function))
+    return typer.main.get_command(app)
+
+
+def _run(command: Command, words: Sequence[str], *, trusts: bool) -> int:
+    """Import a command and carry it out; returns its exit code."""
+    import typer
+
+    parsed = loaded(command)
+    # Not `app(...)`: typer turns Ctrl-C into an exit code there, and nobody would say what is kept.
+    with _news_shown():
+        try:
+            context = parsed.make_context(f"swarm-forage {command.words}", list(words))
+        except typer.Exit as ending:  # its help was shown
+            if _below(command.words):
+                _say(f"\n{_listed_below(command)}")
+            return ending.exit_code
+        try:
+            with context, _trust(words, all_files=trusts):
+                parsed.invoke(context)
+        except typer.Exit as ending:
+            return ending.exit_code
+    return 0
+
+
+@contextmanager
+def _trust(words: Sequence[str], *, all_files: bool) -> Iterator[None]:
+    """While the context lasts, only models among the words of a command are opened, and stderr says which."""
+    from swarm_forage_env.cli.options import complain
+    from swarm_forage_env.policies.mixture import policies_in_mixtures
+    from swarm_forage_env.policies.registry import file_of
+    from swarm_forage_env.policies.trust import of_a_command, trusting
+
+    pieces = (piece.strip() for word in words for piece in (word, *word.split(","), *word.partition("=")[2].split(",")))
+    parts = [part for word in words for part in policies_in_mixtures(word)]
+    typed = [name for piece in (*pieces, *parts) for name in (piece, file_of(piece))]
+    looks_only = "--dry-run" in words
+
+    def tell(line: str) -> None:
+        complain(line, 0)
+
+    with (
+        of_a_command(filter(None, typed), looks_only=looks_only, tell=tell),
+        trusting() if all_files else nullcontext(),
+    ):
+        yield
+
+
+@contextmanager
+def _news_shown() -> Iterator[None]:
+    """Show as one line each what our packages warn of, or tell, such as that they compile."""
+    import logging
+    import warnings
+
+    from swarm_forage_env.cli.options import complain
+
+    class Teller(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            complain(record.getMessage(), 0)
+
+    show_in_full, teller = warnings.showwarning, Teller()
+
+    def show(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+        if category.__module__.partition(".")[0] in PACKAGES:
+            complain(str(message), 0)
+        else:
+            show_in_full(message, category, *rest)
+
+    loggers = [logging.getLogger(package) for package in PACKAGES]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.addHandler(teller)
+        logger.setLevel(logging.INFO)
+    try:
+        with warnings.catch_warnings():
+            warnings.showwarning = show
+            yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.removeHandler(teller)
+            logger.setLevel(level)
+
+
+def _show_any_text() -> None:
+    """Let stdout and stderr show characters that their encoding has not, as backslash escapes instead of an error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a stream that somebody put in its place may be of another kind
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _say(text: str) -> None:
+    sys.stdout.write(f"{text}\n")

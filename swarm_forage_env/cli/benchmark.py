@@ -15,16 +15,8 @@ if TYPE_CHECKING:
 
 Entries = Annotated[list[Path], typer.Argument(metavar="ENTRY...", help="Entry files; the scripted four come along.")]
 
-benchmark = typer.Typer(
-    help="A fixed protocol of worlds and seeds: run policies in it, and compare entries.",
-    invoke_without_command=True,
-    rich_markup_mode=None,
-)
 
-
-@benchmark.callback()
 def run(  # long: one parameter per option
-    context: typer.Context,
     policy: Annotated[
         list[str] | None,
         typer.Option(
@@ -61,8 +53,6 @@ def run(  # long: one parameter per option
 
     Runs that the folder of records holds are not repeated: after Ctrl-C the same command does the rest.
     """
-    if context.invoked_subcommand is not None:
-        return
     if not policy:
         raise typer.BadParameter(
             "Expected --policy, the name or the file of a policy; swarm-forage list has the names."
@@ -75,7 +65,7 @@ def run(  # long: one parameter per option
     from metrics.benchmark.running import entry_name
     from metrics.scoring.question import ask
     from swarm_forage_env._internal.files import as_file_name, check_file
-    from swarm_forage_env.cli.interrupts import resumable
+    from swarm_forage_env.cli.errors import resumable
 
     protocol = load_protocol(quick=quick)
     called = name or entry_name(policy[0], quick=quick)
@@ -104,7 +94,6 @@ def run(  # long: one parameter per option
         typer.echo("A quick look, no entry: shorter runs than those of the scripted controllers.", err=True)
 
 
-@benchmark.command()
 def worlds() -> None:
     """Show the worlds of the benchmark: those to train in, and those that are held out."""
     from metrics.benchmark import load_protocol
@@ -112,13 +101,11 @@ def worlds() -> None:
     typer.echo(load_protocol().text())
 
 
-@benchmark.command()
 def show(entries: Entries, as_json: AsJson = False) -> None:
     """Show what entries are worth, beside the scripted controllers."""
     _show(_board_of(entries), as_json=as_json)
 
 
-@benchmark.command()
 def page(
     entries: Entries,
     into: Annotated[Path, typer.Option("--into", help="Page whose generated part is written anew.")] = Path(

@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
-from swarm_forage_env.cli.options import EXIT_INTERRUPTED, DryRun, FirstSeed, complain
+from swarm_forage_env.cli.options import DryRun, FirstSeed, complain
+from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
 
 @takes_options

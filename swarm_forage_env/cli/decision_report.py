@@ -18,7 +18,7 @@ from metrics.scoring.prediction import (
 from metrics.scoring.prediction_plots import draw_predictions
 from metrics.scoring.question import ask
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.cli.interrupts import resumable
+from swarm_forage_env.cli.errors import resumable
 from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture
 from swarm_forage_env.cli.score_report import plan_json, plan_text
 from swarm_forage_env.runs.plan import Plan

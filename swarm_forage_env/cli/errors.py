@@ -1,4 +1,4 @@
-"""How a command ends: an error becomes one line on stderr and an exit code, also an error that nobody foresaw.
+"""How a command ends that fails: an error becomes one line on stderr and an exit code, also one that nobody foresaw.
 
 An error that nobody foresaw is a fault of ours. Its traceback goes to a file, with the command and the versions, and
 the line says where the file is.
@@ -9,25 +9,20 @@ import shlex
 import sys
 import tempfile
 import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import typer
 
+from swarm_forage_env.cli.app import PACKAGES
 from swarm_forage_env.cli.former_words import right_option
-from swarm_forage_env.cli.options import (
-    EXIT_FAILURE,
-    EXIT_INTERRUPTED,
-    EXIT_UNFORESEEN,
-    EXIT_USAGE,
-    complain,
-)
+from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_UNFORESEEN, EXIT_USAGE, complain
+from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
 DEBUG_VARIABLE = "SWARM_FORAGE_DEBUG"
 """Environment variable; if it is set and not empty, an error that nobody foresaw shows its traceback at once."""
-_USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
-"""Base of typer's complaints about arguments; typer gives it no public name."""
-
 _BOUNDS = {
     "greater_than_equal": ("ge", ">="),
     "greater_than": ("gt", ">"),
@@ -35,27 +30,22 @@ _BOUNDS = {
     "less_than": ("lt", "<"),
 }
 """How pydantic names a bound -> its word for it, and its sign."""
-_OURS = ("swarm_forage_env", "baselines", "metrics")
-"""Where the errors are defined that speak to users: subclasses of ValueError, such as ConfigError and ModelError."""
 
 
-def end(error: BaseException) -> int:
-    """Say in one line on stderr why the command ends; returns the exit code.
+def end(error: BaseException, words: Sequence[str] = ()) -> int:
+    """Say in one line on stderr why the command of these words ends; returns the exit code.
 
     Raises:
         BaseException: `error` again, if nobody foresaw it and `DEBUG_VARIABLE` is set.
     """
     from swarm_forage_env.runs.workers import WorkerError  # late: only a command that fails needs it
 
-    if isinstance(error, _USAGE_ERROR):
+    if hasattr(error, "format_message"):  # typer's complaints about words; their common class has no public name
         return complain(_about_words(error), EXIT_USAGE)
-    if isinstance(error, ValueError) and type(error).__module__.partition(".")[0] in _OURS:
+    if isinstance(error, ValueError) and type(error).__module__.partition(".")[0] in PACKAGES:
         return complain(str(error), EXIT_USAGE)
-    if isinstance(error, KeyboardInterrupt | typer.Abort):
-        # Commands that keep a part of their work say so themselves.
-        return complain(
-            "Interrupted. What was under way is not kept; the same command starts it again.", EXIT_INTERRUPTED
-        )
+    if isinstance(error, SystemExit):
+        return error.code if isinstance(error.code, int) else 0
     if isinstance(error, BrokenPipeError):  # whoever read our output has enough, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the last flush fails again
         return EXIT_FAILURE
@@ -71,11 +61,11 @@ def end(error: BaseException) -> int:
         )
     if os.environ.get(DEBUG_VARIABLE):
         raise error
-    return _end_unforeseen(error)
+    return _end_unforeseen(error, words)
 
 
 def _about_words(error: Any) -> str:
-    """Return what is wrong with the words of a command, a `_USAGE_ERROR`, in the style of our other errors."""
+    """Return what is wrong with the words of a command, for typer, in the style of our other errors."""
     wrong = getattr(error, "option_name", "")
     right = right_option(wrong, [word for option in error.ctx.command.params for word in option.opts]) if wrong else ""
     if right:
@@ -101,16 +91,28 @@ def _about_words(error: Any) -> str:
     )
 
 
-def _end_unforeseen(error: BaseException) -> int:
+@contextmanager
+def resumable(folder: Path) -> Iterator[None]:
+    """Turn Ctrl-C in a study into one line that says where its runs are, and the exit code of an interrupt."""
+    from swarm_forage_env.runs.runner import RunsInterrupted
+
+    try:
+        yield
+    except RunsInterrupted as interrupt:
+        complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+def _end_unforeseen(error: BaseException, words: Sequence[str]) -> int:
     summary = "".join(traceback.format_exception_only(error)).strip().splitlines()[-1]
     try:
-        kept = f"Details: {_report(error)}; please send this file to us."
+        kept = f"Details: {_report(error, words)}; please send this file to us."
     except OSError as problem:
         kept = f"The details cannot be kept ({problem.strerror}); with {DEBUG_VARIABLE}=1 the command shows them."
     return complain(f"an error that should not happen: {summary}. {kept}", EXIT_UNFORESEEN)
 
 
-def _report(error: BaseException) -> Path:
+def _report(error: BaseException, words: Sequence[str]) -> Path:
     """Write what we need to find the fault to a file of its own; returns the file.
 
     Raises:
@@ -122,7 +124,7 @@ def _report(error: BaseException) -> Path:
 
     versions = {"python": platform.python_version(), "system": platform.platform(), **software_versions()}
     lines = [
-        f"command: {shlex.join(['swarm-forage', *sys.argv[1:]])}",
+        f"command: {shlex.join(['swarm-forage', *words])}",
         f"folder: {Path.cwd()}",
         *(f"{name}: {version}" for name, version in versions.items()),
         "",

@@ -11,10 +11,6 @@ EXIT_FAILURE = 1
 EXIT_USAGE = 2
 EXIT_UNFORESEEN = 70
 """What sysexits.h calls an internal software error."""
-EXIT_INTERRUPTED = 130
-"""Exit code that shells report for a program ended by Ctrl-C."""
-EXIT_TERMINATED = 143
-"""Exit code that shells report for a program ended by SIGTERM, as batch systems and containers send it."""
 
 Policies = Annotated[
     tuple[str, ...],

@@ -58,7 +58,7 @@ def _show_plan(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None
 
 
 def _run_specs(specs: "tuple[RunSpec, ...]", store: "RunStore", jobs: int | None) -> "Outcomes":
-    from swarm_forage_env.cli.interrupts import resumable
+    from swarm_forage_env.cli.errors import resumable
     from swarm_forage_env.runs.runner import run_specs
 
     with resumable(store.folder):

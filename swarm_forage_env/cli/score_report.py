@@ -12,7 +12,7 @@ from metrics.scoring.comparison import Comparison, compare_tables
 from metrics.scoring.plots import draw_scores
 from metrics.scoring.table import ScoreTable
 from swarm_forage_env._internal.wording import aligned, counted
-from swarm_forage_env.cli.interrupts import resumable
+from swarm_forage_env.cli.errors import resumable
 from swarm_forage_env.cli.options import EXIT_FAILURE, no_picture
 from swarm_forage_env.cli.report import estimate, estimated_seconds
 from swarm_forage_env.runs.plan import Plan

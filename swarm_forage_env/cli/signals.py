@@ -1,73 +1,78 @@
-"""What commands that store runs do when they are interrupted, by Ctrl-C or by SIGTERM."""
+"""Ctrl-C and SIGTERM: one line on stderr and an exit code, whatever a command is doing when they come.
+
+They are heard before anything is imported that takes time, so this module imports little itself.
+"""
 
 import os
 import signal
 import sys
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
-import typer
-
-from swarm_forage_env.cli.options import EXIT_INTERRUPTED, complain
-from swarm_forage_env.runs.runner import RunsInterrupted
-
+EXIT_INTERRUPTED = 130
+"""Exit code that shells report for a program ended by Ctrl-C."""
+EXIT_TERMINATED = 143
+"""Exit code that shells report for a program ended by SIGTERM, as batch systems and containers send it."""
 AGAIN_S = 0.2
-"""When an interrupt that was lost is sent again; our choice: soon, and late enough to be elsewhere."""
+"""When an interrupt that was lost is raised again; our choice: soon, and late enough to be elsewhere."""
+
+_HEARD = (signal.SIGINT, signal.SIGTERM)
+
+came: list[int] = []
+"""Numbers of the signals that came."""
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, which batch systems and containers send: to be handled as Ctrl-C is."""
+    """SIGTERM, to be handled as Ctrl-C is: what keeps finished runs then keeps them now, too."""
 
 
-@contextmanager
-def heard() -> Iterator[list[int]]:
-    """Let SIGTERM raise `Terminated`, so that what keeps finished runs at Ctrl-C keeps them then, too.
+def hear() -> None:
+    """Let Ctrl-C raise KeyboardInterrupt and SIGTERM `Terminated`, and raise them again where they are lost.
 
-    An interrupt that comes while LLVM calls Python, as it does in compiling, is lost there: it is sent again a moment
-    later. Meanwhile the compiler may fail with an error of its own; the list tells then what it was.
-
-    Yields:
-        A list that is empty until Ctrl-C or SIGTERM came: their numbers.
+    They are lost where a library catches every error, as some do around imports, and where LLVM calls Python, as it
+    does in compiling. What they break may fail later, with an error of its own: `came` tells what it was.
     """
-    came: list[int] = []
-    if threading.current_thread() is not threading.main_thread():  # handlers are set in the main thread only
-        yield came
-        return
-
-    def stop(number: int, _frame: object) -> None:
-        came.append(number)
-        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
-
-    show = sys.unraisablehook
-    again: list[threading.Timer] = []
-
-    def show_others(lost: Any) -> None:
-        if isinstance(lost.exc_value, KeyboardInterrupt):
-            again.append(threading.Timer(AGAIN_S, os.kill, (os.getpid(), came[-1])))
-            again[-1].start()
-        else:
-            show(lost)
-
-    before = {number: signal.signal(number, stop) for number in (signal.SIGTERM, signal.SIGINT)}
-    sys.unraisablehook = show_others
-    try:
-        yield came
-    finally:
-        sys.unraisablehook = show
-        for timer in again:
-            timer.cancel()
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    for number in _HEARD:
+        signal.signal(number, _interrupt)
+    sys.excepthook = _silent_of_interrupts(sys.excepthook)
+    sys.unraisablehook = _silent_of_interrupts(sys.unraisablehook)
 
 
-@contextmanager
-def resumable(folder: Path) -> Iterator[None]:
-    """Turn Ctrl-C in a study into one line that says where its runs are, and the exit code of an interrupt."""
-    try:
-        yield
-    except RunsInterrupted as interrupt:
-        complain(f"{interrupt} They are in {folder}; the same command does the rest.", EXIT_INTERRUPTED)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
+def _interrupt(number: int, _: object = None) -> None:
+    came.append(number)
+    if hasattr(signal, "setitimer"):  # Windows has no such clock: there one presses Ctrl-C again
+        signal.signal(signal.SIGALRM, _interrupt_again)
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
+    raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
+
+
+def _interrupt_again(*_: object) -> None:
+    """Interrupt once more, unless an interrupt is being handled right now: finished runs may be kept just then."""
+    error = sys.exc_info()[1]
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    if error is None:
+        _interrupt(came[-1])
+
+
+def _silent_of_interrupts(show: Callable[..., None]) -> Callable[..., None]:
+    """Return a hook of `sys` that shows all other errors."""
+
+    def hook(*told: Any) -> None:
+        if not issubclass(getattr(told[0], "exc_type", told[0]), KeyboardInterrupt):
+            show(*told)
+
+    return hook
+
+
+def exit_code() -> int:
+    """Return the exit code of a command that was interrupted."""
+    return EXIT_TERMINATED if signal.SIGTERM in came else EXIT_INTERRUPTED
+
+
+def end_at_once(code: int) -> None:
+    """From now on, let a signal end the process with this exit code: all is done, or an error is being told."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+    for number in _HEARD:
+        signal.signal(number, lambda *_: os._exit(code))

@@ -6,12 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, AsJson, DryRun, complain
-from swarm_forage_env.cli.study_diff import diff
-from swarm_forage_env.cli.study_maps import maps
-from swarm_forage_env.cli.study_page import report
-from swarm_forage_env.cli.study_plot import plot
-from swarm_forage_env.cli.study_verdict import verdict
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, complain
+from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
 if TYPE_CHECKING:
     from swarm_forage_env.studies.study import StudySpec
@@ -24,14 +20,7 @@ Reading = Annotated[
     str, typer.Option("--reading", help="described, program (the authors'), both, or file: as it says.")
 ]
 
-study = typer.Typer(
-    help="Whole studies: the experiment sets of the paper, or your own.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
 
-
-@study.command("list")
 def list_studies(
     budget: Annotated[str, typer.Option("--budget", help="smoke, reduced or paper.")] = "paper",
 ) -> None:
@@ -42,7 +31,6 @@ def list_studies(
     output().print(table_of_sets(budget))
 
 
-@study.command()
 def show(name: Name, budget: Budget = None, seeds: Seeds = None, reading: Reading = "file") -> None:
     """Show what a study varies, and how many runs each of its budgets makes."""
     from swarm_forage_env.cli.study_report import described
@@ -53,7 +41,6 @@ def show(name: Name, budget: Budget = None, seeds: Seeds = None, reading: Readin
     typer.echo(f"\nBudgets: {', '.join(budget_names(name))}" + ("" if budget or len(others) < 2 else "; see --budget"))
 
 
-@study.command()
 def run(  # long: one parameter per option
     name: Name,
     budget: Budget = None,
@@ -108,7 +95,6 @@ def run(  # long: one parameter per option
         raise typer.Exit(EXIT_FAILURE)
 
 
-@study.command()
 def status(place: Place, as_json: AsJson = False) -> None:
     """Show which runs of a study are done, missing or failed, cell by cell; exit code 1 unless all are done."""
     from swarm_forage_env.cli.study_report import status_json, status_report
@@ -120,17 +106,12 @@ def status(place: Place, as_json: AsJson = False) -> None:
         raise typer.Exit(EXIT_FAILURE)
 
 
-@study.command()
 def pack(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study.")],
     out: Annotated[Path | None, typer.Option("--out", help="File; default DIR/NAME.parquet.")] = None,
 ) -> None:
     """Put all runs of a study into one file, which holds everything that is known of them."""
     typer.echo(f"packed into {_pack(folder, out)}")
-
-
-for command in (verdict, plot, maps, report, diff):
-    study.command()(command)
 
 
 def _pack(folder: Path, out: Path | None) -> Path:

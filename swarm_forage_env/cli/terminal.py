@@ -3,8 +3,6 @@
 Names of policies, files and scenarios are shown as they are: no console reads markup such as [red] in them.
 """
 
-import io
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
@@ -48,10 +46,3 @@ def progress_bar(text: str, total: float | None = None) -> Iterator[Advance]:
             bar.update(task, completed=done, total=total)
 
         yield advance
-
-
-def show_any_text() -> None:
-    """Let stdout and stderr show characters that their encoding has not, as backslash escapes instead of an error."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # a stream that somebody put in its place may be of another kind
-            stream.reconfigure(errors="backslashreplace")

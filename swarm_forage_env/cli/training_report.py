@@ -8,7 +8,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from swarm_forage_env.cli.options import EXIT_INTERRUPTED, complain, no_picture
+from swarm_forage_env.cli.options import complain, no_picture
+from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 from swarm_forage_env.training.curves import curve_of_training
 from swarm_forage_env.training.evaluations import MODEL_FILE, TrainingCurve
 from swarm_forage_env.training.lines import evaluation_lines, heading, progress_line

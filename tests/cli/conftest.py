@@ -1,10 +1,8 @@
 """The console command in this process: words in, exit code and text out."""
 
-import sys
-
 import pytest
 
-from swarm_forage_env import cli
+from tests.support.console import answer
 from tests.support.pictures import keep_figures
 
 
@@ -26,10 +24,8 @@ def command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
 
     def call(*words):
-        monkeypatch.setattr(sys, "argv", ["swarm-forage", *words])
-        with pytest.raises(SystemExit) as end:
-            cli.main()
+        code = answer(*words)
         shown = capsys.readouterr()
-        return end.value.code or 0, shown.out, shown.err
+        return code, shown.out, shown.err
 
     return call

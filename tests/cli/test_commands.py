@@ -400,21 +400,6 @@ def test_the_columns_of_records_are_listed(command):
     assert "interference_fraction" in out
 
 
-def test_version_and_help(command):
-    assert command("--version") == (0, "swarm-forage 0.1.0\n", "")
-    for words in ((), ("--help",)):
-        code, out, _ = command(*words)
-        assert code == 0
-        assert "record" in out
-
-
-def test_help_loads_neither_physics_nor_tables():
-    heavy = "{'numba', 'pymunk', 'polars', 'scipy', 'matplotlib'}"
-    program = f"import sys; from swarm_forage_env import cli; print({heavy} & set(sys.modules))"
-    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert answer.stdout == "set()\n"
-
-
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from swarm_forage_env.cli.ending import DEBUG_VARIABLE, end
+from swarm_forage_env.cli.errors import DEBUG_VARIABLE, end
 from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_UNFORESEEN, EXIT_USAGE, complain
 from swarm_forage_env.policies.pretrained import network_file
 

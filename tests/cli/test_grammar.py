@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import pytest
-import typer
 
-from swarm_forage_env.cli import app as application
+from swarm_forage_env.cli.app import loaded
+from swarm_forage_env.cli.commands import COMMANDS
 from swarm_forage_env.cli.former_words import OPTIONS, right_option
 
 MAKE_RUNS = ("run", "score", "compare", "predict", "choose", "ablate")
@@ -14,16 +14,7 @@ ONE_RUN = ("record", "replay", "watch", "saliency")
 """Commands that look into one run, or into one of each policy."""
 
 
-def walk(command, words=()):
-    """All commands: words -> command."""
-    below = getattr(command, "commands", {})
-    found = {} if below and words == () else {words: command}
-    for name, one in below.items():
-        found |= walk(one, (*words, name))
-    return found
-
-
-ALL = {" ".join(words): command for words, command in walk(typer.main.get_command(application.app)).items()}
+ALL = {one.words: loaded(one) for group in COMMANDS.values() for one in group if one.place}
 WITH_SCENARIO = [words for words, command in ALL.items() if any("--scenario" in one.opts for one in command.params)]
 
 

@@ -15,7 +15,6 @@ import os
 import re
 import shlex
 import shutil
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
@@ -26,9 +25,9 @@ import pytest
 from metrics import PAPER_POLICIES, choose_policy, compare_policies, predict_policy, score_curves, score_policy
 from metrics.benchmark import load_protocol
 from metrics.benchmark.page import BEGIN, END
-from swarm_forage_env import cli
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.studies.study import Axis
+from tests.support.console import answer
 from tests.support.entries import TINY, made_up_entry
 from tests.support.golden_runs import AS_THEN
 from tests.support.made_tables import made_study, made_table
@@ -223,14 +222,12 @@ class Place:
             self._answers[name] = (_as_json if name.endswith(".json") else _as_text)(code, out, err, files)
         return self._answers[name]
 
-    def _said(self, words: list[str]) -> tuple[Any, str, str]:
+    def _said(self, words: list[str]) -> tuple[int, str, str]:
         out, err = io.StringIO(), io.StringIO()
-        with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-            patch.setattr(sys, "argv", ["swarm-forage", *words])
-            with pytest.raises(SystemExit) as end:
-                cli.main()
+        with redirect_stdout(out), redirect_stderr(err):
+            code = answer(*words)
         notes = steady_text(err.getvalue(), self.folder)
-        return end.value.code or 0, self._steady(out.getvalue()), notes
+        return code, self._steady(out.getvalue()), notes
 
     def _steady(self, text: str) -> str:
         try:

@@ -14,7 +14,15 @@ import pytest
 from numba.core.caching import UserProvidedCacheLocator
 
 ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("swarm_forage_env", "baselines", "metrics")
 SHORT = ("--robots", "2", "--objects", "10", "--horizon", "4", "--set", "interval_s=2")
+
+
+def importers_of_numba() -> list[str]:
+    """Names of our modules that import numba."""
+    files = [file for package in PACKAGES for file in (ROOT / package).rglob("*.py")]
+    importing = [file for file in files if re.search(r"^\s*(from|import) numba\b", file.read_text(), re.MULTILINE)]
+    return [".".join(file.relative_to(ROOT).with_suffix("").parts) for file in importing]
 
 
 class Evil:
@@ -31,7 +39,7 @@ def kernels() -> list[tuple[Path, str, int]]:
     """File, name and first line of all functions that may be kept compiled."""
     return [
         (file, node.name, node.decorator_list[0].lineno)
-        for package in ("swarm_forage_env", "baselines", "metrics")
+        for package in PACKAGES
         for file in (ROOT / package).rglob("*.py")
         for node in ast.parse(file.read_text()).body
         if isinstance(node, ast.FunctionDef) and node.decorator_list
@@ -88,7 +96,7 @@ def command(here: Path, *words: str, **environ: str) -> subprocess.CompletedProc
 @pytest.mark.compiled
 def test_a_forged_cache_that_a_file_names_is_not_opened(here, marker):
     ended = command(here, "run", "--policy", "crw", *SHORT, "--jobs", "1")
-    assert ".numba_config.yaml in the current folder is not read" in ended.stderr
+    assert "swarm-forage: .numba_config.yaml in the current folder is not read" in ended.stderr
     program = "from metrics.distance import dtw; dtw([0.0, 1.0], [1.0, 1.0])"
     python(here, "-c", program)
     assert not marker.exists()
@@ -96,9 +104,7 @@ def test_a_forged_cache_that_a_file_names_is_not_opened(here, marker):
     assert marker.exists(), "the forgery is none"
 
 
-@pytest.mark.parametrize(
-    "module", ["swarm_forage_env._internal.compiling", "swarm_forage_env.world.kernels.many", "metrics.distance"]
-)
+@pytest.mark.parametrize("module", importers_of_numba())
 def test_numba_has_no_settings_from_a_file(here, module):
     """Whichever module is imported first, and whenever numba looks."""
     look = "from numba.core import config; print(config.CACHE_DIR, config.CHROME_TRACE, config.BOUNDSCHECK)"
@@ -111,6 +117,68 @@ def test_what_numba_has_read_before_is_undone(here):
     program = "import numba; a = numba.config.CACHE_DIR; import metrics.distance; print(a, [numba.config.CACHE_DIR])"
     read = python(here, "-c", program).stdout
     assert re.fullmatch(r"/\S+ \[''\]\n", read), read
+
+
+CONSOLE = """
+import sys
+from swarm_forage_env.cli import main
+if __name__ == "__main__":
+    sys.exit(main())
+"""
+FOREIGN = ("numpy", "numba", "yaml", "matplotlib", "typer", "polars", "baselines", "metrics", "swarm_forage_env")
+PLUGIN = "[swarm_forage_env.policies]\nevil = multiprocessing:Evil\n[numba_extensions]\ninit = multiprocessing:evil\n"
+
+
+@pytest.fixture
+def console(tmp_path, here, marker):
+    """The console command, as an installer writes it, in a folder where whatever might be taken for something lies."""
+    evil = f"import os; os.close(os.open({str(marker)!r}, os.O_CREAT)); raise ImportError('a file of somebody else')\n"
+    for name in {*sys.stdlib_module_names, *FOREIGN, "sitecustomize", "usercustomize"}:
+        (here / f"{name}.py").write_text(evil)
+    (here / "evil-1.0.dist-info").mkdir()
+    (here / "evil-1.0.dist-info" / "METADATA").write_text("Metadata-Version: 2.1\nName: evil\nVersion: 1.0\n")
+    (here / "evil-1.0.dist-info" / "entry_points.txt").write_text(PLUGIN)
+    (here / "matplotlibrc").write_text("text.usetex: True\nbackend: module://multiprocessing\n")
+    (here / ".env").write_text(
+        f"NUMBA_CACHE_DIR={tmp_path / 'cache'}\nIMAGEIO_FFMPEG_EXE={tmp_path / 'bin' / 'latex'}\n"
+    )
+    for name in ("dask.yaml", "distributed.yaml", "jobqueue.yaml"):
+        (here / name).write_text("distributed: {worker: {preload: [multiprocessing.py]}}\n")
+    programs = tmp_path / "bin"
+    programs.mkdir()
+    (programs / "swarm-forage").write_text(CONSOLE)
+    (programs / "latex").write_text(f"#!/bin/sh\ntouch {marker}\n")
+    (programs / "latex").chmod(0o755)
+
+    def call(*words):
+        told = {**os.environ, "PYTHONPATH": str(ROOT), "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}"}
+        return subprocess.run([sys.executable, programs / "swarm-forage", *words], cwd=here, env=told, text=True,
+                              capture_output=True, timeout=300, check=False)  # fmt: skip
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("words", "needed"),
+    [
+        (("list",), "numba"),
+        (("run", "--policy", "random", *SHORT, "--seeds", "2", "--jobs", "2"), "matplotlib"),
+        (("record", "--policy", "random", *SHORT[:4], "--seconds", "2", "--file", "film.mp4"), "imageio_ffmpeg"),
+        (("study", "run", "tiny.toml", "--cluster", "local", "--workers", "1"), "distributed"),
+    ],
+)
+def test_no_file_is_read_because_of_its_name(console, here, marker, words, needed):
+    pytest.importorskip(needed)
+    (here / "tiny.toml").write_text(
+        'name = "tiny"\nscenario = "warehouse_small"\npolicies = ["random"]\n[set]\nn_objects = 10\n'
+        '[[axis]]\ncriterion = "population_size"\nvalues = [2]\n'
+        "[budget.tiny]\nseeds = 1\nhorizon_s = 4.0\ninterval_s = 2.0\n"
+    )
+    ended = console(*words)
+    assert (ended.returncode, marker.exists()) == (0, False), ended.stderr
+    assert ended.stderr.count(".numba_config.yaml") <= 1
+    if words[0] == "run":
+        assert (here / "results/warehouse_small/performance.png").exists()
 
 
 def test_both_guards_are_the_same():

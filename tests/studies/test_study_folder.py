@@ -172,7 +172,7 @@ def test_a_folder_without_a_study_is_refused(tmp_path):
 KILLED_RUN = """
 import sys, time
 sys.path.insert(0, sys.argv[2])
-from swarm_forage_env.cli.interrupts import heard
+from swarm_forage_env.cli.signals import hear
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.runs.store import RunStore
 from tests.support.tiny_study import tiny_study
@@ -186,8 +186,8 @@ def never_all(store, record):
 
 if __name__ == "__main__":
     RunStore.write = never_all
-    with heard():  # as commands do: where kernels are compiled Ctrl-C alone can be lost
-        run_study(study, StudyFolder(sys.argv[1]), jobs=1)
+    hear()  # as commands do: where kernels are compiled Ctrl-C alone can be lost
+    run_study(study, StudyFolder(sys.argv[1]), jobs=1)
 """
 
 

@@ -10,7 +10,6 @@ import io
 import json
 import os
 import shutil
-import sys
 import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -23,17 +22,18 @@ from unittest import mock
 
 import numpy as np
 import polars as pl
-import typer.main
 
-from swarm_forage_env import cli
-from swarm_forage_env.cli import app as application
-from swarm_forage_env.cli.ending import DEBUG_VARIABLE
-from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_USAGE
+from swarm_forage_env.cli.app import loaded
+from swarm_forage_env.cli.commands import COMMANDS
+from swarm_forage_env.cli.errors import DEBUG_VARIABLE
+from swarm_forage_env.cli.options import EXIT_FAILURE, EXIT_USAGE
+from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.policies.learned import LearnedPolicy
 from swarm_forage_env.policies.pretrained import network_file, plan_file
 from swarm_forage_env.runs import run, runner
 from swarm_forage_env.studies.study_file import find_study
+from tests.support.console import answer
 
 EXIT_CODES = (0, EXIT_FAILURE, EXIT_USAGE, EXIT_INTERRUPTED)
 """What a command may end with; the code of an error that nobody foresaw is not among them."""
@@ -163,15 +163,12 @@ def outcome(words: Sequence[str]) -> Outcome:
     fault, code = "", 0
     with (
         _beginnings_only(trains="train" in words),
-        mock.patch.object(sys, "argv", ["swarm-forage", *words]),
         mock.patch.dict(os.environ, {DEBUG_VARIABLE: "1"}),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
     ):
         try:
-            cli.main()
-        except SystemExit as end:
-            code = end.code if isinstance(end.code, int) else 0
+            code = answer(*words)
         except BaseException as error:  # noqa: BLE001 - whatever it is, it is a fault
             fault = "".join(traceback.format_exception(error))
     errors = _text(err)
@@ -186,12 +183,8 @@ def outcome(words: Sequence[str]) -> Outcome:
 
 
 def _commands() -> list[tuple[tuple[str, ...], Any]]:
-    """All subcommands with their words."""
-    found: list[tuple[tuple[str, ...], Any]] = []
-    for name, command in typer.main.get_command(application.app).commands.items():  # type: ignore[attr-defined] - a group
-        inner = getattr(command, "commands", None)
-        found += [((name,), command)] if inner is None else [((name, below), one) for below, one in inner.items()]
-    return found
+    """All commands with their words."""
+    return [(tuple(one.words.split()), loaded(one)) for group in COMMANDS.values() for one in group if one.place]
 
 
 def _value(random: Random, item: Any, folder: Path) -> str:

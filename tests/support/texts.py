@@ -14,7 +14,7 @@ _VARYING_FIELDS = {
 }  # fmt: skip
 """Fields of JSON documents; the digest of an entry is also of its versions and hours."""
 _PROGRESS = re.compile(
-    r"\d+/\d+ runs, .*|\d+ of \d+ runs (is|are) stored already\.|Compiling what is used .*|measuring .*"
+    r"\d+/\d+ runs, .*|\d+ of \d+ runs (is|are) stored already\.|swarm-forage: Compiling what is used .*|measuring .*"
     r"|\d+ of them (was|were) made by another version .*"
 )
 """Lines that depend on what is stored and compiled already."""

@@ -1,0 +1,66 @@
+"""Which commands there are. None of them is imported before it is asked for.
+
+A command is a function, in a file of this folder; what its parameters say, `typer` makes options of. A line here adds
+one. A command of two words is listed by the help of the first, `swarm-forage study --help`.
+"""
+
+from typing import NamedTuple
+
+
+class Command(NamedTuple):
+    """A command, as `--help` lists it."""
+
+    words: str
+    about: str
+    """At most 50 characters, so that a terminal of 80 columns cuts none."""
+    place: str = ""
+    """Module in this folder and function in it, `run:run`; empty where only a second word makes a command."""
+
+
+COMMANDS: dict[str, tuple[Command, ...]] = {
+    "Run and compare policies": (
+        Command("run", "Run policies in a scenario and compare them.", "run:run"),
+        Command("score", "Score a policy in all experiments of the measures.", "score:score"),
+        Command("compare", "Score policies in the same experiments.", "score:score"),
+        Command("predict", "Fit performance to swarm size, and predict.", "predict:predict"),
+        Command("choose", "Rank policies by constraints that they meet.", "choose:choose"),
+        Command("rerun", "Run a stored run again, here.", "rerun:rerun"),
+    ),
+    "Train": (
+        Command("train", "Train one policy that every robot shares.", "train:train"),
+        Command("curves", "Draw how trainings went.", "curves:curves"),
+        Command("dataset", "Record what robots see and do, for learners.", "dataset:dataset"),
+        Command("saliency", "Show what a trained network looks at.", "saliency:saliency"),
+    ),
+    "Look into runs": (
+        Command("watch", "Watch a run in a window.", "watch:watch"),
+        Command("record", "Film a run, or draw it at one time.", "record:record"),
+        Command("replay", "Write a run as one page, with play and pause.", "replay:replay"),
+        Command("maps", "Draw where things happened in a run.", "maps:maps"),
+        Command("check", "Check that policies keep the rules.", "check:check"),
+    ),
+    "Look things up": (
+        Command("list", "List scenarios and policies.", "show:list_everything"),
+        Command("info", "Show what a scenario or a policy is.", "show:info"),
+        Command("availability", "Show how likely enough robots are at work.", "availability:availability"),
+    ),
+    "Whole experiments": (
+        Command("ablate", "Switch one quirk at a time.", "ablate:ablate"),
+        Command("study", "Whole studies: the paper's sets, or your own."),
+        Command("study list", "List the experiment sets of the paper.", "study:list_studies"),
+        Command("study show", "Show what a study varies, and its budgets.", "study:show"),
+        Command("study run", "Run what is missing of a study, and pack it.", "study:run"),
+        Command("study status", "Show which runs of a study are done.", "study:status"),
+        Command("study pack", "Put all runs of a study into one file.", "study:pack"),
+        Command("study verdict", "Hold the claims of the paper against runs.", "study_verdict:verdict"),
+        Command("study plot", "Draw the figures of a study.", "study_plot:plot"),
+        Command("study maps", "Draw where things happened in some cells.", "study_maps:maps"),
+        Command("study report", "Write one page about studies.", "study_page:report"),
+        Command("study diff", "Say which cells of two studies differ.", "study_diff:diff"),
+        Command("benchmark", "Run policies in a fixed protocol of worlds.", "benchmark:run"),
+        Command("benchmark worlds", "List the worlds of the benchmark.", "benchmark:worlds"),
+        Command("benchmark show", "Show what entries are worth.", "benchmark:show"),
+        Command("benchmark page", "Write the page that compares entries.", "benchmark:page"),
+    ),
+}
+"""Heading in `--help` -> its commands."""

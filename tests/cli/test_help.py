@@ -1,0 +1,77 @@
+"""Which commands there are, and what `--help` says of them; only the one that is asked for is imported."""
+
+import subprocess
+import sys
+
+import pytest
+
+from swarm_forage_env.cli.app import loaded
+from swarm_forage_env.cli.commands import COMMANDS
+
+ALL = [command for group in COMMANDS.values() for command in group]
+HEAVY = ("numpy", "polars", "typer", "rich", "gymnasium", "pettingzoo", "swarm_forage_env.scenarios")
+COLUMNS = 80
+
+
+def imported(*words: str) -> set[str]:
+    """Which heavy modules a command imports."""
+    program = f"""
+import atexit, sys
+from swarm_forage_env.cli import main
+atexit.register(lambda: print(*(name for name in {HEAVY} if name in sys.modules), file=sys.stderr))
+main()
+"""
+    ended = subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True, check=True)
+    return set(ended.stderr.split())
+
+
+def test_version_and_help(command):
+    assert command("--version") == (0, "swarm-forage 0.1.0\n", "")
+    assert command() == command("--help")
+    code, out, err = command("--help")
+    assert (code, err) == (0, "")
+    assert max(map(len, out.splitlines())) < COLUMNS
+    for one in ALL:
+        assert (one.about in out) == (" " not in one.words)
+
+
+@pytest.mark.parametrize("one", ALL, ids=lambda one: one.words)
+def test_a_line_of_help_is_cut_nowhere(one):
+    assert len(one.about) <= 50
+    assert one.about.endswith(".")
+
+
+@pytest.mark.parametrize("one", [one for one in ALL if one.place], ids=lambda one: one.words)
+def test_every_command_is_there(command, one):
+    assert loaded(one).help
+    code, out, err = command(*one.words.split(), "--help")
+    assert (code, err) == (0, "")
+    assert out.startswith(f"Usage: swarm-forage {one.words}")
+
+
+@pytest.mark.parametrize("words", [("study",), ("study", "--help"), ("benchmark", "--help")])
+def test_the_help_of_a_first_word_lists_the_second_ones(command, words):
+    code, out, err = command(*words)
+    assert (code, err) == (0, "")
+    below = [one for one in ALL if one.words.startswith(f"{words[0]} ")]
+    assert len(below) > 2
+    assert all(f"  {one.words.split()[1]} " in out and one.about in out for one in below)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("rnu",), "No such command 'rnu'. Did you mean 'run'?"),
+        (("--verison",), "No such option: '--verison'. Did you mean '--version'?"),
+        (("study", "rnu"), "No such command of study: 'rnu'. Did you mean 'run'?"),
+        (("study", "--all"), "No such option: '--all'."),
+        (("benchmark", "wolrds"), "No such command of benchmark: 'wolrds'. Did you mean 'worlds'?"),
+    ],
+)
+def test_words_that_mean_nothing_are_answered_with_the_nearest(command, words, told):
+    assert command(*words) == (2, "", f"swarm-forage: {told}\n")
+
+
+def test_only_what_is_asked_for_is_imported():
+    assert imported("--help") == imported("study") == set()
+    assert imported("run", "--help") <= {"typer", "rich"}
