@@ -60,10 +60,10 @@ class Board(Answer):
             OSError: the page cannot be read, or a file cannot be written.
         """
         page, picture = Path(page), Path(picture)
+        before = page.read_text(encoding="utf-8")
         link = Path(os.path.relpath(picture, page.parent)).as_posix()
         details = page.with_name(f"{page.stem}_in_detail{page.suffix}")
-        block = page_block(self.standings, self.protocol, link, details.name)
-        text = with_block(page.read_text(encoding="utf-8"), block, str(page))
+        text = with_block(before, page_block(self.standings, self.protocol, link, details.name), str(page))
         in_detail = details_page(self.standings, self.reference, self.protocol, page.name)
         self.draw(picture)
         for file, content in ((details, in_detail), (page, text)):
