@@ -13,7 +13,7 @@ from swarm_forage_env.rendering.figures import SCREEN
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 SHOWN = ("self_organisation", "flexibility", "task_graph")
-"""Those that pages show; `swarm-forage availability` draws the other one."""
+"""Those that pages show; `swarm-forage predict availability` draws the other one."""
 
 
 if __name__ == "__main__":

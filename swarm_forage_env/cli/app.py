@@ -56,11 +56,12 @@ def carry_out(words: Sequence[str]) -> int:
 def _named(words: Sequence[str]) -> Command:
     """Return the command that the first word, or the first two, name."""
     _check_known("command", words[:1], [name for name in _BY_WORDS if " " not in name])
-    below = _below(words[0])
+    below, first = _below(words[0]), _BY_WORDS[words[0]]
     if below and words[1:] and not words[1].startswith("-"):
-        _check_known(f"command of {words[0]}:", words[1:2], below)
-        return below[words[1]]
-    return _BY_WORDS[words[0]]
+        if not first.place:
+            _check_known(f"command of {words[0]}:", words[1:2], below, f"{words[0]} ")
+        return below.get(words[1], first)
+    return first
 
 
 def _below(word: str) -> dict[str, Command]:
@@ -68,10 +69,16 @@ def _below(word: str) -> dict[str, Command]:
     return {name.split()[1]: command for name, command in _BY_WORDS.items() if name.startswith(f"{word} ")}
 
 
-def _check_known(what: str, words: Iterable[str], known: Iterable[str]) -> None:
+def _check_known(what: str, words: Iterable[str], known: Iterable[str], before: str = "") -> None:
+    """Refuse a word that is not known, and say which one is right; `before` stands before it."""
     for word in words:
         if word not in known:
             from swarm_forage_env._internal.spelling import suggestion
+            from swarm_forage_env.cli.former_words import COMMANDS as FORMER
+
+            right = FORMER.get(f"{before}{word}")
+            if right is not None:
+                raise WrongWordsError(f"No such {what} {word!r}; it is 'swarm-forage {right}'.")
 
             raise WrongWordsError(f"No such {what} {word!r}.{suggestion(word, known)}")
 

@@ -8,6 +8,7 @@ import typer
 
 from metrics.controllers import PAPER_POLICIES
 from swarm_forage_env._internal.printable import printable
+from swarm_forage_env.cli.option_groups import PolicyOptions, takes_options
 from swarm_forage_env.cli.options import AsJson, DryRun, Jobs
 
 if TYPE_CHECKING:
@@ -16,18 +17,14 @@ if TYPE_CHECKING:
 Entries = Annotated[list[Path], typer.Argument(metavar="ENTRY...", help="Entry files; the scripted four come along.")]
 
 
+@takes_options
 def run(  # long: one parameter per option
-    policy: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--policy", help="Name, or file of a trained policy. May be repeated: training seeds of one method."
-        ),
-    ] = None,
+    policies: PolicyOptions,
     name: Annotated[str | None, typer.Option("--name", help="Name of the entry; default that of the policy.")] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="Entry file; default results/benchmark/NAME.json.")] = None,
-    records: Annotated[
-        Path, typer.Option("--records", help="Folder for records of runs, which are not repeated.")
-    ] = Path("results/benchmark/records"),
+    file: Annotated[Path | None, typer.Option("--file", help="Entry; default results/benchmark/NAME.json.")] = None,
+    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Folder for records of runs.")] = Path(
+        "results/benchmark/records"
+    ),
     quick: Annotated[bool, typer.Option("--quick", help="Short runs and few seeds, for a look; no entry.")] = False,
     trained_in: Annotated[
         str,
@@ -51,16 +48,14 @@ def run(  # long: one parameter per option
 ) -> None:
     """Run policies in all worlds of the benchmark, write one entry file, and show what it is worth.
 
-    Runs that the folder of records holds are not repeated: after Ctrl-C the same command does the rest.
+    Several policies are training seeds of one method. Runs that the folder of records holds are not repeated: after
+    Ctrl-C the same command does the rest.
     """
-    if not policy:
-        raise typer.BadParameter(
-            "Expected --policy, the name or the file of a policy; swarm-forage list has the names."
-        )
-    if name is None and len(policy) > 1:
+    names = list(policies.names())
+    if name is None and len(names) > 1:
         raise typer.BadParameter("Expected --name for an entry of several policies.")
-    if quick and out is not None:
-        raise typer.BadParameter("Expected --out without --quick: a quick look is no entry.")
+    if quick and file is not None:
+        raise typer.BadParameter("Expected --file without --quick: a quick look is no entry.")
     from metrics.benchmark import Training, benchmark_question, board_of, load_protocol, scripted_entries
     from metrics.benchmark.running import entry_name
     from metrics.scoring.question import ask
@@ -68,27 +63,27 @@ def run(  # long: one parameter per option
     from swarm_forage_env.cli.errors import resumable
 
     protocol = load_protocol(quick=quick)
-    called = name or entry_name(policy[0], quick=quick)
+    called = name or entry_name(names[0], quick=quick)
     question = benchmark_question(
-        policy,
+        names,
         name=called,
         protocol=protocol,
         training=Training(worlds=trained_in, command=training, library=library, core_hours=training_hours),
         training_seeds=training_seeds or (),
     )
     if dry_run:
-        typer.echo(_plan_text(question, records, jobs))
+        typer.echo(_plan_text(question, out, jobs))
         return
-    file = None if quick else out or Path("results/benchmark", f"{as_file_name(called)}.json")
-    if file is not None:
-        check_file(file)
+    entry_file = None if quick else file or Path("results/benchmark", f"{as_file_name(called)}.json")
+    if entry_file is not None:
+        check_file(entry_file)
     if called not in PAPER_POLICIES:
         scripted_entries(load_protocol())  # what it will be shown beside
-    with resumable(records):
-        entry = ask(question, out=records, jobs=jobs)
-    if file is not None:
-        entry.write(file)
-        typer.echo(f"entry {file}", err=True)
+    with resumable(out):
+        entry = ask(question, out=out, jobs=jobs)
+    if entry_file is not None:
+        entry.write(entry_file)
+        typer.echo(f"entry {entry_file}", err=True)
     _show(board_of([entry], protocol), as_json=as_json)
     if quick:
         typer.echo("A quick look, no entry: shorter runs than those of the scripted controllers.", err=True)
@@ -108,7 +103,7 @@ def show(entries: Entries, as_json: AsJson = False) -> None:
 
 def page(
     entries: Entries,
-    into: Annotated[Path, typer.Option("--into", help="Page whose generated part is written anew.")] = Path(
+    file: Annotated[Path, typer.Option("--file", help="Page whose generated part is written anew.")] = Path(
         "docs/benchmark.md"
     ),
     picture: Annotated[Path, typer.Option("--picture", help="Figure that the page shows.")] = Path(
@@ -116,8 +111,8 @@ def page(
     ),
 ) -> None:
     """Write the tables of all entries into a page, and draw its figure."""
-    for file in _board_of(entries).write_page(into, picture):
-        typer.echo(file)
+    for written in _board_of(entries).write_page(file, picture):
+        typer.echo(written)
 
 
 def _board_of(paths: list[Path]) -> "Board":

@@ -18,34 +18,27 @@ class Command(NamedTuple):
 
 
 COMMANDS: dict[str, tuple[Command, ...]] = {
-    "Run and compare policies": (
+    "Run and look": (
         Command("run", "Run policies in a scenario and compare them.", "run:run"),
-        Command("score", "Score a policy in all experiments of the measures.", "score:score"),
-        Command("compare", "Score policies in the same experiments.", "score:score"),
+        Command("watch", "Watch a run in a window.", "watch:watch"),
+        Command("record", "Film a run, or draw it at one time.", "record:record"),
+        Command("replay", "Write runs as one page, with play and pause.", "replay:replay"),
+        Command("maps", "Draw where on the floor things happened.", "maps:maps"),
+        Command("saliency", "Show what a trained network looks at.", "saliency:saliency"),
+    ),
+    "Score and decide": (
+        Command("score", "Score policies in all measures' experiments.", "score:score"),
+        Command("compare", "The same, for several policies.", "score:score"),
         Command("predict", "Fit performance to swarm size, and predict.", "predict:predict"),
+        Command("predict availability", "Show how likely enough robots are at work.", "availability:availability"),
         Command("choose", "Rank policies by constraints that they meet.", "choose:choose"),
-        Command("rerun", "Run a stored run again, here.", "rerun:rerun"),
     ),
     "Train": (
         Command("train", "Train one policy that every robot shares.", "train:train"),
-        Command("curves", "Draw how trainings went.", "curves:curves"),
+        Command("train curves", "Draw how trainings went.", "curves:curves"),
         Command("dataset", "Record what robots see and do, for learners.", "dataset:dataset"),
-        Command("saliency", "Show what a trained network looks at.", "saliency:saliency"),
     ),
-    "Look into runs": (
-        Command("watch", "Watch a run in a window.", "watch:watch"),
-        Command("record", "Film a run, or draw it at one time.", "record:record"),
-        Command("replay", "Write a run as one page, with play and pause.", "replay:replay"),
-        Command("maps", "Draw where things happened in a run.", "maps:maps"),
-        Command("check", "Check that policies keep the rules.", "check:check"),
-    ),
-    "Look things up": (
-        Command("list", "List scenarios and policies.", "show:list_everything"),
-        Command("info", "Show what a scenario or a policy is.", "show:info"),
-        Command("availability", "Show how likely enough robots are at work.", "availability:availability"),
-    ),
-    "Whole experiments": (
-        Command("ablate", "Switch one quirk at a time.", "ablate:ablate"),
+    "Studies and benchmark": (
         Command("study", "Whole studies: the paper's sets, or your own."),
         Command("study list", "List the experiment sets of the paper.", "study:list_studies"),
         Command("study show", "Show what a study varies, and its budgets.", "study:show"),
@@ -57,10 +50,19 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
         Command("study maps", "Draw where things happened in some cells.", "study_maps:maps"),
         Command("study report", "Write one page about studies.", "study_page:report"),
         Command("study diff", "Say which cells of two studies differ.", "study_diff:diff"),
+        Command("ablate", "Switch one quirk of the rules at a time.", "ablate:ablate"),
         Command("benchmark", "Run policies in a fixed protocol of worlds.", "benchmark:run"),
         Command("benchmark worlds", "List the worlds of the benchmark.", "benchmark:worlds"),
         Command("benchmark show", "Show what entries are worth.", "benchmark:show"),
         Command("benchmark page", "Write the page that compares entries.", "benchmark:page"),
+    ),
+    "What there is": (
+        Command("list", "List scenarios, policies, wrappers or columns.", "show:list_everything"),
+        Command("info", "Show what a scenario or a policy is.", "show:info"),
+    ),
+    "Checks": (
+        Command("check", "Check rules of policies, find stuck robots.", "check:check"),
+        Command("rerun", "Run a stored run again, here, and compare.", "rerun:rerun"),
     ),
 }
 """Heading in `--help` -> its commands."""

@@ -42,6 +42,33 @@ OPTIONS = {
 }
 """Option -> options that may be meant; the first of them that a command has is."""
 
+COMMANDS = {
+    "availability": "predict availability",
+    "bench": "benchmark",
+    "columns": "list columns",
+    "config": "info",
+    "curves": "train curves",
+    "describe": "info",
+    "eval": "score",
+    "evaluate": "score",
+    "film": "record",
+    "plot": "study plot",
+    "policies": "list policies",
+    "reproduce": "rerun",
+    "report": "study report",
+    "scenarios": "list scenarios",
+    "schema": "list columns",
+    "show": "info",
+    "simulate": "run",
+    "stuck": "check",
+    "study compare": "study diff",
+    "verdict": "study verdict",
+    "video": "record",
+    "view": "watch",
+    "wrappers": "list wrappers",
+}
+"""Command, after its first word where that is one -> what it is called."""
+
 
 def right_option(word: str, known: Collection[str]) -> str:
     """Return the option of a command that a wrong one stands for; empty if none is known."""

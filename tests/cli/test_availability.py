@@ -12,6 +12,8 @@ from metrics import availability_curves
 PNG = b"\x89PNG"
 PAGE = Path(__file__).resolve().parents[2] / "docs/equations.md"
 
+COMMAND = ("predict", "availability")
+
 
 def rows(out):
     """Numbers of the printed table, one list per row."""
@@ -19,7 +21,7 @@ def rows(out):
 
 
 def test_the_table_has_the_papers_number_and_each_swarms_own_mean(command):
-    code, out, _ = command("availability")
+    code, out, _ = command(*COMMAND)
     assert code == 0
     assert rows(out) == [
         [50, 5, 5.0, 0.833, 0.402, 0.161, 0.026, 0.001],
@@ -35,7 +37,7 @@ def test_the_table_has_the_papers_number_and_each_swarms_own_mean(command):
 def test_the_page_shows_what_its_command_prints(command):
     page = PAGE.read_text()
     (words,) = re.findall(
-        r"^swarm-forage (availability .*?) --picture docs/images/availability.png$", page, re.MULTILINE
+        r"^swarm-forage (predict availability .*?) --picture docs/images/availability.png$", page, re.MULTILINE
     )
     _, out, _ = command(*words.split())
     lines = [line.rstrip() for line in out.rstrip().splitlines()]
@@ -44,13 +46,15 @@ def test_the_page_shows_what_its_command_prints(command):
 
 def test_sizes_teams_and_demands_are_chosen(command):
     # Two robots, M = 1: weights 1, 1/2, 1/4 of 0, 1, 2 at work, so a mean of 4/7, and 1/7 for both.
-    code, out, _ = command("availability", "--robots", "2", "--teams", "1", "--needed", "0, 2,3")
+    code, out, _ = command(*COMMAND, "--robots", "2", "--teams", "1", "--needed", "0, 2,3")
     assert code == 0
     assert rows(out) == [[2, 1, 0.6, 1.0, 0.143, 0.0]]
 
 
 def test_the_picture_is_written_beside_the_table(command, painted):
-    code, out, err = command("availability", "--robots", "4,9", "--teams", "2.5", "--picture", "some/where.png")
+    code, out, err = command(
+        "predict", "availability", "--robots", "4,9", "--teams", "2.5", "--picture", "some/where.png"
+    )
     assert code == 0
     assert len(rows(out)) == 2
     assert err == "picture some/where.png\n"
@@ -58,7 +62,9 @@ def test_the_picture_is_written_beside_the_table(command, painted):
 
 
 def test_json_is_the_only_thing_on_stdout(command):
-    _, out, _ = command("availability", "--robots", "50", "--teams", "5", "--json", "--picture", "curves.svg")
+    _, out, _ = command(
+        "predict", "availability", "--robots", "50", "--teams", "5", "--json", "--picture", "curves.svg"
+    )
     answer = json.loads(out)
     (curve,) = answer["curves"]
     assert answer["picture"] == "curves.svg"
@@ -68,7 +74,7 @@ def test_json_is_the_only_thing_on_stdout(command):
 
 
 def test_help_has_the_symbol_of_the_page(command):
-    assert "Mean teams M" in " ".join(command("availability", "--help")[1].split())
+    assert "Mean teams M" in " ".join(command(*COMMAND, "--help")[1].split())
 
 
 @pytest.mark.parametrize(
@@ -83,7 +89,7 @@ def test_help_has_the_symbol_of_the_page(command):
     ],
 )
 def test_mistakes_are_one_line_and_leave_nothing(command, words, said):
-    code, out, err = command("availability", *words)
+    code, out, err = command(*COMMAND, *words)
     assert (code, out) == (2, "")
     assert said in err
     assert err.count("\n") == 1
@@ -92,6 +98,6 @@ def test_mistakes_are_one_line_and_leave_nothing(command, words, said):
 
 def test_without_matplotlib_the_table_comes_and_the_picture_is_missed(command, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    code, out, err = command("availability", "--picture", "curves.png")
+    code, out, err = command(*COMMAND, "--picture", "curves.png")
     assert (code, len(rows(out))) == (1, 6)
     assert "No picture without matplotlib" in err

@@ -155,9 +155,9 @@ def test_an_altered_entry_is_refused_in_one_line(command, mine):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "Expected --policy"),
+        ((), "Expected a policy, by name or file"),
         (("--policy", "crw", "--policy", "dpo"), "Expected --name"),
-        (("--policy", "crw", "--quick", "--out", "x.json"), "a quick look is no entry"),
+        (("--policy", "crw", "--quick", "--file", "x.json"), "a quick look is no entry"),
         (("--policy", "cwr"), "Unknown policy 'cwr'"),
         (("--policy", "none.npz"), "none.npz"),
         (("--policy", "crw", "--trained-in", "mars"), "got 'mars'"),
@@ -165,8 +165,8 @@ def test_an_altered_entry_is_refused_in_one_line(command, mine):
         (("show", "none.json"), "Cannot read the entry none.json"),
         (("show", "mine.json", "mine.json"), "'mine' twice"),
         (("show", "dpo.json"), "another policy with the name 'dpo'"),
-        (("page", "mine.json", "--into", "none.md"), "none.md"),
-        (("page", "mine.json", "--into", "mine.json"), "write these two lines"),
+        (("page", "mine.json", "--file", "none.md"), "none.md"),
+        (("page", "mine.json", "--file", "mine.json"), "write these two lines"),
     ],
 )
 def test_what_makes_no_sense_is_refused_in_one_line(words, message, command, mine):

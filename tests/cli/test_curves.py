@@ -34,7 +34,7 @@ def test_trainings_are_drawn_beside_others(command, monkeypatch):
     pytest.importorskip("matplotlib")
     training("first")
     training("second", dataclasses.replace(PLAN, algorithm="a2c"), best=8.0)
-    words = ("curves", "first", "second", "--policy", "random,crw", "--jobs", "1")
+    words = ("train", "curves", "first", "second", "--policy", "random,crw", "--jobs", "1")
     code, out, _ = command(*words, "--picture", "both.png")
     assert code == 0
     rows = [re.split(r" {2,}", line) for line in out.splitlines()]
@@ -45,7 +45,7 @@ def test_trainings_are_drawn_beside_others(command, monkeypatch):
     assert out.endswith("wrote both.png\n")
     assert Path("both.png").read_bytes().startswith(b"\x89PNG")
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    code, _, err = command("curves", "first", "--policy", "none")
+    code, _, err = command("train", "curves", "first", "--policy", "none")
     assert code == 1
     assert "No picture without matplotlib" in err
     assert not Path("first/curves.png").exists()
@@ -66,7 +66,7 @@ def test_what_curves_refuses(command):
         (("first", "elsewhere"), "judged by the same runs, got first and elsewhere"),
         (("first", "--policy", "crv"), "Did you mean 'crw'"),
     ):
-        code, _, err = command("curves", *words)
+        code, _, err = command("train", "curves", *words)
         assert code == 2
         assert message in err
         assert err.count("\n") == 1
@@ -86,11 +86,11 @@ def test_trainings_in_folders_of_one_name_are_told_apart(command, monkeypatch):
     training("a/ppo")
     training("b/ppo", best=8.0)
     training("b/a2c")
-    code, out, _ = command("curves", "a/ppo", "b/ppo", "b/a2c", "--policy", "none")
+    code, out, _ = command("train", "curves", "a/ppo", "b/ppo", "b/a2c", "--policy", "none")
     assert code == 0
     assert pictures == [["a/ppo", "b/ppo", "a2c"]]
     assert "b/ppo, at its best" in out
-    code, _, err = command("curves", "a/ppo", "b/../a/ppo", "--policy", "none")
+    code, _, err = command("train", "curves", "a/ppo", "b/../a/ppo", "--policy", "none")
     assert code == 2
     assert "Expected each training once" in err
 
@@ -101,7 +101,7 @@ def test_the_place_of_the_picture_is_looked_at_before_anything_is_run(command, m
     training("first")
     Path("taken.png").mkdir()
     told = "swarm-forage: Expected a file to write, got a folder: taken.png\n"
-    assert command("curves", "first", "--picture", "taken.png") == (1, "", told)
+    assert command("train", "curves", "first", "--picture", "taken.png") == (1, "", told)
     assert pictures == []
 
 
@@ -111,7 +111,7 @@ def test_curves_tell_of_a_picture_that_cannot_be_written(command, monkeypatch):
 
     monkeypatch.setattr("swarm_forage_env.rendering.plots.draw_trainings", full)
     training("first")
-    code, out, err = command("curves", "first", "--policy", "none")
+    code, out, err = command("train", "curves", "first", "--policy", "none")
     assert code == 1
     assert "first, at its best" in out
     assert err == "swarm-forage: No picture first/curves.png: No space left on device.\n"

@@ -98,7 +98,7 @@ def test_names_are_shown_as_they_are_in_tables_and_pictures(command, tmp_path):
 
 
 def test_a_terminal_that_knows_ascii_alone_shows_the_rest_as_escapes():
-    words = [sys.executable, "-m", "swarm_forage_env.cli", "availability", "--robots", "5", "--teams", "2"]
+    words = [sys.executable, "-m", "swarm_forage_env.cli", "predict", "availability", "--robots", "5", "--teams", "2"]
     told = {**os.environ, "PYTHONIOENCODING": "ascii", "LANG": "C", "LC_ALL": "C"}
     ended = subprocess.run(words, env=told, capture_output=True, timeout=120, check=False)
     assert ended.returncode == 0, ended.stderr

@@ -6,6 +6,7 @@ import pytest
 
 from swarm_forage_env.cli.app import loaded
 from swarm_forage_env.cli.commands import COMMANDS
+from swarm_forage_env.cli.former_words import COMMANDS as FORMER
 from swarm_forage_env.cli.former_words import OPTIONS, right_option
 
 MAKE_RUNS = ("run", "score", "compare", "predict", "choose", "ablate")
@@ -70,6 +71,17 @@ def test_a_former_option_is_answered_where_a_command_has_the_right_one(command, 
             assert (code, out) == (2, "")
             assert err == f"swarm-forage: No such option: {word}; for this command it is {right}.\n"
     assert answered, f"no command answers {word}"
+
+
+@pytest.mark.parametrize("words", FORMER)
+def test_a_former_command_is_answered(command, words):
+    code, out, err = command(*words.split())
+    assert (code, out) == (2, "")
+    *_, word = words.split()
+    assert err.startswith("swarm-forage: No such command")
+    assert err.endswith(f"{word!r}; it is 'swarm-forage {FORMER[words]}'.\n")
+    assert FORMER[words] in ALL or FORMER[words].split()[0] == "list"
+    assert words not in ALL
 
 
 def test_a_folder_is_no_file(command):

@@ -65,7 +65,6 @@ def test_the_help_of_a_first_word_lists_the_second_ones(command, words):
         (("--verison",), "No such option: '--verison'. Did you mean '--version'?"),
         (("study", "rnu"), "No such command of study: 'rnu'. Did you mean 'run'?"),
         (("study", "--all"), "No such option: '--all'."),
-        (("benchmark", "wolrds"), "No such command of benchmark: 'wolrds'. Did you mean 'worlds'?"),
     ],
 )
 def test_words_that_mean_nothing_are_answered_with_the_nearest(command, words, told):
