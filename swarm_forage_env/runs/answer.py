@@ -3,6 +3,7 @@
     print(answer)                   # as text
     answer.write("answer.md")       # as Markdown; .txt, .csv and .json likewise
     answer.to_mapping()             # as plain values
+    answer.draw("answer.png")       # as a picture, where there is one
 
 A new answer says what its tables are (`sheets`) and what its numbers are (`to_mapping`); the forms follow.
 """
@@ -19,6 +20,7 @@ from typing import Any
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.wording import aligned
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -68,6 +70,23 @@ class Answer(ABC):
     @abstractmethod
     def to_mapping(self) -> dict[str, Any]:
         """Return everything as plain values, ready for JSON; numbers that do not exist are None."""
+
+    @property
+    def has_picture(self) -> bool:
+        """Whether there is something to draw."""
+        return False
+
+    def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
+        """Draw the answer into a picture file.
+
+        Args:
+            path: File to write; as in `rendering.figures.saved_figure`, whose errors this has.
+            style: Of the figure.
+
+        Raises:
+            ValueError: there is nothing to draw.
+        """
+        raise ValueError(f"Expected an answer with a picture, got a {type(self).__name__} with nothing to draw.")
 
     def text(self) -> str:
         """Return everything for people."""
