@@ -1,5 +1,9 @@
 # Public names, each written once, those first that are needed first; `__init__.py` loads them when they are first used.
 
+# what runs were
+from .scoring import summarize_runs as summarize_runs
+from .scoring import RunSummary as RunSummary
+
 # from policies and files of curves to tables of scores
 from .scoring import score_policy as score_policy
 from .scoring import compare_policies as compare_policies
@@ -15,8 +19,11 @@ from .scoring import Performance as Performance
 from .scoring import predict_policy as predict_policy
 from .scoring import predict_curves as predict_curves
 from .scoring import choose_policy as choose_policy
+from .scoring import ablate_quirks as ablate_quirks
 from .scoring import PredictionTable as PredictionTable
+from .scoring import Predictions as Predictions
 from .scoring import Choice as Choice
+from .scoring import Ablation as Ablation
 
 # interference
 from .interference import t_lost_fraction as t_lost_fraction

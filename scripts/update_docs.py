@@ -109,7 +109,7 @@ def made_with() -> dict[str, str]:
 
 def deliveries(table: str) -> list[str]:
     """Return the deliveries per 1,000 s of each row of a printed table, such as "20.45 ± 0.91"."""
-    return re.findall(r"^│.*?│\s+(\d[\d,.]* ± [\d.]+) │", table, re.MULTILINE)
+    return re.findall(r"^\S.*?  +(\d[\d,.]* ± [\d.]+)\s", table, re.MULTILINE)
 
 
 def make(name: str) -> dict[str, Any]:
@@ -140,10 +140,12 @@ def fields(printed: str, labels: tuple[str, ...]) -> dict[str, str]:
     found = deliveries(printed)
     if len(found) != len(labels):
         raise ValueError(f"Expected a table with deliveries of {', '.join(labels)}, got:\n{printed}")
-    lines = printed.rstrip().splitlines()
-    top = next(number for number, line in enumerate(lines) if line.startswith("┏"))
-    bottom = next(number for number, line in enumerate(lines) if line.startswith("└"))
-    table = "\n".join(line.rstrip() for line in lines[top - 1 : bottom + 2])
+    lines = [line.rstrip() for line in printed.rstrip().splitlines()]
+    if labels:  # a table of runs: a headline, and a note on its intervals
+        top = next(number for number, line in enumerate(lines) if line.startswith("policy "))
+        bottom = next(number for number, line in enumerate(lines) if line.startswith("±"))
+        lines = lines[top - 1 : bottom + 1]
+    table = "\n".join(lines)
     return {"table": table, **dict(zip(labels, found, strict=True))}
 
 

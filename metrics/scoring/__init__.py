@@ -2,18 +2,27 @@
 
 from swarm_forage_env.scenarios.performance import Performance
 
+from .ablation import Ablation, AblationQuestion, ablate_quirks, ablation_question
 from .choosing import Choice, ChoiceQuestion, choice_question, choose_policy
 from .comparison import Comparison, compare_tables
 from .figure_panels import StudyPanel, StudyPanels, study_panels
 from .front_door import ScoreQuestion, compare_policies, score_curves, score_policy, score_question
 from .measures import ScoreForms
 from .plots import draw_scores
-from .prediction import PredictionQuestion, PredictionTable, predict_curves, predict_policy, prediction_question
+from .prediction import (
+    PredictionQuestion,
+    Predictions,
+    PredictionTable,
+    predict_curves,
+    predict_policy,
+    prediction_question,
+)
 from .prediction_plots import draw_predictions
 from .question import Question, ask
 from .study_diff import StudyDiff, diff_studies
 from .study_plots import StudyFigure, draw_figure, draw_map, study_figures
 from .study_tables import StudyLine, study_lines
+from .summary import RunQuestion, RunSummary, run_question, summarize_runs
 from .table import Score, ScoreTable
 from .verdicts import Judged, Waiting, judge_claims
 
@@ -23,9 +32,13 @@ __all__ = [
     "score_curves",
     "compare_tables",
     "ask",
+    "run_question",
+    "summarize_runs",
     "score_question",
     "prediction_question",
     "choice_question",
+    "ablate_quirks",
+    "ablation_question",
     "study_lines",
     "study_panels",
     "study_figures",
@@ -46,6 +59,8 @@ __all__ = [
     "ScoreQuestion",
     "PredictionQuestion",
     "ChoiceQuestion",
+    "RunQuestion",
+    "AblationQuestion",
     "StudyLine",
     "StudyPanel",
     "StudyPanels",
@@ -55,5 +70,8 @@ __all__ = [
     "Waiting",
     "Performance",
     "PredictionTable",
+    "Predictions",
     "Choice",
+    "RunSummary",
+    "Ablation",
 ]

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import stdtr  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from swarm_forage_env._internal.wording import aligned, counted, number, paragraph, percent, plain
+from swarm_forage_env._internal.wording import counted, number, percent, plain
+from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.policy_spec import PolicyLike
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import performance_of
@@ -161,7 +162,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Choice:
+class Choice(Answer):
     """Policies in order, the best first, with the evidence."""
 
     candidates: tuple[Candidate, ...]
@@ -223,14 +224,15 @@ class Choice:
             ],
         }
 
-    def __str__(self) -> str:
-        rows: list[Sequence[str]] = [_HEADER]
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return the ranking, and runs that failed."""
+        rows: list[Sequence[str]] = []
         for rank, candidate in enumerate(self.candidates, 1):
             names = [(str(rank), candidate.policy), *[("", "")] * (len(candidate.evidence) - 1)]
             rows += [(*name, *evidence.cells()) for name, evidence in zip(names, candidate.evidence, strict=True)]
         failures = [f"failed: {failure}" for candidate in self.candidates for failure in candidate.failures]
         title = f"{self.scenario}, {counted(self.n_robots, 'robot')}, runs of {self.horizon_s:,g} s: {self.unit}"
-        return "\n".join([title, *aligned(rows), self.reason, RULE, *paragraph(failures)])
+        return Sheet(title=title, header=_HEADER, rows=rows, notes=(self.reason, RULE)), Sheet(notes=failures)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

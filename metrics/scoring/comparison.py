@@ -4,18 +4,22 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from swarm_forage_env._internal.wording import aligned, limits, paragraph, percent, plain
+from swarm_forage_env._internal.wording import limits, percent, plain
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
+from swarm_forage_env.runs.answer import Answer, Sheet
 
 from ..checks import CurveError
 from ..curves import FloatArray
 from ..significance import holm, paired_p
 from ..statistics import Summary, aggregate
 from .intervals import spread
-from .table import DOUBTFUL, Score, ScoreTable, forecast_lines, title
+from .plots import draw_scores
+from .table import DOUBTFUL, Score, ScoreTable, forecast_sheets, title
 
 FAMILY_ERROR = 0.05
 """Probability that one or more differences within a measure are called significant by chance."""
@@ -95,11 +99,11 @@ class Difference:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Comparison:
-    """Score tables side by side, with the differences between all pairs of policies."""
+class Comparison(Answer):
+    """Score tables side by side, with the differences between all pairs of policies; one table is shown as it is."""
 
     tables: tuple[ScoreTable, ...]
-    differences: tuple[Difference, ...]
+    differences: tuple[Difference, ...] = ()
 
     @property
     def policies(self) -> tuple[str, ...]:
@@ -129,19 +133,23 @@ class Comparison:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return everything as plain values, ready for JSON."""
-        return {
-            "test": TEST,
-            "tables": [table.to_mapping() for table in self.tables],
-            "differences": [difference.to_mapping() for difference in self.differences],
-        }
+        tables = [table.to_mapping() for table in self.tables]
+        if len(tables) == 1:
+            return {"tables": tables}
+        return {"test": TEST, "tables": tables, "differences": [one.to_mapping() for one in self.differences]}
 
-    def value_rows(self, *, band: bool = False) -> list[tuple[str, ...]]:
+    @property
+    def band(self) -> bool:
+        """Whether the authors' bands stand beside the values."""
+        return any(table.band for table in self.tables)
+
+    def value_rows(self) -> list[tuple[str, ...]]:
         """Return the values side by side as texts, a row of headings first; distances have a row of noise floors."""
         lines = [("measure", "at", "better", *self.policies)]
         for row in self.rows():
             scores = [self.score(policy, row) for policy in self.policies]
             better = "higher" if row.higher_is_better else "lower"
-            lines.append((row.label, row.at, better, *(_cell(score, band=band) for score in scores)))
+            lines.append((row.label, row.at, better, *(_cell(score, band=self.band) for score in scores)))
             if any(score is not None and score.noise_floor is not None for score in scores):
                 lines.append(
                     (
@@ -177,15 +185,32 @@ class Comparison:
         ]
         return (*shared, *own)
 
-    def text(self, *, band: bool = False) -> str:
-        """Return values and differences for people; with `band`, the authors' bands beside the values."""
-        lines = [title(self.tables), *aligned(self.value_rows(band=band)), VALUES, *([BANDS] if band else [])]
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return values, differences, forecasts and notes."""
+        if len(self.tables) == 1:
+            return self.tables[0].sheets()
+        header, *rows = self.value_rows()
+        about = (VALUES, BANDS) if self.band else (VALUES,)
+        parts = [Sheet(title=title(self.tables), header=header, rows=rows, notes=about)]
         for start in range(0, len(self.pairs), PAIRS_PER_TABLE):
-            lines += ["", *aligned(self.difference_rows(self.pairs[start : start + PAIRS_PER_TABLE]))]
-        return "\n".join([*lines, TEST, *forecast_lines(self.tables), *paragraph(self.notes())])
+            header, *rows = self.difference_rows(self.pairs[start : start + PAIRS_PER_TABLE])
+            is_last = start + PAIRS_PER_TABLE >= len(self.pairs)
+            parts.append(Sheet(header=header, rows=rows, notes=(TEST,) if is_last else ()))
+        return *parts, *forecast_sheets(self.tables), Sheet(notes=self.notes())
 
-    def __str__(self) -> str:
-        return self.text()
+    @property
+    def has_picture(self) -> bool:
+        """Whether a score has runs."""
+        return any(table.has_picture for table in self.tables)
+
+    def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
+        """Draw the scores of all policies, see `draw_scores`."""
+        draw_scores(self.tables, path, band=self.band, style=style)
+
+
+def side_by_side(tables: Sequence[ScoreTable]) -> Comparison:
+    """Return tables as one answer; several are compared, see `compare_tables`."""
+    return Comparison(tables=tuple(tables)) if len(tables) == 1 else compare_tables(tables)
 
 
 def compare_tables(tables: Sequence[ScoreTable]) -> Comparison:

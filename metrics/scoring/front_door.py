@@ -15,7 +15,7 @@ from swarm_forage_env.wrappers.world import World, WorldLike, world_of
 
 from ..checks import CurveError, chosen_seeds
 from .columns import THROTTLE
-from .comparison import Comparison, compare_tables
+from .comparison import Comparison, side_by_side
 from .curves_file import read_curves
 from .forecast import forecast_population
 from .measures import ScoreForms, check_measures, criteria_of
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ScoreQuestion(Question[tuple[ScoreTable, ...]]):
-    """The runs that score some policies; the answer is one table per policy."""
+class ScoreQuestion(Question[Comparison]):
+    """The runs that score some policies; several are compared."""
 
     world: World
     """What the worlds of the plan are variants of."""
@@ -47,9 +47,26 @@ class ScoreQuestion(Question[tuple[ScoreTable, ...]]):
         """What the performance is: its name and unit, and whether it is a total and adds up over robots."""
         return self.performance or performance_of(self.world.scenario.performance)
 
-    def answer(self, table: Table) -> tuple[ScoreTable, ...]:
-        """Return one table of scores per policy."""
-        return tuple(self._scores(table, policy.label) for policy in self.plan.policies)
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Which swarms are too small for some kind of robots."""
+        swarms = {condition.world.n_robots: condition.world.scenario.robots for condition in self.plan.conditions}
+        missing: dict[str, list[int]] = {}
+        for size, robots in sorted(swarms.items()):
+            for kind, rows in zip(robots.robot_kinds, robots.kind_rows, strict=True):
+                if rows.start == rows.stop:
+                    missing.setdefault(kind.name, []).append(size)
+        if not missing:
+            return ()
+        told = "; ".join(f"no {name} with {', '.join(map(str, sizes))} robots" for name, sizes in missing.items())
+        return (
+            f"Kinds are shares of a swarm, and small swarms lack some: {told}. Measures over the size of the swarm "
+            "compare other mixtures there.",
+        )
+
+    def answer(self, table: Table) -> Comparison:
+        """Return one table of scores per policy, and their differences."""
+        return side_by_side([self._scores(table, policy.label) for policy in self.plan.policies])
 
     def _scores(self, table: Table, policy: str) -> ScoreTable:
         study = policy_curves(table, policy, self.performance)
@@ -71,6 +88,7 @@ class ScoreQuestion(Question[tuple[ScoreTable, ...]]):
                 "n_robots": self.world.n_robots,
                 "out": None if table.folder is None else str(table.folder),
             },
+            band=self.forms.band,
         )
 
 
@@ -145,7 +163,7 @@ def score_policy(
         disturbance=disturbance,
         forms=forms,
     )
-    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)[0]
+    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress).tables[0]
 
 
 def compare_policies(
@@ -183,7 +201,10 @@ def compare_policies(
         disturbance=disturbance,
         forms=forms,
     )
-    return compare_tables(ask(question, out=out, jobs=jobs, executor=executor, progress=progress))
+    names = [policy.label for policy in question.plan.policies]
+    if len(names) < 2:
+        raise CurveError(f"Expected two or more policies to compare, got {', '.join(names)}.")
+    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)
 
 
 def score_question(
@@ -258,6 +279,7 @@ def score_curves(
                 forecasts=forecast_population(study),
                 missing=missing,
                 settings={"curves": str(path), "horizon_s": study.horizon_s, **told},
+                band=forms is not None and forms.band,
             )
         )
     return tuple(tables)

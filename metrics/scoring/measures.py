@@ -68,6 +68,8 @@ class ScoreForms:
     """Variants as in docs/metrics.md; a measure that has none of them is scored in the corrected one."""
     forms: tuple[Form, ...] = ("marginal",)
     """For measures that compare two sizes."""
+    band: bool = False
+    """Whether tables and pictures have the authors' bands, too: mean plus and minus two standard deviations."""
 
     def __post_init__(self) -> None:
         _check_words("variant", self.variants, get_args(Variant))

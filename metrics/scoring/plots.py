@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from swarm_forage_env.rendering.figures import SCREEN, FigureStyle, Look, Panel, looks, saved_panels, shade
 
@@ -12,7 +13,9 @@ from ..claims.panel import MIN_PAIRS
 from ..statistics import Summary
 from .columns import NOISE, POPULATION, SIZE, THROTTLE
 from .measures import MEASURE_CRITERIA
-from .table import Score, ScoreTable
+
+if TYPE_CHECKING:
+    from .table import Score, ScoreTable  # a table draws itself by this
 
 FEWEST_RUNS = MIN_PAIRS
 """Fewer runs are drawn without an interval: they decide nothing, and that of two runs reaches nine standard deviations
@@ -28,7 +31,7 @@ X_LABELS = {
 
 
 def draw_scores(
-    tables: Sequence[ScoreTable], path: str | Path, *, band: bool = False, style: FigureStyle = SCREEN
+    tables: "Sequence[ScoreTable]", path: str | Path, *, band: bool = False, style: FigureStyle = SCREEN
 ) -> None:
     """Draw score tables side by side into a picture file: one panel per measure, one line per policy.
 
@@ -74,12 +77,12 @@ class _Content:
     label: str
     is_relative: bool
 
-    def scores(self, table: ScoreTable) -> list[Score]:
+    def scores(self, table: "ScoreTable") -> "list[Score]":
         """Return the scores of a table that can be drawn here."""
         found = [score for score in table.scores if score.label == self.label and score.per_seed]
         return [score for score in found if math.isfinite(self.summary(score).mean)]
 
-    def summary(self, score: Score) -> Summary:
+    def summary(self, score: "Score") -> Summary:
         """Return the numbers of a score that are shown here; all NaN where there are none."""
         if not self.is_relative:
             return score.summary
@@ -87,12 +90,12 @@ class _Content:
         absent = Summary(mean=nothing, std=nothing, lower=nothing, upper=nothing, n_used=0, n_nan=0)
         return score.relative or absent
 
-    def floor(self, score: Score) -> float | None:
+    def floor(self, score: "Score") -> float | None:
         """Return the noise floor of a score, in the unit of this panel."""
         return score.relative_floor if self.is_relative else score.noise_floor
 
 
-def _contents(tables: Sequence[ScoreTable]) -> list[_Content]:
+def _contents(tables: "Sequence[ScoreTable]") -> list[_Content]:
     """Return the panels that have something to show, in the order of tables, relative ones beside their measure."""
     scores = [score for table in tables for score in table.scores]
     order = list(MEASURE_CRITERIA)
@@ -101,7 +104,7 @@ def _contents(tables: Sequence[ScoreTable]) -> list[_Content]:
     return [content for content in wanted if any(content.scores(table) for table in tables)]
 
 
-def _draw_panel(panel: Panel, content: _Content, tables: Sequence[ScoreTable], *, band: bool) -> None:
+def _draw_panel(panel: Panel, content: _Content, tables: "Sequence[ScoreTable]", *, band: bool) -> None:
     shown = [score for table in tables for score in content.scores(table)]
     first = shown[0]
     about = METRICS[first.measure]
@@ -124,7 +127,7 @@ def _draw_panel(panel: Panel, content: _Content, tables: Sequence[ScoreTable], *
 
 
 def _draw_policy(
-    panel: Panel, content: _Content, scores: Sequence[Score], x: Sequence[float], look: Look, *, band: bool
+    panel: Panel, content: _Content, scores: "Sequence[Score]", x: Sequence[float], look: Look, *, band: bool
 ) -> None:
     summaries = [content.summary(score) for score in scores]
     y = [summary.mean for summary in summaries]
@@ -145,7 +148,7 @@ def _draw_policy(
         panel.fill_between(places, 0.0, heights, color=look.colour, alpha=0.06, linewidth=0.0)
 
 
-def _place(x: float, shown: Sequence[Score]) -> str:
+def _place(x: float, shown: "Sequence[Score]") -> str:
     """Return the text of a level; for throttles the distance of the conditions from the ideal, as in the paper."""
     distances = (score.beside.get("environment_distance") for score in shown if score.x == x)
     distance = next((distance for distance in distances if distance is not None), None)

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swarm_forage_env._internal.wording import aligned, counted, number, paragraph, percent, plain
+from swarm_forage_env._internal.wording import counted, number, percent, plain
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
+from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.policy_spec import PolicyLike
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import performance_of
@@ -25,6 +27,7 @@ from .columns import SIZE
 from .curves_file import read_curves
 from .intervals import bounds
 from .performance import PerformanceLike
+from .prediction_plots import draw_predictions
 from .question import Question, ask, failure_lines
 from .totals import plan_totals, run_totals, unit_text
 
@@ -47,7 +50,7 @@ _HEADER = ("robots", "runs", "measured", "law", "95 % interval", "used", "inside
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PredictionTable:
+class PredictionTable(Answer):
     """The prediction for one policy, beside what its runs showed."""
 
     policy: str
@@ -138,18 +141,28 @@ class PredictionTable:
             "inside": self.is_inside(size),
         }
 
-    def __str__(self) -> str:
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return the sizes with law, critical size and errors, and runs that failed."""
         where = f" in {self.scenario}" if self.scenario else ""
         sizes = sorted({*self.fit, *self.left_out, *self.predicted_sizes})
-        lines = [
-            f"{self.policy}{where}: {self.unit}, fitted to {', '.join(map(str, self.fit))} robots",
-            *aligned([_HEADER, *map(self._row, sizes)]),
+        notes = (
             f"law: {law_text(self.prediction.law)}",
             f"critical size: {self.critical_text()}",
             self.laws_text(),
-            *([] if self.adds_up else [_NO_SUM]),
-        ]
-        return "\n".join([*lines, *paragraph([f"failed: {failure}" for failure in self.failures])])
+            *(() if self.adds_up else (_NO_SUM,)),
+        )
+        title = f"{self.policy}{where}: {self.unit}, fitted to {', '.join(map(str, self.fit))} robots"
+        table = Sheet(title=title, header=_HEADER, rows=[self._row(size) for size in sizes], notes=notes)
+        return table, Sheet(notes=[f"failed: {failure}" for failure in self.failures])
+
+    @property
+    def has_picture(self) -> bool:
+        """Always."""
+        return True
+
+    def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
+        """Draw the prediction, see `draw_predictions`."""
+        draw_predictions([self], path, style=style)
 
     def critical_text(self) -> str:
         """Return the critical size with its interval in words, or that there is none within reach."""
@@ -182,7 +195,38 @@ class PredictionTable:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PredictionQuestion(Question[tuple[PredictionTable, ...]]):
+class Predictions(Answer):
+    """The predictions for several policies."""
+
+    tables: tuple[PredictionTable, ...]
+
+    @property
+    def inside_text(self) -> str:
+        """How many held-back sizes lie in their intervals, in words; empty if none was held back."""
+        answers = [table.is_inside(size) for table in self.tables for size in table.hold]
+        known = [answer for answer in answers if answer is not None]
+        return f"{sum(known)} of {counted(len(known), 'held-back mean')} inside the interval" if known else ""
+
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return those of all policies, and how many held-back sizes lie in their intervals."""
+        return *(sheet for table in self.tables for sheet in table.sheets()), Sheet(title=self.inside_text)
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return all predictions as plain values."""
+        return {"tables": [table.to_mapping() for table in self.tables]}
+
+    @property
+    def has_picture(self) -> bool:
+        """Always."""
+        return True
+
+    def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
+        """Draw one panel per policy, see `draw_predictions`."""
+        draw_predictions(self.tables, path, style=style)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PredictionQuestion(Question[Predictions]):
     """The runs of a prediction, one world per size, and what becomes of each size; the answer is a table per policy."""
 
     world: World
@@ -190,9 +234,9 @@ class PredictionQuestion(Question[tuple[PredictionTable, ...]]):
     fit: tuple[int, ...]
     hold: tuple[int, ...]
 
-    def answer(self, table: Table) -> tuple[PredictionTable, ...]:
+    def answer(self, table: Table) -> Predictions:
         """Return one prediction per policy."""
-        return tuple(self._prediction(table, policy.label) for policy in self.plan.policies)
+        return Predictions(tables=tuple(self._prediction(table, policy.label) for policy in self.plan.policies))
 
     def _prediction(self, table: Table, policy: str) -> PredictionTable:
         totals = {
@@ -269,7 +313,7 @@ def predict_policy(
         parameters=parameters,
         caches=caches,
     )
-    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress)[0]
+    return ask(question, out=out, jobs=jobs, executor=executor, progress=progress).tables[0]
 
 
 def prediction_question(
@@ -418,10 +462,3 @@ def _table(
     at = sorted({*hold, *(factor * fit[-1] for factor in AHEAD), *between})
     prediction = predict_performance(fit, [totals[size] for size in fit], at, seed=_RESAMPLING_SEED)
     return PredictionTable(totals=totals, fit=fit, hold=hold, prediction=prediction, **told)
-
-
-def counted_inside(tables: Sequence[PredictionTable]) -> str:
-    """Return how many held-back sizes lie in their intervals, in words; empty if none was held back."""
-    answers = [table.is_inside(size) for table in tables for size in table.hold]
-    known = [answer for answer in answers if answer is not None]
-    return f"{sum(known)} of {counted(len(known), 'held-back mean')} inside the interval" if known else ""

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +18,11 @@ from swarm_forage_env.rendering.figures import (
     size_axis,
 )
 
-from .prediction import PredictionTable
+if TYPE_CHECKING:
+    from .prediction import PredictionTable  # a table draws itself by this
 
 
-def draw_predictions(tables: Sequence[PredictionTable], path: str | Path, *, style: FigureStyle = SCREEN) -> None:
+def draw_predictions(tables: "Sequence[PredictionTable]", path: str | Path, *, style: FigureStyle = SCREEN) -> None:
     """Draw predictions into a picture file, one panel per policy.
 
     Points are runs, filled where they are fitted and open where they are held back. The law is a dashed line, the band
@@ -36,7 +38,7 @@ def draw_predictions(tables: Sequence[PredictionTable], path: str | Path, *, sty
             _draw_table(panel, table, look)
 
 
-def _draw_table(panel: Panel, table: PredictionTable, look: Look) -> None:
+def _draw_table(panel: Panel, table: "PredictionTable", look: Look) -> None:
     found = table.prediction
     curve = np.geomspace(table.fit[0], found.at[-1], 200)
     shade(panel, found.at, found.lower, found.upper, look.colour, label=f"{found.level:.0%} interval")

@@ -1,9 +1,11 @@
 """A question: which runs it needs, and how their table answers it. Everything that is asked of policies is one.
 
     question = score_question(["crw"], "warehouse_small", budget="quick")
-    table = ask(question, out="results")          # makes the runs, or reads those that are there
+    found = ask(question, out="results")          # makes the runs, or reads those that are there
+    print(found)
 
-A new question is a dataclass with `plan` and `answer`, and a function that writes the plan.
+A new question is a dataclass with `plan` and `answer`, and a function that writes the plan. Its answer is best an
+`swarm_forage_env.runs.answer.Answer`, which has all forms.
 """
 
 from abc import ABC, abstractmethod
@@ -17,28 +19,44 @@ from swarm_forage_env.runs.runner import run_plan
 from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.runs.table import Table
 
-Answer = TypeVar("Answer")
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Question(ABC, Generic[Answer]):
+class Question(ABC, Generic[Found]):
     """Runs, and what they answer."""
 
     plan: Plan
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What to know of the plan before its runs are made."""
+        return ()
+
+    def make_runs(
+        self,
+        *,
+        store: RunStore | None = None,
+        executor: Executor | None = None,
+        jobs: int | None = None,
+        progress: bool = False,
+    ) -> Table:
+        """Make the runs that the answer needs; arguments and errors as in `runs.runner.run_plan`."""
+        return run_plan(self.plan, store=store, executor=executor, jobs=jobs, progress=progress)
+
     @abstractmethod
-    def answer(self, table: Table) -> Answer:
+    def answer(self, table: Table) -> Found:
         """Return the answer that the runs give; it says which failed."""
 
 
 def ask(
-    question: Question[Answer],
+    question: Question[Found],
     *,
     out: str | Path | None = None,
     jobs: int | None = None,
     executor: Executor | None = None,
     progress: bool = True,
-) -> Answer:
+) -> Found:
     """Make the runs of a question and return its answer.
 
     Args:
@@ -52,7 +70,7 @@ def ask(
         swarm_forage_env.runs.runner.RunsInterrupted: Ctrl-C; finished runs are in `out`.
     """
     store = None if out is None else RunStore(out)
-    return question.answer(run_plan(question.plan, store=store, jobs=jobs, executor=executor, progress=progress))
+    return question.answer(question.make_runs(store=store, jobs=jobs, executor=executor, progress=progress))
 
 
 def failure_lines(table: Table, policy: str) -> tuple[str, ...]:

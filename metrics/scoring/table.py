@@ -2,9 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swarm_forage_env._internal.wording import aligned, counted, limits, number, paragraph, percent, plain
+from swarm_forage_env._internal.wording import counted, limits, number, percent, plain
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
+from swarm_forage_env.runs.answer import Answer, Sheet
 
 from ..catalog import METRICS
 from ..curves import Form, Variant
@@ -12,6 +15,7 @@ from ..statistics import Summary, aggregate
 from .forecast import FORECAST_HEADER, FORECAST_TITLE, PopulationForecast
 from .intervals import bounds, interval
 from .measures import label_of
+from .plots import draw_scores
 
 if TYPE_CHECKING:
     import polars as pl
@@ -162,7 +166,7 @@ class Score:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ScoreTable:
+class ScoreTable(Answer):
     """All scores of one policy in one scenario."""
 
     policy: str
@@ -177,6 +181,8 @@ class ScoreTable:
     """Runs that failed, one line each."""
     settings: Mapping[str, Any] = field(default_factory=dict[str, Any])
     """How the runs were made: budget, length, seeds, folder."""
+    band: bool = False
+    """Whether the authors' bands stand beside the intervals."""
 
     def __getitem__(self, measure: str) -> tuple[Score, ...]:
         """Return the scores of one measure.
@@ -234,15 +240,22 @@ class ScoreTable:
             "failures": list(self.failures),
         }
 
-    def text(self, *, band: bool = False) -> str:
-        """Return the table for people; with `band`, the authors' bands beside the intervals."""
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return scores, forecasts and notes."""
         place = HEADER.index("95 % interval") + 1
-        header = (*HEADER[:place], BAND, *HEADER[place:]) if band else HEADER
-        rows = aligned([header, *(score.cells(band=band) for score in self.scores)])
-        return "\n".join([title([self]), *rows, *forecast_lines([self]), *paragraph(self.notes())])
+        header = (*HEADER[:place], BAND, *HEADER[place:]) if self.band else HEADER
+        rows = [score.cells(band=self.band) for score in self.scores]
+        scores = Sheet(title=title([self]), header=header, rows=rows)
+        return scores, *forecast_sheets([self]), Sheet(notes=self.notes())
 
-    def __str__(self) -> str:
-        return self.text()
+    @property
+    def has_picture(self) -> bool:
+        """Whether a score has runs."""
+        return any(score.per_seed for score in self.scores)
+
+    def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
+        """Draw the scores, see `draw_scores`."""
+        draw_scores([self], path, band=self.band, style=style)
 
 
 def title(tables: Sequence[ScoreTable]) -> str:
@@ -259,13 +272,11 @@ def title(tables: Sequence[ScoreTable]) -> str:
     return words
 
 
-def forecast_lines(tables: Sequence[ScoreTable]) -> list[str]:
-    """Return forecasts and observations as lines; equal lines of several policies appear once."""
-    lines: list[str] = []
-    shown: list[list[tuple[str, ...]]] = []
+def forecast_sheets(tables: Sequence[ScoreTable]) -> list[Sheet]:
+    """Return forecasts and observations; equal ones of several policies appear once."""
+    different: list[list[tuple[str, ...]]] = []
     for table in tables:
         rows = [forecast.cells() for forecast in table.forecasts]
-        if rows and rows not in shown:
-            shown.append(rows)
-            lines += ["", FORECAST_TITLE, *aligned([FORECAST_HEADER, *rows])]
-    return lines
+        if rows and rows not in different:
+            different.append(rows)
+    return [Sheet(title=FORECAST_TITLE, header=FORECAST_HEADER, rows=rows) for rows in different]

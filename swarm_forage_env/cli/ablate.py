@@ -1,18 +1,13 @@
 """The command `ablate`."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from metrics import PAPER_POLICIES
 from swarm_forage_env.cli.option_groups import PlaceOptions, PolicyOptions, WorldOptions, takes_options
-from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, Jobs, Out
-
-if TYPE_CHECKING:
-    from swarm_forage_env.runs.store import RunStore
-    from swarm_forage_env.studies.ablation import Ablation
+from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Out
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -56,50 +51,22 @@ def ablate(
     """
     from pathlib import Path
 
+    from metrics.scoring.ablation import ablation_question
     from swarm_forage_env._internal.fields import MOST_SEEDS, whole
-    from swarm_forage_env.runs.store import RunStore
+    from swarm_forage_env.cli.printer import ask_and_show, refusing
+    from swarm_forage_env.cli.scenario_options import described_world, split_names
+    from swarm_forage_env.runs.answer import Answer
+    from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
 
     whole("--seeds", seeds, at_least=2, at_most=MOST_SEEDS)
-    plan = _plan(described, policies.names(",".join(PAPER_POLICIES)), quirks, seeds)
-    store = RunStore(out or Path("results", "ablation"))
-    if dry_run:
-        _show_plan(plan, store, seeds, jobs)
-    else:
-        _run(plan, store, jobs, as_json=as_json)
-
-
-def _plan(described: SeveralPlaces, policies: Sequence[str], quirks: str, seeds: int) -> "Ablation":
-    from swarm_forage_env.cli.scenario_options import described_world, split_names
-    from swarm_forage_env.scenarios.quirks import QUIRK_NAMES
-    from swarm_forage_env.studies.ablation import plan_ablation
-
-    worlds = [described_world(place)[0] for place in described.places()]
     every = {"all": QUIRK_NAMES, "none": ()}
-    switched = every[quirks] if quirks in every else split_names(quirks)
-    return plan_ablation(worlds, policies, quirks=switched, seeds=range(seeds), caches=described.caches)
-
-
-def _show_plan(plan: "Ablation", store: "RunStore", seeds: int, jobs: int | None) -> None:
-    from swarm_forage_env.cli.report import estimated_seconds, plan_note
-    from swarm_forage_env.runs.workers import available_cores
-
-    todo = [spec for spec in plan.specs if spec.run_id not in store]
-    processes = jobs or available_cores()
-    note = plan_note(todo, estimated_seconds(todo, processes), processes)
-    typer.echo(f"At most {note} A quirk that changes nothing needs one run instead of {seeds}.")
-
-
-def _run(plan: "Ablation", store: "RunStore", jobs: int | None, *, as_json: bool) -> None:
-    from swarm_forage_env.cli.ablation_report import ablation_json, ablation_pages
-    from swarm_forage_env.cli.errors import resumable
-    from swarm_forage_env.scenarios.performance import performance_of
-    from swarm_forage_env.studies.ablation import run_ablation
-
-    with resumable(store.folder):
-        result = run_ablation(plan, store=store, jobs=jobs, progress=True)
-    show = ablation_json if as_json else ablation_pages
-    typer.echo(show(result, performance_of(plan.specs[0].scenario.performance)))
-    for failure in result.failures:
-        typer.echo(f"failed: {failure.spec.describe()}: {failure.error}", err=True)
-    if result.failures:
-        raise typer.Exit(EXIT_FAILURE)
+    with refusing():
+        question = ablation_question(
+            [described_world(place)[0] for place in described.places()],
+            policies.names(",".join(PAPER_POLICIES)),
+            quirks=every[quirks] if quirks in every else split_names(quirks),
+            seeds=seeds,
+            caches=described.caches,
+        )
+    folder = out or Path("results", "ablation")
+    ask_and_show(question, folder, jobs, as_json=as_json, dry_run=dry_run, text=Answer.markdown)

@@ -130,18 +130,12 @@ def _show(board: "Board", *, as_json: bool) -> None:
 def _plan_text(question: "BenchmarkQuestion", records: Path, jobs: int | None) -> str:
     """What would be run, with an estimate."""
     from swarm_forage_env._internal.wording import counted
-    from swarm_forage_env.cli.report import estimate, estimated_seconds
-    from swarm_forage_env.runs.store import RunStore
-    from swarm_forage_env.runs.workers import available_cores
+    from swarm_forage_env.cli.terminal import notes
+    from swarm_forage_env.runs.plan_summary import summarize_plan
 
-    protocol, store, specs = question.protocol, RunStore(records), question.plan.specs
-    todo = [spec for spec in specs if spec.run_id not in store]
-    processes = jobs or available_cores()
-    seconds = estimated_seconds(todo, processes)
-    return "\n".join(
-        [
-            f"{question.name} in the benchmark, {protocol.name}: {counted(len(protocol.worlds), 'world')}, "
-            f"{counted(len(protocol.seeds), 'seed')}, {protocol.horizon_s:,g} s per run, records go to {store.folder}",
-            f"{counted(len(specs), 'run')}, {len(todo):,} to do" + estimate(seconds, processes, any_left=bool(todo)),
-        ]
+    protocol = question.protocol
+    return (
+        f"{question.name} in the benchmark, {protocol.name}: {counted(len(protocol.worlds), 'world')}, "
+        f"{counted(len(protocol.seeds), 'seed')}, {protocol.horizon_s:,g} s per run\n"
+        f"{summarize_plan(question.plan, out=records, jobs=jobs, tell=notes().print)}"
     )

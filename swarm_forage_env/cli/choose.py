@@ -48,10 +48,21 @@ def choose(
     Each policy runs undisturbed and under each disturbance alone. A constraint is met if the whole 95 % interval of
     mean performance reaches the demand. Runs that the folder holds already are not repeated.
     """
-    from swarm_forage_env.cli.decision_report import Demands, choose_runs
+    from metrics.scoring.choosing import choice_question
+    from swarm_forage_env.cli.printer import ask_and_show, refusing
     from swarm_forage_env.cli.scenario_options import default_folder, described_world
 
     world, caches = described_world(described)
-    demands = Demands(deliver=deliver, keep=keep, failures=failures, deaths=deaths, noise=noise)
-    folder = out or default_folder(world.scenario.name)
-    choose_runs(policies.names(), world, caches, demands, seeds, folder, jobs, as_json=as_json, dry_run=dry_run)
+    with refusing():
+        question = choice_question(
+            policies.names(),
+            world,
+            deliver=deliver,
+            keep=keep,
+            failures=failures,
+            deaths=deaths,
+            noise=noise,
+            seeds=seeds,
+            caches=caches,
+        )
+    ask_and_show(question, out or default_folder(world.scenario.name), jobs, as_json=as_json, dry_run=dry_run)

@@ -39,27 +39,23 @@ def predict(
     The critical size is the swarm size of the largest performance. Sizes of --hold are run as well and held against
     the prediction. Runs that the folder holds already are not repeated.
     """
-    from swarm_forage_env.cli.decision_report import predict_file, predict_runs
+    from metrics.scoring.prediction import Predictions, predict_curves, prediction_question
+    from swarm_forage_env.cli.printer import ask_and_show, refusing, show
     from swarm_forage_env.cli.scenario_options import default_folder, described_world, split_numbers
 
     fitted = None if fit is None else split_numbers("--fit", fit, int)
     held = () if hold is None else split_numbers("--hold", hold, int)
     if curves is not None:
         refuse_others(context, "--curves", _OF_CURVES, OF_RUNS)
-        predict_file(curves, fitted, held, described.performance, picture, as_json=as_json)
+        with refusing():
+            tables = predict_curves(curves, fit=fitted, hold=held, performance=described.performance)
+        show(Predictions(tables=tables), picture, as_json=as_json)
         return
     if any(word.partition("=")[0] == "n_robots" for word in described.settings):
         raise typer.BadParameter("Expected no --set n_robots=..., because sizes are varied; use --fit and --hold.")
     world, caches = described_world(described)
-    predict_runs(
-        policies.names(),
-        world,
-        caches,
-        (fitted, held),
-        seeds,
-        out or default_folder(world.scenario.name),
-        picture,
-        jobs,
-        as_json=as_json,
-        dry_run=dry_run,
-    )
+    with refusing():
+        question = prediction_question(policies.names(), world, fit=fitted, hold=held, seeds=seeds, caches=caches)
+    folder = out or default_folder(world.scenario.name)
+    file = picture or folder / "prediction.png"
+    ask_and_show(question, folder, jobs, as_json=as_json, dry_run=dry_run, picture=file)

@@ -49,25 +49,29 @@ def score(
     policies are compared seed by seed, with the differences that are significant. Runs that the folder holds already
     are not repeated. The budget says how long runs are, unless --horizon does.
     """
-    from swarm_forage_env.cli.scenario_options import default_folder
-    from swarm_forage_env.cli.score_options import ScoreOptions, build_question, score_forms, tables_of_file
-    from swarm_forage_env.cli.score_report import run_and_show, show_scores
+    from metrics.scoring.comparison import side_by_side
+    from metrics.scoring.front_door import score_curves
+    from swarm_forage_env.cli.printer import ask_and_show, refusing, show
+    from swarm_forage_env.cli.scenario_options import default_folder, split_names
+    from swarm_forage_env.cli.score_options import asked_scores, score_forms
 
+    forms = score_forms(variant, form, band=band)
+    wanted = None if measures is None else split_names(measures)
     if curves is not None:
         refuse_others(context, "--curves", _OF_CURVES, OF_RUNS)
-        tables = tables_of_file(curves, measures, described.performance, score_forms(variant, form))
-        show_scores(tables, picture, as_json=as_json, band=band)
+        with refusing():
+            tables = score_curves(curves, measures=wanted, performance=described.performance, forms=forms)
+        show(side_by_side(tables), picture, as_json=as_json)
         return
-    options = ScoreOptions(
-        policies=policies.names(),
-        measures=measures,
-        variants=variant,
-        forms=form,
+    question = asked_scores(
+        policies.names(),
+        described,
+        measures=wanted,
         budget=budget,
         seeds=seeds,
         disturbance=disturbance,
+        forms=forms,
     )
-    question = build_question(described, options)
     folder = out or default_folder(question.world.scenario.name)
-    file = picture or folder / ("scores.png" if len(options.policies) == 1 else "comparison.png")
-    run_and_show(question, folder, file, jobs, as_json=as_json, dry_run=dry_run, band=band)
+    file = picture or folder / ("scores.png" if len(question.plan.policies) == 1 else "comparison.png")
+    ask_and_show(question, folder, jobs, as_json=as_json, dry_run=dry_run, picture=file)

@@ -50,15 +50,16 @@ def test_worlds_may_be_disturbed_and_performance_another(command):
     disturbed = ("--wrapper", "sensor_noise:sigma=0.01,groups=proximity", "--performance", "n_carrying")
     code, out, _ = command(*ABLATE, *words, *disturbed)
     assert code == 0
-    assert "**Both readings.** Robots carrying" in out
+    assert "**Both readings: robots carrying" in out
     assert "per 1,000 s" not in out
     assert "| `obstacle_behind_counts` |" in out
 
 
 def test_dry_run_makes_nothing(command):
-    code, out, _ = command(*ABLATE, *QUIRKS, "--dry-run")
+    code, out, err = command(*ABLATE, *QUIRKS, "--dry-run")
     assert code == 0
-    assert "At most 64 runs to do, 12,800 simulated seconds" in out
+    assert out.startswith("64 runs, 64 to do, records go to results/ablation")
+    assert "A quirk that changes nothing needs one run instead of 2." in err
     assert not Path("results").exists()
 
 

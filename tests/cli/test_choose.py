@@ -54,8 +54,8 @@ def test_the_same_command_again_runs_nothing(command, monkeypatch):
 def test_a_dry_run_shows_conditions_and_runs_nothing(command):
     code, out, _ = command(*CHOOSE, *ADVERSE, "--dry-run")
     assert code == 0
-    assert out.splitlines()[0] == "random, crw in warehouse_small, 2 seeds, records go to results/warehouse_small"
-    assert "16 runs, 16 to do: roughly" in out
+    assert out.splitlines()[0] == "16 runs, 16 to do, records go to results/warehouse_small"
+    assert [line.split()[0] for line in out.splitlines()[7:]] == ["policy", "random", "crw", "all", "about"]
     assert not Path("results").exists()
 
 

@@ -105,8 +105,8 @@ def test_json_has_null_where_there_is_no_interval(command):
 def test_several_controllers_and_their_worlds(command):
     code, out, _ = command("run", "--policy", "random, crw,random", *SHORT, "--caches", "static", "--dry-run")
     assert code == 0
-    rows = [line.split("│")[2:4] for line in out.splitlines() if "│ to do" in line]
-    assert [[cell.strip() for cell in row] for row in rows] == [["random", "static"], ["crw", "static"]]
+    rows = [line.split()[:2] for line in out.splitlines() if "static" in line]
+    assert rows == [["random", "static"], ["crw", "static"], ["all", "static"]]
 
 
 @pytest.mark.parametrize("words", [("crw,dpo",), ("crw", "dpo"), ("--policy", "crw", "dpo"), ("--policy", "crw,dpo")])
@@ -119,8 +119,8 @@ def test_policies_are_words_or_an_option(command, words):
 def test_a_dry_run_plans_estimates_and_touches_nothing(command):
     code, out, _ = command("run", "--policy", "random", "--seeds", "3", "--jobs", "2", "--dry-run")
     assert code == 0
-    assert out.count("│ to do") == 3
-    assert "3 runs to do, 30,000 simulated seconds: roughly 8 s on 2 processes" in out
+    assert out.startswith("3 runs, 3 to do, records go to results/warehouse_small\n")
+    assert "on 2 cores as fast as this one is now" in out
     assert not list(Path.cwd().iterdir())
 
 
@@ -130,7 +130,7 @@ def test_a_dry_run_knows_what_is_stored(command):
     answer = json.loads(out)
     assert [run["stored"] for run in answer["runs"]] == [True, False]
     assert answer["runs"][1]["spec"]["seed"] == 1
-    assert answer["estimated_wall_s"] == pytest.approx(3 * 20 / 0.5e6)
+    assert 0.0 < answer["estimated_wall_s"] < 10.0
 
 
 def test_set_changes_any_field_with_its_type(command):
@@ -194,8 +194,8 @@ def test_a_failed_run_is_reported_with_the_way_to_run_it_again(command, monkeypa
         patch.setattr(RandomPolicy, "act", refuse)
         code, out, err = command(*RUN)
         assert code == 1
-        assert out == ""
-        assert "RuntimeError: I would rather not" in err
+        assert out.count("\n") == 1
+        assert "RuntimeError: I would rather not" in out
         again = err.strip().splitlines()[-1].split("again, alone: swarm-forage ")[1].split()
         code, out, err = command(*again)
         assert (code, out) == (1, "")

@@ -76,8 +76,8 @@ def test_the_same_command_again_runs_nothing(command, one_object_per_robot, monk
 def test_a_dry_run_shows_sizes_and_runs_nothing(command):
     code, out, _ = command(*RUNS, *WORLD, "--dry-run")
     assert code == 0
-    assert out.splitlines()[0] == "crw in warehouse_small, 2 seeds, records go to results/warehouse_small"
-    assert "10 runs, 10 to do: roughly" in out
+    assert out.splitlines()[0] == "10 runs, 10 to do, records go to results/warehouse_small"
+    assert "on 1 core as fast as this one is now" in out
     assert not Path("results").exists()
     _, out, _ = command(*RUNS, *WORLD, "--dry-run", "--json")
     assert len(json.loads(out)["runs"]) == 10
@@ -109,7 +109,7 @@ def test_another_performance_is_predicted_from_runs_and_from_curves(command, cur
 def test_search_and_rescue_has_sizes_of_its_own(command):
     code, out, _ = command("predict", "--policy", "crw", "--scenario", "search_and_rescue", "--dry-run")
     assert code == 0
-    sizes = [line.split()[2] for line in out.splitlines() if line.startswith("population_size")]
+    sizes = [line.split()[3] for line in out.splitlines() if line.startswith("search_and_rescue")]
     assert sizes == ["12", "51", "115", "204", "320"]
 
 

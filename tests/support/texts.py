@@ -9,8 +9,8 @@ from typing import Any
 
 VARIES = "<varies>"
 _VARYING_FIELDS = {
-    "commit", "core_hours", "cpu_time_s", "created", "digest", "simulated_s_per_wall_s", "traceback", "versions",
-    "wall_time_s",
+    "commit", "core_hours", "cpu_time_s", "created", "digest", "estimated_wall_s", "simulated_s_per_wall_s",
+    "traceback", "versions", "wall_time_s",
 }  # fmt: skip
 """Fields of JSON documents; the digest of an entry is also of its versions and hours."""
 _PROGRESS = re.compile(
@@ -25,7 +25,7 @@ _REPLACED: tuple[tuple[str, str], ...] = (
     (r"about \d[^,\n]* on (\d+) cores?", r"about <time> on \1 core"),
     (r"(?<=\nVersions\n)study \|.*\n(.*\|\n)+", "<versions>\n"),
 )
-_SPEED = re.compile(r"(?<=│)[ \d,]{11}\d(?= │$)", re.MULTILINE)
+_SPEED = re.compile(r"(\d\.\d{3} +)[\d,]+$", re.MULTILINE)
 """In the last column of a table of runs."""
 _DIGITS = 6
 """Digits of a number in JSON and CSV: the last ones of a fit differ between processors."""
@@ -37,7 +37,7 @@ def steady_text(text: str, folder: Path) -> str:
     for pattern, placeholder in _REPLACED:
         text = re.sub(pattern, placeholder, text)
     if "per wall s" in text:
-        text = _SPEED.sub(f"{'<speed>':>12}", text)
+        text = _SPEED.sub(r"\1<speed>", text)
     lines = [line.rstrip() for line in text.splitlines() if not _PROGRESS.fullmatch(line)]
     return "\n".join(lines)
 

@@ -236,7 +236,7 @@ def test_policies_of_equal_names_are_refused():
 
 def test_a_budget_of_ones_own_and_a_path_as_name(tmp_path):
     question = score_question([Path("random")], WORLD, budget=replace(TINY, n_seeds=1), measures=SIZES)
-    (found,) = ask(question, out=str(tmp_path), jobs=1, progress=False)
+    (found,) = ask(question, out=str(tmp_path), jobs=1, progress=False).tables
     assert found.settings["budget"] == "custom"
     assert found.settings["seeds"] == [0]
 
@@ -268,9 +268,9 @@ def test_a_world_with_wrappers_is_another_world(slow, tmp_path, monkeypatch):
     calm = {spec.run_id for spec in planned(["random"], measures=SIZES).specs}
     disturbed = score_question(["random"], slow, budget=TINY, measures=SIZES)
     assert calm.isdisjoint(spec.run_id for spec in disturbed.plan.specs)
-    (first,) = ask(disturbed, out=tmp_path, jobs=1, progress=False)
+    (first,) = ask(disturbed, out=tmp_path, jobs=1, progress=False).tables
     monkeypatch.setattr(workers, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
-    (again,) = ask(disturbed, out=tmp_path, jobs=1, progress=False)
+    (again,) = ask(disturbed, out=tmp_path, jobs=1, progress=False).tables
     assert str(again) == str(first)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from metrics import CurveError, SizeLaw, predict_curves, predict_performance, predict_policy
 from metrics.scoring import ask
-from metrics.scoring.prediction import counted_inside, law_text, prediction_question
+from metrics.scoring.prediction import Predictions, law_text, prediction_question
 from metrics.scoring.prediction_plots import draw_predictions
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs import workers
@@ -72,7 +72,7 @@ def test_curves_of_a_known_law_are_predicted(tmp_path):
         assert table.is_inside(size) is True
         assert table.measured(size).mean == pytest.approx(float(LAW.performance(size)))
     assert table.prediction.critical == pytest.approx(22.1, abs=0.5)
-    assert counted_inside([table]) == "2 of 2 held-back means inside the interval"
+    assert Predictions(tables=(table,)).inside_text == "2 of 2 held-back means inside the interval"
     text = str(table)
     assert text.splitlines()[0] == "mine: performance per run, fitted to 1, 2, 4, 8, 16 robots"
     assert "critical size: 22 robots (interval 2" in text
@@ -86,7 +86,7 @@ def test_sizes_of_a_file_are_all_fitted_unless_told_otherwise(tmp_path):
     assert (table.fit, table.predicted_sizes) == (SIZES, (128, 256))
     assert table.is_inside(128) is None
     assert table.measured(128) is None
-    assert counted_inside([table]) == ""
+    assert Predictions(tables=(table,)).inside_text == ""
     (table,) = predict_curves(path, fit=[2, 4, 8, 16], hold=[64])
     assert (table.fit, table.predicted_sizes) == ((2, 4, 8, 16), (32, 64))
     with pytest.raises(CurveError, match=r"sizes that mine has in .*, 1, 2, 4, 8, 16, 32, 64, got 3"):
@@ -102,7 +102,7 @@ def test_a_prediction_that_misses_says_so(tmp_path):
     (table,) = predict_curves(path, hold=[32, 64])
     assert [table.is_inside(size) for size in table.hold] == [False, False]
     assert "held back  NO" in str(table)
-    assert counted_inside([table]) == "0 of 2 held-back means inside the interval"
+    assert Predictions(tables=(table,)).inside_text == "0 of 2 held-back means inside the interval"
     assert table.critical_text().startswith("none up to 64 robots, 4 times the largest fitted; ")
 
 
@@ -163,7 +163,9 @@ def test_only_power_law_clusters_grow_with_the_swarm_whatever_the_name():
 def predicted(totals, *, fit=(1, 2, 4, 8, 16), hold=(), world=WORLD):
     """Predict from runs that are given by size."""
     question = prediction_question(["random"], world, fit=fit, hold=hold, seeds=2)
-    (table,) = question.answer(table_of_totals(question.plan, {"random": [totals[size] for size in (*fit, *hold)]}))
+    (table,) = question.answer(
+        table_of_totals(question.plan, {"random": [totals[size] for size in (*fit, *hold)]})
+    ).tables
     return table
 
 
@@ -179,7 +181,7 @@ def test_a_size_that_lost_its_runs_is_left_out_and_not_held_back():
     assert row(table, 16)[-2:] == ["left", "out"]
     (told,) = table.failures
     assert told.endswith("random in warehouse_small, 16 robots, seed 1, population_size = 16: it broke")
-    assert (table.is_inside(16), counted_inside([table])) == (None, "")
+    assert (table.is_inside(16), Predictions(tables=(table,)).inside_text) == (None, "")
     told = table.to_mapping()
     assert [(each["n_robots"], each["runs"]) for each in told["left_out"]] == [(16, [80.0])]
     assert [(each["held_back"], each["measured"]) for each in told["predictions"]] == [([], None)] * 2
@@ -195,7 +197,7 @@ def test_one_held_back_run_gives_no_verdict():
     table = predicted(runs, fit=(1, 2, 4, 8), hold=(16, 20))
     assert [table.is_inside(size) for size in (16, 20)] == [None, True]
     assert row(table, 16)[-2:] == ["held", "back"]
-    assert counted_inside([table]) == "1 of 1 held-back mean inside the interval"
+    assert Predictions(tables=(table,)).inside_text == "1 of 1 held-back mean inside the interval"
 
 
 def test_the_unit_is_that_of_the_performance(tmp_path):
@@ -279,7 +281,7 @@ def test_wrappers_of_the_world_are_in_all_runs(tmp_path, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(workers, "run_one", lambda spec: pytest.fail("a stored run was repeated"))
         question = prediction_question(["random"], world, fit=[1, 2, 3, 4], hold=[6], seeds=2)
-        (again,) = ask(question, out=tmp_path, jobs=1, progress=False)
+        (again,) = ask(question, out=tmp_path, jobs=1, progress=False).tables
     assert str(again) == str(table)
     calm = prediction_question(["random"], world.scenario, fit=[1, 2, 3, 4], hold=[6], seeds=2)
     assert {spec.run_id for spec in calm.plan.specs}.isdisjoint(run.run_id for run in runs)
@@ -295,7 +297,7 @@ def test_failed_runs_are_those_of_their_policy(monkeypatch):
     question = prediction_question(
         ["random", "crw"], replace(WORLD, performance="n_active"), fit=[1, 2, 3, 4, 5], seeds=2
     )
-    random, crw = ask(question, jobs=1, progress=False)
+    random, crw = ask(question, jobs=1, progress=False).tables
     assert (random.policy, random.fit, random.left_out, random.failures) == ("random", (1, 2, 3, 4, 5), (), ())
     assert (crw.policy, crw.fit, crw.left_out) == ("crw", (1, 2, 4, 5), (3,))
     assert len(crw.failures) == 2

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from metrics.scoring.ablation import TASK_COLUMNS, Switch, ablate_quirks, ablation_question
+from metrics.scoring.question import ask
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.runs.plan import Plan
 from swarm_forage_env.runs.run import run_one
-from swarm_forage_env.runs.store import RunStore
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, QUIRK_NAMES, Quirks
-from swarm_forage_env.studies.ablation import TASK_COLUMNS, Switch, plan_ablation, run_ablation
 from swarm_forage_env.wrappers.noise import SensorNoiseConfig
 from swarm_forage_env.wrappers.world import World
 
@@ -19,8 +19,8 @@ WORLD = scenario("warehouse_small", n_robots=6, horizon_s=40.0, interval_s=20.0,
 
 
 def test_each_quirk_is_switched_alone_in_both_readings():
-    plan = plan_ablation([WORLD], ["crw"], seeds=[3])
-    rules = {switch: condition.world.scenario.quirks for switch, condition in plan.conditions.items()}
+    question = ablation_question([WORLD], ["crw"], seeds=[3])
+    rules = {switch: condition.world.scenario.quirks for switch, condition in question.conditions.items()}
     assert len(rules) == 2 * (1 + len(QUIRK_NAMES))
     assert rules[Switch("warehouse_small", 6, "crw", "DESCRIBED", "")] == Quirks()
     assert rules[Switch("warehouse_small", 6, "crw", "AUTHORS_PROGRAM", "")] == AUTHORS_PROGRAM
@@ -31,11 +31,10 @@ def test_each_quirk_is_switched_alone_in_both_readings():
 
 
 def test_a_quirk_without_effect_is_run_once_and_one_with_effect_with_every_seed(tmp_path):
-    store = RunStore(tmp_path)
     quirks = ["nest_left_at_random", "explore_double_start"]
-    plan = plan_ablation([WORLD], ["crw"], quirks=quirks, seeds=[0, 1])
-    result = run_ablation(plan, store=store, jobs=1)
-    assert len(plan.specs) == 12
+    question = ablation_question([WORLD], ["crw"], quirks=quirks, seeds=[0, 1])
+    result = ask(question, out=tmp_path, jobs=1, progress=False)
+    assert len(question.plan.specs) == 12
     # Nobody delivers in 40 s, so nobody leaves the nest after it; exploring starts in the first tick.
     assert len(list(tmp_path.rglob("*.parquet"))) == 4 + 2 * 1 + 2 * 2
     effects = {effect.switch[3:]: effect for effect in result.effects()}
@@ -50,9 +49,9 @@ def test_a_quirk_without_effect_is_run_once_and_one_with_effect_with_every_seed(
 
 def test_differences_are_those_of_the_runs_with_the_same_seed():
     world = scenario("warehouse_small", n_robots=20, n_objects=300, horizon_s=400.0)
-    plan = plan_ablation([world], ["stochm"], quirks=["integer_estimates"], seeds=[0, 1])
-    effect = next(e for e in run_ablation(plan, jobs=1).effects() if e.switch.reading == "DESCRIBED")
-    conditions = [plan.conditions[effect.switch._replace(quirk=quirk)] for quirk in ("", "integer_estimates")]
+    question = ablation_question([world], ["stochm"], quirks=["integer_estimates"], seeds=[0, 1])
+    effect = next(e for e in ask(question, jobs=1, progress=False).effects() if e.switch.reading == "DESCRIBED")
+    conditions = [question.conditions[effect.switch._replace(quirk=quirk)] for quirk in ("", "integer_estimates")]
     runs = [Plan(conditions=(condition,), seeds=(0, 1)).specs for condition in conditions]
     pairs = [[run_one(spec) for spec in specs] for specs in zip(*runs, strict=True)]
     mean = np.mean([before.performance.sum() for before, _ in pairs])
@@ -67,7 +66,7 @@ def test_differences_are_those_of_the_runs_with_the_same_seed():
 
 def test_policies_are_ordered_by_performance():
     world = scenario("warehouse_small", n_robots=20, horizon_s=1000.0)
-    result = run_ablation(plan_ablation([world], ["random", "dpo"], quirks=[], seeds=[0]), jobs=1)
+    result = ablate_quirks([world], ["random", "dpo"], quirks=[], seeds=[0], jobs=1, progress=False)
     assert list(result.means(Switch("warehouse_small", 20, "", "DESCRIBED", ""))) == ["dpo", "random"]
     assert result.effects() == ()
 
@@ -76,25 +75,27 @@ def test_a_policy_that_fails_is_left_out_and_told():
     def refuse(obs):
         raise RuntimeError("I would rather not")
 
-    plan = plan_ablation([WORLD], {"random": "random", "mine": refuse}, quirks=["explore_double_start"], seeds=[0, 1])
-    result = run_ablation(plan, jobs=1)
+    question = ablation_question(
+        [WORLD], {"random": "random", "mine": refuse}, quirks=["explore_double_start"], seeds=[0, 1]
+    )
+    result = ask(question, jobs=1, progress=False)
     assert {switch.policy for switch in result.records} == {"random"}
     assert {effect.switch.policy for effect in result.effects()} == {"random"}
     assert {failure.spec.policy for failure in result.failures} == {"mine"}
-    assert len(result.failures) == len(plan.specs) / 2
+    assert len(result.failures) == len(question.plan.specs) / 2
 
 
 def test_two_worlds_of_one_name_and_size_are_refused():
     with pytest.raises(
         ConfigError, match="differ in name or number of robots, got warehouse_small with 6 robots twice"
     ):
-        plan_ablation([WORLD, replace(WORLD, horizon_s=60.0)], ["crw"], quirks=[])
+        ablation_question([WORLD, replace(WORLD, horizon_s=60.0)], ["crw"], quirks=[])
 
 
 def test_disturbances_are_the_same_in_all_runs():
     noisy = World(WORLD, (SensorNoiseConfig(sigma=0.01),))
-    plan = plan_ablation([noisy], ["crw"], quirks=["explore_double_start"])
-    assert {spec.wrappers for spec in plan.specs} == {noisy.wrappers}
+    question = ablation_question([noisy], ["crw"], quirks=["explore_double_start"])
+    assert {spec.wrappers for spec in question.plan.specs} == {noisy.wrappers}
 
 
 @pytest.mark.parametrize(
@@ -106,4 +107,4 @@ def test_disturbances_are_the_same_in_all_runs():
 )
 def test_impossible_plans_are_refused(words, message):
     with pytest.raises(ConfigError, match=message):
-        plan_ablation([WORLD], ["crw"], **words)
+        ablation_question([WORLD], ["crw"], **words)

@@ -1,0 +1,354 @@
+"""What runs were, condition by condition: performance, deliveries, interference, and the same of each part of a swarm.
+
+table = run_plan(Plan.product(policy_specs(["crw", "dpo"]), [World(scenario("warehouse_small"))], seeds=range(4)))
+print(summarize_runs(table))
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarm_forage_env._internal.wording import counted, plain
+from swarm_forage_env.policies.mixture import is_mixture, part_sizes
+from swarm_forage_env.policies.registry import part_labels
+from swarm_forage_env.rendering.figures import SCREEN, FigureStyle
+from swarm_forage_env.rendering.plots import Curve, draw_curves
+from swarm_forage_env.runs.answer import Answer, Sheet
+from swarm_forage_env.runs.plan import Condition, Plan
+from swarm_forage_env.runs.policy_spec import PolicyLike, policy_specs
+from swarm_forage_env.runs.record import RunRecord
+from swarm_forage_env.runs.store import RunStore
+from swarm_forage_env.runs.table import Table
+from swarm_forage_env.scenarios.columns import part_column
+from swarm_forage_env.scenarios.kinds import kind_sizes
+from swarm_forage_env.scenarios.performance import Performance, performance_curve, performance_of
+from swarm_forage_env.wrappers.world import World, WorldLike, world_of
+
+from ..checks import chosen_seeds
+from ..statistics import Summary, aggregate
+from .intervals import bounds
+from .plots import FEWEST_RUNS
+from .question import Question
+
+LEVEL = 0.95
+"""Confidence level of all intervals."""
+NO_NUMBER = "-"
+"""What robots do on average where there are none."""
+_ENDS = ("mean", "low", "high")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PartSummary:
+    """What one part of a mixed swarm does, or one kind of robots."""
+
+    policy: str
+    n_robots: int
+    deliveries_per_1000_s: Summary
+    deliveries_per_robot_per_1000_s: Summary | None
+    """Per robot of the part that is present; None where the part has no robots, as of a share that is too small."""
+    first_pickups_per_1000_s: Summary
+    interference_fraction: float
+    """NaN where the part has no robots."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ConditionSummary:
+    """What the runs of a policy in a world were."""
+
+    condition: Condition
+    caches: str
+    n_runs: int
+    performance: Summary
+    """Of what the scenario names, see `performance_number`."""
+    deliveries_per_1000_s: Summary
+    deliveries_per_robot_per_1000_s: Summary
+    """Per robot that is present."""
+    first_pickups_per_1000_s: Summary
+    interference_fraction: float
+    simulated_s_per_wall_s: float
+    """Simulated seconds per second and process, policy and recording included."""
+    parts: tuple[PartSummary, ...] = ()
+    """Of a mixed swarm, or of several kinds of robots, in order."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunSummary(Answer):
+    """What the runs of a table were."""
+
+    table: Table
+    rows: tuple[ConditionSummary, ...]
+    """One per condition with finished runs."""
+
+    @property
+    def world(self) -> World:
+        """The first world."""
+        return self.table.plan.conditions[0].world
+
+    @property
+    def read_as(self) -> Performance:
+        """What performance is in the first world."""
+        return performance_of(self.world.scenario.performance)
+
+    def sheets(self) -> tuple[Sheet, ...]:
+        """Return one row per condition and part, and runs that failed."""
+        told = [f"failed: {failure.spec.describe()}: {failure.error}" for failure in self.table.failures.values()]
+        failures = Sheet(notes=told)
+        if not self.rows:
+            return (failures,)
+        worlds = list(dict.fromkeys(condition.world.name for condition in self.table.plan.conditions))
+        is_mixed = any(row.parts for row in self.rows)
+        # Deliveries are always there; what else the scenario calls performance stands before them.
+        other = [] if self.read_as.name == "collected" else [f"{self.read_as.title} {span(self.read_as)}"]
+        header = ["policy", *(["world"] if len(worlds) > 1 else []), "caches", "runs", *other, "deliveries per 1,000 s"]
+        header += [*(["per robot"] if is_mixed else []), "interference", "simulated s per wall s"]
+        lines: list[list[str]] = []
+        for row in self.rows:
+            about = [row.condition.policy.label, *([row.condition.world.name] if len(worlds) > 1 else [])]
+            numbers = [spread_text(row.performance)] if other else []
+            numbers += [spread_text(row.deliveries_per_1000_s)]
+            numbers += [spread_text(row.deliveries_per_robot_per_1000_s)] if is_mixed else []
+            tail = [f"{row.interference_fraction:.3f}", f"{row.simulated_s_per_wall_s:,.0f}"]
+            lines.append([*about, row.caches, str(row.n_runs), *numbers, *tail])
+            empty = [""] * (len(about) + 1 + len(other))
+            lines += [_part_line(part, empty) for part in row.parts]
+        is_spread = any(row.n_runs > 1 for row in self.rows)
+        interval = f"± {LEVEL:.0%} t interval over seeds" if is_spread else "one seed, so no interval"
+        note = f"{interval}; interference: share of active robot time"
+        return Sheet(title=self._title(len(worlds)), header=header, rows=lines, notes=(note,)), failures
+
+    def _title(self, n_worlds: int) -> str:
+        scenario = self.world.scenario
+        if n_worlds > 1:
+            return f"{scenario.name} and others: {counted(n_worlds, 'world')}"
+        headline = f"{scenario.name}: {counted(self.world.n_robots, 'robot')}, {scenario.objects.n_objects} objects"
+        disturbed = ", ".join(config.name for config in self.world.wrappers)
+        return f"{headline}, {scenario.horizon_s:g} s" + (f", with {disturbed}" if disturbed else "")
+
+    def to_mapping(self) -> dict[str, Any]:
+        """Return policies, runs and failures as plain values."""
+        folder = self.table.folder
+        store = None if folder is None else RunStore(folder)
+        return {
+            "scenario": self.world.scenario.name,
+            "performance": {
+                "name": self.read_as.name,
+                "unit": self.read_as.unit,
+                "is_per_1000_s": self.read_as.is_total,
+            },
+            "out": None if folder is None else str(folder),
+            "controllers": [_condition_mapping(row) for row in self.rows],
+            "runs": [
+                {
+                    **record.keys(),
+                    "performance": performance_number(record, self.read_as),
+                    "deliveries_per_1000_s": record.rate_per_1000_s("collected"),
+                    "first_pickups_per_1000_s": record.rate_per_1000_s("first_picked"),
+                    "interference_fraction": float(record.interference_fraction.mean()),
+                    "wall_time_s": plain(record.wall_time_s),
+                    "file": None if store is None else str(store.path(record.run_id)),
+                }
+                for row in self.rows
+                for record in self.table.of(row.condition)
+            ],
+            "failures": [
+                {
+                    "run_id": failure.run_id,
+                    "error": failure.error,
+                    "file": None if store is None else str(store.failure_path(failure.run_id)),
+                }
+                for failure in self.table.failures.values()
+            ],
+        }
+
+    @property
+    def has_picture(self) -> bool:
+        """Whether runs have finished, and all have the same intervals."""
+        scenarios = [row.condition.world.scenario for row in self.rows]
+        return len({(scenario.horizon_s, scenario.interval_s) for scenario in scenarios}) == 1
+
+    def draw(self, path: str | Path, *, style: FigureStyle = SCREEN) -> None:
+        """Draw performance over time, one curve per condition with the t interval over seeds."""
+        if not self.has_picture:
+            raise ValueError("Expected finished runs with the same intervals, got nothing to draw.")
+        scenario, read_as = self.world.scenario, self.read_as
+        is_one_world = len({row.condition.world.name for row in self.rows}) == 1
+        curves: list[Curve] = []
+        for row in self.rows:
+            runs = np.array([record.performance for record in self.table.of(row.condition)])
+            per_interval = [aggregate(column, level=LEVEL) for column in runs.T]
+            mean, low, high = np.array([(point.mean, point.lower, point.upper) for point in per_interval]).T
+            if len(runs) < FEWEST_RUNS:
+                low = high = np.full_like(mean, np.nan)
+            label = row.condition.policy.label if is_one_world else row.condition.describe()
+            curves.append(Curve(label, mean, low, high))
+        draw_curves(
+            path,
+            self.table.of(self.rows[0].condition)[0].t_end_s,
+            curves,
+            title=f"{scenario.name}, {scenario.robots.n_robots} robots" if is_one_world else scenario.name,
+            ylabel=f"{read_as.title} per {scenario.interval_s:g} s" if read_as.is_total else read_as.title,
+            band=_about_bands(curves),
+            style=style,
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunQuestion(Question[RunSummary]):
+    """How policies do in worlds; the answer is what their runs were."""
+
+    def answer(self, table: Table) -> RunSummary:
+        """Return the summary of all runs."""
+        return summarize_runs(table)
+
+
+def run_question(
+    policies: Sequence[PolicyLike] | Mapping[str, PolicyLike],
+    *worlds: WorldLike,
+    seeds: int | Sequence[int] = 1,
+    parameters: Mapping[str, Any] | None = None,
+    caches: str | None = None,
+) -> RunQuestion:
+    """Return the question how policies do in worlds, which `summarize_runs` answers.
+
+    Args:
+        policies: As in `compare_policies`.
+        worlds: Each a `World`, a configuration or the name of a preset.
+        seeds: How many, or which.
+        parameters: As in `score_policy`.
+        caches: As in `score_policy`.
+
+    Raises:
+        ValueError: an unknown policy or scenario, or values that describe no run.
+    """
+    chosen = policy_specs(policies, parameters=parameters, caches=caches)
+    return RunQuestion(plan=Plan.product(chosen, [world_of(world) for world in worlds], chosen_seeds(seeds, 1)))
+
+
+def summarize_runs(table: Table) -> RunSummary:
+    """Say what the runs of a table were, one row per condition that has finished runs."""
+    return RunSummary(table=table, rows=tuple(_condition_summaries(table)))
+
+
+def performance_number(record: RunRecord, read_as: Performance) -> float:
+    """Return the performance of a run as one number: per 1,000 s for totals, else the mean over intervals."""
+    return record.rate_per_1000_s("performance") if read_as.is_total else float(record.performance.mean())
+
+
+def span(read_as: Performance) -> str:
+    """Return what `performance_number` counts, in words."""
+    return "per 1,000 s" if read_as.is_total else "mean"
+
+
+def spread_text(summary: Summary | None) -> str:
+    """Return a mean with half of its interval, with two digits behind the point."""
+    if summary is None or math.isnan(summary.mean):
+        return NO_NUMBER
+    half = summary.upper - summary.mean
+    return f"{summary.mean:.2f}" + ("" if math.isnan(half) else f" ± {half:.2f}")
+
+
+def _condition_summaries(table: Table) -> Iterator[ConditionSummary]:
+    for condition in table.plan.conditions:
+        records = table.of(condition)
+        if not records:
+            continue
+        wall_s = sum(record.wall_time_s for record in records)
+        read_as = performance_of(condition.world.scenario.performance)
+        yield ConditionSummary(
+            condition=condition,
+            caches=table.plan.specs_of(condition)[0].scenario.caches,
+            n_runs=len(records),
+            performance=_mean(records, lambda record, read_as=read_as: performance_number(record, read_as)),
+            deliveries_per_1000_s=_mean(records, lambda record: record.rate_per_1000_s("collected")),
+            deliveries_per_robot_per_1000_s=_mean(records, _deliveries_per_robot),
+            first_pickups_per_1000_s=_mean(records, lambda record: record.rate_per_1000_s("first_picked")),
+            interference_fraction=float(np.mean([record.interference_fraction.mean() for record in records])),
+            simulated_s_per_wall_s=sum(record.horizon_s for record in records) / wall_s if wall_s else math.nan,
+            parts=tuple(_part_summaries(condition, records)),
+        )
+
+
+def _mean(records: Sequence[RunRecord], number: Callable[[RunRecord], float]) -> Summary:
+    return aggregate([number(record) for record in records], level=LEVEL)
+
+
+def _deliveries_per_robot(record: RunRecord) -> float:
+    """Per 1,000 s and robot that is present."""
+    none = np.zeros(record.n_intervals)
+    share = np.divide(record.collected, record.n_present, out=none, where=record.n_present > 0.0)
+    return float(share.sum()) * 1000.0 / record.horizon_s
+
+
+def _part_summaries(condition: Condition, records: Sequence[RunRecord]) -> Iterator[PartSummary]:
+    """What each part of a mixed swarm, or each of several kinds of robots, has done; nothing of others."""
+    policy, robots = condition.policy, condition.world.scenario.robots
+    if is_mixture(policy.policy):
+        labels = part_labels(policy.policy)
+        sizes = part_sizes(policy.policy, robots.n_robots, policy.parameters.get("share"))
+    elif robots.tells_kinds:
+        labels = tuple(kind.name for kind in robots.robot_kinds)
+        sizes = kind_sizes(robots.robot_kinds, robots.n_robots)
+    else:
+        return
+    for part, (label, size) in enumerate(zip(labels, sizes, strict=True), start=1):
+
+        def rate(name: str, part: int = part) -> Summary:
+            column = part_column(part, name)
+            totals = [float(performance_curve(column, record.columns()).sum()) for record in records]
+            rates = [total * 1000.0 / record.horizon_s for total, record in zip(totals, records, strict=True)]
+            return aggregate(rates, level=LEVEL)
+
+        fractions = [performance_curve(part_column(part, "interference_fraction"), one.columns()) for one in records]
+        yield PartSummary(
+            policy=label,
+            n_robots=size,
+            deliveries_per_1000_s=rate("collected"),
+            deliveries_per_robot_per_1000_s=rate("collected_per_robot") if size else None,
+            first_pickups_per_1000_s=rate("first_picked"),
+            interference_fraction=float(np.mean(fractions)) if size else math.nan,
+        )
+
+
+def _part_line(part: PartSummary, empty: Sequence[str]) -> list[str]:
+    name = f"  of which {part.policy} ({counted(part.n_robots, 'robot')})"
+    rates = [spread_text(part.deliveries_per_1000_s), spread_text(part.deliveries_per_robot_per_1000_s)]
+    interference = f"{part.interference_fraction:.3f}" if part.n_robots else NO_NUMBER
+    return [name, *empty, *rates, interference, ""]
+
+
+def _condition_mapping(row: ConditionSummary) -> dict[str, Any]:
+    return {
+        "controller": row.condition.policy.label,
+        "caches": row.caches,
+        "n_runs": row.n_runs,
+        "performance": _ends(row.performance),
+        **_rates_mapping(row),
+        "simulated_s_per_wall_s": plain(row.simulated_s_per_wall_s),
+        "parts": [{"policy": part.policy, "n_robots": part.n_robots, **_rates_mapping(part)} for part in row.parts],
+    }
+
+
+def _rates_mapping(row: ConditionSummary | PartSummary) -> dict[str, Any]:
+    return {
+        "deliveries_per_1000_s": _ends(row.deliveries_per_1000_s),
+        "deliveries_per_robot_per_1000_s": _ends(row.deliveries_per_robot_per_1000_s),
+        "first_pickups_per_1000_s": _ends(row.first_pickups_per_1000_s),
+        "interference_fraction": plain(row.interference_fraction),
+    }
+
+
+def _ends(summary: Summary | None) -> dict[str, float | None]:
+    return dict(zip(_ENDS, bounds(summary) or (None, None, None), strict=True))
+
+
+def _about_bands(curves: Sequence[Curve]) -> str:
+    """Return what the bands are; of curves without them, why."""
+    few = f"fewer than {FEWEST_RUNS} runs, too few for a band"
+    with_band = [bool(np.isfinite(curve.low).any()) for curve in curves]
+    if not any(with_band):
+        return few
+    return f"bands: {LEVEL:.0%} t interval over seeds" + ("" if all(with_band) else f"; elsewhere {few}")

@@ -1,0 +1,129 @@
+"""How commands ask questions and show answers: text or JSON on stdout, a picture in a file, notes on stderr."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from metrics.checks import CurveError
+from metrics.scoring.question import Question
+from swarm_forage_env._internal.fields import ConfigError
+from swarm_forage_env._internal.printable import printable
+from swarm_forage_env._internal.wording import counted
+from swarm_forage_env.cli.errors import resumable
+from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture
+from swarm_forage_env.cli.terminal import notes
+from swarm_forage_env.runs.answer import Answer
+from swarm_forage_env.runs.plan_summary import summarize_plan
+from swarm_forage_env.runs.store import RunStore
+from swarm_forage_env.runs.table import Table
+
+FAILURES_SHOWN = 10
+"""Failed runs for which the command that makes them again is told; the folder has all."""
+
+
+@contextmanager
+def refusing() -> Iterator[None]:
+    """Turn what is wrong with a policy, a file or a value into an error about the words of the user.
+
+    Raises:
+        ConfigError: any ValueError within.
+    """
+    try:
+        yield
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+
+
+def ask_and_show(
+    question: Question[Any],
+    folder: Path,
+    jobs: int | None,
+    *,
+    as_json: bool,
+    dry_run: bool,
+    picture: Path | None = None,
+    text: Callable[[Answer], str] = Answer.text,
+) -> None:
+    """Make the runs of a question and show its answer; with `dry_run`, only show the plan.
+
+    Args:
+        question: What is asked; its answer is an `Answer`.
+        folder: Where records go.
+        jobs: Processes; None = one per core.
+        as_json: Print JSON.
+        dry_run: Run nothing.
+        picture: File of the picture; None = the answer has none.
+        text: How the answer is printed otherwise.
+
+    Raises:
+        typer.Exit: Ctrl-C; runs have failed, or too many for an answer.
+    """
+    aside = notes()
+    for remark in question.remarks:
+        aside.print(remark)
+    if dry_run:
+        show(summarize_plan(question.plan, out=folder, jobs=jobs, tell=aside.print), as_json=as_json)
+        return
+    store = RunStore(folder)
+    with resumable(folder):
+        table = question.make_runs(store=store, jobs=jobs, progress=True)
+    try:
+        answer: Answer = question.answer(table)
+    except CurveError as error:  # what is left is too little
+        raise typer.Exit(complain(str(error), EXIT_FAILURE)) from None
+    show(answer, picture, as_json=as_json, text=text)
+    _tell_of_records(table, store)
+    if table.failures:
+        raise typer.Exit(EXIT_FAILURE)
+
+
+def show(
+    answer: Answer, picture: Path | None = None, *, as_json: bool, text: Callable[[Answer], str] = Answer.text
+) -> None:
+    """Print an answer, and draw it.
+
+    Args:
+        answer: What was found.
+        picture: File for the picture; a picture that cannot be made is told of, because the answer is worth more.
+        as_json: Print JSON; it names the picture.
+        text: How the answer is printed otherwise.
+    """
+    drawn = None if picture is None else _drawn(answer, picture)
+    if as_json:
+        may_be_drawn = picture is not None or answer.has_picture
+        told = {"picture": None if drawn is None else str(drawn)} if may_be_drawn else {}
+        typer.echo(json.dumps({**answer.to_mapping(), **told}, indent=1))
+    else:
+        typer.echo(printable(text(answer).rstrip("\n")))
+    if drawn is not None:
+        typer.echo(f"picture {drawn}", err=True)
+
+
+def _drawn(answer: Answer, picture: Path) -> Path | None:
+    """Draw an answer; None if it has no picture, or there can be none."""
+    if not answer.has_picture:
+        return None
+    try:
+        answer.draw(picture)
+    except ImportError as error:
+        typer.echo(error, err=True)
+    except OSError as error:
+        typer.echo(no_picture(picture, error), err=True)
+    else:
+        return picture
+    return None
+
+
+def _tell_of_records(table: Table, store: RunStore) -> None:
+    """Say on stderr where the records are, and how failed runs are made again."""
+    if table.records:
+        typer.echo(f"{counted(len(table.records), 'record')} in {store.folder}", err=True)
+    failed = [*table.failures]
+    for run_id in failed[:FAILURES_SHOWN]:
+        typer.echo(f"again, alone: swarm-forage rerun {store.failure_path(run_id)}", err=True)
+    if len(failed) > FAILURES_SHOWN:
+        typer.echo(f"and {len(failed) - FAILURES_SHOWN} more", err=True)
