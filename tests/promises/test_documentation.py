@@ -59,10 +59,9 @@ def test_marked_commands_of_the_readme_are_one_line_each(name):
     assert len(blocks[0].splitlines()) == 1
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_relative_links_lead_to_files(page):
-    targets = re.findall(r"\]\((?!https?://|#)([^)#]+)", page.read_text())
-    assert [target for target in targets if not (page.parent / target).exists()] == []
+def test_relative_links_lead_to_files():
+    targets = [(page, link) for page in PAGES for link in re.findall(r"\]\((?!https?://|#)([^)#]+)", page.read_text())]
+    assert [(page.name, target) for page, target in targets if not (page.parent / target).exists()] == []
 
 
 def test_what_pages_show_is_not_left_out_of_the_repository(tmp_path):
@@ -79,11 +78,11 @@ def test_what_pages_show_is_not_left_out_of_the_repository(tmp_path):
     assert left_out.split() == ["results/of_a_run"]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_code_blocks_are_closed_before_the_next_begins(page):
-    fences = re.findall(r"^```(.*)$", page.read_text(), re.MULTILINE)
-    assert len(fences) % 2 == 0
-    assert [language for language in fences[1::2] if language] == []
+def test_code_blocks_are_closed_before_the_next_begins():
+    for page in PAGES:
+        fences = re.findall(r"^```(.*)$", page.read_text(), re.MULTILINE)
+        assert len(fences) % 2 == 0, page.name
+        assert [language for language in fences[1::2] if language] == [], page.name
 
 
 def test_index_lists_every_page():

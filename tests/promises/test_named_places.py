@@ -14,8 +14,8 @@ PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 PAGES.remove(ROOT / "CHANGELOG.md")  # it tells of names that are no more
 OBJECTS = {
     *("action_space", "algorithm", "b", "claim", "client", "env", "forage_env", "interface", "layout", "model"),
-    *("plan", "policy", "rng", "robots", "self", "sensor_noise", "settings", "sigmas", "spec", "state", "swarm"),
-    *("training", "verdict", "world", "wrapper"),
+    *("objects", "plan", "policy", "rng", "robots", "self", "sensor_noise", "settings", "sigmas", "spec", "state"),
+    *("swarm", "table", "training", "verdict", "world", "wrapper"),
 }
 """What pages and docstrings call objects, whether a module has the name or not: of these, only classes count."""
 FOREIGN = {
@@ -36,7 +36,7 @@ FOREIGN = {
 """Other packages."""
 SPELLINGS = (r"reset\((?:self, )?task\b", r"\btask\.(?:layout|n_robots)\b", r"\benv\.task\b", r"\bSwarmTask\b")
 """Old names that are no module's."""
-SUFFIXES = {"csv", "json", "md", "mplstyle", "npz", "png", "py", "toml", "zip"}
+SUFFIXES = {"csv", "json", "md", "mplstyle", "npz", "png", "py", "pyi", "toml", "zip"}
 DOTTED = re.compile(r"`([a-z_][a-z_0-9]*(?:\.[A-Za-z_0-9]+)+)")
 PATHS = re.compile(r"`?((?:swarm_forage_env|baselines|metrics|tests|scripts|docs)/[\w/.-]+\.(?:py|md|toml|npz|json))")
 
@@ -62,7 +62,8 @@ def inside(folder: Path, rest: list[str]) -> bool:
         return not rest or rest[0] in names_in(file)
     if not (folder / first).is_dir():
         return False
-    return not rest or inside(folder / first, rest) or rest[0] in names_in(folder / first / "__init__.py")
+    fronts = (front for ending in ("py", "pyi") if (front := folder / first / f"__init__.{ending}").is_file())
+    return not rest or inside(folder / first, rest) or any(rest[0] in names_in(front) for front in fronts)
 
 
 def resolves(dotted: str, file: Path) -> bool:
@@ -83,9 +84,9 @@ def stale(text: str, file: Path) -> list[str]:
     return found + [match[0] for old in SPELLINGS for match in re.finditer(old, text)]
 
 
-@pytest.mark.parametrize("file", [*SOURCES, *PAGES], ids=lambda file: file.relative_to(ROOT).as_posix())
-def test_names_of_modules_and_files_are_those_of_today(file):
-    assert stale(file.read_text(), file) == []
+def test_names_of_modules_and_files_are_those_of_today():
+    found = {file.relative_to(ROOT).as_posix(): stale(file.read_text(), file) for file in [*SOURCES, *PAGES]}
+    assert {file: names for file, names in found.items() if names} == {}
 
 
 @pytest.mark.parametrize(
