@@ -23,13 +23,13 @@ from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
 DEBUG_VARIABLE = "SWARM_FORAGE_DEBUG"
 """Environment variable; if it is set and not empty, an error that nobody foresaw shows its traceback at once."""
-_BOUNDS = {
-    "greater_than_equal": ("ge", ">="),
-    "greater_than": ("gt", ">"),
-    "less_than_equal": ("le", "<="),
-    "less_than": ("lt", "<"),
+_WANTED = {
+    "Input should be a valid integer": "a whole number",
+    "Input should be a valid number": "a number",
+    "Input should be greater than or equal to": "a number >=",
+    "Input should be less than or equal to": "a number <=",
 }
-"""How pydantic names a bound -> its word for it, and its sign."""
+"""What pydantic says of values, by which typer checks them -> how we say it."""
 
 
 def end(error: BaseException, words: Sequence[str] = ()) -> int:
@@ -70,25 +70,12 @@ def _about_words(error: Any) -> str:
     right = right_option(wrong, [word for option in error.ctx.command.params for word in option.opts]) if wrong else ""
     if right:
         return f"No such option: {wrong}; for this command it is {right}."
-    found = getattr(error.__cause__, "errors", None)  # of pydantic, by which typer checks values
-    param = getattr(error, "param", None)
-    if found is None or param is None:
+    said = next((theirs for theirs in _WANTED if error.message.startswith(theirs)), None)
+    if said is None:
         return error.format_message()
-    (first, *_) = found()
-    kind = first["type"]
-    if kind.startswith("int_"):
-        wanted = "a whole number"
-    elif kind.startswith("float_"):
-        wanted = "a number"
-    elif kind in _BOUNDS:
-        word, sign = _BOUNDS[kind]
-        wanted = f"a number {sign} {first['ctx'][word]}"
-    else:
-        return error.format_message()
-    about = getattr(param, "help", None)
-    return f"Expected {param.opts[0]} to be {wanted}, got {str(first['input'])!r}." + (
-        f" It is: {about}" if about else ""
-    )
+    wanted = _WANTED[said] + error.message.removeprefix(said).partition(",")[0]
+    got = error.__cause__.errors()[0]["input"]
+    return f"Expected {error.param.opts[0]} to be {wanted}, got {got!r}. It is: {error.param.help}"
 
 
 @contextmanager

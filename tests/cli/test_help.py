@@ -74,3 +74,9 @@ def test_words_that_mean_nothing_are_answered_with_the_nearest(command, words, t
 def test_only_what_is_asked_for_is_imported():
     assert imported("--help") == imported("study") == set()
     assert imported("run", "--help") <= {"typer", "rich"}
+
+
+@pytest.mark.parametrize("one", [one for one in ALL if one.place], ids=lambda one: one.words)
+def test_every_word_that_a_command_takes_is_explained(one):
+    """A complaint about a value quotes it."""
+    assert [param.opts for param in loaded(one).params if not param.help] == []
