@@ -6,8 +6,7 @@ from typing import Annotated
 import typer
 
 from metrics import PAPER_POLICIES
-from swarm_forage_env.cli.option_groups import PlaceOptions, PolicyOptions, WorldOptions, takes_options
-from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Out
+from swarm_forage_env.cli.option_groups import PlaceOptions, PolicyOptions, RunOptions, WorldOptions
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -32,18 +31,14 @@ class SeveralPlaces(PlaceOptions):
         ]
 
 
-@takes_options
 def ablate(
     policies: PolicyOptions,
     described: SeveralPlaces,
+    options: RunOptions,
     quirks: Annotated[
         str, typer.Option("--quirks", help="Which to switch, separated by commas; all; or none: the readings only.")
     ] = "all",
     seeds: Annotated[int, typer.Option(min=2, help="Runs per policy, size and switched quirk.")] = 3,
-    out: Out = None,
-    jobs: Jobs = None,
-    as_json: AsJson = False,
-    dry_run: DryRun = False,
 ) -> None:
     """Switch one quirk at a time, on in the described reading and off in the authors' program, and show what it moves.
 
@@ -68,5 +63,5 @@ def ablate(
             seeds=seeds,
             caches=described.caches,
         )
-    folder = out or Path("results", "ablation")
-    ask_and_show(question, folder, jobs, as_json=as_json, dry_run=dry_run, text=Answer.markdown)
+    folder = options.out or Path("results", "ablation")
+    ask_and_show(question, folder, options, text=Answer.markdown)

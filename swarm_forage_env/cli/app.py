@@ -128,9 +128,11 @@ def loaded(command: Command) -> Any:
     """Import a command; returns what typer makes of it."""
     import typer
 
+    from swarm_forage_env.cli.option_groups import spread
+
     module, _, function = command.place.partition(":")
     app = typer.Typer(add_completion=False, rich_markup_mode=None)
-    app.command()(getattr(import_module(f"swarm_forage_env.cli.{module}"), function))
+    app.command()(spread(getattr(import_module(f"swarm_forage_env.cli.{module}"), function)))
     return typer.main.get_command(app)
 
 

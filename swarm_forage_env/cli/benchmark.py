@@ -8,7 +8,7 @@ import typer
 
 from metrics.controllers import PAPER_POLICIES
 from swarm_forage_env._internal.printable import printable
-from swarm_forage_env.cli.option_groups import PolicyOptions, takes_options
+from swarm_forage_env.cli.option_groups import PolicyOptions
 from swarm_forage_env.cli.options import AsJson, DryRun, Jobs
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 Entries = Annotated[list[Path], typer.Argument(metavar="ENTRY...", help="Entry files; the scripted four come along.")]
 
 
-@takes_options
 def run(  # long: one parameter per option
     policies: PolicyOptions,
     name: Annotated[str | None, typer.Option("--name", help="Name of the entry; default that of the policy.")] = None,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm_forage_env._internal.printable import printable
-from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions
 from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, FirstSeed, complain
 
 if TYPE_CHECKING:
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from swarm_forage_env.runs.spec import RunSpec
 
 
-@takes_options
 def check(
     policies: PolicyOptions,
     described: WorldOptions,

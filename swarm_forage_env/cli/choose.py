@@ -4,14 +4,13 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
-from swarm_forage_env.cli.options import AsJson, DryRun, Jobs, Out
+from swarm_forage_env.cli.option_groups import PolicyOptions, RunOptions, WorldOptions
 
 
-@takes_options
 def choose(
     policies: PolicyOptions,
     described: WorldOptions,
+    options: RunOptions,
     deliver: Annotated[
         float,
         typer.Option(help="Performance that an undisturbed run must reach, in all: objects or what is asked for."),
@@ -38,10 +37,6 @@ def choose(
         typer.Option(metavar="SIGMA", help="Standard deviation of the noise of all sensors and wheels."),
     ] = None,
     seeds: Annotated[int, typer.Option(min=2, help="Runs per policy and condition.")] = 4,
-    out: Out = None,
-    jobs: Jobs = None,
-    as_json: AsJson = False,
-    dry_run: DryRun = False,
 ) -> None:
     """Rank policies by the constraints that they meet: deliver so much, despite failures, deaths and noise.
 
@@ -65,4 +60,4 @@ def choose(
             seeds=seeds,
             caches=caches,
         )
-    ask_and_show(question, out or default_folder(world.scenario.name), jobs, as_json=as_json, dry_run=dry_run)
+    ask_and_show(question, options.out or default_folder(world.scenario.name), options)

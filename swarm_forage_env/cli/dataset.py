@@ -5,12 +5,11 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions
 from swarm_forage_env.cli.options import DryRun, FirstSeed, complain
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
 
-@takes_options
 def dataset(  # long: one parameter per option
     policies: PolicyOptions,
     described: WorldOptions,

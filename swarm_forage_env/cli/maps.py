@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, refuse_others, takes_options
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, refuse_others
 from swarm_forage_env.cli.options import Picture
 from swarm_forage_env.cli.terminal import notes, progress_bar
 
@@ -24,7 +24,6 @@ OwnScales: TypeAlias = Annotated[
 ]
 
 
-@takes_options
 def maps(
     context: typer.Context,
     policies: PolicyOptions,

@@ -1,10 +1,9 @@
 """Options that several commands share, as classes: what they describe, each is a parameter of a command.
 
-    @takes_options
     def watch(policies: PolicyOptions, described: WorldOptions, speed: ...) -> None:
 
-The command line then shows `--scenario`, `--robots` and the rest where `described` stands, and the function gets them
-as one object.
+The command line shows `--scenario`, `--robots` and the rest where `described` stands, and the function gets them as
+one object.
 """
 
 import functools
@@ -76,8 +75,18 @@ class PolicyOptions:
         return name
 
 
-def takes_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the fields of its option classes as parameters; it gets objects of these classes."""
+@dataclass(frozen=True, kw_only=True, slots=True)
+class RunOptions:
+    """How the runs of a question are made, and in which form its answer is shown."""
+
+    out: options.Out = None
+    jobs: options.Jobs = None
+    as_json: options.AsJson = False
+    dry_run: options.DryRun = False
+
+
+def spread(command: Callable[..., None]) -> Callable[..., None]:
+    """Return a command with the fields of its option classes as parameters; it gets objects of these classes."""
     signature = inspect.signature(command)
     kinds: dict[str, Any] = {name: each.annotation for name, each in signature.parameters.items()}
     groups = {name: kind for name, kind in kinds.items() if is_dataclass(kind)}

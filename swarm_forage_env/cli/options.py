@@ -26,7 +26,7 @@ Scenario = Annotated[
     typer.Option(
         "--scenario",
         metavar="NAME|FILE.toml",
-        help="A preset, see 'swarm-forage list'; or a file with fields of a scenario, and wrappers (docs/files.md).",
+        help="A preset, see 'swarm-forage list'; or a file with fields and wrappers (docs/adversity.md).",
     ),
 ]
 Robots = Annotated[int | None, typer.Option("--robots", min=1, help="Swarm size.")]

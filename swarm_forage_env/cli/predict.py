@@ -4,18 +4,18 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.option_groups import PlaceOptions, PolicyOptions, refuse_others, takes_options
-from swarm_forage_env.cli.options import OF_RUNS, AsJson, Curves, DryRun, Jobs, Out, Picture
+from swarm_forage_env.cli.option_groups import PlaceOptions, PolicyOptions, RunOptions, refuse_others
+from swarm_forage_env.cli.options import OF_RUNS, Curves, Picture
 
 _OF_CURVES = ("curves", "fit", "hold", "performance", "picture", "as_json")
 """Options of `predict` that go with --curves."""
 
 
-@takes_options
 def predict(
     context: typer.Context,
     policies: PolicyOptions,
     described: PlaceOptions,
+    options: RunOptions,
     curves: Curves = None,
     fit: Annotated[
         str | None,
@@ -28,11 +28,7 @@ def predict(
         str | None, typer.Option(help="Larger sizes that are run, or in the file, but not fitted: the test.")
     ] = None,
     seeds: Annotated[int, typer.Option(min=2, help="Runs per size.")] = 4,
-    out: Out = None,
     picture: Picture = None,
-    jobs: Jobs = None,
-    as_json: AsJson = False,
-    dry_run: DryRun = False,
 ) -> None:
     """Fit performance to small swarms; predict twice and four times the largest, with intervals, and the critical size.
 
@@ -49,13 +45,13 @@ def predict(
         refuse_others(context, "--curves", _OF_CURVES, OF_RUNS)
         with refusing():
             tables = predict_curves(curves, fit=fitted, hold=held, performance=described.performance)
-        show(Predictions(tables=tables), picture, as_json=as_json)
+        show(Predictions(tables=tables), picture, as_json=options.as_json)
         return
     if any(word.partition("=")[0] == "n_robots" for word in described.settings):
         raise typer.BadParameter("Expected no --set n_robots=..., because sizes are varied; use --fit and --hold.")
     world, caches = described_world(described)
     with refusing():
         question = prediction_question(policies.names(), world, fit=fitted, hold=held, seeds=seeds, caches=caches)
-    folder = out or default_folder(world.scenario.name)
+    folder = options.out or default_folder(world.scenario.name)
     file = picture or folder / "prediction.png"
-    ask_and_show(question, folder, jobs, as_json=as_json, dry_run=dry_run, picture=file)
+    ask_and_show(question, folder, options, picture=file)

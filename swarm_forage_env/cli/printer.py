@@ -14,6 +14,7 @@ from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.printable import printable
 from swarm_forage_env._internal.wording import counted
 from swarm_forage_env.cli.errors import resumable
+from swarm_forage_env.cli.option_groups import RunOptions
 from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture
 from swarm_forage_env.cli.terminal import notes
 from swarm_forage_env.runs.answer import Answer
@@ -41,21 +42,17 @@ def refusing() -> Iterator[None]:
 def ask_and_show(
     question: Question[Any],
     folder: Path,
-    jobs: int | None,
+    options: RunOptions,
     *,
-    as_json: bool,
-    dry_run: bool,
     picture: Path | None = None,
     text: Callable[[Answer], str] = Answer.text,
 ) -> None:
-    """Make the runs of a question and show its answer; with `dry_run`, only show the plan.
+    """Make the runs of a question and show its answer; or only its plan.
 
     Args:
         question: What is asked; its answer is an `Answer`.
         folder: Where records go.
-        jobs: Processes; None = one per core.
-        as_json: Print JSON.
-        dry_run: Run nothing.
+        options: How runs are made, and what is printed.
         picture: File of the picture; None = the answer has none.
         text: How the answer is printed otherwise.
 
@@ -65,17 +62,18 @@ def ask_and_show(
     aside = notes()
     for remark in question.remarks:
         aside.print(remark)
-    if dry_run:
-        show(summarize_plan(question.plan, out=folder, jobs=jobs, tell=aside.print), as_json=as_json)
+    if options.dry_run:
+        plan = summarize_plan(question.plan, out=folder, jobs=options.jobs, tell=aside.print)
+        show(plan, as_json=options.as_json)
         return
     store = RunStore(folder)
     with resumable(folder):
-        table = question.make_runs(store=store, jobs=jobs, progress=True)
+        table = question.make_runs(store=store, jobs=options.jobs, progress=True)
     try:
         answer: Answer = question.answer(table)
     except CurveError as error:  # what is left is too little
         raise typer.Exit(complain(str(error), EXIT_FAILURE)) from None
-    show(answer, picture, as_json=as_json, text=text)
+    show(answer, picture, as_json=options.as_json, text=text)
     _tell_of_records(table, store)
     if table.failures:
         raise typer.Exit(EXIT_FAILURE)

@@ -5,12 +5,11 @@ from typing import Annotated, Any
 
 import typer
 
-from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions
 from swarm_forage_env.cli.options import Seed
 from swarm_forage_env.cli.terminal import progress_bar
 
 
-@takes_options
 def record(
     policies: PolicyOptions,
     described: WorldOptions,

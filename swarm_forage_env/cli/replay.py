@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, refuse_others, takes_options
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, refuse_others
 from swarm_forage_env.cli.options import Seed
 from swarm_forage_env.cli.terminal import notes, progress_bar
 
@@ -23,7 +23,6 @@ _RUN_ID = re.compile(r"[0-9a-f]{16}")
 _OPTIONS_OF_STORED_RUNS = ("policies", "named_policies", "file", "seconds", "frame")
 
 
-@takes_options
 def replay(
     context: typer.Context,
     policies: PolicyOptions,

@@ -4,20 +4,17 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
-from swarm_forage_env.cli.options import AsJson, DryRun, FirstSeed, Jobs, Out
+from swarm_forage_env.cli.option_groups import PolicyOptions, RunOptions, WorldOptions
+from swarm_forage_env.cli.options import FirstSeed, Picture
 
 
-@takes_options
 def run(
     policies: PolicyOptions,
     described: WorldOptions,
+    options: RunOptions,
     seeds: Annotated[int, typer.Option(min=1, help="Runs per policy.")] = 1,
     first_seed: FirstSeed = 0,
-    out: Out = None,
-    jobs: Jobs = None,
-    as_json: AsJson = False,
-    dry_run: DryRun = False,
+    picture: Picture = None,
 ) -> None:
     """Run policies in a scenario and compare how they perform.
 
@@ -34,5 +31,5 @@ def run(
     chosen = range(first_seed, first_seed + seeds)
     with refusing():
         question = run_question(policies.names("crw"), world, seeds=chosen, caches=caches)
-    folder = out or default_folder(world.scenario.name)
-    ask_and_show(question, folder, jobs, as_json=as_json, dry_run=dry_run, picture=folder / "performance.png")
+    folder = options.out or default_folder(world.scenario.name)
+    ask_and_show(question, folder, options, picture=picture or folder / "performance.png")

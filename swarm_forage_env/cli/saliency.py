@@ -6,12 +6,11 @@ from typing import Annotated
 import typer
 
 from swarm_forage_env._internal.printable import printable
-from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions
 from swarm_forage_env.cli.options import AsJson, Picture, Seed, no_picture
 from swarm_forage_env.cli.terminal import notes
 
 
-@takes_options
 def saliency(
     policies: PolicyOptions,
     described: WorldOptions,

@@ -2,19 +2,15 @@
 
 import typer
 
-from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, refuse_others, takes_options
+from swarm_forage_env.cli.option_groups import PolicyOptions, RunOptions, WorldOptions, refuse_others
 from swarm_forage_env.cli.options import (
     OF_RUNS,
-    AsJson,
     Band,
     Budget,
     Curves,
     Disturbance,
-    DryRun,
     Forms,
-    Jobs,
     Measures,
-    Out,
     Picture,
     ScoreSeeds,
     Variants,
@@ -24,11 +20,11 @@ _OF_CURVES = ("curves", "measures", "performance", "variant", "form", "band", "p
 """Options that go with --curves."""
 
 
-@takes_options
 def score(
     context: typer.Context,
     policies: PolicyOptions,
     described: WorldOptions,
+    options: RunOptions,
     curves: Curves = None,
     measures: Measures = None,
     variant: Variants = "corrected",
@@ -37,11 +33,7 @@ def score(
     budget: Budget = "standard",
     seeds: ScoreSeeds = None,
     disturbance: Disturbance = "throttle",
-    out: Out = None,
     picture: Picture = None,
-    jobs: Jobs = None,
-    as_json: AsJson = False,
-    dry_run: DryRun = False,
 ) -> None:
     """Run policies in all experiments that the measures of swarm engineering need, score and compare them.
 
@@ -61,7 +53,7 @@ def score(
         refuse_others(context, "--curves", _OF_CURVES, OF_RUNS)
         with refusing():
             tables = score_curves(curves, measures=wanted, performance=described.performance, forms=forms)
-        show(side_by_side(tables), picture, as_json=as_json)
+        show(side_by_side(tables), picture, as_json=options.as_json)
         return
     question = asked_scores(
         policies.names(),
@@ -72,6 +64,6 @@ def score(
         disturbance=disturbance,
         forms=forms,
     )
-    folder = out or default_folder(question.world.scenario.name)
+    folder = options.out or default_folder(question.world.scenario.name)
     file = picture or folder / ("scores.png" if len(question.plan.policies) == 1 else "comparison.png")
-    ask_and_show(question, folder, jobs, as_json=as_json, dry_run=dry_run, picture=file)
+    ask_and_show(question, folder, options, picture=file)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.option_groups import WorldOptions, given_options, refuse_others, takes_options
+from swarm_forage_env.cli.option_groups import WorldOptions, given_options, refuse_others
 from swarm_forage_env.training.defaults import (
     DECISION_TICKS,
     DEFAULT_ARENAS,
@@ -21,7 +21,6 @@ _OF_RESUMING = ("steps", "out", "callbacks", "jobs", "resume")
 """Options that say nothing of the plan that is resumed."""
 
 
-@takes_options
 def train(  # long: one parameter per option
     context: typer.Context,
     described: WorldOptions,

@@ -4,11 +4,10 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions, takes_options
+from swarm_forage_env.cli.option_groups import PolicyOptions, WorldOptions
 from swarm_forage_env.cli.options import Seed
 
 
-@takes_options
 def watch(
     policies: PolicyOptions,
     described: WorldOptions,

@@ -1,13 +1,18 @@
 """One word means one thing in all commands: which options they have, and what is said of former and wrong words."""
 
+import inspect
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import pytest
+import typer
 
 from swarm_forage_env.cli.app import loaded
 from swarm_forage_env.cli.commands import COMMANDS
 from swarm_forage_env.cli.former_words import COMMANDS as FORMER
 from swarm_forage_env.cli.former_words import OPTIONS, right_option
+from swarm_forage_env.cli.option_groups import spread
 
 MAKE_RUNS = ("run", "score", "compare", "predict", "choose", "ablate")
 """Commands that make many runs."""
@@ -46,6 +51,30 @@ def test_whatever_has_a_scenario_takes_a_file_of_it(command, words):
 @pytest.mark.parametrize("words", MAKE_RUNS)
 def test_whatever_makes_runs_says_where_how_many_and_in_what_form(words):
     assert {"--jobs", "--seeds", "--out", "--json", "--dry-run", "--policy"} <= options_of(words)
+
+
+@pytest.mark.parametrize(
+    "words", ["list", "info", "check", "rerun", "saliency", "predict availability", "benchmark show"]
+)
+def test_what_is_printed_is_there_as_json_too(words):
+    assert "--json" in options_of(words)
+
+
+def test_spread_gives_a_command_objects_of_its_option_classes():
+    @dataclass(frozen=True, kw_only=True)
+    class Look:
+        size: Annotated[int, typer.Option("--size")] = 3
+        names: Annotated[tuple[str, ...], typer.Option("--name")] = ()
+
+    def show(look: Look, file: str = "x") -> None:
+        seen.append((look, file))
+
+    seen: list[object] = []
+    one = spread(show)
+    assert list(inspect.signature(one).parameters) == ["size", "names", "file"]
+    one(size=4, names=["a", "b"], file="y")
+    one(size=3, names=None, file="x")
+    assert seen == [(Look(size=4, names=("a", "b")), "y"), (Look(), "x")]
 
 
 def test_an_option_takes_a_value_in_all_commands_or_in_none():

@@ -169,7 +169,7 @@ def test_seeds_length_and_world_can_be_chosen(command):
         (("score", "crw", "--curves", "x.csv"), "Expected --curves without POLICY, which are about runs"),
         (
             ("score", "--curves", "x.csv", "--seeds", "3", "--dry-run"),
-            "Expected --curves without --seeds, --dry-run, which are about runs",
+            "Expected --curves without --dry-run, --seeds, which are about runs",
         ),
         (("score", "--policy", "crww"), "Unknown policy 'crww'. Did you mean 'crw'?"),
         (("score", "--policy", "gone.zip"), "Cannot read the policy file"),
