@@ -3,7 +3,7 @@
     python scripts/check_report.py report.html S1a "S2a still" "S2a fast"
 
 The names are the experiments that were run. Every claim and intuition must be listed, and those about these experiments
-alone must have an answer, with its numbers, in both readings. Exit code 1 if something is missing.
+alone must have an answer, with its numbers, under both rules. Exit code 1 if something is missing.
 """
 
 import re
@@ -14,13 +14,13 @@ from pathlib import Path
 from metrics.claims import CLAIMS, INTUITIONS
 from metrics.scoring.figure_panels import FIGURE_MEASURES
 from metrics.scoring.measures import MEASURE_CRITERIA
-from swarm_forage_env.studies.study import READING_NAMES
+from swarm_forage_env.studies.study import RULES_NAMES
 
 TABLES = {"verdicts": CLAIMS, "intuitions": INTUITIONS}
 """Table of the page -> what it lists."""
 
 ANSWERED = r'<b>{}, corrected</b> <span class="answer [\w ]+">.*statistic'
-"""What a row of such a table has for a reading."""
+"""What a row of such a table has for the rules."""
 
 
 def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
@@ -29,12 +29,12 @@ def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
     measures = [name for name in FIGURE_MEASURES if MEASURE_CRITERIA[name] == "population_size"]
     studies = dict.fromkeys(name.split()[0] for name in experiments)
     missing = [
-        f"figure {study}: {measure.replace('_', ' ')}, reading {reading}"
+        f"figure {study}: {measure.replace('_', ' ')}, rules {rules}"
         for study in studies
         for measure in measures
-        for reading in READING_NAMES
+        for rules in RULES_NAMES
         if not any(
-            words.startswith(f"{study}: {measure.replace('_', ' ')} (") and words.endswith(f"reading {reading}")
+            words.startswith(f"{study}: {measure.replace('_', ' ')} (") and words.endswith(f"rules {rules}")
             for words in drawn
         )
     ]
@@ -45,9 +45,9 @@ def missing_in(page: str, experiments: Sequence[str]) -> list[str]:
                 missing.append(f"claim {name}")
             elif {panel[0] for panel in claim.panels} <= {*experiments}:
                 missing += [
-                    f"the answer to {name}, reading {reading}"
-                    for reading in (READING_NAMES if claim.panels else ())
-                    if not re.search(ANSWERED.format(reading), rows[name])
+                    f"the answer to {name}, rules {rules}"
+                    for rules in (RULES_NAMES if claim.panels else ())
+                    if not re.search(ANSWERED.format(rules), rows[name])
                 ]
     return missing
 

@@ -21,8 +21,8 @@ from PIL import Image
 from metrics.claims import CLAIMS, INTUITIONS
 from metrics.claims.outcomes import Answer
 from metrics.scoring import Judged, StudyFigure, StudyPanels, Waiting, draw_figure, judge_claims, study_figures
-from metrics.scoring.cell_distributions import cell_distributions
 from metrics.scoring.model_plots import draw_models
+from metrics.scoring.place_distributions import place_distributions
 from metrics.scoring.study_models import model_figures
 from metrics.scoring.verdicts import VARIANTS
 from swarm_forage_env import read_study
@@ -68,9 +68,9 @@ class Results(NamedTuple):
     expected_later: Sequence[Waiting]
 
     @property
-    def readings(self) -> list[str]:
-        """Readings that some study has."""
-        return list(dict.fromkeys(reading for table in self.tables for reading in table.spec.readings))
+    def rules(self) -> list[str]:
+        """Those that some study has."""
+        return list(dict.fromkeys(rules for table in self.tables for rules in table.spec.rules))
 
 
 def gathered(places: Sequence[Path]) -> Results:
@@ -89,12 +89,12 @@ def rows(header: Sequence[str], lines: Sequence[Sequence[Any]], right: Sequence[
 
 
 def what_is_there(results: Results) -> str:
-    """Return how many runs of the sets the page is of, and which sets and cells are not run yet, per budget."""
+    """Return how many runs of the sets the page is of, and which sets and conditions are not run yet, per budget."""
     return "\n\n".join(_of_budget(results, budget) for budget in dict.fromkeys(t.spec.budget for t in results.tables))
 
 
 def plan_of(table: StudyTable) -> StudySpec:
-    """Return the whole study of which a table may hold fewer seeds or one reading."""
+    """Return the whole study of which a table may hold fewer seeds, or rules."""
     spec = table.spec
     if not is_set_of_paper(spec):
         return spec
@@ -111,19 +111,19 @@ def _of_budget(results: Results, budget: str) -> str:
     nothing: list[str] = []
     in_part: list[str] = []
     for name, plan in sorted(plans.items()):
-        done = [state.n_runs[DONE] for state in tables[name].cell_states()] if name in tables else []
-        n_cells, n_seeds = len(plan.cells), len(plan.seeds)
+        done = [state.n_runs[DONE] for state in tables[name].place_states()] if name in tables else []
+        n_places, n_seeds = len(plan.places), len(plan.seeds)
         n_there += sum(done)
         n_planned += plan.n_runs
         n_whole, n_begun = (sum(count >= least for count in done) for least in (n_seeds, 1))
         if n_begun == 0:
             nothing.append(name)
-        elif n_whole == n_cells:
+        elif n_whole == n_places:
             whole.append(name)
         else:
             in_part.append(
-                f"\n- {name}: {n_whole:,} of {counted(n_cells, 'cell')} whole, with {counted(n_seeds, 'run')} each; "
-                f"{n_begun - n_whole:,} begun, {n_cells - n_begun:,} not run"
+                f"\n- {name}: {n_whole:,} of {counted(n_places, 'condition')} whole, with {counted(n_seeds, 'run')} "
+                f"each; {n_begun - n_whole:,} begun, {n_places - n_begun:,} not run"
             )
     of = f" of the paper's sets at budget `{budget}`" if budget else ""
     text = f"**This page is of {n_there:,} of {counted(n_planned, 'run')}{of}.**"
@@ -136,21 +136,22 @@ def what_ran(results: Results) -> str:
     """Return the part on runs and what they took."""
     lines: list[tuple[Any, ...]] = []
     for table in results.tables:
-        done = [state.n_runs[DONE] for state in table.cell_states()]
+        done = [state.n_runs[DONE] for state in table.place_states()]
         took = "-" if table.wall_time_s is None else f"{table.wall_time_s / 3600.0:.2f}"
-        where = (f"`{table.spec.name}`", table.spec.title, table.spec.budget, ", ".join(table.spec.readings))
+        where = (f"`{table.spec.name}`", table.spec.title, table.spec.budget, ", ".join(table.spec.rules))
         lines.append(
             (*where, f"{sum(done):,} of {plan_of(table).n_runs:,}", min(done), f"{table.spec.horizon_s:,.0f}", took)
         )
     known = [table.wall_time_s for table in results.tables if table.wall_time_s is not None]
     total = f"\n\nAll runs together took {sum(known) / 3600.0:.1f} hours of one core.{what_the_rest_takes(results)}"
     total = total if known else ""
-    header = ("set", "about", "budget", "readings", "runs", "fewest per cell", "length, s", "hours")
+    header = ("set", "about", "budget", "rules", "runs", "fewest per condition", "length, s", "hours")
     return (
         "## What was run\n\n"
         f"{rows(header, lines, right=(4, 5, 6, 7))}\n\n"
         "Hours are those of one core by the clock, other work of the machine included; a dash where only a packed file "
-        "was at hand, which does not keep them. Fewer than four runs of a cell decide nothing by intervals." + total
+        "was at hand, which does not keep them. Fewer than four runs of a condition decide nothing by intervals."
+        + total
     )
 
 
@@ -158,9 +159,9 @@ def what_the_rest_takes(results: Results) -> str:
     """Return what whole sets take at the rate of these runs, in proportion to robots times ticks; "" if unknown."""
     timed = [table for table in results.tables if table.wall_time_s]
     done = sum(
-        state.n_runs[DONE] * table.spec.specs_of(state.cell)[0].robot_ticks
+        state.n_runs[DONE] * table.spec.specs_of(state.place)[0].robot_ticks
         for table in timed
-        for state in table.cell_states()
+        for state in table.place_states()
     )
     if not done:
         return ""
@@ -176,23 +177,23 @@ def what_the_rest_takes(results: Results) -> str:
 
 def answers(results: Results) -> str:
     """Return how many claims have which answer, and the answer to each, measures corrected."""
-    formulas = [one.verdict.answer for one in results.judged if not one.reading]
+    formulas = [one.verdict.answer for one in results.judged if not one.rules]
     counts: list[tuple[Any, ...]] = []
-    for reading in results.readings:
-        mine = [one.verdict.answer for one in results.judged if (one.reading, one.variant) == (reading, "corrected")]
-        waiting = sum((one.reading, one.variant) == (reading, "corrected") for one in results.waiting)
-        counts.append((reading, *((mine + formulas).count(word) for word in ANSWERS), waiting))
-    found = {(one.claim.name, one.reading): one.verdict for one in results.judged if one.variant == "corrected"}
+    for rules in results.rules:
+        mine = [one.verdict.answer for one in results.judged if (one.rules, one.variant) == (rules, "corrected")]
+        waiting = sum((one.rules, one.variant) == (rules, "corrected") for one in results.waiting)
+        counts.append((rules, *((mine + formulas).count(word) for word in ANSWERS), waiting))
+    found = {(one.claim.name, one.rules): one.verdict for one in results.judged if one.variant == "corrected"}
     lines: list[tuple[str, ...]] = []
     for name, claim in CLAIMS.items():
-        cells = [_answer(found.get((name, reading if claim.panels else ""))) for reading in results.readings]
+        cells = [_answer(found.get((name, rules if claim.panels else ""))) for rules in results.rules]
         lines.append((f"[{name}]({DETAILS}#{name.lower()})", claim.text, *cells))
     return (
         "## The answers\n\n"
-        f"{rows(('reading', *ANSWERS, 'waiting for runs'), counts, right=range(1, 2 + len(ANSWERS)))}\n\n"
+        f"{rows(('rules', *ANSWERS, 'waiting for runs'), counts, right=range(1, 2 + len(ANSWERS)))}\n\n"
         "An answer is by intervals of paired runs, our rule, with the measures corrected. In brackets stands the "
         "answer by the paper's rule, overlapping bands of two standard deviations, where it is another."
-        f"{_otherwise(results)}{_on_fewer_values(results)}\n\n{rows(('claim', 'text', *results.readings), lines)}"
+        f"{_otherwise(results)}{_on_fewer_values(results)}\n\n{rows(('claim', 'text', *results.rules), lines)}"
     )
 
 
@@ -200,9 +201,9 @@ def _otherwise(results: Results) -> str:
     """A sentence on the claims to which another form or sense gives another answer; empty if there are none."""
     given: dict[tuple[str, str], set[str]] = {}
     for one in results.judged:
-        answers_here = given.setdefault((one.claim.name, one.reading), set())
+        answers_here = given.setdefault((one.claim.name, one.rules), set())
         answers_here |= {verdict.answer for verdict in (one.verdict, *one.verdict.otherwise.values())} - {"no scores"}
-    names = [name for name in CLAIMS if any(len(given.get((name, reading), ())) > 1 for reading in results.readings)]
+    names = [name for name in CLAIMS if any(len(given.get((name, rules), ())) > 1 for rules in results.rules)]
     words = f"[some of them]({DETAILS}#answers-that-hang-on-a-slip) give another answer"
     return (
         f" With other forms of the measures, or in another sense of the paper's words, {words} to {', '.join(names)}."
@@ -228,14 +229,14 @@ def _answer(verdict: Any) -> str:
 def in_short(results: Results) -> str:
     """Return how many claims have which answer, with each form of the measures and by each rule."""
     lines: list[tuple[Any, ...]] = []
-    for reading in results.readings:
+    for rules in results.rules:
         for variant in VARIANTS:
-            mine = [one.verdict for one in results.judged if (one.reading, one.variant) == (reading, variant)]
+            mine = [one.verdict for one in results.judged if (one.rules, one.variant) == (rules, variant)]
             counts = [sum(verdict.answer == word for verdict in mine) for word in ANSWERS]
             by_bands = [sum(verdict.by_bands == word for verdict in mine) for word in ANSWERS]
-            waiting = sum((one.reading, one.variant) == (reading, variant) for one in results.waiting)
-            lines.append((reading, variant, *counts, *by_bands, waiting))
-    header = ("reading", "measures", *ANSWERS, *(f"{word} by bands" for word in ANSWERS), "waiting")
+            waiting = sum((one.rules, one.variant) == (rules, variant) for one in results.waiting)
+            lines.append((rules, variant, *counts, *by_bands, waiting))
+    header = ("rules", "measures", *ANSWERS, *(f"{word} by bands" for word in ANSWERS), "waiting")
     return (
         f"## How many\n\n{rows(header, lines, right=range(2, 3 + 2 * len(ANSWERS)))}\n\n"
         "Claims that follow from formulas alone, V1 and V2, are not counted."
@@ -243,20 +244,20 @@ def in_short(results: Results) -> str:
 
 
 def every_verdict(results: Results) -> str:
-    """Return each claim with all its verdicts: readings, forms of the measures, both rules."""
+    """Return each claim with all its verdicts: rules, forms of the measures, both rules."""
     parts = [
         "## Claim by claim\n\nMeasures are as corrected, as printed in the paper, and as in the authors' program "
         "(`sierra`); behind a colon stands another sense of the claim. The statistic is what was decided on, in words "
         "in the last column, and of several statements the share that holds; the effect is a share of the largest mean "
         "in the figure; runs are the fewest behind any number."
     ]
-    header = ("reading", "measures", "by intervals", "by bands", "statistic", "effect", "runs", "why")
+    header = ("rules", "measures", "by intervals", "by bands", "statistic", "effect", "runs", "why")
     for name, claim in {**CLAIMS, **INTUITIONS}.items():
         here = [one for one in (*results.judged, *results.expected) if one.claim.name == name]
         lines = [
             (
-                one.reading or "-",
-                (f"{one.variant}: {sense}" if sense else one.variant) if one.reading else "-",
+                one.rules or "-",
+                (f"{one.variant}: {sense}" if sense else one.variant) if one.rules else "-",
                 verdict.answer,
                 verdict.by_bands,
                 number(verdict.statistic),
@@ -277,35 +278,33 @@ def every_verdict(results: Results) -> str:
 
 
 def what_hangs_on_what(results: Results) -> str:
-    """Return the claims whose answer depends on the reading, on the form, on what is meant or on the rule."""
+    """Return the claims whose answer depends on the rules, on the form, on what is meant or on the rule."""
     found = {
-        (one.claim.name, one.reading, one.variant): one.verdict
+        (one.claim.name, one.rules, one.variant): one.verdict
         for one in results.judged
-        if one.reading and one.verdict.answer != "no scores"
+        if one.rules and one.verdict.answer != "no scores"
     }
     lines: list[tuple[str, ...]] = []
     for name in CLAIMS:
         here = {key[1:]: verdict.answer for key, verdict in found.items() if key[0] == name}
-        by_reading = {
-            reading: here[reading, "corrected"] for reading in results.readings if (reading, "corrected") in here
-        }
-        if len(set(by_reading.values())) > 1:
-            words = ", ".join(f"{reading}: {answer}" for reading, answer in by_reading.items())
-            lines.append((name, "the reading of the rules", words))
-        for reading, base in by_reading.items():
-            others = {v: here[reading, v] for v in VARIANTS if (reading, v) in here and here[reading, v] != base}
+        by_rules = {rules: here[rules, "corrected"] for rules in results.rules if (rules, "corrected") in here}
+        if len(set(by_rules.values())) > 1:
+            words = ", ".join(f"{rules}: {answer}" for rules, answer in by_rules.items())
+            lines.append((name, "the rules", words))
+        for rules, base in by_rules.items():
+            others = {v: here[rules, v] for v in VARIANTS if (rules, v) in here and here[rules, v] != base}
             if others:
                 words = ", ".join(f"{variant}: {answer}" for variant, answer in {"corrected": base, **others}.items())
-                lines.append((name, f"the form of the measure ({reading})", words))
-            verdict = found[name, reading, "corrected"]
+                lines.append((name, f"the form of the measure ({rules})", words))
+            verdict = found[name, rules, "corrected"]
             lines += [
-                (name, f"what is meant ({reading})", f"as judged: {base}, {sense}: {other.answer}")
+                (name, f"what is meant ({rules})", f"as judged: {base}, {sense}: {other.answer}")
                 for sense, other in verdict.otherwise.items()
                 if other.answer != base
             ]
             by_bands = verdict.by_bands
             if by_bands not in (base, "no scores"):
-                lines.append((name, f"the rule ({reading})", f"intervals: {base}, bands: {by_bands}"))
+                lines.append((name, f"the rule ({rules})", f"intervals: {base}, bands: {by_bands}"))
     text = rows(("claim", "hangs on", "answers"), lines) if lines else "No answer does."
     return (
         "## Answers that hang on a slip\n\nThe paper's description and the authors' program differ "
@@ -318,41 +317,39 @@ def what_hangs_on_what(results: Results) -> str:
 
 def intuitions(results: Results) -> str:
     """Return what the paper expected, with the answers."""
-    found = {(one.claim.name, one.reading): one.verdict for one in results.expected}
+    found = {(one.claim.name, one.rules): one.verdict for one in results.expected}
     lines = [
         (
             f"[{name}]({DETAILS}#{name.lower()})",
             claim.figure.split(",")[0],
             claim.text,
-            *(_answer(found.get((name, r))) for r in results.readings),
+            *(_answer(found.get((name, r))) for r in results.rules),
         )
         for name, claim in INTUITIONS.items()
     ]
     return (
         "## What the paper expected\n\nIts tables of intuitions, written before its experiments, in our words, with "
         'what we take "modest" and "low" to mean. Left out: that STOCHM is congested near its caches, since no measure '
-        f"says where time is lost.\n\n{rows(('name', 'where', 'expected', *results.readings), lines)}"
+        f"says where time is lost.\n\n{rows(('name', 'where', 'expected', *results.rules), lines)}"
     )
 
 
 def pictured(results: Results) -> Iterator[tuple[StudyTable, list[StudyFigure]]]:
     """Yield each study with its figures that claims are about, measures corrected.
 
-    They are those of the first reading that it has, and of another one where the answer to one of the claims differs.
+    They are those of the first rules that it has, and of another one where the answer to one of the claims differs.
     """
     about = {panel for claim in CLAIMS.values() for panel in claim.panels}
-    answers = {
-        (one.claim.name, one.reading): one.verdict.answer for one in results.judged if one.variant == "corrected"
-    }
+    answers = {(one.claim.name, one.rules): one.verdict.answer for one in results.judged if one.variant == "corrected"}
     for table, panels in zip(results.tables, results.scored, strict=True):
         shown: list[StudyFigure] = []
         for figure in study_figures(panels):
             first = figure.panels[0]
             here = {panel.name for panel in figure.panels}
             names = [name for name, claim in CLAIMS.items() if not here.isdisjoint(claim.panels)]
-            base = table.spec.readings[0]
-            differs = any(answers.get((name, base)) != answers.get((name, first.reading)) for name in names)
-            if first.variant == "corrected" and here & about and (first.reading == base or differs):
+            base = table.spec.rules[0]
+            differs = any(answers.get((name, base)) != answers.get((name, first.rules)) for name in names)
+            if first.variant == "corrected" and here & about and (first.rules == base or differs):
                 shown.append(figure)
         yield table, shown
 
@@ -365,20 +362,20 @@ def figures(results: Results, folder: Path) -> str:
     parts = [
         "## Figures",
         "Those that claims are about, measures corrected, and models beside runs ([laws.md](laws.md)). The second "
-        "reading is shown where the answer to one of the claims differs. All others: `swarm-forage study plot`.",
+        "rules are shown where the answer to one of the claims differs. All others: `swarm-forage study plot`.",
     ]
-    found = {(one.claim.name, one.reading): one.verdict for one in results.judged if one.variant == "corrected"}
+    found = {(one.claim.name, one.rules): one.verdict for one in results.judged if one.variant == "corrected"}
     for table, shown in pictured(results):
         parts += [f"### {table.spec.name}: {table.spec.title}"] if shown else []
         for figure in shown:
             parts.append(_pictured(figure.name, figure.title, folder, lambda path, it=figure: draw_figure(it, [path])))
             here = {panel.name for panel in figure.panels}
-            reading = figure.panels[0].reading
+            rules = figure.panels[0].rules
             names = [name for name, claim in CLAIMS.items() if not here.isdisjoint(claim.panels)]
-            words = ", ".join(f"{name} {_answer(found.get((name, reading)))}" for name in names)
+            words = ", ".join(f"{name} {_answer(found.get((name, rules)))}" for name in names)
             parts.append(f"Claims: {words}.")
         for model in model_figures(table):
-            if model.reading == table.spec.readings[0]:
+            if model.rules == table.spec.rules[0]:
                 parts.append(_pictured(model.name, model.title, folder, lambda path, it=model: draw_models(it, [path])))
     return "\n\n".join(parts)
 
@@ -394,11 +391,11 @@ def _pictured(name: str, title: str, folder: Path, draw: Callable[[Path], None])
 
 
 def breakdowns(results: Results) -> str:
-    """Return in how many cells of each set runs broke down, and where most often."""
+    """Return in how many conditions of each set runs broke down, and where most often."""
     lines: list[tuple[Any, ...]] = []
     for table in results.tables:
-        cells = cell_distributions(table)
-        judged = cells.filter(cells["broken"].is_not_null())
+        places = place_distributions(table)
+        judged = places.filter(places["broken"].is_not_null())
         broken = judged.filter(judged["broken"] > 0.0).sort("broken", descending=True, maintain_order=True)
         axis = [item.name for item in table.spec.axes]
         worst = ""
@@ -407,9 +404,9 @@ def breakdowns(results: Results) -> str:
             place = ", ".join(f"{name.replace('_', ' ')} {_value(row[name])}" for name in axis)
             half = "" if math.isinf(row["half_broken_s"]) else f", half by {row['half_broken_s']:,.0f} s"
             share = f"{round(row['broken'] * row['n_runs'])} of {counted(row['n_runs'], 'run')}"
-            worst = f"{row['policy']}, {row['reading']}, {place}: {share}{half}"
-        lines.append((f"`{table.spec.name}`", len(cells), len(judged), len(broken), worst or "-"))
-    header = ("set", "cells", "judged", "with a breakdown", "most often")
+            worst = f"{row['policy']}, {row['rules']}, {place}: {share}{half}"
+        lines.append((f"`{table.spec.name}`", len(places), len(judged), len(broken), worst or "-"))
+    header = ("set", "conditions", "judged", "with a breakdown", "most often")
     return (
         "## Breakdowns\n\nA mean hides runs that broke down: they end below half of the reference and stay there "
         "([metrics.md](metrics.md#all-runs-not-means-alone)). The reference is the undisturbed swarm; where sizes "
@@ -445,7 +442,12 @@ def fewer_values(results: Results) -> str:
         if words or len(spec.seeds) < n_paper:
             runs = f"{len(spec.seeds)} of {n_paper}"
             lines.append((f"`{spec.name}`", words or "-", runs, ", ".join(claims_of(spec.name)) if words else "-"))
-    header = ("set", "values of the paper that are left out", "runs of a cell", "claims judged without these values")
+    header = (
+        "set",
+        "values of the paper that are left out",
+        "runs each",
+        "claims judged without these values",
+    )
     return f"Fewer runs and values than in the paper:\n\n{rows(header, lines)}\n\n" if lines else ""
 
 

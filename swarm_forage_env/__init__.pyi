@@ -48,9 +48,9 @@ from .rendering.figures import FigureStyle as FigureStyle
 # training
 from .views.sampler import ScenarioSampler as ScenarioSampler
 from .views.sampler import SampledWorld as SampledWorld
-from .contract.own import OwnSensor as OwnSensor
-from .contract.own import register_reward as register_reward
-from .contract.own import register_sensor as register_sensor
+from .contract.own_functions import OwnSensor as OwnSensor
+from .contract.own_functions import register_reward as register_reward
+from .contract.own_functions import register_sensor as register_sensor
 
 # studies
 from .studies.study_file import load_study as load_study

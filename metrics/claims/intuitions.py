@@ -8,7 +8,7 @@ intuition is left out: that STOCHM is congested near its caches. No measure says
 
 from .checking import Claim, Place, Statement
 from .predicates import is_not_higher, stays_alike
-from .stating import E_T, SIMPLE, STEADY, UNSTEADY, A, C, D, N, P, R, best_of, better, spatial, states
+from .statements import E_T, SIMPLE, STEADY, UNSTEADY, A, C, D, N, P, R, best_of, better, spatial, states
 
 _SPATIAL = (spatial("S1a"), spatial("S1b"))
 _FLEXIBLE = tuple((experiment, measure) for measure in (R, A) for experiment in ("S1c", "S1d"))

@@ -33,7 +33,7 @@ from .predicates import (
     varies,
 )
 from .shapes import ZERO, bend_of, changes_before, changes_within, is_linear, rise_of, slope_of, with_zero
-from .stating import (
+from .statements import (
     ALL_PAIRS,
     COMPLEX,
     E_S,

@@ -2,7 +2,7 @@
 
 print(ablate_quirks(["warehouse_small"], ["crw", "dpo"], quirks=["explore_double_start"]).markdown())
 
-A quirk whose first run equals that of its reading, bit for bit, is taken to do nothing there; its other seeds are not
+A quirk whose first run equals that of its rules, bit for bit, is taken to do nothing there; its other seeds are not
 run.
 """
 
@@ -25,7 +25,7 @@ from swarm_forage_env.runs.runner import run_plan
 from swarm_forage_env.runs.store import RunFailure, RunStore
 from swarm_forage_env.runs.table import Table
 from swarm_forage_env.scenarios.performance import Performance, performance_of
-from swarm_forage_env.scenarios.quirks import QUIRK_NAMES, READINGS
+from swarm_forage_env.scenarios.quirks import QUIRK_NAMES, RULES
 from swarm_forage_env.wrappers.world import WorldLike, world_of
 
 from ..significance import holm, pooled_p
@@ -42,7 +42,7 @@ CLOSE = 0.05
 """Policies whose means differ by a smaller share count as equal in an order (our choice)."""
 ALPHA = 0.05
 _SWITCHED = {"DESCRIBED": "switched on in the description", "AUTHORS_PROGRAM": "switched off in the authors' program"}
-_READINGS_HEADER = (
+_RULES_HEADER = (
     "world",
     "robots",
     "policy",
@@ -59,15 +59,15 @@ NOTES = (
 
 
 class Switch(NamedTuple):
-    """One condition of an ablation: a policy in a world, under a reading, with one quirk switched."""
+    """One condition of an ablation: a policy in a world, under one of the two rules, with one quirk switched."""
 
     scenario: str
     n_robots: int
     policy: str
-    reading: str
-    """Key of `scenarios.quirks.READINGS`."""
+    rules: str
+    """Key of `scenarios.quirks.RULES`."""
     quirk: str
-    """The quirk that differs from the reading; empty = none."""
+    """The quirk that differs from the rules; empty = none."""
 
     @property
     def base(self) -> "Switch":
@@ -77,13 +77,13 @@ class Switch(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Effect:
-    """What one switched quirk changed, seed by seed against its reading."""
+    """What one switched quirk changed, seed by seed against its rules."""
 
     switch: Switch
     is_same: bool
-    """Whether the first run equals that of the reading bit for bit. Then no other was made, and R = 1."""
+    """Whether the first run equals that of the unchanged rules bit for bit. Then no other was made, and R = 1."""
     performance: FloatArray
-    """(R,) difference as a share of the reading's mean performance; NaN if that is 0."""
+    """(R,) difference as a share of the unchanged rules' mean performance; NaN if that is 0."""
     interference: FloatArray
     """(R,) difference of the share of robot time in interference."""
     task_shares: FloatArray | None
@@ -129,7 +129,7 @@ class Ablation(Answer):
     def means(self, switch: Switch) -> dict[str, float]:
         """Return the mean performance of each policy in a switch's world under its rules, best first.
 
-        A policy whose runs failed is left out. One that the quirk does not touch has the runs of its reading.
+        A policy whose runs failed is left out. One that the quirk does not touch has the runs of its rules.
         """
         found: dict[str, float] = {}
         for policy in dict.fromkeys(other.policy for other in self.records):
@@ -139,10 +139,10 @@ class Ablation(Answer):
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return readings, effects and failures as plain values."""
+        """Return rules, effects and failures as plain values."""
         return {
             "performance": f"{self.performance.title} {span(self.performance)}",
-            "readings": [
+            "rules": [
                 {
                     **switch._asdict(),
                     "n_runs": len(records),
@@ -156,12 +156,12 @@ class Ablation(Answer):
         }
 
     def sheets(self) -> tuple[Sheet, ...]:
-        """Return the two readings side by side, then what each quirk moves, then runs that failed."""
+        """Return the two rules side by side, then what each quirk moves, then runs that failed."""
         effects = self.effects()
-        parts = [self._readings(), *([Sheet(notes=(NOTES,))] if effects else [])]
+        parts = [self._both_rules(), *([Sheet(notes=(NOTES,))] if effects else [])]
         for scenario in dict.fromkeys(switch.scenario for switch in self.records):
-            for reading, switched in _SWITCHED.items():
-                own = [e for e in effects if (e.switch.scenario, e.switch.reading) == (scenario, reading)]
+            for rules, switched in _SWITCHED.items():
+                own = [e for e in effects if (e.switch.scenario, e.switch.rules) == (scenario, rules)]
                 moving = {effect.switch.quirk for effect in own if not effect.is_same}
                 if own and not moving:
                     title = f"{scenario}: each quirk {switched}"
@@ -176,22 +176,22 @@ class Ablation(Answer):
         done = float(np.mean([performance_number(record, self.performance) for record in records]))
         return done, float(np.mean([record.interference_fraction.mean() for record in records]))
 
-    def _readings(self) -> Sheet:
-        """Performance and interference under both readings."""
+    def _both_rules(self) -> Sheet:
+        """Performance and interference under both rules."""
         rows: list[tuple[str, ...]] = []
         for switch, records in self.records.items():
-            twin = self.records.get(switch._replace(reading="AUTHORS_PROGRAM"))
-            if switch.quirk or switch.reading != "DESCRIBED" or twin is None:
+            twin = self.records.get(switch._replace(rules="AUTHORS_PROGRAM"))
+            if switch.quirk or switch.rules != "DESCRIBED" or twin is None:
                 continue
             (done, lost), (done_there, lost_there) = (self._numbers(own) for own in (records, twin))
             numbers = (f"{done:.1f}", f"{done_there:.1f}", f"{lost:.3f}", f"{lost_there:.3f}")
             rows.append((switch.scenario, str(switch.n_robots), switch.policy, *numbers))
         counted = f"{self.performance.title} {span(self.performance)}"
-        title = f"Both readings: {counted}, share of robot time in interference"
-        return Sheet(title=title, header=_READINGS_HEADER, rows=rows)
+        title = f"Both rules: {counted}, share of robot time in interference"
+        return Sheet(title=title, header=_RULES_HEADER, rows=rows)
 
     def _moved(self, effects: Sequence[Effect]) -> list[Sheet]:
-        """Tables of one world and reading: performance with orders, interference, tasks."""
+        """Tables of one world and rules: performance with orders, interference, tasks."""
         some = effects[0].switch
         quirks = list(dict.fromkeys(effect.switch.quirk for effect in effects))
         sizes = sorted({effect.switch.n_robots for effect in effects})
@@ -201,10 +201,10 @@ class Ablation(Answer):
             f"order at {size}": [self._changed_order(switch._replace(quirk=quirk)) for quirk in quirks]
             for size, switch in at.items()
         }
-        head = f"{some.scenario}, each quirk {_SWITCHED[some.reading]}"
+        head = f"{some.scenario}, each quirk {_SWITCHED[some.rules]}"
         performance, interference = (_starred(effects, quantity) for quantity in ("performance", "interference"))
         sheets = [
-            _sheet(f"{head}: performance, % of the reading's ({order})", effects, performance, orders),
+            _sheet(f"{head}: performance, % of the unchanged rules ({order})", effects, performance, orders),
             _sheet(f"{head}: interference, points of % of robot time", effects, interference, {}),
         ]
         if any(effect.task_shares is not None for effect in effects):
@@ -252,7 +252,7 @@ class AblationQuestion(Question[Ablation]):
     ) -> Table:
         """Make the runs; arguments and errors as in `runs.runner.run_plan`.
 
-        First both readings and the first seed of each quirk; then the other seeds of the quirks that changed something.
+        First both rules and the first seed of each quirk; then the other seeds of the quirks that changed something.
         """
         conditions, seeds = self.conditions, self.plan.seeds
         tables: list[Table] = []
@@ -270,7 +270,7 @@ class AblationQuestion(Question[Ablation]):
         return self._joined(tables)
 
     def answer(self, table: Table) -> Ablation:
-        """Return the records of all switches; one that changed nothing has those of its reading."""
+        """Return the records of all switches; one that changed nothing has those of its rules."""
         records: dict[Switch, tuple[RunRecord, ...]] = {}
         for switch, condition in self.conditions.items():
             own = table.of(self.conditions[switch.base] if self._is_same(table, switch) else condition)
@@ -293,7 +293,7 @@ class AblationQuestion(Question[Ablation]):
         )
 
     def _is_same(self, table: Table, switch: Switch) -> bool:
-        """Whether the first run of a switched quirk was made and equals that of its reading."""
+        """Whether the first run of a switched quirk was made and equals that of its rules."""
         if not switch.quirk:
             return False
         conditions, seed = self.conditions, self.plan.seeds[0]
@@ -319,7 +319,7 @@ def ablate_quirks(
     Args:
         worlds: The worlds, with their numbers of robots; their own quirks are replaced.
         policies: As in `compare_policies`.
-        quirks: Names of the quirks to switch; none = compare the two readings only.
+        quirks: Names of the quirks to switch; none = compare the two rules only.
         seeds: How many, or which; differences are taken seed by seed.
         caches: Which caches there are; default those of each policy.
         out: As in `score_policy`, and so are all further arguments.
@@ -351,11 +351,11 @@ def ablation_question(
         raise ConfigError(f"Expected one or more policies and seeds, got {len(policies)} and {len(chosen_seeds)}.")
     chosen = policy_specs(policies, caches=caches)
     conditions: dict[Switch, Condition] = {}
-    for world, (reading, rules), quirk, policy in product(
-        map(world_of, worlds), READINGS.items(), ("", *quirks), chosen
+    for world, (rules, unchanged), quirk, policy in product(
+        map(world_of, worlds), RULES.items(), ("", *quirks), chosen
     ):
-        switched = replace(rules, **{quirk: not getattr(rules, quirk)}) if quirk else rules
-        switch = Switch(world.scenario.name, world.n_robots, policy.label, reading, quirk)
+        switched = replace(unchanged, **{quirk: not getattr(unchanged, quirk)}) if quirk else unchanged
+        switch = Switch(world.scenario.name, world.n_robots, policy.label, rules, quirk)
         if switch in conditions:
             raise ConfigError(
                 f"Expected worlds that differ in name or number of robots, got {switch.scenario} with "

@@ -22,8 +22,8 @@ from ..queues import PopulationRates
 from ..robustness import mean_signed_difference, noise_robustness
 from ..statistics import Summary
 from .columns import HANDLING, NOISE, POPULATION, THROTTLE
-from .draft import ScoreDraft, Uncomputable
 from .measures import DISTURBANCES, MEASURE_CRITERIA
+from .scored_experiments import ScoredExperiments, Uncomputable
 from .studies import RunCurves, StudyCurves, common_runs
 from .table import Score
 
@@ -41,7 +41,7 @@ def _levels(study: StudyCurves, *criteria: str) -> tuple[tuple[RunCurves, RunCur
     return levels
 
 
-def _draft(
+def _compared(
     measure: str,
     pair: tuple[RunCurves, RunCurves],
     *,
@@ -49,10 +49,10 @@ def _draft(
     unit: str,
     beside: dict[str, float],
     is_relative: bool = True,
-) -> ScoreDraft:
-    """Return the draft of a score that compares a level with its reference."""
+) -> ScoredExperiments:
+    """Return the experiments of a score, which compares a level with its reference."""
     level = pair[1]
-    return ScoreDraft(
+    return ScoredExperiments(
         measure=measure,
         variant=variant,
         at=f"{_WORDS[level.criterion]} {level.value:.4g}",
@@ -138,8 +138,8 @@ def _distance_scores(name: str, study: StudyCurves, variant: Variant, _: Form) -
         floor = float(_floor(reference, variant).mean()) if len(reference.seeds) > 1 else None
         beside = _beside_distance(reference, level)
         unit = "objects (DTW with clock)" if variant == "sierra" else "objects (DTW)"
-        draft = _draft(name, (reference, level), variant=variant, unit=unit, beside=beside)
-        yield draft.score(partial(_DISTANCES[name], variant=variant), floor=floor, order_matters=True)
+        compared = _compared(name, (reference, level), variant=variant, unit=unit, beside=beside)
+        yield compared.score(partial(_DISTANCES[name], variant=variant), floor=floor, order_matters=True)
 
 
 def _check_conditions(reference: RunCurves, level: RunCurves, variant: Variant) -> None:
@@ -200,7 +200,7 @@ def _population_scores(name: str, study: StudyCurves, variant: Variant, _: Form)
             )
 
         is_last = variant == "sierra"
-        draft = _draft(
+        compared = _compared(
             name,
             (reference, level),
             variant=variant,
@@ -208,7 +208,7 @@ def _population_scores(name: str, study: StudyCurves, variant: Variant, _: Form)
             beside={"weight": weight},
             is_relative=not is_last,
         )
-        yield draft.score(values)
+        yield compared.score(values)
 
 
 def _against_lowest_rate(levels: Sequence[tuple[RunCurves, RunCurves]]) -> list[tuple[RunCurves, RunCurves]]:
@@ -241,8 +241,8 @@ def _recorded_population_scores(name: str, study: StudyCurves, variant: Variant,
         weight = {}
         if ideal.seeds:
             weight = {"weight": float(disturbed.curves["n_active"].mean() / ideal.curves["n_active"].mean())}
-        draft = _draft(name, (reference, level), variant=variant, unit=f"objects {span}", beside=weight)
-        yield draft.score(_recorded_population)
+        compared = _compared(name, (reference, level), variant=variant, unit=f"objects {span}", beside=weight)
+        yield compared.score(_recorded_population)
 
 
 def _rates(level: RunCurves) -> PopulationRates:

@@ -9,8 +9,8 @@ from ..emergence import interference_gain, spatial_emergence, task_emergence, ti
 from ..interference import performance_lost
 from ..scaling import efficiency, raw_performance, scalability
 from .columns import SIZE
-from .draft import ScoreDraft, Uncomputable, Values
 from .measures import MEASURE_VARIANTS
+from .scored_experiments import ScoredExperiments, Uncomputable, Values
 from .studies import RunCurves, StudyCurves, common_runs
 from .table import Score
 
@@ -115,7 +115,7 @@ class _SizeMeasure:
     weighted_in: tuple[Variant, ...] = ()
     """Variants that weight the time lost with the performance achieved, which misleads where performance falls."""
     order_matters: bool = False
-    """As in `ScoreDraft.score`."""
+    """As in `ScoredExperiments.score`."""
 
 
 _SIZE_MEASURES: dict[str, _SizeMeasure] = {
@@ -182,7 +182,7 @@ def _size_scores(name: str, study: StudyCurves, variant: Variant, form: Form) ->
         if measure.from_one and not _without_one(measure, one, variant, form):
             experiments = (one, *experiments)
         falls = variant in measure.weighted_in and previous is not None and _falls(previous, larger)
-        score = ScoreDraft(
+        score = ScoredExperiments(
             measure=name,
             variant=variant,
             form=form,

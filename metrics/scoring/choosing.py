@@ -26,7 +26,7 @@ from ..statistics import Summary, aggregate
 from .columns import NOISE, POPULATION
 from .intervals import bounds, interval
 from .question import Question, ask, failure_lines
-from .totals import plan_totals, run_totals, unit_text
+from .run_totals import plan_totals, run_totals, unit_text
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -57,11 +57,11 @@ _EXPERIMENTS: dict[tuple[Any, ...], str] = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StudyPanel:
-    """One measure in one variant, of all policies of a study, under one reading and at one value of each other axis."""
+    """One measure in one variant, of all policies under one of the rules, at one value of each other axis."""
 
     study: str
     """Name of the study."""
-    reading: str
+    rules: str
     """Which rules: "described" or "program"."""
     others: "Mapping[str, Value]"
     """Value on each axis but the last, by its name."""
@@ -121,7 +121,7 @@ def experiment_of(study: str, others: "Sequence[Value]") -> str | None:
 def study_panels(
     table: "StudyTable", variants: Sequence[Variant] = ("corrected",), measures: Sequence[str] = FIGURE_MEASURES
 ) -> StudyPanels:
-    """Score a study and return its panels, by reading, other axes, variant, measure and form.
+    """Score a study and return its panels, by rules, other axes, variant, measure and form.
 
     A study whose last axis is no criterion of these measures has panels of its performance, where the axis has numbers.
 
@@ -136,7 +136,7 @@ def study_panels(
     ScoreForms(variants=tuple(variants))  # refuses unknown ones
     lines: dict[tuple[Any, ...], list[StudyLine]] = {}
     for line in study_lines(table):
-        lines.setdefault((line.reading, *line.others.values()), []).append(line)
+        lines.setdefault((line.rules, *line.others.values()), []).append(line)
     panels: list[StudyPanel] = []
     missing: dict[tuple[str, str], str] = {}
     is_scored = bool(table.spec.axes) and table.spec.axes[-1].is_criterion
@@ -198,7 +198,7 @@ def _panel(
                 matrices[policy][x.index(score.x), seeds.index(seed)] = value
     return StudyPanel(
         study=table.spec.name,
-        reading=line.reading,
+        rules=line.rules,
         others=line.others,
         words=line.words,
         measure=scores[0].measure,
@@ -234,7 +234,7 @@ def _performance_panels(table: "StudyTable", groups: Sequence[Sequence[StudyLine
         panels.append(
             StudyPanel(
                 study=table.spec.name,
-                reading=first.reading,
+                rules=first.rules,
                 others=first.others,
                 words=first.words,
                 measure="raw_performance",

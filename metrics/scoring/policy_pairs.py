@@ -25,7 +25,7 @@ def policy_pairs(panels: Sequence[StudyPanel]) -> "pl.DataFrame":
     """Return one row per panel and pair of policies.
 
     Args:
-        panels: Of one measure, variant and reading, as in `StudyFigure.panels`.
+        panels: Of one measure, variant and rules, as in `StudyFigure.panels`.
 
     Returns:
         Columns: the place of the panel; `first`, `second`, two policies; `p_better`, the probability that a run of the
@@ -50,7 +50,7 @@ def policy_pairs(panels: Sequence[StudyPanel]) -> "pl.DataFrame":
             better = _probability(panel, first, second)
             rows.append(
                 {
-                    "reading": panel.reading,
+                    "rules": panel.rules,
                     **panel.others,
                     "first": first,
                     "second": second,

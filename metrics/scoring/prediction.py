@@ -29,7 +29,7 @@ from .intervals import bounds
 from .performance import PerformanceLike
 from .prediction_plots import draw_predictions
 from .question import Question, ask, failure_lines
-from .totals import plan_totals, run_totals, unit_text
+from .run_totals import plan_totals, run_totals, unit_text
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

@@ -1,4 +1,4 @@
-"""Two studies of the same cells held against each other: do their runs differ beyond chance?
+"""Two studies of the same conditions held against each other: do their runs differ beyond chance?
 
 A change of the code may change the last bits of every run and leave the science as it is. So runs are compared first
 bit by bit, and where they differ, by tests of their means.
@@ -19,7 +19,7 @@ from ..curves import FloatArray
 from ..significance import ROUNDING, holm
 
 if TYPE_CHECKING:
-    from swarm_forage_env.studies.study import Cell
+    from swarm_forage_env.studies.study import Place
     from swarm_forage_env.studies.study_table import StudyTable
 
 COLUMNS = ("performance", "interference_fraction", "n_carrying", "cache_pickups")
@@ -29,16 +29,16 @@ FAMILY_ERROR = 0.05
 """Probability that one or more differences are called significant by chance."""
 TEST = (
     "Means over the intervals of a run are compared. Studies of the same seeds are paired by seed, others by Welch's "
-    "test. A line is all cells of a policy in a reading that can be tested, and identical ones, each in shares of its "
-    "own mean, so that a small change everywhere is found, too. * = significant: p at most 0.05 after Holm's "
-    "correction over all tests of cells and lines together. Intervals are Student's, 95 %."
+    "test. A line is all conditions of a policy under the same rules that can be tested, and identical ones, each in "
+    "shares of its own mean, so that a small change everywhere is found, too. * = significant: p at most 0.05 after "
+    "Holm's correction over all tests of conditions and lines together. Intervals are Student's, 95 %."
 )
 """How studies are compared, as a text for readers."""
 _LEVEL = 0.975
 """Quantile of the upper bound of a 95 % interval."""
 
 State: TypeAlias = Literal["identical", "alike", "different", "open"]
-"""Of a cell: same seeds and every recorded number the same; no column differs significantly; one does; the numbers
+"""Of a condition: same seeds and every recorded number the same; no column differs significantly; one does; the numbers
 differ and there are too few runs to say more."""
 
 
@@ -47,13 +47,13 @@ class Shift:
     """The mean of a column in the second study less that in the first."""
 
     column: str
-    place: tuple[str, ...]
-    """Reading, policy and the value on each axis; of a line reading and policy alone."""
+    words: tuple[str, ...]
+    """Rules, policy and the value on each axis; of a line rules and policy alone."""
     first: float
     """Mean of the first study; NaN for a line."""
     second: float
     difference: float
-    """Mean difference; of a line the mean over its cells, as a share of the mean of both studies."""
+    """Mean difference; of a line the mean over its conditions, as a share of the mean of both studies."""
     lower: float
     """Bounds of its 95 % interval; NaN where there is none."""
     upper: float
@@ -76,7 +76,7 @@ class Shift:
         numbers = ("first", "second", "difference", "lower", "upper", "p", "p_holm")
         return {
             "column": self.column,
-            "place": list(self.place),
+            "place": list(self.words),
             **{name: plain(getattr(self, name)) for name in numbers},
             "n_first": self.n_first,
             "n_second": self.n_second,
@@ -86,26 +86,26 @@ class Shift:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CellDiff:
-    """A cell of both studies."""
+class PlaceDiff:
+    """A condition of both studies."""
 
-    cell: "Cell"
-    place: tuple[str, ...]
-    """Reading, policy and the value on each axis, as they are shown."""
+    place: "Place"
+    words: tuple[str, ...]
+    """Rules, policy and the value on each axis, as they are shown."""
     state: State
     n_identical: int
     """Runs of the same seed with the same numbers in all columns of both studies."""
     shifts: tuple[Shift, ...]
-    """One per column that was tested; none for an identical cell."""
+    """One per column that was tested; none for an identical condition."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lacking:
-    """A cell that is not compared, since not both studies have finished runs of it."""
+    """A condition that is not compared, since not both studies have finished runs of it."""
 
-    cell: "Cell"
-    place: tuple[str, ...]
-    """Reading, policy and the value on each axis, as they are shown."""
+    place: "Place"
+    words: tuple[str, ...]
+    """Rules, policy and the value on each axis, as they are shown."""
     why: str
 
 
@@ -113,32 +113,32 @@ class Lacking:
 class StudyDiff:
     """How two studies differ."""
 
-    cells: tuple[CellDiff, ...]
-    """Cells that both have, with runs in both."""
+    places: tuple[PlaceDiff, ...]
+    """Conditions that both have, with runs in both."""
     lines: tuple[Shift, ...]
-    """All cells of a policy in a reading together, per column; none where all of them are identical."""
+    """All conditions of a policy under the same rules together, per column; none where all of them are identical."""
     lacking: tuple[Lacking, ...]
-    """Cells that cannot be compared."""
+    """Conditions that cannot be compared."""
     settings: tuple[str, ...]
     """What differs between the two studies apart from their runs, in words."""
 
     def count(self, state: State) -> int:
-        """Return how many cells are in a state."""
-        return sum(cell.state == state for cell in self.cells)
+        """Return how many conditions are in a state."""
+        return sum(place.state == state for place in self.places)
 
     @property
     def differs(self) -> bool:
-        """Whether a cell or a line differs significantly, or a cell is open or not compared."""
+        """Whether a condition or a line differs significantly, or a condition is open or not compared."""
         return (
             bool(self.lacking)
-            or any(cell.state in ("different", "open") for cell in self.cells)
+            or any(place.state in ("different", "open") for place in self.places)
             or any(line.is_significant for line in self.lines)
         )
 
     @property
     def shifts(self) -> tuple[Shift, ...]:
         """All tests, those of lines first."""
-        return (*self.lines, *(shift for cell in self.cells for shift in cell.shifts))
+        return (*self.lines, *(shift for place in self.places for shift in place.shifts))
 
     def to_mapping(self) -> dict[str, Any]:
         """Return everything as plain values, ready for JSON."""
@@ -146,24 +146,24 @@ class StudyDiff:
             "differs": self.differs,
             "test": TEST,
             "settings": list(self.settings),
-            "cells": [
+            "conditions": [
                 {
-                    "place": list(cell.place),
-                    "state": cell.state,
-                    "n_identical": cell.n_identical,
-                    "shifts": [shift.to_mapping() for shift in cell.shifts],
+                    "place": list(place.words),
+                    "state": place.state,
+                    "n_identical": place.n_identical,
+                    "shifts": [shift.to_mapping() for shift in place.shifts],
                 }
-                for cell in self.cells
+                for place in self.places
             ],
             "lines": [shift.to_mapping() for shift in self.lines],
-            "lacking": [{"place": list(one.place), "why": one.why} for one in self.lacking],
+            "lacking": [{"place": list(one.words), "why": one.why} for one in self.lacking],
         }
 
 
 def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[str] = COLUMNS) -> StudyDiff:
-    """Compare two studies cell by cell.
+    """Compare two studies condition by condition.
 
-    Cells are those of the same reading, policy and values. Only finished runs count.
+    Conditions are those of the same rules, policy and values. Only finished runs count.
 
     Args:
         first: From `swarm_forage_env.read_study`.
@@ -171,7 +171,8 @@ def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[st
         columns: Recorded columns whose means are tested; the comparison of bits takes all.
 
     Raises:
-        CurveError: studies that have no cell with runs in common, other axes or times, or a column that neither has.
+        CurveError: studies that have no condition with runs in common, other axes or times, or a column that neither
+            has.
     """
     _check_alike(first, second)
     unknown = [name for name in columns if name not in first.frame.columns or name not in second.frame.columns]
@@ -179,34 +180,34 @@ def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[st
         raise CurveError(
             f"Expected columns that both studies have, got {unknown[0]!r}; see 'swarm-forage list columns'."
         )
-    cells: list[_Compared] = []
+    places: list[_Compared] = []
     lacking: list[Lacking] = []
-    places = first.spec.place_words(second.spec)
-    for cell, place in places.items():
-        why = _why_not(cell, first, second)
+    shown = first.spec.place_words(second.spec)
+    for place, words in shown.items():
+        why = _why_not(place, first, second)
         if why:
-            lacking.append(Lacking(cell=cell, place=place, why=why))
+            lacking.append(Lacking(place=place, words=words, why=why))
             continue
-        n_identical, is_same = _identical(cell, first, second)
-        tests = [] if is_same else [_tested(cell, place, column, first, second) for column in columns]
+        n_identical, is_same = _identical(place, first, second)
+        tests = [] if is_same else [_tested(place, words, column, first, second) for column in columns]
         found = [test for test in tests if test is not None]
-        cells.append(_Compared(cell=cell, n_identical=n_identical, is_same=is_same, tests=found))
-    if not cells:
-        raise CurveError("Expected two studies with finished runs of the same cells, got none that both have.")
-    lines = _lines(cells, columns)
-    every = [*lines, *(shift for one in cells for shift, _ in one.tests)]
+        places.append(_Compared(place=place, n_identical=n_identical, is_same=is_same, tests=found))
+    if not places:
+        raise CurveError("Expected two studies with finished runs of the same conditions, got none that both have.")
+    lines = _lines(places, columns)
+    every = [*lines, *(shift for one in places for shift, _ in one.tests)]
     corrected = iter(holm(np.array([shift.p for shift in every])).tolist())
     lines = tuple(replace(line, p_holm=next(corrected)) for line in lines)
     return StudyDiff(
-        cells=tuple(
-            CellDiff(
-                cell=one.cell,
-                place=places[one.cell],
+        places=tuple(
+            PlaceDiff(
+                place=one.place,
+                words=shown[one.place],
                 state=_state(shifts, is_same=one.is_same),
                 n_identical=one.n_identical,
                 shifts=shifts,
             )
-            for one in cells
+            for one in places
             for shifts in (tuple(replace(shift, p_holm=next(corrected)) for shift, _ in one.tests),)
         ),
         lines=lines,
@@ -217,7 +218,7 @@ def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[st
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Sample:
-    """The runs of a cell in one column, for the test of a line."""
+    """The runs of a condition in one column, for the test of a line."""
 
     scale: float
     """Mean of both studies; what a line is measured in shares of."""
@@ -229,9 +230,9 @@ class _Sample:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Compared:
-    """A cell of both studies with its tests, before the correction."""
+    """A condition of both studies with its tests, before the correction."""
 
-    cell: "Cell"
+    place: "Place"
     n_identical: int
     is_same: bool
     """Whether all runs on both sides are the same to the last bit."""
@@ -249,21 +250,21 @@ def _check_alike(first: "StudyTable", second: "StudyTable") -> None:
             raise CurveError(f"Expected two studies of the same {what}, got {words[0]} and {words[1]}.")
 
 
-def _why_not(cell: "Cell", first: "StudyTable", second: "StudyTable") -> str:
+def _why_not(place: "Place", first: "StudyTable", second: "StudyTable") -> str:
     tables = {"first": first, "second": second}
     for name, table in tables.items():
-        if cell not in table.spec.cells:
+        if place not in table.spec.places:
             return f"the {name} study does not have it"
-    without = [name for name, table in tables.items() if not table.curves(cell, "performance")[0]]
+    without = [name for name, table in tables.items() if not table.curves(place, "performance")[0]]
     if len(without) == 2:
         return "neither study has a finished run of it"
     return f"the {without[0]} study has no finished run of it" if without else ""
 
 
-def _identical(cell: "Cell", first: "StudyTable", second: "StudyTable") -> tuple[int, bool]:
+def _identical(place: "Place", first: "StudyTable", second: "StudyTable") -> tuple[int, bool]:
     """Runs of the same seed with the same numbers, and whether that is all of them on both sides."""
     names = [name for name, kind in first.frame.schema.items() if kind.is_numeric() and name in second.frame.columns]
-    (seeds, mine), (others, theirs) = (table.curves(cell, *names) for table in (first, second))
+    (seeds, mine), (others, theirs) = (table.curves(place, *names) for table in (first, second))
     shared = [seed for seed in seeds if seed in others]
     same = [
         all(
@@ -277,10 +278,10 @@ def _identical(cell: "Cell", first: "StudyTable", second: "StudyTable") -> tuple
 
 
 def _tested(
-    cell: "Cell", place: tuple[str, ...], column: str, first: "StudyTable", second: "StudyTable"
+    place: "Place", words: tuple[str, ...], column: str, first: "StudyTable", second: "StudyTable"
 ) -> "tuple[Shift, _Sample] | None":
-    """The test of one column; None where runs of this cell do not have it."""
-    (seeds, mine), (others, theirs) = (table.curves(cell, column) for table in (first, second))
+    """The test of one column; None where runs of this condition do not have it."""
+    (seeds, mine), (others, theirs) = (table.curves(place, column) for table in (first, second))
     if column not in mine or column not in theirs:
         return None
     a, b = (np.atleast_1d(curves[column].mean(axis=-1)) for curves in (mine, theirs))
@@ -290,7 +291,7 @@ def _tested(
     p, half = _test(difference, variance, freedom, scale=float(np.abs([*a, *b]).max()), n_runs=len({*seeds, *others}))
     shift = Shift(
         column=column,
-        place=place,
+        words=words,
         first=float(a.mean()),
         second=float(b.mean()),
         difference=difference,
@@ -335,39 +336,39 @@ def _test(difference: float, variance: float, freedom: float, *, scale: float, n
     return 2.0 * float(stdtr(freedom, -abs(difference) / error)), float(stdtrit(freedom, _LEVEL)) * error
 
 
-def _lines(cells: Sequence[_Compared], columns: Sequence[str]) -> tuple[Shift, ...]:
-    """One test per reading, policy and column over all cells that can be tested; identical ones count with 0."""
+def _lines(places: Sequence[_Compared], columns: Sequence[str]) -> tuple[Shift, ...]:
+    """One test per policy, rules and column over all conditions that can be tested; identical ones count with 0."""
     groups: dict[tuple[str, str], list[_Compared]] = {}
-    for one in cells:
-        groups.setdefault((one.cell.reading, one.cell.policy), []).append(one)
+    for one in places:
+        groups.setdefault((one.place.rules, one.place.policy), []).append(one)
     lines = [
         line
-        for place, together in groups.items()
+        for words, together in groups.items()
         for column in columns
-        if (line := _line(place, column, together)) is not None
+        if (line := _line(words, column, together)) is not None
     ]
     return tuple(lines)
 
 
-def _line(place: tuple[str, str], column: str, together: Sequence[_Compared]) -> Shift | None:
-    """The mean over cells of the difference, in shares of each cell's mean; None where no cell can be tested.
+def _line(words: tuple[str, str], column: str, together: Sequence[_Compared]) -> Shift | None:
+    """The mean difference over conditions, in shares of each condition's mean; None where none can be tested.
 
-    Cells that nobody can test, those of one run or of mean 0, say nothing and are left out.
+    Conditions that nobody can test, those of one run or of mean 0, say nothing and are left out.
     """
     found = [test for one in together for test in one.tests if test[0].column == column]
     usable = [(shift, sample) for shift, sample in found if sample.variance >= 0.0 and sample.scale > 0.0]
-    n_cells = len(usable) + sum(one.is_same for one in together)
-    if not usable or n_cells < 2:
+    n_places = len(usable) + sum(one.is_same for one in together)
+    if not usable or n_places < 2:
         return None
-    difference = sum(shift.difference / sample.scale for shift, sample in usable) / n_cells
+    difference = sum(shift.difference / sample.scale for shift, sample in usable) / n_places
     variance, freedom = _sum_of_variances(
-        [(sample.variance / (sample.scale * n_cells) ** 2, sample.freedom) for _, sample in usable]
+        [(sample.variance / (sample.scale * n_places) ** 2, sample.freedom) for _, sample in usable]
     )
     n_first, n_second = (sum(getattr(shift, name) for shift, _ in usable) for name in ("n_first", "n_second"))
     p, half = _test(difference, variance, freedom, scale=1.0, n_runs=max(n_first, n_second))
     return Shift(
         column=column,
-        place=place,
+        words=words,
         first=math.nan,
         second=math.nan,
         difference=difference,

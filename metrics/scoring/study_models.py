@@ -69,12 +69,12 @@ class ModelPanel:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ModelFigure:
-    """Panels of one kind of model under one reading."""
+    """Panels of one kind of model under one of the rules."""
 
     study: str
     kind: str
     """laws, or population."""
-    reading: str
+    rules: str
     title: str
     x_label: str
     y_label: str
@@ -84,7 +84,7 @@ class ModelFigure:
     @property
     def name(self) -> str:
         """Name of its files."""
-        return f"{self.study}_{self.kind}_{self.reading}"
+        return f"{self.study}_{self.kind}_{self.rules}"
 
     def to_frame(self) -> "pl.DataFrame":
         """Return the numbers behind the picture, one row per point of a curve."""
@@ -97,7 +97,7 @@ class ModelFigure:
                     nothing = np.full(curve.x.shape, np.nan)
                     low, high = (nothing if edge is None else edge for edge in (curve.lower, curve.upper))
                     for x, y, lower, upper in zip(curve.x, curve.y, low, high, strict=True):
-                        where = {"reading": self.reading, **panel.place, "what": what, "curve": curve.name}
+                        where = {"rules": self.rules, **panel.place, "what": what, "curve": curve.name}
                         rows.append(
                             {**where, "x": float(x), "y": float(y), "lower": float(lower), "upper": float(upper)}
                         )
@@ -107,7 +107,7 @@ class ModelFigure:
         """Return the table beside the picture."""
         import polars as pl
 
-        rows = [{"reading": self.reading, **panel.place, **row} for panel in self.panels for row in panel.facts]
+        rows = [{"rules": self.rules, **panel.place, **row} for panel in self.panels for row in panel.facts]
         return pl.DataFrame(rows, infer_schema_length=None).fill_nan(None)
 
 
@@ -118,18 +118,18 @@ def model_figures(table: "StudyTable") -> tuple[ModelFigure, ...]:
         table: From `swarm_forage_env.read_study`.
 
     Returns:
-        One figure per reading and kind; none for a study that varies neither, or without enough runs.
+        One figure per rules and kind; none for a study that varies neither, or without enough runs.
     """
     found: dict[tuple[str, str], list[ModelPanel]] = {}
     lines = study_lines(table)
     for line in lines:
         panel = _law_panel(table, line)
         if panel is not None:
-            found.setdefault(("laws", line.reading), []).append(panel)
-    for reading in table.spec.readings:
-        panels = _population_panels([line for line in lines if line.reading == reading])
+            found.setdefault(("laws", line.rules), []).append(panel)
+    for rules in table.spec.rules:
+        panels = _population_panels([line for line in lines if line.rules == rules])
         if panels:
-            found["population", reading] = panels
+            found["population", rules] = panels
     amount = f"{lines[0].curves.amount} per robot in {table.spec.horizon_s:,.0f} s"
     words = {
         "laws": ("performance per robot beside laws", "robots", amount, True),
@@ -139,14 +139,14 @@ def model_figures(table: "StudyTable") -> tuple[ModelFigure, ...]:
         ModelFigure(
             study=table.spec.name,
             kind=kind,
-            reading=reading,
-            title=f"{table.spec.name}: {words[kind][0]}, reading {reading}",
+            rules=rules,
+            title=f"{table.spec.name}: {words[kind][0]}, rules {rules}",
             x_label=words[kind][1],
             y_label=words[kind][2],
             is_log=words[kind][3],
             panels=tuple(panels),
         )
-        for (kind, reading), panels in found.items()
+        for (kind, rules), panels in found.items()
     )
 
 
@@ -279,15 +279,15 @@ def foraging_runs(table: "StudyTable", line: StudyLine) -> ForagingRuns | None:
     That is with caches, in arenas that grow, for another performance than deliveries, for mixed swarms, and without
     runs of one robot.
     """
-    worlds = [table.spec.specs_of(cell)[0].scenario for cell in line.cells]
+    worlds = [table.spec.specs_of(place)[0].scenario for place in line.places]
     arenas = {(world.arena.width_m, world.arena.height_m) for world in worlds}
     if any(world.performance != "collected" for world in worlds) or line.policy.startswith("mixed:"):
         return None
     if len(arenas) > 1 or any(world.caches != "none" for world in worlds):
         return None
     columns: dict[int, Mapping[str, FloatArray]] = {}
-    for cell, runs in zip(line.cells, line.curves.experiments, strict=True):
-        found = table.curves(cell, *FORAGING_COLUMNS)[1]
+    for place, runs in zip(line.places, line.curves.experiments, strict=True):
+        found = table.curves(place, *FORAGING_COLUMNS)[1]
         if found.keys() >= {*FORAGING_COLUMNS} and len(found["collected"]):
             columns[runs.n_robots] = found
     if 1 not in columns:

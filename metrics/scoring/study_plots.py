@@ -48,17 +48,17 @@ MANY_DOTS = 500
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StudyFigure:
-    """Panels of one measure in one form, variant and reading: one per value of the axes before the last."""
+    """Panels of one measure in one form, variant and rules: one per value of the axes before the last."""
 
     panels: tuple[StudyPanel, ...]
 
     @property
     def name(self) -> str:
-        """Name of its files: study, measure, reading; the form and the variant if it is not the usual one."""
+        """Name of its files: study, measure, rules; the form and the variant if it is not the usual one."""
         first = self.panels[0]
         form = "" if first.form == "marginal" else first.form
         variant = "" if first.variant == "corrected" else first.variant
-        words = (first.study, first.measure, form, first.reading, variant)
+        words = (first.study, first.measure, form, first.rules, variant)
         return "_".join(word for word in words if word)
 
     @property
@@ -67,7 +67,7 @@ class StudyFigure:
         first = self.panels[0]
         arrow = "higher" if first.higher_is_better else "lower"
         measure = label_of(first.measure, "corrected", first.form).replace("_", " ")
-        words = f"{measure} ({arrow} is better), reading {first.reading}"
+        words = f"{measure} ({arrow} is better), rules {first.rules}"
         return f"{first.study}: {words}" + ("" if first.variant == "corrected" else f", measure {first.variant}")
 
     @property
@@ -87,7 +87,7 @@ class StudyFigure:
         for panel in self.panels:
             for policy, scores in panel.scores.items():
                 for x, level, runs, summary in zip(panel.x, panel.levels, scores, _summaries(scores), strict=True):
-                    place = {"reading": panel.reading, **panel.others, "policy": policy}
+                    place = {"rules": panel.rules, **panel.others, "policy": policy}
                     means = {"mean": summary.mean, "lower": summary.lower, "upper": summary.upper, "sd": summary.std}
                     of_runs = {f"seed_{seed}": value for seed, value in zip(panel.seeds, runs.tolist(), strict=True)}
                     where = {panel.criterion: float(x), "level": float(level)}
@@ -100,7 +100,7 @@ def study_figures(scored: StudyPanels) -> tuple[StudyFigure, ...]:
     groups: dict[tuple[str, str, PanelName], list[StudyPanel]] = {}
     for panel in scored.panels:
         if any(np.isfinite(scores).any() for scores in panel.scores.values()):
-            groups.setdefault((panel.reading, panel.variant, panel.name._replace(experiment="")), []).append(panel)
+            groups.setdefault((panel.rules, panel.variant, panel.name._replace(experiment="")), []).append(panel)
     return tuple(StudyFigure(panels=tuple(panels)) for panels in groups.values())
 
 
@@ -124,8 +124,8 @@ def caption(figure: StudyFigure, band: Band) -> str:
     """Return what dots and bands are, and why some or all bands are missing."""
     n_runs = [s.n_used for panel in figure.panels for scores in panel.scores.values() for s in _summaries(scores)]
     if max(n_runs) < FEWEST_RUNS:
-        return f"lines: means; dots: runs\nno bands: fewer than {FEWEST_RUNS} runs of a cell tell too little"
-    lacking = f"\nno band: cells with fewer than {FEWEST_RUNS} runs, which tell too little"
+        return f"lines: means; dots: runs\nno bands: fewer than {FEWEST_RUNS} runs of a condition tell too little"
+    lacking = f"\nno band: conditions with fewer than {FEWEST_RUNS} runs, which tell too little"
     return f"shaded: {_BANDS[band]}; dots: runs" + (lacking if any(0 < n < FEWEST_RUNS for n in n_runs) else "")
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 from ..catalog import METRICS
 from .by_adversity import BY_ADVERSITY
 from .by_size import BY_SIZE
-from .draft import Uncomputable
 from .measures import ScoreForms, check_measures, label_of
+from .scored_experiments import Uncomputable
 from .studies import StudyCurves
 from .table import Score
 

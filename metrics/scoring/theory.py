@@ -92,7 +92,7 @@ def theory_of(spec: StudySpec) -> tuple[TheoryFigure, ...]:
     if "throttle" in axes:
         found.append(flexibility())
     if "population_dynamics" in axes:
-        sizes = {spec.specs_of(cell)[0].scenario.robots.n_robots for cell in spec.cells}
+        sizes = {spec.specs_of(place)[0].scenario.robots.n_robots for place in spec.places}
         found.append(availability_figure(sorted(sizes)))
     if {policy.policy for policy in spec.policies} & {"stochm", "stochx"}:
         found.append(task_graph())

@@ -1,4 +1,4 @@
-"""The claims of the paper held against studies, in every reading and variant that the studies can answer."""
+"""The claims of the paper held against studies, under all rules and in all variants that the studies can answer."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from swarm_forage_env._internal.wording import plain
 
 from ..checks import CurveError
 from ..claims import CLAIMS, Claim, PanelName, Verdict, check_claim
-from ..claims.stating import POLICIES
+from ..claims.statements import POLICIES
 from ..curves import Variant
 from .figure_panels import StudyPanel, StudyPanels
 from .measures import MEASURE_VARIANTS, label_of
@@ -22,10 +22,10 @@ VARIANTS: tuple[Variant, ...] = ("corrected", "paper", "sierra")
 
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """What studies say of one claim in one reading and one variant."""
+    """What studies say of one claim under one of the rules and in one variant."""
 
     claim: Claim
-    reading: str
+    rules: str
     """Empty for a claim about formulas, which needs no runs."""
     variant: Variant
     verdict: Verdict
@@ -36,7 +36,7 @@ class Judged:
             "claim": self.claim.name,
             "text": self.claim.text,
             "figure": self.claim.figure,
-            "reading": self.reading,
+            "rules": self.rules,
             "variant": self.variant,
             **_plain(self.verdict),
             "otherwise": {words: _plain(verdict) for words, verdict in self.verdict.otherwise.items()},
@@ -56,10 +56,10 @@ def _plain(verdict: Verdict) -> dict[str, Any]:
 
 @dataclass(frozen=True, kw_only=True)
 class Waiting:
-    """A claim that cannot be answered yet, in one reading and one variant."""
+    """A claim that cannot be answered yet, under one of the rules and in one variant."""
 
     claim: Claim
-    reading: str
+    rules: str
     variant: Variant
     lacks: tuple[PanelName, ...]
     """Panels without scores."""
@@ -71,7 +71,7 @@ class Waiting:
         return {
             "claim": self.claim.name,
             "text": self.claim.text,
-            "reading": self.reading,
+            "rules": self.rules,
             "variant": self.variant,
             "lacks": [list(name) for name in self.lacks],
             "reasons": list(self.reasons),
@@ -111,7 +111,7 @@ def judge_claims(
         claims: By name; those of the paper's text, or its `INTUITIONS`.
 
     Returns:
-        The answered claims, by reading, variant and claim, formulas first; and those that wait for runs.
+        The answered claims, by rules, variant and claim, formulas first; and those that wait for runs.
 
     Raises:
         CurveError: a study twice, one without the policies of the paper, or none of its sets.
@@ -122,21 +122,21 @@ def judge_claims(
     for reason in filter(None, map(why_no_claims, tables)):
         raise CurveError(reason)
     found = _Found(
-        panels={(panel.reading, panel.variant, panel.name): panel for one in scored for panel in one.panels},
+        panels={(panel.rules, panel.variant, panel.name): panel for one in scored for panel in one.panels},
         reasons={
             (name, *key): why for name, one in zip(names, scored, strict=True) for key, why in one.missing.items()
         },
     )
     judged = [
-        Judged(claim=claim, reading="", variant="corrected", verdict=check_claim(claim, {}))
+        Judged(claim=claim, rules="", variant="corrected", verdict=check_claim(claim, {}))
         for claim in claims.values()
         if not claim.panels
     ]
     waiting: list[Waiting] = []
-    readings = dict.fromkeys(reading for table in tables for reading in table.spec.readings)
-    for reading, variant, claim in product(readings, variants, claims.values()):
+    every = dict.fromkeys(rules for table in tables for rules in table.spec.rules)
+    for rules, variant, claim in product(every, variants, claims.values()):
         if claim.panels and any(_variant_of(name.measure, variant) == variant for name in claim.panels):
-            outcome = _judge(claim, reading, variant, found)
+            outcome = _judge(claim, rules, variant, found)
             if isinstance(outcome, Judged):
                 judged.append(outcome)
             else:
@@ -149,7 +149,7 @@ class _Found:
     """What studies have."""
 
     panels: Mapping[tuple[str, Variant, PanelName], StudyPanel]
-    """By reading, variant and name."""
+    """By rules, variant and name."""
     reasons: Mapping[tuple[str, str, str], str]
     """Study, measure in a form of it, and variant -> why there are no scores."""
 
@@ -159,17 +159,17 @@ def _variant_of(measure: str, variant: Variant) -> Variant:
     return variant if variant in MEASURE_VARIANTS.get(measure, ()) else "corrected"
 
 
-def _judge(claim: Claim, reading: str, variant: Variant, found: _Found) -> Judged | Waiting:
+def _judge(claim: Claim, rules: str, variant: Variant, found: _Found) -> Judged | Waiting:
     places: dict[PanelName, tuple[str, Variant, PanelName]] = {
-        name: (reading, _variant_of(name.measure, variant), name) for name in (*claim.panels, *claim.other_panels)
+        name: (rules, _variant_of(name.measure, variant), name) for name in (*claim.panels, *claim.other_panels)
     }
     lacks = tuple(name for name in claim.panels if places[name] not in found.panels)
     if not lacks:
         panels = {name: found.panels[place].for_claims() for name, place in places.items() if place in found.panels}
-        return Judged(claim=claim, reading=reading, variant=variant, verdict=check_claim(claim, panels))
+        return Judged(claim=claim, rules=rules, variant=variant, verdict=check_claim(claim, panels))
     keys = [
         (name.experiment.split()[0], label_of(name.measure, "corrected", name.form), _variant_of(name.measure, variant))
         for name in lacks
     ]
     reasons = tuple(dict.fromkeys(found.reasons[key] for key in keys if key in found.reasons))
-    return Waiting(claim=claim, reading=reading, variant=variant, lacks=lacks, reasons=reasons)
+    return Waiting(claim=claim, rules=rules, variant=variant, lacks=lacks, reasons=reasons)

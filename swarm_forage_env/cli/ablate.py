@@ -36,11 +36,11 @@ def ablate(
     described: SeveralPlaces,
     options: RunOptions,
     quirks: Annotated[
-        str, typer.Option("--quirks", help="Which to switch, separated by commas; all; or none: the readings only.")
+        str, typer.Option("--quirks", help="Which to switch, separated by commas; all; or none: both rules only.")
     ] = "all",
     seeds: Annotated[int, typer.Option(min=2, help="Runs per policy, size and switched quirk.")] = 3,
 ) -> None:
-    """Switch one quirk at a time, on in the described reading and off in the authors' program, and show what it moves.
+    """Switch one quirk at a time, on in the rules as described and off in the authors' program, and show what it moves.
 
     The tables are Markdown. Records go to a folder; an interrupted command can simply be given again.
     """

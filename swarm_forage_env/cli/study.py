@@ -15,10 +15,8 @@ if TYPE_CHECKING:
 Name = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A set of the paper (S1a to S2d), or a study file.")]
 Place = Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Folder of a study, or its packed file.")]
 Budget = Annotated[str | None, typer.Option("--budget", help="How much is run; default the first of the file.")]
-Seeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per cell; default those of the budget.")]
-Reading = Annotated[
-    str, typer.Option("--reading", help="described, program (the authors'), both, or file: as it says.")
-]
+Seeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per condition; default those of the budget.")]
+Rules = Annotated[str, typer.Option("--rules", help="described, program (the authors'), both, or file: as it says.")]
 
 
 def list_studies(
@@ -31,12 +29,12 @@ def list_studies(
     output().print(table_of_sets(budget))
 
 
-def show(name: Name, budget: Budget = None, seeds: Seeds = None, reading: Reading = "file") -> None:
+def show(name: Name, budget: Budget = None, seeds: Seeds = None, rules: Rules = "file") -> None:
     """Show what a study varies, and how many runs each of its budgets makes."""
     from swarm_forage_env.cli.study_report import described
     from swarm_forage_env.studies.study_file import budget_names
 
-    typer.echo(described(_chosen(name, budget, seeds, reading)))
+    typer.echo(described(_chosen(name, budget, seeds, rules)))
     others = [other for other in budget_names(name) if other != budget]
     typer.echo(f"\nBudgets: {', '.join(budget_names(name))}" + ("" if budget or len(others) < 2 else "; see --budget"))
 
@@ -46,7 +44,7 @@ def run(  # long: one parameter per option
     budget: Budget = None,
     out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/studies/NAME_BUDGET.")] = None,
     seeds: Seeds = None,
-    reading: Reading = "file",
+    rules: Rules = "file",
     shard: Annotated[str, typer.Option("--shard", metavar="I/N", help="Only the I-th of N equal parts.")] = "1/1",
     workers: Annotated[
         int | None,
@@ -75,7 +73,7 @@ def run(  # long: one parameter per option
     from swarm_forage_env.runs.workers import available_cores
     from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard, run_study
 
-    spec = _chosen(name, budget, seeds, reading)
+    spec = _chosen(name, budget, seeds, rules)
     part = parse_shard(shard)
     folder = StudyFolder(out or Path("results", "studies", f"{spec.name}_{spec.budget}"))
     if dry_run:
@@ -96,13 +94,13 @@ def run(  # long: one parameter per option
 
 
 def status(place: Place, as_json: AsJson = False) -> None:
-    """Show which runs of a study are done, missing or failed, cell by cell; exit code 1 unless all are done."""
+    """Show which runs of each condition are done, missing or failed; exit code 1 unless all are done."""
     from swarm_forage_env.cli.study_report import status_json, status_report
     from swarm_forage_env.studies.study_table import read_study
 
     table = read_study(place)
     typer.echo(status_json(table) if as_json else status_report(table))
-    if not all(state.is_complete for state in table.cell_states()):
+    if not all(state.is_complete for state in table.place_states()):
         raise typer.Exit(EXIT_FAILURE)
 
 
@@ -125,12 +123,12 @@ def _pack(folder: Path, out: Path | None) -> Path:
     return file
 
 
-def _chosen(name: str, budget: str | None, seeds: int | None, reading: str) -> "StudySpec":
+def _chosen(name: str, budget: str | None, seeds: int | None, rules: str) -> "StudySpec":
     """Return the study that the options describe."""
     from swarm_forage_env._internal.fields import known_name
-    from swarm_forage_env.studies.study import READING_NAMES
+    from swarm_forage_env.studies.study import RULES_NAMES
     from swarm_forage_env.studies.study_file import load_study
 
-    known_name("reading", reading, (*READING_NAMES, "both", "file"))
-    readings = {"both": tuple(READING_NAMES), "file": None}.get(reading, (reading,))
-    return load_study(name, budget, seeds=seeds, readings=readings)
+    known_name("rules", rules, (*RULES_NAMES, "both", "file"))
+    chosen = {"both": tuple(RULES_NAMES), "file": None}.get(rules, (rules,))
+    return load_study(name, budget, seeds=seeds, rules=chosen)

@@ -1,4 +1,4 @@
-"""The command `study diff`: which cells of two studies differ beyond chance."""
+"""The command `study diff`: which conditions of two studies differ beyond chance."""
 
 import json
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from metrics.scoring.study_diff import Shift, StudyDiff
 
 ROWS_SHOWN = 20
-"""Differences that are listed, and cells that are not compared; `--json` has all."""
+"""Differences that are listed, and conditions that are not compared; `--json` has all."""
 
 
 def diff(
@@ -27,9 +27,9 @@ def diff(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Say which cells of two studies differ beyond chance.
+    """Say which conditions of two studies differ beyond chance.
 
-    Exit code 0 if no cell differs; 1 if one does or may, or if one has no finished runs in A or in B.
+    Exit code 0 if no condition differs; 1 if one does or may, or if one has no finished runs in A or in B.
     """
     from metrics.scoring.study_diff import COLUMNS, diff_studies
     from swarm_forage_env._internal.fields import ConfigError
@@ -41,18 +41,18 @@ def diff(
         found = diff_studies(mine, other, names)
     except ValueError as error:  # studies that cannot be compared
         raise ConfigError(str(error)) from error
-    header = ("reading", "policy", *(axis.name for axis in mine.spec.axes))
+    header = ("rules", "policy", *(axis.name for axis in mine.spec.axes))
     typer.echo(json.dumps(found.to_mapping(), indent=1) if as_json else diff_report(found, header))
     if found.differs:
         raise typer.Exit(EXIT_FAILURE)
 
 
 def diff_report(found: "StudyDiff", header: Sequence[str]) -> str:
-    """Return what was found in words: how many cells differ, the tests that say so, and what was not compared.
+    """Return what was found in words: how many conditions differ, the tests that say so, and what was not compared.
 
     Args:
         found: From `metrics.scoring.diff_studies`.
-        header: Names of what a cell is placed by.
+        header: Names of what a condition is placed by.
     """
     from metrics.scoring.study_diff import TEST
     from swarm_forage_env._internal.wording import aligned, counted
@@ -64,22 +64,22 @@ def diff_report(found: "StudyDiff", header: Sequence[str]) -> str:
         "open": "open: other bits, and too few runs to say more",
     }
     counts = [(str(found.count(state)), text) for state, text in words.items() if found.count(state)]  # type: ignore[arg-type] - its keys are the states
-    lines = [f"{counted(len(found.cells), 'cell')} compared", *(f"  {row}" for row in aligned(counts))]
+    lines = [f"{counted(len(found.places), 'cell')} compared", *(f"  {row}" for row in aligned(counts))]
     lines += [f"not the same: {text}" for text in found.settings]
-    of_cells = [shift for cell in found.cells for shift in cell.shifts if shift.is_significant]
-    shown = sorted(of_cells, key=lambda shift: shift.p)
+    of_places = [shift for place in found.places for shift in place.shifts if shift.is_significant]
+    shown = sorted(of_places, key=lambda shift: shift.p)
     if shown:
         heads = (*header, "column", "A", "B", "B - A", "95 % interval", "runs", "p (Holm)")
         lines += ["", *aligned([heads, *map(_row, shown[:ROWS_SHOWN])])]
         lines += _more(len(shown))
     if found.lines:
-        lines += ["", "all cells of a policy together, in shares of each cell's mean:"]
+        lines += ["", "all conditions of a policy together, in shares of each condition's mean:"]
         lines += aligned(
-            [("reading", "policy", "column", "B - A", "95 % interval", "p (Holm)"), *map(_line, found.lines)]
+            [("rules", "policy", "column", "B - A", "95 % interval", "p (Holm)"), *map(_line, found.lines)]
         )
     if found.lacking:
         lines += ["", f"{counted(len(found.lacking), 'cell')} not compared:"]
-        lines += aligned([(*header, "why"), *((*one.place, one.why) for one in found.lacking[:ROWS_SHOWN])])
+        lines += aligned([(*header, "why"), *((*one.words, one.why) for one in found.lacking[:ROWS_SHOWN])])
         lines += _more(len(found.lacking))
     return "\n".join([*lines, *(["", TEST] if found.shifts else [])])
 
@@ -93,7 +93,7 @@ def _row(shift: "Shift") -> tuple[str, ...]:
 
     runs = str(shift.n_first) if shift.n_first == shift.n_second else f"{shift.n_first}, {shift.n_second}"
     means = (number(value) for value in (shift.first, shift.second, shift.difference))
-    return (*shift.place, shift.column, *means, limits(shift.lower, shift.upper), runs, f"{shift.p_holm:.2g}")
+    return (*shift.words, shift.column, *means, limits(shift.lower, shift.upper), runs, f"{shift.p_holm:.2g}")
 
 
 def _line(shift: "Shift") -> tuple[str, ...]:
@@ -101,4 +101,4 @@ def _line(shift: "Shift") -> tuple[str, ...]:
 
     mark = " *" if shift.is_significant else ""
     between = f"{percent(shift.lower)} to {percent(shift.upper)}"
-    return (*shift.place, shift.column, percent(shift.difference), between, f"{shift.p_holm:.2g}{mark}")
+    return (*shift.words, shift.column, percent(shift.difference), between, f"{shift.p_holm:.2g}{mark}")

@@ -94,29 +94,29 @@ def page_of(tables: "Sequence[StudyTable]", scored: "Sequence[StudyPanels]", ver
     from swarm_forage_env.rendering.report import build_report
 
     judged, waiting, expected, expected_later = verdicts
-    columns = list(dict.fromkeys((one.reading, one.variant) for one in (*judged, *waiting) if one.reading))
+    columns = list(dict.fromkeys((one.rules, one.variant) for one in (*judged, *waiting) if one.rules))
     names = version_names(tables)
     answers = get_args(Answer)
-    counts = Counter((one.reading, one.variant, one.verdict.answer) for one in judged)
-    waits = Counter((one.reading, one.variant, WAITS) for one in waiting)
+    counts = Counter((one.rules, one.variant, one.verdict.answer) for one in judged)
+    waits = Counter((one.rules, one.variant, WAITS) for one in waiting)
     return build_report(
         {
             "title": f"Swarm foraging: {', '.join(table.spec.name for table in tables)}",
             "answers": (*answers, WAITS),
-            "columns": [{"reading": reading, "variant": variant} for reading, variant in columns],
+            "columns": [{"rules": rules, "variant": variant} for rules, variant in columns],
             "counts": [
                 {
-                    "reading": reading,
+                    "rules": rules,
                     "variant": variant,
-                    "counts": [(counts + waits)[reading, variant, word] for word in (*answers, WAITS)],
+                    "counts": [(counts + waits)[rules, variant, word] for word in (*answers, WAITS)],
                 }
-                for reading, variant in columns
+                for rules, variant in columns
             ],
             "claims": _claim_rows(CLAIMS, columns, judged, waiting),
-            "readings": list(dict.fromkeys(one.reading for one in (*expected, *expected_later))),
+            "rules": list(dict.fromkeys(one.rules for one in (*expected, *expected_later))),
             "intuitions": _claim_rows(
                 INTUITIONS,
-                list(dict.fromkeys((one.reading, one.variant) for one in (*expected, *expected_later))),
+                list(dict.fromkeys((one.rules, one.variant) for one in (*expected, *expected_later))),
                 expected,
                 expected_later,
             ),
@@ -145,8 +145,8 @@ def _claim_rows(
     """Return one row per claim, with a cell per column, and what stands behind its answers."""
     if not columns:
         return []
-    found = {(one.claim.name, one.reading, one.variant): one.verdict for one in judged}
-    waits = {(one.claim.name, one.reading, one.variant): one for one in waiting}
+    found = {(one.claim.name, one.rules, one.variant): one.verdict for one in judged}
+    waits = {(one.claim.name, one.rules, one.variant): one for one in waiting}
     rows: list[dict[str, Any]] = []
     for name, claim in claims.items():
         cells: list[dict[str, Any]] = []
@@ -187,7 +187,7 @@ def lacking(waits: "Waiting") -> str:
 def _study(
     table: "StudyTable", panels: "StudyPanels", judged: "Sequence[Judged]", waiting: "Sequence[Waiting]", band: str
 ) -> dict[str, Any]:
-    from metrics.scoring.cell_distributions import cell_distributions
+    from metrics.scoring.place_distributions import place_distributions
     from metrics.scoring.study_models import model_figures
     from metrics.scoring.study_plots import study_figures
     from swarm_forage_env.cli.study_report import described, status_report
@@ -200,7 +200,7 @@ def _study(
         if first.variant == "corrected":
             figures.append(figure)
         else:
-            others.setdefault((first.reading, first.measure), []).append(figure)
+            others.setdefault((first.rules, first.measure), []).append(figure)
     notes().print(f"fitting models to {table.spec.name}")
     return {
         "snapshot": _snapshot(table),
@@ -209,11 +209,11 @@ def _study(
         "title": table.spec.title,
         "state": status_report(table).splitlines()[0],
         "figures": [
-            _figure(figure, others.get((figure.panels[0].reading, figure.panels[0].measure), ()), judged, waiting, band)
+            _figure(figure, others.get((figure.panels[0].rules, figure.panels[0].measure), ()), judged, waiting, band)
             for figure in figures
         ],
         "models": [_model(figure) for figure in model_figures(table)],
-        "cells": _numbers(cell_distributions(table)),
+        "conditions": _numbers(place_distributions(table)),
         "missing": [
             f"{measure}: {why}" for (measure, variant), why in panels.missing.items() if variant == "corrected"
         ],
@@ -288,11 +288,11 @@ def _theory(tables: "Sequence[StudyTable]", judged: "Sequence[Judged]") -> list[
 
 
 def _numbers(frame: "pl.DataFrame") -> dict[str, Any]:
-    """Return a table as the page shows it; the heading already tells the reading where there is one of them."""
+    """Return a table as the page shows it; the heading already tells the rules where there is one of them."""
     if not len(frame):
         return {"header": [], "rows": []}
-    is_one = "reading" in frame.columns and frame["reading"].n_unique() < 2
-    shown = frame.drop("reading") if is_one else frame
+    is_one = "rules" in frame.columns and frame["rules"].n_unique() < 2
+    shown = frame.drop("rules") if is_one else frame
     return {"header": [name.replace("_", " ") for name in shown.columns], "rows": shown.rows()}
 
 
@@ -320,14 +320,14 @@ def _picture(words: str, draw: "Draw") -> dict[str, str]:
 def _claims_about(
     figure: "StudyFigure", judged: "Sequence[Judged]", waiting: "Sequence[Waiting]"
 ) -> list[dict[str, Any]]:
-    """Return the claims that use a panel of the figure, with what was found under its reading."""
+    """Return the claims that use a panel of the figure, with what was found under its rules."""
     from metrics.scoring.verdicts import Waiting
 
     here = {panel.name for panel in figure.panels}
-    reading = figure.panels[0].reading
+    rules = figure.panels[0].rules
     found: dict[str, dict[str, Any]] = {}
     for one in (*judged, *waiting):
-        if one.reading != reading or here.isdisjoint(one.claim.panels):
+        if one.rules != rules or here.isdisjoint(one.claim.panels):
             continue
         entry = found.setdefault(one.claim.name, {"name": one.claim.name, "text": one.claim.text, "found": []})
         told = (
@@ -348,7 +348,7 @@ def _cost(table: "StudyTable") -> list[str | int | float]:
     from swarm_forage_env.runs.store import DONE
 
     spec = table.spec
-    n_done = sum(state.n_runs[DONE] for state in table.cell_states())
+    n_done = sum(state.n_runs[DONE] for state in table.place_states())
     hours = spec.n_runs * spec.horizon_s / 3600.0
     took = "not kept" if table.wall_time_s is None else table.wall_time_s / 3600.0
     return [spec.name, spec.budget, n_done, spec.n_runs, float(spec.robot_ticks), hours, took]
@@ -361,14 +361,14 @@ def command_of(table: "StudyTable") -> str:
     from swarm_forage_env.studies.study_file import is_set_of_paper
 
     spec = table.spec
-    reading, *others = spec.readings
+    rules, *others = spec.rules
     trusted = any(trust.runs_code(file_of(name)) for name in _policy_files(spec))
     words = ["swarm-forage", *([trust.TRUST_OPTION] if trusted else []), "study", "run"]
     words += [spec.name if is_set_of_paper(spec) else spec.file or "FILE"]
     words += ["--budget", spec.budget] if spec.budget else []
     # Other seeds than the first ones are chosen by the budget.
     words += ["--seeds", str(len(spec.seeds))] if spec.seeds == tuple(range(len(spec.seeds))) else []
-    words += ["--reading", "both" if others else reading]
+    words += ["--rules", "both" if others else rules]
     command = shlex.join(words)
     return command if is_set_of_paper(spec) else f"{command}  # study {spec.name}, identity {spec.study_id}"
 

@@ -40,12 +40,12 @@ def plot(
 
     Models are laws and a mean field where swarm sizes vary, the queue where robots leave and come. theory_... has what
     follows without runs: availability curves, and sketches of the measures. NAME_snapshot.png is the arena when a run
-    begins. NAME_cells.csv has how runs of each cell spread and how many broke down, ..._pairs.csv which policy is
-    better how often.
+    begins. NAME_conditions.csv has how runs of each condition spread and how many broke down, ..._pairs.csv which
+    policy is better how often.
     """
-    from metrics.scoring.cell_distributions import cell_distributions
     from metrics.scoring.figure_panels import study_panels
     from metrics.scoring.model_plots import draw_models
+    from metrics.scoring.place_distributions import place_distributions
     from metrics.scoring.study_models import model_figures
     from metrics.scoring.theory import theory_of
     from swarm_forage_env._internal.fields import known_name
@@ -73,9 +73,9 @@ def plot(
         tables = {f"{sketch.name}.csv": sketch.numbers}
         drawing.write(sketch.name, sketch.draw, tables)
     typer.echo(snapshot_written(table.spec, folder / f"{table.spec.name}_snapshot.png"))
-    cells = folder / f"{table.spec.name}_cells.csv"
-    cell_distributions(table).write_csv(cells)
-    typer.echo(cells)
+    places = folder / f"{table.spec.name}_conditions.csv"
+    place_distributions(table).write_csv(places)
+    typer.echo(places)
     for (measure, variant), why in scored.missing.items():
         typer.echo(f"no figure of {measure}, {variant}: {why}", err=True)
 

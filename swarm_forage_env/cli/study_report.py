@@ -22,24 +22,24 @@ FAILURES_SHOWN = 10
 
 
 def table_of_sets(budget: str = PAPER) -> Table:
-    """Return the sets of the paper with what they take at a budget, for one of the two readings.
+    """Return the sets of the paper with what they take at a budget, under one of the rules.
 
-    Of another budget than the paper's it also has how many runs each cell has, how long they are, and which of the
+    Of another budget than the paper's it also has how many runs each condition has, how long they are, and which of the
     paper's values are left out.
     """
     table = Table(
         title=f"experiment sets of the paper{'' if budget == PAPER else f', budget {budget}'}",
-        caption=f"of four controllers at budget {budget}, for each of the two readings",
+        caption=f"of four controllers at budget {budget}, under each of the two rules",
     )
     table.add_column("set")
     table.add_column("about" if budget == PAPER else "left out")
-    for name in () if budget == PAPER else ("runs of a cell", "length, s"):
+    for name in () if budget == PAPER else ("runs each", "length, s"):
         table.add_column(name, justify="right")
     for name in ("experiments", "runs", "robot-ticks"):
         table.add_column(name, justify="right")
     totals = [0, 0, 0]
     for name in set_names():
-        spec = load_study(name, budget, readings=("described",))
+        spec = load_study(name, budget, rules=("described",))
         numbers = [spec.n_experiments, spec.n_runs, spec.robot_ticks]
         totals = [total + number for total, number in zip(totals, numbers, strict=True)]
         words = (spec.title,)
@@ -64,9 +64,9 @@ def described(spec: StudySpec) -> str:
         *(("wrapper", config.name) for config in spec.wrappers),
         ("policies", ", ".join(policy.label for policy in spec.policies)),
         *(("axis", axis) for axis in axes),
-        ("readings", ", ".join(spec.readings)),
+        ("rules", ", ".join(spec.rules)),
         ("budget", f"{spec.budget}: {counted(len(spec.seeds), 'seed')}, {spec.horizon_s:,g} s"),
-        ("runs", f"{spec.n_runs:,} in {counted(len(spec.cells), 'cell')}, {spec.robot_ticks:.3g} robot-ticks"),
+        ("runs", f"{spec.n_runs:,} in {counted(len(spec.places), 'condition')}, {spec.robot_ticks:.3g} robot-ticks"),
         ("identity", spec.study_id),
     ]
     absent = left_out_words(spec)
@@ -81,7 +81,7 @@ def plan_report(spec: StudySpec, folder: StudyFolder, part: tuple[int, int], wor
     todo = {run_id: run for run_id, run in planned.items() if states[run_id] != DONE}
     aside = notes()
     costs = calibrate(todo.values(), tell=aside.print)
-    labels = {run.run_id: cell.policy for cell in spec.cells for run in spec.specs_of(cell)}
+    labels = {run.run_id: place.policy for place in spec.places for run in spec.specs_of(place)}
     by_policy: dict[str, list[RunSpec]] = {}
     for run_id, run in todo.items():
         by_policy.setdefault(labels[run_id], []).append(run)
@@ -119,20 +119,20 @@ def state_report(state: Outcomes, folder: StudyFolder) -> str:
 
 
 def status_report(table: StudyTable) -> str:
-    """Return how far a study is: all cells that are not complete, and failed runs."""
-    states = table.cell_states()
-    open_cells = [state for state in states if not state.is_complete]
+    """Return how far a study is: all conditions that are not complete, and failed runs."""
+    states = table.place_states()
+    open_places = [state for state in states if not state.is_complete]
     spec = table.spec
     lines = [
         f"{spec.name}, budget {spec.budget}: {_counts([sum(s.n_runs[name] for s in states) for name in STATES])}",
-        f"{len(states) - len(open_cells):,} of {counted(len(states), 'cell')} complete",
+        f"{len(states) - len(open_places):,} of {counted(len(states), 'condition')} complete",
     ]
     if len(table.versions) > 1:
         lines.append(f"The runs were made by {len(table.versions)} versions or commits of the packages.")
-    if open_cells:
-        header = ("reading", "policy", *(axis.name for axis in spec.axes), *STATES)
+    if open_places:
+        header = ("rules", "policy", *(axis.name for axis in spec.axes), *STATES)
         places = spec.place_words()
-        rows = [(*places[state.cell], *(str(state.n_runs[name]) for name in STATES)) for state in open_cells]
+        rows = [(*places[state.place], *(str(state.n_runs[name]) for name in STATES)) for state in open_places]
         lines += ["", *aligned([header, *rows])]
     failures = table.frame.filter(table.frame["state"] == FAILED)
     for row in failures.head(FAILURES_SHOWN).iter_rows(named=True):
@@ -141,13 +141,17 @@ def status_report(table: StudyTable) -> str:
 
 
 def status_json(table: StudyTable) -> str:
-    """Return the states of all cells, and all failed runs, as a JSON document."""
+    """Return the states of all conditions, and all failed runs, as a JSON document."""
     lost = table.frame.filter(table.frame["state"] == FAILED)
-    failures = lost.select("run_id", "reading", "policy", "seed", "error", "traceback", "rerun").to_dicts()
+    failures = (
+        lost.rename({"reading": "rules"})
+        .select("run_id", "rules", "policy", "seed", "error", "traceback", "rerun")
+        .to_dicts()
+    )
     document = {
         "study": table.spec.to_mapping(),
         "versions": list(table.versions),
-        "cells": table.cells().to_dicts(),
+        "conditions": table.places().to_dicts(),
         "failures": failures,
     }
     return json.dumps(document, indent=1)

@@ -51,10 +51,10 @@ def verdict(
             words = f"note: {table.spec.name} has the name of one of the paper's sets and other settings"
             notes().print(words)
     console = output()
-    for key in dict.fromkeys((one.reading, one.variant) for one in judged):
-        console.print(_table([one for one in judged if (one.reading, one.variant) == key]))
-    for reading in dict.fromkeys(one.reading for one in expected):
-        console.print(_table([one for one in expected if one.reading == reading], "intuitions"))
+    for key in dict.fromkeys((one.rules, one.variant) for one in judged):
+        console.print(_table([one for one in judged if (one.rules, one.variant) == key]))
+    for rules in dict.fromkeys(one.rules for one in expected):
+        console.print(_table([one for one in expected if one.rules == rules], "intuitions"))
     typer.echo("\n".join(waiting_lines((*waiting, *expected_later))))
     if json_file is not None:
         text = verdict_json(tables, judged, waiting, expected, expected_later) + "\n"
@@ -109,7 +109,7 @@ def waiting_lines(waiting: "Sequence[Waiting]") -> list[str]:
     for one in waiting:
         words = f"for {', '.join(dict.fromkeys(name.experiment for name in one.lacks))}"
         if one.reasons:
-            words += f" ({one.reading}, {one.variant}: {'; '.join(one.reasons)})"
+            words += f" ({one.rules}, {one.variant}: {'; '.join(one.reasons)})"
         claims.setdefault(words, {})[one.claim.name] = None
     if not claims:
         return ["No claim waits for runs."]
@@ -125,7 +125,7 @@ def _table(judged: "Sequence[Judged]", what: str = "") -> "Table":
     from swarm_forage_env._internal.wording import number, percent
 
     first = judged[0]
-    title = f"reading {first.reading}, measures {first.variant}" if first.reading else "from formulas alone"
+    title = f"rules {first.rules}, measures {first.variant}" if first.rules else "from formulas alone"
     table = Table(title=f"{what}, {title}" if what else title, title_justify="left")
     for name in ("claim", "text", "by intervals", "by bands"):
         table.add_column(name)

@@ -19,7 +19,7 @@ from swarm_forage_env.contract.layout import (
     neighbours_row,
     observation_layout,
 )
-from swarm_forage_env.contract.own import own_sensor
+from swarm_forage_env.contract.own_functions import own_sensor
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, IntArray, ObsArray
 from swarm_forage_env.scenarios.config import ScenarioConfig
 from swarm_forage_env.scenarios.quirks import Quirks

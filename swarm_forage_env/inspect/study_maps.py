@@ -1,4 +1,4 @@
-"""Maps of the floor per cell of a study: a cell's runs are made again, since records hold no positions."""
+"""Maps of the floor per condition of a study: a condition's runs are made again, since records hold no positions."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,62 +9,62 @@ from swarm_forage_env.inspect.maps import FloorMaps, floor_maps, mean_maps, same
 from swarm_forage_env.inspect.replay.capture import record_replay
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE
-from swarm_forage_env.studies.study import Cell, StudySpec, Value, value_words
+from swarm_forage_env.studies.study import Place, StudySpec, Value, value_words
 from swarm_forage_env.studies.study_table import StudyTable
 
-MOST_CELLS = 8
-"""Cells that are mapped at once (our choice: with their differences they are fifteen rows of a picture)."""
+MOST_PLACES = 8
+"""Conditions that are mapped at once (our choice: with their differences they are fifteen rows of a picture)."""
 DEFAULT_SEEDS = 4
-"""Runs made again per cell (our choice: a density averages over thousands of moments in each run already)."""
+"""Runs made again per condition (our choice: a density averages over thousands of moments in each run already)."""
 _COMPARED = "collected"
 """Column of a stored run that must come out the same when the run is made again."""
 
 Advance = Callable[[float], None]
-"""Called with the robot-ticks of all cells that are done."""
+"""Called with the robot-ticks of all conditions that are done."""
 
 
-def choose_cells(spec: StudySpec, words: Sequence[str]) -> tuple[Cell, ...]:
-    """Return the cells that words name, in their order; without words all cells.
+def choose_places(spec: StudySpec, words: Sequence[str]) -> tuple[Place, ...]:
+    """Return the conditions that words name, in their order; without words all conditions.
 
     Args:
         spec: The study.
-        words: "KEY=VALUE,KEY=VALUE" each, as "policy=dpo,population_size=16". Keys are `reading`, `policy` and the axes
-            of the study; a word names every cell that has all of its values.
+        words: "KEY=VALUE,KEY=VALUE" each, as "policy=dpo,population_size=16". Keys are `rules`, `policy` and the axes
+            of the study; a word names every condition that has all of its values.
 
     Raises:
-        ConfigError: an unknown key or value, or more than `MOST_CELLS` cells.
+        ConfigError: an unknown key or value, or more than `MOST_PLACES` conditions.
     """
-    found = dict.fromkeys(cell for word in words for cell in _named(spec, word)) if words else spec.cells
-    if len(found) > MOST_CELLS:
+    found = dict.fromkeys(place for word in words for place in _named(spec, word)) if words else spec.places
+    if len(found) > MOST_PLACES:
         example = ",".join(
             f"{key}={value_words(values)[values[0]]}" for key, values in _values(spec).items() if len(values) > 1
         )
         raise ConfigError(
-            f"Expected at most {MOST_CELLS} cells, got {len(found)} of study {spec.name}; choose some by their values, "
-            f"such as --cell {example}. There are {_known(spec)}."
+            f"Expected at most {MOST_PLACES} conditions, got {len(found)} of study {spec.name}; choose some by their "
+            f"values, such as --condition {example}. There are {_known(spec)}."
         )
     return tuple(found)
 
 
-def maps_of_cells(
+def maps_of_places(
     table: StudyTable,
-    cells: Sequence[Cell],
+    places: Sequence[Place],
     *,
     n_seeds: int | None = None,
     side_m: float = 0.4,
     advance: Advance | None = None,
 ) -> tuple[tuple[FloorMaps, ...], tuple[str, ...]]:
-    """Make runs of cells again and return the mean of their maps.
+    """Make runs of conditions again and return the mean of their maps.
 
     Args:
         table: The study.
-        cells: Which cells; their arenas must have one shape.
-        n_seeds: How many runs per cell, the first ones; default at most `DEFAULT_SEEDS`.
+        places: Which ones; their arenas must have one shape.
+        n_seeds: How many runs per condition, the first ones; default at most `DEFAULT_SEEDS`.
         side_m: Side of a square in the smallest arena. In larger ones squares are larger, so that all have as many.
         advance: Called after every frame.
 
     Returns:
-        One per cell; and the run_ids of those runs that came out different from what the study holds.
+        One per condition; and the run_ids of those runs that came out different from what the study holds.
 
     Raises:
         ConfigError: arenas of several shapes, more seeds than the study has, a side that does not fit the arena, or a
@@ -74,19 +74,21 @@ def maps_of_cells(
     if n_seeds is not None:
         whole("the number of seeds", n_seeds, at_least=1, at_most=len(spec.seeds))
     n_seeds = n_seeds or min(DEFAULT_SEEDS, len(spec.seeds))
-    arenas = [spec.world(cell).scenario.arena for cell in cells]
+    arenas = [spec.world(place).scenario.arena for place in places]
     sizes_m = [(arena.width_m, arena.height_m) for arena in arenas]
     if not all(same_proportions(size_m, sizes_m[0]) for size_m in sizes_m):
-        raise ConfigError(f"Expected cells whose arenas have one shape, got {sorted({*sizes_m})} m; choose others.")
+        raise ConfigError(
+            f"Expected conditions whose arenas have one shape, got {sorted({*sizes_m})} m; choose others."
+        )
     smallest_m = min(size_m[0] for size_m in sizes_m)
-    labels = _labels(spec, cells)
+    labels = _labels(spec, places)
     maps: list[FloorMaps] = []
     changed: list[str] = []
     done = 0.0
-    for cell, label, size_m in zip(cells, labels, sizes_m, strict=True):
+    for place, label, size_m in zip(places, labels, sizes_m, strict=True):
         of_runs: list[FloorMaps] = []
-        for run in spec.specs_of(cell)[:n_seeds]:
-            one, is_same = _map_of(table, cell, run, side_m * size_m[0] / smallest_m, _part(advance, done, run))
+        for run in spec.specs_of(place)[:n_seeds]:
+            one, is_same = _map_of(table, place, run, side_m * size_m[0] / smallest_m, _part(advance, done, run))
             of_runs.append(one)
             changed += [] if is_same else [run.run_id]
             done += run.robot_ticks
@@ -94,14 +96,14 @@ def maps_of_cells(
     return tuple(maps), tuple(changed)
 
 
-def robot_ticks(spec: StudySpec, cells: Sequence[Cell], n_seeds: int | None) -> int:
-    """Return how much `maps_of_cells` has to do."""
+def robot_ticks(spec: StudySpec, places: Sequence[Place], n_seeds: int | None) -> int:
+    """Return how much `maps_of_places` has to do."""
     n_runs = n_seeds or min(DEFAULT_SEEDS, len(spec.seeds))
-    return sum(run.robot_ticks for cell in cells for run in spec.specs_of(cell)[:n_runs])
+    return sum(run.robot_ticks for place in places for run in spec.specs_of(place)[:n_runs])
 
 
 def _map_of(
-    table: StudyTable, cell: Cell, run: RunSpec, side_m: float, progress: Callable[[int, int], None] | None
+    table: StudyTable, place: Place, run: RunSpec, side_m: float, progress: Callable[[int, int], None] | None
 ) -> tuple[FloorMaps, bool]:
     """Return the maps of a run, and whether it came out as the study has it; one that it has not is as good."""
     try:
@@ -111,7 +113,7 @@ def _map_of(
     except ValueError as error:  # a policy that is not installed here, or a file that has changed
         raise ConfigError(str(error)) from error
     assert record is not None, "whole runs have records"
-    rows = table.rows(cell)
+    rows = table.rows(place)
     stored = rows.filter((rows["run_id"] == run.run_id) & (rows["state"] == DONE))
     is_same = not len(stored) or np.array_equal(stored[_COMPARED].to_numpy(), record.columns()[_COMPARED])
     return floor_maps(replay, side_m=side_m), is_same
@@ -125,26 +127,26 @@ def _part(advance: Advance | None, before: float, run: RunSpec) -> Callable[[int
 
 
 def _values(spec: StudySpec) -> dict[str, tuple[Value, ...]]:
-    """Return everything by which cells differ: key -> its values."""
+    """Return everything by which conditions differ: key -> its values."""
     return {
-        "reading": spec.readings,
+        "rules": spec.rules,
         "policy": tuple(policy.label for policy in spec.policies),
         **{axis.name: axis.values for axis in spec.axes},
     }
 
 
-def _place(spec: StudySpec, cell: Cell) -> dict[str, Value]:
-    return dict(zip(_values(spec), (cell.reading, cell.policy, *cell.values), strict=True))
+def _by_key(spec: StudySpec, place: Place) -> dict[str, Value]:
+    return dict(zip(_values(spec), (place.rules, place.policy, *place.values), strict=True))
 
 
-def _named(spec: StudySpec, word: str) -> list[Cell]:
-    """Return the cells that one word names."""
+def _named(spec: StudySpec, word: str) -> list[Place]:
+    """Return the conditions that one word names."""
     pairs = [part.partition("=") for part in word.split(",")]
     if not all(equals for _, equals, _ in pairs):
-        raise ConfigError(f"Expected a cell as KEY=VALUE,KEY=VALUE, got {word!r}. There are {_known(spec)}.")
+        raise ConfigError(f"Expected a condition as KEY=VALUE,KEY=VALUE, got {word!r}. There are {_known(spec)}.")
     wanted = {key.strip(): text.strip() for key, _, text in pairs}
     values = _values(spec)
-    known_keys(wanted, values, f"key of the cells of study {spec.name}")
+    known_keys(wanted, values, f"key of the conditions of study {spec.name}")
     meant: dict[str, list[Value]] = {}
     for key, text in wanted.items():
         words = value_words(values[key])
@@ -152,7 +154,7 @@ def _named(spec: StudySpec, word: str) -> list[Cell]:
         if not meant[key]:
             there = ", ".join(words.values())
             raise ConfigError(f"Expected {key} to be one of {there} in study {spec.name}, got {text!r}.")
-    return [cell for cell in spec.cells if all(_place(spec, cell)[key] in those for key, those in meant.items())]
+    return [place for place in spec.places if all(_by_key(spec, place)[key] in those for key, those in meant.items())]
 
 
 def _is(value: Value, word: str, text: str) -> bool:
@@ -171,11 +173,9 @@ def _known(spec: StudySpec) -> str:
     return "; ".join(f"{key} {', '.join(value_words(values).values())}" for key, values in _values(spec).items())
 
 
-def _labels(spec: StudySpec, cells: Sequence[Cell]) -> list[str]:
-    """Name each cell by its policy and what differs between them."""
-    places = [_place(spec, cell) for cell in cells]
-    differing = [key for key in _values(spec) if key != "policy" and len({place[key] for place in places}) > 1]
+def _labels(spec: StudySpec, places: Sequence[Place]) -> list[str]:
+    """Name each condition by its policy and what differs between them."""
+    keyed = [_by_key(spec, place) for place in places]
+    differing = [key for key in _values(spec) if key != "policy" and len({one[key] for one in keyed}) > 1]
     words = {key: value_words(values) for key, values in _values(spec).items()}
-    return [
-        " ".join([str(place["policy"]), *(f"{key}={words[key][place[key]]}" for key in differing)]) for place in places
-    ]
+    return [" ".join([str(one["policy"]), *(f"{key}={words[key][one[key]]}" for key in differing)]) for one in keyed]

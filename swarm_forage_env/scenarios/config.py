@@ -207,7 +207,7 @@ class RewardConfig:
     team: bool = False
     """Every active robot receives the mean over active robots instead of its own reward."""
     own_reward: str = ""
-    """Name of a function that adds to these terms, registered by `contract.own.register_reward`; "" = none."""
+    """Name of a function that adds to these terms, of `contract.own_functions.register_reward`; "" = none."""
 
     def __post_init__(self) -> None:
         for name in ("delivery", "first_pickup", "nest_progress", "interference", "tick"):

@@ -8,7 +8,7 @@ from swarm_forage_env._internal import fields
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env.scenarios.config import SECTIONS, ScenarioConfig
 from swarm_forage_env.scenarios.kinds import RobotKind, kind_from_words
-from swarm_forage_env.scenarios.quirks import READINGS
+from swarm_forage_env.scenarios.quirks import RULES
 
 
 def field_sections() -> dict[str, str]:
@@ -57,7 +57,7 @@ def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
     """Return `config` with single fields replaced by name, wherever they live.
 
     Example: `with_overrides(config, n_robots=20, width_m=48.0)`. A section may be replaced whole
-    (`quirks=AUTHORS_PROGRAM`), the quirks also by the name of a reading (`quirks="AUTHORS_PROGRAM"`).
+    (`quirks=AUTHORS_PROGRAM`), the quirks also by the name of rules (`quirks="AUTHORS_PROGRAM"`).
 
     Raises:
         ConfigError: unknown name (with the nearest known one), or values that do not fit together.
@@ -68,8 +68,8 @@ def with_overrides(config: ScenarioConfig, **overrides: Any) -> ScenarioConfig:
     top: dict[str, Any] = {}
     for name, value in overrides.items():
         if name == "quirks" and isinstance(value, str):
-            fields.known_name("reading", value, READINGS)
-            top[name] = READINGS[value]
+            fields.known_name("rules", value, RULES)
+            top[name] = RULES[value]
         elif name in SECTIONS:
             own = ", ".join(item.name for item in dataclasses.fields(SECTIONS[name]))
             fields.instance(name, value, SECTIONS[name], hint=f"; single fields of it are given by their names: {own}")

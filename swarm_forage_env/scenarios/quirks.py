@@ -6,7 +6,7 @@ the two gives a published result. A quirk is a single `if` at the place where it
 Not reproduced at all: two-cell ramp objects, the rule that objects may not touch, throttling before the speed
 cap, and interference counted from each controller's machine state. (Under sensor noise the program counts false
 obstacles, too: records have that share in a column of its own, `believed_interference_fraction`.) Contact between
-robots is the same in both readings, and so is the rule that a robot ignores obstacles close to its goal, a parameter
+robots is the same in both rules, and so is the rule that a robot ignores obstacles close to its goal, a parameter
 of the controllers (`approach_ignores_obstacles`).
 """
 
@@ -82,5 +82,5 @@ AUTHORS_PROGRAM = Quirks(
 
 QUIRK_NAMES = tuple(field.name for field in fields(Quirks))
 """Every switch, in the order of the class."""
-READINGS = {"DESCRIBED": Quirks(), "AUTHORS_PROGRAM": AUTHORS_PROGRAM}
-"""The two readings by name."""
+RULES = {"DESCRIBED": Quirks(), "AUTHORS_PROGRAM": AUTHORS_PROGRAM}
+"""Both rules by name: as the paper describes them, and as its program has them."""

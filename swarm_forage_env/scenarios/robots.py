@@ -28,7 +28,7 @@ class RobotConfig:
     start_margin_m: float = 2.8
     """Robots start at uniform positions at least this far from the arena border."""
     own_sensors: tuple[str, ...] = ()
-    """Names of further slices of an observation, registered by `contract.own.register_sensor`."""
+    """Names of further slices of an observation, registered by `contract.own_functions.register_sensor`."""
     neighbours_seen: int = 0
     """How many of the nearest robots a robot observes; 0 = none, as in the paper."""
     neighbour_range_m: float = 2.0

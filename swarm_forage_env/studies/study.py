@@ -1,7 +1,8 @@
-"""StudySpec: all runs of a study as data: a scenario, policies, axes along which it varies, readings and seeds.
+"""StudySpec: all runs of a study as data: a scenario, policies, axes along which it varies, rules and seeds.
 
-A cell is one policy under one reading at one value of every axis. It is run once per seed, and all cells share the
-seeds. The last axis is the one that is plotted along x; each cell has its reference cell on it (`StudySpec.reference`).
+A condition is one policy under one of the rules at one value of every axis, and `Place` its address. It is run once per
+seed, and all conditions share the seeds. The last axis is the one that is plotted along x; each condition has its
+reference on it (`StudySpec.reference`).
 """
 
 import json
@@ -30,7 +31,7 @@ from swarm_forage_env.runs.spec import RunSpec, identity_of, wrappers_from_list,
 from swarm_forage_env.scenarios.kinds import words_of_kind
 from swarm_forage_env.scenarios.overrides import field_sections, field_types, parse_tuple
 from swarm_forage_env.scenarios.presets import SCENARIO_NAMES, scenario
-from swarm_forage_env.scenarios.quirks import READINGS
+from swarm_forage_env.scenarios.quirks import RULES
 from swarm_forage_env.studies.ladders import CRITERIA, swarms_of_sizes, wrappers_at
 from swarm_forage_env.wrappers.registry import wrapper_config_class
 from swarm_forage_env.wrappers.world import SIZE, UNDISTURBED, World
@@ -40,20 +41,22 @@ if TYPE_CHECKING:
     from swarm_forage_env.wrappers.base import WrapperConfig
 
 Value: TypeAlias = float | str | bool
-"""Place on an axis."""
+"""Where something is on an axis."""
 
 POLICY_KEYS = ("label", "policy", "parameters", "caches")
 """What a study file says of a policy: fields of `PolicySpec`."""
-READING_NAMES = {"described": "DESCRIBED", "program": "AUTHORS_PROGRAM"}
-"""Word of studies -> name of the reading in `scenarios.quirks.READINGS`."""
+RULES_NAMES = {"described": "DESCRIBED", "program": "AUTHORS_PROGRAM"}
+"""Word of studies -> name of the rules in `scenarios.quirks.RULES`."""
 SCENARIO_FIELDS = (*field_sections(), "density", "side_m")
 """What a study may set, and vary, of a scenario: all that `scenarios.presets.scenario` takes by name."""
 OF_THE_STUDY = {
     "horizon_s": "the budget of a study sets it",
     "interval_s": "the budget of a study sets it",
-    "quirks": "the readings of a study set them",
+    "quirks": "the rules of a study set them",
 }
 """Scenario fields that something else in a study decides, and what."""
+_STORED = {"rules": "readings"}
+"""Field -> its key in files, where that is another word."""
 NOTHING = "none"
 """On an axis of lists, the list without entries."""
 
@@ -105,7 +108,7 @@ def _kind(value: Any) -> str:
 
 
 def list_word(entries: Sequence[Any]) -> str:
-    """Return a list as a place on an axis: ["nest_distance", "x"] is "nest_distance,x", [] is "none".
+    """Return a list as a value on an axis: ["nest_distance", "x"] is "nest_distance,x", [] is "none".
 
     Lists in it are joined by plus signs: [[1, 2], [3, 4]] is "1,2+3,4". So are tables, which are kinds of robots:
     [{name = "scout", share = 0.2}, {name = "hauler"}] is "scout:share=0.2+hauler".
@@ -124,7 +127,7 @@ def _list_fields() -> dict[str, Any]:
 
 
 def _field_value(name: str, value: Value) -> Any:
-    """The value that a scenario takes for a place on the axis of a field."""
+    """The value that a scenario takes for a value on the axis of a field."""
     kind = _list_fields().get(name)
     if kind is None:
         return value
@@ -136,11 +139,11 @@ def _field_value(name: str, value: Value) -> Any:
         raise ConfigError(f"Expected lists of numbers on axis {name}, got {value!r}.") from error
 
 
-class Cell(NamedTuple):
-    """One place of a study."""
+class Place(NamedTuple):
+    """The address of a condition in a study: rules, policy, and a value on each axis."""
 
-    reading: str
-    """Key of `READING_NAMES`."""
+    rules: str
+    """Key of `RULES_NAMES`."""
     policy: str
     """Label of a policy."""
     values: tuple[Value, ...]
@@ -166,8 +169,8 @@ class StudySpec:
     policies: tuple[PolicySpec, ...]
     axes: tuple[Axis, ...]
     reference: Value | None = None
-    """Value on the last axis at which the reference cells are; None = the study has none."""
-    readings: tuple[str, ...] = tuple(READING_NAMES)
+    """Value on the last axis at which the reference conditions are; None = the study has none."""
+    rules: tuple[str, ...] = tuple(RULES_NAMES)
     budget: str = ""
     """Name of the budget that the values follow; empty = none."""
     seeds: tuple[int, ...]
@@ -183,9 +186,9 @@ class StudySpec:
             if name in OF_THE_STUDY:
                 raise ConfigError(f"Expected no {name} in set: {OF_THE_STUDY[name]}.")
         known_keys(self.settings, SCENARIO_FIELDS, "scenario field")
-        several("readings", self.readings, f"of {', '.join(READING_NAMES)}")
-        for reading in self.readings:
-            known_name("reading", reading, READING_NAMES)
+        several("rules", self.rules, f"of {', '.join(RULES_NAMES)}")
+        for rules in self.rules:
+            known_name("rules", rules, RULES_NAMES)
         several("policies", self.policies, "policies")
         several("seeds", self.seeds, "seeds")
         for seed in self.seeds:
@@ -208,56 +211,56 @@ class StudySpec:
                         f"Expected only mixed swarms with a part that the axis {SHARE} sets, such as "
                         f"mixed:dpo={SHARE},crw=rest, got {policy.label}. At the share 0 or 1 they have one part."
                     )
-        for cell in self.cells:
-            self.specs_of(cell)  # refuses what scenarios, wrappers and runs refuse
+        for place in self.places:
+            self.specs_of(place)  # refuses what scenarios, wrappers and runs refuse
 
     @cached_property
-    def cells(self) -> tuple[Cell, ...]:
-        """All cells: reading by reading, policy by policy, the last axis fastest."""
+    def places(self) -> tuple[Place, ...]:
+        """All conditions: rules by rules, policy by policy, the last axis fastest."""
         labels = [policy.label for policy in self.policies]
-        places = product(self.readings, labels, product(*(axis.values for axis in self.axes)))
-        return tuple(Cell(*place) for place in places)
+        addresses = product(self.rules, labels, product(*(axis.values for axis in self.axes)))
+        return tuple(Place(*address) for address in addresses)
 
-    def place_words(self, *others: "StudySpec") -> dict[Cell, tuple[str, ...]]:
-        """Return how cells are shown, those of other studies with the same axes, too: reading, policy, values."""
-        cells = dict.fromkeys(cell for study in (self, *others) for cell in study.cells)
-        words = [value_words(values) for values in zip(*(cell.values for cell in cells), strict=True)]
+    def place_words(self, *others: "StudySpec") -> dict[Place, tuple[str, ...]]:
+        """Return how conditions are shown, those of other studies with the same axes, too: rules, policy, values."""
+        places = dict.fromkeys(place for study in (self, *others) for place in study.places)
+        words = [value_words(values) for values in zip(*(place.values for place in places), strict=True)]
         return {
-            cell: (cell.reading, cell.policy, *(of[value] for of, value in zip(words, cell.values, strict=True)))
-            for cell in cells
+            place: (place.rules, place.policy, *(of[value] for of, value in zip(words, place.values, strict=True)))
+            for place in places
         }
 
     @property
     def n_runs(self) -> int:
         """How many runs there are."""
-        return len(self.cells) * len(self.seeds)
+        return len(self.places) * len(self.seeds)
 
     @property
     def n_experiments(self) -> int:
-        """How many combinations of values there are, which each policy runs under each reading."""
-        return len(self.cells) // (len(self.policies) * len(self.readings))
+        """How many combinations of values there are, which each policy runs under each of the rules."""
+        return len(self.places) // (len(self.policies) * len(self.rules))
 
     @property
     def robot_ticks(self) -> int:
         """Robots times ticks of all runs."""
         return self.plan.robot_ticks
 
-    def reference_of(self, cell: Cell) -> Cell | None:
-        """Return the cell that a cell is compared with, the same but for the last axis; None = the study has none."""
+    def reference_of(self, place: Place) -> Place | None:
+        """Return what a condition is compared with, the same but for the last axis; None = the study has none."""
         if self.reference is None:
             return None
-        # The value of the axis, not an equal one of another kind: 1 and 1.0 are one place.
+        # The value of the axis, not an equal one of another kind: 1 and 1.0 are the same.
         value = self.axes[-1].values[self.axes[-1].values.index(self.reference)]
-        return cell._replace(values=(*cell.values[:-1], value))
+        return place._replace(values=(*place.values[:-1], value))
 
-    def world(self, cell: Cell) -> World:
-        """Return the world of a cell, with the criterion that its runs are labelled with."""
-        return self._worlds[cell.reading, cell.values]
+    def world(self, place: Place) -> World:
+        """Return the world of a condition, with the criterion that its runs are labelled with."""
+        return self._worlds[place.rules, place.values]
 
-    def condition(self, cell: Cell) -> Condition:
-        """Return what is run in a cell."""
-        policy, world = self._policies[cell.policy], self.world(cell)
-        shares = {axis.name: value for axis, value in zip(self.axes, cell.values, strict=True) if axis.name == SHARE}
+    def condition(self, place: Place) -> Condition:
+        """Return what is run in a condition."""
+        policy, world = self._policies[place.policy], self.world(place)
+        shares = {axis.name: value for axis, value in zip(self.axes, place.values, strict=True) if axis.name == SHARE}
         has_caches = "caches" in (*self.settings, *(axis.name for axis in self.axes))
         return Condition(
             replace(
@@ -270,12 +273,12 @@ class StudySpec:
 
     @cached_property
     def plan(self) -> Plan:
-        """All runs, in the order of the cells."""
-        return Plan(conditions=tuple(map(self.condition, self.cells)), seeds=self.seeds)
+        """All runs, in the order of the conditions."""
+        return Plan(conditions=tuple(map(self.condition, self.places)), seeds=self.seeds)
 
-    def specs_of(self, cell: Cell) -> tuple[RunSpec, ...]:
-        """Return the runs of a cell, one per seed."""
-        return self.plan.specs_of(self.condition(cell))
+    def specs_of(self, place: Place) -> tuple[RunSpec, ...]:
+        """Return the runs of a condition, one per seed."""
+        return self.plan.specs_of(self.condition(place))
 
     @property
     def study_id(self) -> str:
@@ -296,7 +299,7 @@ class StudySpec:
             "policies": [_plain(policy) for policy in self.policies],
             "axes": [{"name": axis.name, "values": list(axis.values)} for axis in self.axes],
             "reference": self.reference,
-            "readings": list(self.readings),
+            _STORED["rules"]: list(self.rules),
             "budget": self.budget,
             "seeds": list(self.seeds),
             "horizon_s": self.horizon_s,
@@ -311,12 +314,12 @@ class StudySpec:
         budget: str | None = None,
         *,
         seeds: int | None = None,
-        readings: tuple[str, ...] | None = None,
+        rules: tuple[str, ...] | None = None,
     ) -> "StudySpec":
         """Read a study file; arguments and errors as in `study_file.load_study`."""
         from swarm_forage_env.studies.study_file import load_study  # late: that module builds on this one
 
-        return load_study(file, budget, seeds=seeds, readings=readings)
+        return load_study(file, budget, seeds=seeds, rules=rules)
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any]) -> "StudySpec":
@@ -325,7 +328,7 @@ class StudySpec:
         Raises:
             ConfigError: unknown or missing keys, or values that describe no study.
         """
-        own = [item.name for item in fields(cls)]
+        own = [_STORED.get(item.name, item.name) for item in fields(cls)]
         known_keys(table("a study", mapping), own, "key of a study")
         missing = [key for key in own if key not in mapping and key != "file"]
         if missing:
@@ -340,8 +343,8 @@ class StudySpec:
             values[name] = tuple(kind(**entry) for entry in entries)
         values["wrappers"] = wrappers_from_list(values["wrappers"])
         values["settings"] = plain_settings(values["settings"])
-        for name in ("readings", "seeds"):
-            values[name] = tuple(values[name])
+        values["seeds"] = tuple(values["seeds"])
+        values["rules"] = tuple(values.pop(_STORED["rules"]))
         return cls(**values)
 
     def to_json(self) -> str:
@@ -355,29 +358,29 @@ class StudySpec:
     @cached_property
     def _worlds(self) -> dict[tuple[str, tuple[Value, ...]], World]:
         return {
-            (reading, values): self._world(values, sized)
-            for reading in self.readings
-            for values, sized in self._scenarios(reading)
+            (rules, values): self._world(values, sized)
+            for rules in self.rules
+            for values, sized in self._scenarios(rules)
         }
 
-    def _scenarios(self, reading: str) -> "Iterator[tuple[tuple[Value, ...], ScenarioConfig]]":
+    def _scenarios(self, rules: str) -> "Iterator[tuple[tuple[Value, ...], ScenarioConfig]]":
         """Every combination of values with its scenario: fields first, then the size of the swarm."""
         fixed: dict[str, Any] = {"horizon_s": self.horizon_s, "interval_s": self.interval_s, **self.settings}
         names = [axis.name for axis in self.axes]
-        place = names.index(SIZE) if SIZE in names else None
+        at = names.index(SIZE) if SIZE in names else None
         for values in product(*(axis.values for axis in self.axes if axis.name != SIZE)):
             here: dict[str, Any] = dict(zip((name for name in names if name != SIZE), values, strict=True))
             overrides: dict[str, Any] = fixed | {
                 name: _field_value(name, value) for name, value in here.items() if name in SCENARIO_FIELDS
             }
-            density = None if place is None else overrides.pop("density", None)
-            world = scenario(self.scenario, quirks=READINGS[READING_NAMES[reading]], **overrides)
-            if place is None:
+            density = None if at is None else overrides.pop("density", None)
+            world = scenario(self.scenario, quirks=RULES[RULES_NAMES[rules]], **overrides)
+            if at is None:
                 yield values, world
                 continue
-            sizes: Any = self.axes[place].values
+            sizes: Any = self.axes[at].values
             for size, sized in swarms_of_sizes(world, sizes, density).items():
-                yield (*values[:place], size, *values[place:]), sized
+                yield (*values[:at], size, *values[at:]), sized
 
     def _world(self, values: tuple[Value, ...], sized: "ScenarioConfig") -> World:
         """Add what disturbs the swarm to its scenario, and name the criterion."""

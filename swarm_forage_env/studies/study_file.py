@@ -4,7 +4,7 @@
     title = "Noise, small warehouse"
     scenario = "warehouse_small"
     policies = ["crw", "results/my_policy.npz", { policy = "stochx", label = "without caches", caches = "none" }]
-    readings = ["described", "program"]    # default both
+    rules = ["described", "program"]       # default both
 
     [set]                                  # any scenario field
     physics = "compiled"
@@ -55,7 +55,9 @@ SETS = Path(__file__).parent / "sets"
 """Folder of the paper's sets."""
 PAPER = "paper"
 """Name of the budget that every study has: as long, and as many runs, as in the paper."""
-_KEYS = ("name", "title", "scenario", "policies", "readings", "set", "wrappers", "axis", "budget")
+FORMER_RULES = "readings"
+"""Key of `rules` in study files of earlier versions."""
+_KEYS = ("name", "title", "scenario", "policies", "rules", FORMER_RULES, "set", "wrappers", "axis", "budget")
 _AXIS_KEYS = ("criterion", "field", "values", "reference")
 _BUDGET_KEYS = ("seeds", "horizon_s", "interval_s", "values")
 
@@ -94,7 +96,7 @@ def load_study(
     budget: str | None = None,
     *,
     seeds: int | None = None,
-    readings: Sequence[str] | None = None,
+    rules: Sequence[str] | None = None,
 ) -> StudySpec:
     """Read a study file and return what one of its budgets runs.
 
@@ -105,14 +107,14 @@ def load_study(
         name: Name of one of the paper's sets, or path of a file.
         budget: Name of a budget; default the first of the file.
         seeds: How many, instead of those of the budget: 0, 1, 2, ...
-        readings: Instead of those of the file.
+        rules: Instead of those of the file.
 
     Raises:
         ConfigError: the file is missing or no TOML, or describes no study; the message names the file.
     """
     file = find_study(name)
     try:
-        spec = _study(_read(file), file.parent, budget, seeds, readings)
+        spec = _study(_read(file), file.parent, budget, seeds, rules)
     except ConfigError as error:
         raise error if str(file) in str(error) else ConfigError(f"Cannot use {file}: {error}") from error
     return spec if file.parent == SETS else replace(spec, file=str(file))
@@ -123,7 +125,7 @@ def is_set_of_paper(spec: StudySpec) -> bool:
     if spec.name not in set_names():  # else a file of that name would be opened
         return False
     try:
-        same = load_study(spec.name, spec.budget, readings=spec.readings)
+        same = load_study(spec.name, spec.budget, rules=spec.rules)
     except ConfigError:  # no such budget of it
         return False
     return replace(same, seeds=spec.seeds).study_id == spec.study_id
@@ -162,7 +164,7 @@ def _read(file: Path) -> dict[str, Any]:
 
 
 def _study(
-    content: Mapping[str, Any], folder: Path, budget: str | None, n_seeds: int | None, readings: Sequence[str] | None
+    content: Mapping[str, Any], folder: Path, budget: str | None, n_seeds: int | None, rules: Sequence[str] | None
 ) -> StudySpec:
     known_keys(content, _KEYS, "key of a study file")
     for key in ("name", "scenario", "policies"):
@@ -177,8 +179,11 @@ def _study(
     settings = plain_settings(table("set", content.get("set", {})))
     axes, reference = _axes(content, settings, allowed)
     told: dict[str, Any] = {}
-    if readings is not None or "readings" in content:
-        told["readings"] = tuple(_listed("readings", readings or content["readings"]))
+    given = [key for key in ("rules", FORMER_RULES) if key in content]
+    if len(given) > 1:
+        raise ConfigError(f"Expected rules once, got {' and '.join(given)}, which is their former name.")
+    if rules is not None or given:
+        told["rules"] = tuple(_listed("rules", rules or content[given[0]]))
     return StudySpec(
         name=content["name"],
         title=content.get("title", ""),

@@ -22,20 +22,20 @@ from swarm_forage_env.runs.record import RecordError
 from swarm_forage_env.runs.runner import Outcomes, longest_first, run_specs
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import FAILED, MISSING, STATES, RunStore
-from swarm_forage_env.studies.study import READING_NAMES, Cell, StudySpec
+from swarm_forage_env.studies.study import RULES_NAMES, Place, StudySpec
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class CellState:
-    """How far a cell is."""
+class PlaceState:
+    """How far a condition is."""
 
-    cell: Cell
+    place: Place
     n_runs: Mapping[str, int]
     """State -> how many runs are in it."""
 
     @property
     def is_complete(self) -> bool:
-        """Whether every run of the cell is recorded."""
+        """Whether every run of the condition is recorded."""
         return not (self.n_runs[FAILED] or self.n_runs[MISSING])
 
 
@@ -70,7 +70,7 @@ class StudyFolder:
             raise RecordError(f"Cannot use {self.study_file}: {error}") from error
 
     def take(self, spec: StudySpec) -> StudySpec:
-        """Make it the folder of a study; a study that differs in seeds and readings alone is added to the one there.
+        """Make it the folder of a study; a study that differs in seeds and rules alone is added to the one there.
 
         Returns:
             The study that the folder holds now.
@@ -84,7 +84,7 @@ class StudyFolder:
             kept = replace(
                 spec,
                 seeds=tuple(sorted({*there.seeds, *spec.seeds})),
-                readings=tuple(name for name in READING_NAMES if name in {*there.readings, *spec.readings}),
+                rules=tuple(name for name in RULES_NAMES if name in {*there.rules, *spec.rules}),
             )
             mine, other = kept.to_mapping(), there.to_mapping()
             told = ("seeds", "readings", "title", "budget", "file")
@@ -99,18 +99,18 @@ class StudyFolder:
             draft.write_text(json.dumps(kept.to_mapping(), indent=1), encoding="utf-8")
         return kept
 
-    def cell_states(self) -> tuple[CellState, ...]:
-        """Return how far each cell of the study is."""
+    def place_states(self) -> tuple[PlaceState, ...]:
+        """Return how far each condition of the study is."""
         spec = self.study()
-        runs = {cell: spec.specs_of(cell) for cell in spec.cells}
+        runs = {place: spec.specs_of(place) for place in spec.places}
         states = self.store.look_up((run for of in runs.values() for run in of), keep=False).states
-        return tuple(cell_state(cell, (states[run.run_id] for run in of)) for cell, of in runs.items())
+        return tuple(place_state(place, (states[run.run_id] for run in of)) for place, of in runs.items())
 
 
-def cell_state(cell: Cell, states: Iterable[str]) -> CellState:
-    """Count the states of a cell's runs."""
+def place_state(place: Place, states: Iterable[str]) -> PlaceState:
+    """Count the states of a condition's runs."""
     counted = Counter(states)
-    return CellState(cell=cell, n_runs={state: counted[state] for state in STATES})
+    return PlaceState(place=place, n_runs={state: counted[state] for state in STATES})
 
 
 def shard(specs: Sequence[RunSpec], index: int, count: int) -> tuple[RunSpec, ...]:

@@ -1,9 +1,9 @@
 """StudyTable: all runs of a study in one table, and the Parquet file that holds it.
 
-One row per interval of a run, in the order of the study's cells, seeds and intervals. A run that failed or is missing
-is one row without an interval, so that no run is a silent hole. The file needs nothing beside it: its metadata hold the
-study, the versions that made its runs, and a digest by which a damaged file is noticed. The same runs make the same
-bytes, in whatever order and on however many machines they were made.
+One row per interval of a run, in the order of the study's conditions, seeds and intervals. A run that failed or is
+missing is one row without an interval, so that no run is a silent hole. The file needs nothing beside it: its metadata
+hold the study, the versions that made its runs, and a digest by which a damaged file is noticed. The same runs make the
+same bytes, in whatever order and on however many machines they were made.
 """
 
 import hashlib
@@ -24,8 +24,8 @@ from swarm_forage_env.contract.types import FloatArray
 from swarm_forage_env.runs.record import PACKAGES, RecordError, RunRecord
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE, FAILED, FAILURES, MISSING, RunStore, read_failure
-from swarm_forage_env.studies.study import Cell, StudySpec
-from swarm_forage_env.studies.study_folder import CellState, StudyFolder, cell_state
+from swarm_forage_env.studies.study import Place, StudySpec
+from swarm_forage_env.studies.study_folder import PlaceState, StudyFolder, place_state
 
 if TYPE_CHECKING:
     import polars as pl
@@ -49,37 +49,37 @@ class StudyTable:
 
     spec: StudySpec
     frame: "pl.DataFrame"
-    """Columns: `study`, `cell` (place in `spec.cells`), `reading`, `policy`, one `AXIS` column per axis; those of
-    `RunRecord`, null where a run has no such column; `LOSS_COLUMNS`."""
+    """Columns: `study`, `cell` (index in `spec.places`), `reading` (the rules), `policy`, one `AXIS` column per axis;
+    those of `RunRecord`, null where a run has no such column; `LOSS_COLUMNS`."""
     versions: tuple[Mapping[str, str], ...]
     """Versions and commits that made the runs, each once."""
     wall_time_s: float | None = None
     """How long all finished runs took together, by the clock. None where it is not known: a file leaves it out, so that
     the same runs make the same bytes."""
 
-    def rows(self, cell: Cell) -> "pl.DataFrame":
-        """Return the rows of a cell, those of failed and missing runs included.
+    def rows(self, place: Place) -> "pl.DataFrame":
+        """Return the rows of a condition, those of failed and missing runs included.
 
         Raises:
-            KeyError: the study has no such cell.
+            KeyError: the study has no such condition.
         """
-        start, stop = self._spans[cell]
+        start, stop = self._spans[place]
         return self.frame[start:stop]
 
-    def curves(self, cell: Cell, *columns: str) -> tuple[tuple[int, ...], dict[str, FloatArray]]:
-        """Return the finished runs of a cell as arrays.
+    def curves(self, place: Place, *columns: str) -> tuple[tuple[int, ...], dict[str, FloatArray]]:
+        """Return the finished runs of a condition as arrays.
 
         Args:
-            cell: Which cell; that of its reference is `spec.reference_of(cell)`.
-            columns: Columns of records; those that the cell's runs do not have are left out.
+            place: Which one; that of its reference is `spec.reference_of(place)`.
+            columns: Columns of records; those that the condition's runs do not have are left out.
 
         Returns:
             The seeds of the R runs, rising, and for each column its values in T intervals, (R, T).
 
         Raises:
-            KeyError: the study has no such cell.
+            KeyError: the study has no such condition.
         """
-        rows = self.rows(cell)
+        rows = self.rows(place)
         rows = rows.filter(rows["state"] == DONE)
         seeds = tuple(int(seed) for seed in rows["seed"].unique(maintain_order=True))
         present = [name for name in columns if name in rows.columns and rows[name].null_count() == 0]
@@ -96,31 +96,31 @@ class StudyTable:
         if not len(rows):
             raise KeyError(f"Study {self.spec.name} has no run {run_id!r}.")
         first = rows.row(0, named=True)
-        specs = self.spec.specs_of(self.spec.cells[first["cell"]])
+        specs = self.spec.specs_of(self.spec.places[first["cell"]])
         return next(spec for spec in specs if spec.seed == first["seed"])
 
-    def cell_states(self) -> tuple[CellState, ...]:
-        """Return how many runs of each cell are done, failed and missing."""
+    def place_states(self) -> tuple[PlaceState, ...]:
+        """Return how many runs of each condition are done, failed and missing."""
         interval = self.frame["interval"]
         states = self.frame.filter(interval.is_null() | (interval == 0))["state"].to_list()  # one row per run
         n_seeds = len(self.spec.seeds)
         return tuple(
-            cell_state(cell, states[number * n_seeds : (number + 1) * n_seeds])
-            for number, cell in enumerate(self.spec.cells)
+            place_state(place, states[number * n_seeds : (number + 1) * n_seeds])
+            for number, place in enumerate(self.spec.places)
         )
 
-    def cells(self) -> "pl.DataFrame":
-        """Return one row per cell: where it is, whether it is a reference, and how many runs are in which state."""
+    def places(self) -> "pl.DataFrame":
+        """Return one row per condition: where it is, whether it is a reference, how many runs are in which state."""
         import polars as pl
 
         rows = [
             {
-                **place(self.spec, state.cell),
-                "is_reference": self.spec.reference_of(state.cell) == state.cell,
-                "n_robots": self.spec.world(state.cell).n_robots,
+                **place_columns(self.spec, state.place),
+                "is_reference": self.spec.reference_of(state.place) == state.place,
+                "n_robots": self.spec.world(state.place).n_robots,
                 **{f"n_{name}": count for name, count in state.n_runs.items()},
             }
-            for state in self.cell_states()
+            for state in self.place_states()
         ]
         return pl.DataFrame(rows, infer_schema_length=None)
 
@@ -134,20 +134,20 @@ class StudyTable:
             draft.write_bytes(content.getvalue())
 
     @cached_property
-    def _spans(self) -> dict[Cell, tuple[int, int]]:
-        """First row of each cell, and the row behind its last."""
-        numbers = np.arange(len(self.spec.cells) + 1)
+    def _spans(self) -> dict[Place, tuple[int, int]]:
+        """First row of each condition, and the row behind its last."""
+        numbers = np.arange(len(self.spec.places) + 1)
         ends = np.searchsorted(self.frame["cell"].to_numpy(), numbers).tolist()
-        return {cell: (ends[number], ends[number + 1]) for number, cell in enumerate(self.spec.cells)}
+        return {place: (ends[number], ends[number + 1]) for number, place in enumerate(self.spec.places)}
 
 
-def place(spec: StudySpec, cell: Cell) -> dict[str, Any]:
-    """Return where a cell is, by column: reading, policy, and its value on each axis; numbers are floats."""
+def place_columns(spec: StudySpec, place: Place) -> dict[str, Any]:
+    """Return where a condition is, by column: rules, policy, and its value on each axis; numbers are floats."""
     values = {
         AXIS + axis.name: value if isinstance(value, str | bool) else float(value)
-        for axis, value in zip(spec.axes, cell.values, strict=True)
+        for axis, value in zip(spec.axes, place.values, strict=True)
     }
-    return {"reading": cell.reading, "policy": cell.policy, **values}
+    return {"rules": place.rules, "policy": place.policy, **values}
 
 
 def gather_study(folder: StudyFolder) -> StudyTable:
@@ -162,10 +162,10 @@ def gather_study(folder: StudyFolder) -> StudyTable:
     versions: set[tuple[tuple[str, str], ...]] = set()
     frames: list[pl.DataFrame] = []
     wall_time_s = 0.0
-    for number, cell in enumerate(spec.cells):
+    for number, place in enumerate(spec.places):
         records: list[RunRecord] = []
         lost: list[dict[str, Any]] = []
-        for run in spec.specs_of(cell):
+        for run in spec.specs_of(place):
             record = _record(folder.store, run)
             if record is None:
                 lost.append(_loss(folder.store, run))
@@ -173,7 +173,8 @@ def gather_study(folder: StudyFolder) -> StudyTable:
                 records.append(record)
                 wall_time_s += record.wall_time_s
                 versions.add(tuple((name, record.provenance.get(name, "")) for name in (*PACKAGES, "commit")))
-        first = {"study": spec.name, "cell": number, **place(spec, cell)}
+        where = place_columns(spec, place)
+        first = {"study": spec.name, "cell": number, "reading": where.pop("rules"), **where}
         rows = pl.concat([_frame(records), _losses(lost)], how="diagonal").sort("seed", "interval")
         frames.append(rows.select(*(pl.lit(value).alias(name) for name, value in first.items()), pl.all()))
     frame = pl.concat(frames, how="diagonal")
@@ -257,7 +258,7 @@ def _losses(rows: Sequence[Mapping[str, Any]]) -> "pl.DataFrame":
 
 
 def _frame(records: Sequence[RunRecord]) -> "pl.DataFrame":
-    """The rows of one cell's records, which all have the same columns."""
+    """The rows of one condition's records, which all have the same columns."""
     import polars as pl
 
     if not records:

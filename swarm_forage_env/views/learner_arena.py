@@ -10,7 +10,7 @@ import numpy as np
 
 from swarm_forage_env._internal.fields import ConfigError, table
 from swarm_forage_env._internal.spelling import suggestion
-from swarm_forage_env.contract.calls import OPTION_OF_TESTS
+from swarm_forage_env.contract.reset_and_step import OPTION_OF_TESTS
 from swarm_forage_env.contract.types import ActionArray, BoolArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.policies.interface import (

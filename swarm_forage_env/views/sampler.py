@@ -33,7 +33,15 @@ from swarm_forage_env.contract.layout import BUILT_IN_SLICES, LayoutRow
 from swarm_forage_env.contract.policy import layout_for
 from swarm_forage_env.env import ForageEnv
 from swarm_forage_env.scenarios.config import ScenarioConfig, from_mapping, to_mapping
-from swarm_forage_env.scenarios.draws import KINDS, Drawn, corners, draw_fields, drawn_names, plain_fields, read_fields
+from swarm_forage_env.scenarios.distributions import (
+    KINDS,
+    Drawn,
+    corners,
+    draw_fields,
+    drawn_names,
+    plain_fields,
+    read_fields,
+)
 from swarm_forage_env.scenarios.overrides import field_types
 from swarm_forage_env.scenarios.presets import chosen_scenario
 from swarm_forage_env.scenarios.sensors import WINDOWS_CELLS
@@ -59,7 +67,7 @@ class SampledWorld:
 
     scenario: str | ScenarioConfig | Mapping[str, Any] = field(hash=False)
     """Name of a preset, a complete configuration, or a table: `preset` (either of the two) and fields by name, each a
-    value or a distribution (`scenarios.draws`). It is kept as such a table."""
+    value or a distribution (`scenarios.distributions`). It is kept as such a table."""
     wrappers: Mapping[str, Mapping[str, Any]] = field(default_factory=dict, hash=False)
     """What may disturb the swarm: tables of fields by the name of the wrapper, values or distributions, and in each the
     `probability` that it is there, 1 where nothing is said."""

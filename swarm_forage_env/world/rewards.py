@@ -1,6 +1,6 @@
 """Rewards of a swarm for learners: the terms of `kernels.reward`, weighted by `scenarios.config.RewardConfig`.
 
-A function of the user may add to them (`contract.own.register_reward`).
+A function of the user may add to them (`contract.own_functions.register_reward`).
 """
 
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from swarm_forage_env._internal.compiling import direct
-from swarm_forage_env.contract.own import OwnFunctionError, OwnReward, called, own_reward
+from swarm_forage_env.contract.own_functions import OwnFunctionError, OwnReward, called, own_reward
 from swarm_forage_env.scenarios.config import RewardConfig
 from swarm_forage_env.world.kernels.reward import Payment, Weights, rewards
 from swarm_forage_env.world.state import StepEvents, SwarmState

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 from pettingzoo.utils import BaseParallelWrapper
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.calls import no_options
+from swarm_forage_env.contract.reset_and_step import no_options
 from swarm_forage_env.contract.types import ActionArray, BoolArray, CodeArray, FloatArray, ObsArray
 from swarm_forage_env.env import BatchStep, ForageEnv
 from swarm_forage_env.scenarios import config as configs

@@ -26,12 +26,12 @@ def test_tables_show_both_readings_and_what_each_quirk_moves(command):
     code, out, _ = command(*ABLATE, *QUIRKS, "--json")
     answer = json.loads(out)
     assert len(answer["effects"]) == 2 * 2 * 2 * 3
-    (one,) = (e for e in answer["effects"] if (e["n_robots"], e["policy"], e["reading"], e["quirk"]) ==
+    (one,) = (e for e in answer["effects"] if (e["n_robots"], e["policy"], e["rules"], e["quirk"]) ==
               (8, "crw", "DESCRIBED", "integer_estimates"))  # fmt: skip
     assert (one["is_same"], one["n_runs"]) == (True, 1)
     assert one["interference"] == {"mean": 0.0, "lower": None, "upper": None}
     assert "task_share_none" not in one
-    assert len(answer["readings"]) == 2 * 2 * 2
+    assert len(answer["rules"]) == 2 * 2 * 2
     assert answer["performance"] == "deliveries per 1,000 s"
     assert answer["failures"] == []
 

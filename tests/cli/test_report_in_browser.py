@@ -17,8 +17,8 @@ from tests.support.made_tables import FOUR, made_study, made_table
 LOADED = "document.readyState === 'complete'"
 
 
-def by_policy(cell):
-    return (10.0 - FOUR.index(cell.policy)) * cell.values[-1]
+def by_policy(place):
+    return (10.0 - FOUR.index(place.policy)) * place.values[-1]
 
 
 def in_order(name):
@@ -65,7 +65,7 @@ def test_it_fits_and_asks_for_nothing(written, tmp_path, width):
 
 
 def test_tables_are_sorted_by_a_click(written, tmp_path):
-    names = "[...document.querySelectorAll('#verdicts .name')].map((cell) => cell.textContent)"
+    names = "[...document.querySelectorAll('#verdicts .name')].map((condition) => condition.textContent)"
     with Browser(tmp_path, width=1280, height=900) as browser:
         browser.open(written, LOADED)
         before = browser.ask(names)
@@ -91,9 +91,9 @@ def test_printing_unfolds_what_is_folded(written, tmp_path):
 
 
 def test_a_set_is_run_again_by_its_name():
-    spec = load_study("S1a", "smoke", seeds=1, readings=("described",))
+    spec = load_study("S1a", "smoke", seeds=1, rules=("described",))
     text = page(spec)
-    assert "<pre>swarm-forage study run S1a --budget smoke --seeds 1 --reading described</pre>" in text
+    assert "<pre>swarm-forage study run S1a --budget smoke --seeds 1 --rules described</pre>" in text
     assert spec.study_id in text
 
 
@@ -147,5 +147,5 @@ def test_what_follows_from_formulas_stands_beside_its_curves():
 def test_other_forms_of_a_measure_are_drawn_where_claims_are_judged_by_them():
     articles = {part.split("</h3>")[0].split("<h3>")[1]: part for part in page(made_study()).split("<article")[1:]}
     forms = {title: part.count("The same, measured as") for title, part in articles.items()}
-    assert forms["S1a: raw performance (higher is better), reading described"] == 1, "as in the program"
-    assert forms["S1a: task emergence (higher is better), reading described"] == 0, "no claim is about it"
+    assert forms["S1a: raw performance (higher is better), rules described"] == 1, "as in the program"
+    assert forms["S1a: task emergence (higher is better), rules described"] == 0, "no claim is about it"

@@ -59,11 +59,11 @@ def test_what_a_budget_leaves_out_is_listed(command):
 
 
 def test_a_study_is_shown(written):
-    code, out, _ = written("study", "show", "S1g", "--budget", "smoke", "--reading", "program")
+    code, out, _ = written("study", "show", "S1g", "--budget", "smoke", "--rules", "program")
     assert code == 0
     assert "axis      population_dynamics: 1, 4, 8 (reference 1)" in out
-    assert "readings  program" in out
-    assert "runs      24 in 12 cells, 6e+06 robot-ticks" in out
+    assert "rules  program" in out
+    assert "runs      24 in 12 conditions, 6e+06 robot-ticks" in out
     assert "Budgets: tiny, paper" in written("study", "show", "mine.toml")[1]
 
 
@@ -75,27 +75,27 @@ def test_a_study_runs_and_is_packed(written):
     for place in (FOLDER, FOLDER / "mine.parquet"):
         code, out, _ = written("study", "status", str(place))
         assert code == 0
-        assert out.splitlines() == ["mine, budget tiny: 8 of 8 runs done", "4 of 4 cells complete"]
+        assert out.splitlines() == ["mine, budget tiny: 8 of 8 runs done", "4 of 4 conditions complete"]
     code, out, err = written(*RUN, "--seeds", "3")
     assert "8 of 12 runs are stored already" in err
     assert code == 0
 
 
 def test_shards_are_not_packed_until_asked(written):
-    code, out, err = written(*RUN, "--shard", "1/2", "--reading", "described", "--out", "here")
+    code, out, err = written(*RUN, "--shard", "1/2", "--rules", "described", "--out", "here")
     assert code == 0
     assert "packed" not in err
     code, out, _ = written("study", "status", "here")
     assert code == 1
     assert out.splitlines()[0] == "mine, budget tiny: 2 of 4 runs done, 2 missing"
-    assert out.splitlines()[1] == "0 of 2 cells complete"
+    assert out.splitlines()[1] == "0 of 2 conditions complete"
     assert re.search(r"^described +random +2 +1 +0 +1$", out, re.MULTILINE)
     code, out, _ = written("study", "pack", "here", "--out", "there/packed.parquet")
     assert code == 0
     assert read_study("there/packed.parquet").spec.name == "mine"
     code, out, _ = written("study", "status", "there/packed.parquet", "--json")
     assert code == 1
-    assert [cell["n_missing"] for cell in json.loads(out)["cells"]] == [1, 1]
+    assert [place["n_missing"] for place in json.loads(out)["conditions"]] == [1, 1]
 
 
 def test_failures_are_told_with_the_command_that_makes_them_again(written, monkeypatch):
@@ -144,7 +144,7 @@ def test_an_interrupt_keeps_what_is_done(written, monkeypatch):
     [
         (("run", "mine.tom"), "Expected a study file or one of S1a"),
         (("run", "mine.toml", "--budget", "tini"), "Did you mean 'tiny'?"),
-        (("run", "mine.toml", "--reading", "progam"), "Did you mean 'program'?"),
+        (("run", "mine.toml", "--rules", "progam"), "Did you mean 'program'?"),
         (("run", "mine.toml", "--shard", "3/2"), "the shard to be a whole number from 1 to 2"),
         (("status", "nowhere"), "No such file"),
         (("pack", "."), "without study.json"),

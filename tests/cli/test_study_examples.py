@@ -36,8 +36,8 @@ def test_a_study_file_of_the_page_runs(command, name):
     code, out, err = command("study", "run", "mine.toml", "--budget", "short", "--workers", "1", "--out", "done")
     assert code == 0, err
     table = read_study(Path("done"))
-    assert all(state.is_complete for state in table.cell_states())
-    assert len(table.cell_states()) == {"speed": 12, "share": 5}[name], "every policy at every value"
+    assert all(state.is_complete for state in table.place_states())
+    assert len(table.place_states()) == {"speed": 12, "share": 5}[name], "every policy at every value"
 
 
 @pytest.mark.compiled
@@ -56,7 +56,7 @@ def test_a_policy_of_ones_own_runs_in_a_study_by_its_name(tmp_path):
     lines = (f"{name} = {target}" for name, target in names.items())
     (installed / "entry_points.txt").write_text("\n".join([f"[{group}]", *lines, ""]))
     (tmp_path / "mine.toml").write_text(
-        'name = "mine"\nscenario = "warehouse_small"\npolicies = ["crw", "my_policy"]\nreadings = ["described"]\n'
+        'name = "mine"\nscenario = "warehouse_small"\npolicies = ["crw", "my_policy"]\nrules = ["described"]\n'
         '[[axis]]\nfield = "max_speed_mps"\nvalues = [0.05, 0.1]\n' + SHORT
     )
     words = ("-m", "swarm_forage_env.cli", "study", "run", "mine.toml", "--workers", "1", "--out", "done")

@@ -23,7 +23,7 @@ policies = [
     { policy = "random", label = "stochm" },
     { policy = "random", label = "stochx" },
 ]
-readings = ["described"]
+rules = ["described"]
 
 [set]
 n_objects = 20
@@ -51,7 +51,7 @@ def test_claims_are_held_against_a_study(ran):
     code, out, err = ran("study", "verdict", "done", "--json", "there/verdict.json")
     assert code == 0
     assert "from formulas alone" in out
-    assert "reading described, measures sierra" in out
+    assert "rules described, measures sierra" in out
     assert "E4, E5, E6, C1, C2, C3, P1, H1, H3" in out, "claims and intuitions that wait for S1b"
     assert "scoring S1a" in err
     assert "note: S1a has the name of one of the paper's sets and other settings" in err
@@ -80,14 +80,14 @@ def test_figures_are_drawn_with_their_numbers(ran):
     names = {path.name for path in Path("figures").iterdir()}
     assert {f"S1a_raw_performance_described{suffix}" for suffix in (".svg", ".png", ".csv")} <= names
     assert "S1a_raw_performance_described_sierra.svg" in names
-    assert Path("figures/S1a_raw_performance_described.csv").read_text().startswith("reading,policy,population_size,")
+    assert Path("figures/S1a_raw_performance_described.csv").read_text().startswith("rules,policy,population_size,")
     assert {f"theory_self_organisation{suffix}" for suffix in (".svg", ".png", ".csv")} <= names
     assert Path("figures/S1a_snapshot.png").read_bytes().startswith(b"\x89PNG")
     pairs = Path("figures/S1a_raw_performance_described_pairs.csv").read_text()
-    assert pairs.startswith("reading,first,second,p_better,")
-    cells = Path("figures/S1a_cells.csv").read_text()
-    assert cells.startswith("reading,policy,population_size,n_runs,mean,lowest,highest,interquartile_mean,")
-    assert len(cells.splitlines()) == 1 + 8, "four policies of two sizes"
+    assert pairs.startswith("rules,first,second,p_better,")
+    places = Path("figures/S1a_conditions.csv").read_text()
+    assert places.startswith("rules,policy,population_size,n_runs,mean,lowest,highest,interquartile_mean,")
+    assert len(places.splitlines()) == 1 + 8, "four policies of two sizes"
 
 
 def test_figures_for_a_paper_have_its_width_and_no_headline(ran):
@@ -115,17 +115,24 @@ def test_what_cannot_be_drawn_is_told(ran):
     assert "Expected a study with finished runs and numbers on its last axis, got S1a" in err
 
 
-def test_maps_of_cells_are_drawn(ran):
-    words = ("--cell", "policy=crw,population_size=1", "--cell", "policy=dpo,population_size=2", "--seeds", "1")
+def test_maps_of_places_are_drawn(ran):
+    words = (
+        "--condition",
+        "policy=crw,population_size=1",
+        "--condition",
+        "policy=dpo,population_size=2",
+        "--seeds",
+        "1",
+    )
     code, out, err = ran("study", "maps", "done", *words, "--side", "1", "--per-robot", "--out", "maps")
     assert (code, err) == (0, "")
-    assert out == "wrote maps of 2 cells to maps/maps.png and .npz files beside it\n"
+    assert out == "wrote maps of 2 conditions to maps/maps.png and .npz files beside it\n"
     one, two = "crw_population_size=1", "dpo_population_size=2"
     arrays = {f"maps.{name}.npz" for name in (one, two, f"{two}_minus_{one}")}
     assert {path.name for path in Path("maps").iterdir()} == {"maps.png", *arrays}
     with np.load(f"maps/maps.{two}.npz") as stored:
         assert stored["density"].sum() == pytest.approx(1.0), "per robot"
-    code, _, err = ran("study", "maps", "done", "--cell", "policy=crv")
+    code, _, err = ran("study", "maps", "done", "--condition", "policy=crv")
     assert code == 2
     assert "Expected policy to be one of crw, dpo, stochm, stochx in study S1a, got 'crv'" in err
 
@@ -137,11 +144,11 @@ def test_a_report_is_written(ran):
     page = Path("pages/report.html").read_text()
     assert 'id="verdicts"' in page
     assert "S1a, budget tiny: 16 of 16 runs done" in page
-    assert "swarm-forage study run S1a.toml --budget tiny --seeds 2 --reading described" in page
+    assert "swarm-forage study run S1a.toml --budget tiny --seeds 2 --rules described" in page
     assert ran("study", "report", "done/S1a.parquet", "--out", "again.html")[0] == 0
     again = Path("again.html").read_text()
-    last_cells = re.compile(r'<td class="number" data-value="[^"]*">[^<]*</td></tr>|<td>not kept</td></tr>')
-    assert last_cells.sub("", again) == last_cells.sub("", page)
+    last_places = re.compile(r'<td class="number" data-value="[^"]*">[^<]*</td></tr>|<td>not kept</td></tr>')
+    assert last_places.sub("", again) == last_places.sub("", page)
     assert "<td>not kept</td>" in again, "a packed file does not say how long runs took"
 
 
@@ -176,13 +183,13 @@ def test_what_a_report_refuses(ran, monkeypatch):
 def test_two_studies_are_held_against_each_other(ran):
     code, out, _ = ran("study", "diff", "done", "done/S1a.parquet")
     assert code == 0
-    assert out == "8 cells compared\n  8  identical to the last bit\n"
+    assert out == "8 conditions compared\n  8  identical to the last bit\n"
     Path("later.toml").write_text(FILE.replace("seeds = 2", "seeds = [2, 3]"))
     assert ran("study", "run", "later.toml", "--workers", "1", "--out", "later")[0] == 0
     code, out, _ = ran("study", "diff", "done", "later", "--columns", "n_active, interference_fraction")
     assert code == 0
     assert "8  alike: other bits, no difference beyond chance" in out
-    assert "all cells of a policy together" in out
+    assert "all conditions of a policy together" in out
     Path("fast.toml").write_text(FILE.replace("n_objects = 20", "n_objects = 20\nmax_speed_mps = 0.9"))
     assert ran("study", "run", "fast.toml", "--workers", "1", "--seeds", "1", "--out", "fast")[0] == 0
     code, out, _ = ran("study", "diff", "done", "fast")
@@ -191,14 +198,14 @@ def test_two_studies_are_held_against_each_other(ran):
     assert "8  open: other bits, and too few runs to say more" in out
     code, out, _ = ran("study", "diff", "done", "fast", "--json")
     assert code == 1
-    assert json.loads(out)["cells"][0]["state"] == "open"
+    assert json.loads(out)["conditions"][0]["state"] == "open"
 
 
 def test_differences_are_listed_with_their_intervals():
     spec = made_study()
-    before = made_table(spec, lambda cell: 10.0 * cell.values[-1])
-    after = made_table(spec, lambda cell: (15.0 if cell.policy == "dpo" else 10.0) * cell.values[-1])
-    report = diff_report(diff_studies(before, after, ("performance",)), ("reading", "policy", "population_size"))
+    before = made_table(spec, lambda place: 10.0 * place.values[-1])
+    after = made_table(spec, lambda place: (15.0 if place.policy == "dpo" else 10.0) * place.values[-1])
+    report = diff_report(diff_studies(before, after, ("performance",)), ("rules", "policy", "population_size"))
     assert "9  identical to the last bit" in report
     assert "3  different" in report
     assert re.search(
@@ -207,27 +214,27 @@ def test_differences_are_listed_with_their_intervals():
     assert re.search(r"^described +dpo +performance +40 % +39\.8 % to 40\.2 % .* \*$", report, re.MULTILINE)
 
 
-def test_cells_that_one_study_lacks_are_listed(command):
+def test_places_that_one_study_lacks_are_listed(command):
     whole = made_study("S1a", Axis(name="noise", values=(0.0, 0.03 / 7)))
     part = made_study("S1a", Axis(name="noise", values=(0.0,)))
     for spec, name in ((whole, "whole"), (part, "part")):
-        made_table(spec, lambda cell: 10.0).write(f"{name}.parquet")
+        made_table(spec, lambda place: 10.0).write(f"{name}.parquet")
     code, out, _ = command("study", "diff", "whole.parquet", "part.parquet", "--columns", "performance")
     assert code == 1
     assert out.splitlines()[:5] == [
-        "4 cells compared",
+        "4 conditions compared",
         "  4  identical to the last bit",
         "",
-        "4 cells not compared:",
-        "reading    policy  noise       why",
+        "4 conditions not compared:",
+        "rules    policy  noise       why",
     ]
     assert "described  crw     0.00428571  the second study does not have it" in out
     many = made_study("S1a", Axis(name="noise", values=tuple(0.01 * i for i in range(7))))
     report = diff_report(
-        diff_studies(made_table(many, lambda cell: 10.0), made_table(part, lambda cell: 10.0), ("performance",)),
-        ("reading", "policy", "noise"),
+        diff_studies(made_table(many, lambda place: 10.0), made_table(part, lambda place: 10.0), ("performance",)),
+        ("rules", "policy", "noise"),
     )
-    assert "24 cells not compared" in report
+    assert "24 conditions not compared" in report
     assert "and 4 more; --json has all" in report
 
 
@@ -241,7 +248,7 @@ def test_what_a_diff_refuses(ran):
 @pytest.mark.parametrize(
     ("words", "place", "work"),
     [
-        (("maps", "--out", "there"), "there/maps.png", "swarm_forage_env.inspect.study_maps.maps_of_cells"),
+        (("maps", "--out", "there"), "there/maps.png", "swarm_forage_env.inspect.study_maps.maps_of_places"),
         (("report", "--out", "page.html"), "page.html", "metrics.scoring.figure_panels.study_panels"),
         (("verdict", "--json", "all.json"), "all.json", "metrics.scoring.figure_panels.study_panels"),
     ],

@@ -62,7 +62,7 @@ ABLATE = (
     "--quirks explore_double_start,integer_estimates,dynamic_cache_merges_all"
 )
 STUDY = "study run S1a.toml --workers 1 --out done"
-CELLS = "--cell policy=crw,population_size=2 --cell policy=dpo,population_size=4"
+PLACES = "--condition policy=crw,population_size=2 --condition policy=dpo,population_size=4"
 BENCHMARK = "benchmark --policy crw --name again --trained-in nothing --jobs 1"
 
 CASES = {
@@ -114,7 +114,7 @@ CASES = {
     "study_verdict.txt": "study verdict done",
     "study_verdict_made.txt": "study verdict made.parquet noise.parquet --json verdict_made.json",
     "study_plot.txt": "study plot done --out figures --band sd --variant corrected,sierra",
-    "study_maps.txt": f"study maps done {CELLS} --out maps",
+    "study_maps.txt": f"study maps done {PLACES} --out maps",
     "study_report.txt": "study report packed.parquet --out report.html",
     "study_report_made.txt": "study report made.parquet noise.parquet --out report_made.html",
     "study_diff_same.txt": "study diff done packed.parquet",
@@ -182,7 +182,7 @@ name = "S1a"
 title = "Sizes in a small room"
 scenario = "warehouse_small"
 policies = ["crw", "dpo", "stochm", "stochx"]
-readings = ["described"]
+rules = ["described"]
 
 [set]
 physics = "compiled"
@@ -290,12 +290,12 @@ def _write_tables() -> None:
     spec = made_study()
     better = {"crw": 1.0, "dpo": 1.2, "stochm": 1.3, "stochx": 1.1}
     later = better | {"dpo": 1.5}
-    made_table(spec, lambda cell: 10.0 * better[cell.policy] * cell.values[-1] ** 0.9).write("made.parquet")
-    made_table(spec, lambda cell: 10.0 * later[cell.policy] * cell.values[-1] ** 0.9).write("later.parquet")
-    lost = {(cell, seed) for cell in spec.cells[:2] for seed in spec.seeds[:2]}
-    made_table(spec, lambda cell: 10.0 * cell.values[-1], lost=lost).write("lost.parquet")
+    made_table(spec, lambda place: 10.0 * better[place.policy] * place.values[-1] ** 0.9).write("made.parquet")
+    made_table(spec, lambda place: 10.0 * later[place.policy] * place.values[-1] ** 0.9).write("later.parquet")
+    lost = {(place, seed) for place in spec.places[:2] for seed in spec.seeds[:2]}
+    made_table(spec, lambda place: 10.0 * place.values[-1], lost=lost).write("lost.parquet")
     noisy = made_study("S1e", Axis(name="noise", values=(0.0, 0.01, 0.03)), reference=0.0)
-    made_table(noisy, lambda cell: 10.0 * better[cell.policy] * (1.0 - 5.0 * cell.values[-1])).write("noise.parquet")
+    made_table(noisy, lambda place: 10.0 * better[place.policy] * (1.0 - 5.0 * place.values[-1])).write("noise.parquet")
     rows = [(n, seed, t, n**0.8 * (1 + 0.1 * seed) + t) for n in (1, 2, 4) for seed in (0, 1, 2) for t in (0, 1)]
     _write_curves("curves.csv", rows)
     law = [(n, seed, 0, n / (1 + 0.05 * (n - 1)) * (5 + seed / 9)) for n in (1, 2, 4, 8, 16, 32) for seed in (0, 1)]

@@ -65,9 +65,9 @@ def test_two_versions_are_drawn_beside_each_other(run):
 
 
 def test_results_say_which_sets_and_cells_they_are_of(run):
-    """One cell of S1a lacks one of its two runs, another both, and those of the other reading do; S1c is whole."""
+    """One cell of S1a lacks one of its two runs, another both, and those of the other rules do; S1c is whole."""
     pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
-    spec = load_study("S1a", "smoke", readings=("described",))
+    spec = load_study("S1a", "smoke", rules=("described",))
     lost = {(spec.cells[0], 1), (spec.cells[1], 0), (spec.cells[1], 1)}
     made_table(spec, lambda cell: 10.0 * cell.values[0], lost=lost).write("S1a.parquet")
     whole = load_study("S1c", "smoke")
@@ -89,14 +89,14 @@ def test_results_say_which_sets_and_cells_they_are_of(run):
     assert pictures == set(re.findall(r"\]\((images/.+?)\)", page))
     assert f"{len(pictures)} pictures" in out
     assert pictures
-    assert "swarm-forage study run S1c --budget smoke --seeds 2 --reading both" in page
+    assert "swarm-forage study run S1c --budget smoke --seeds 2 --rules both" in page
     details = Path("page/results_in_detail.md").read_text(encoding="utf-8")
     headings = re.findall(r"^### (\w+)$", details, flags=re.MULTILINE)
     assert headings == [*CLAIMS, *INTUITIONS]
     assert re.findall(r"\(results_in_detail\.md#(\w+)\)", page) == [name.lower() for name in CLAIMS]
     (of_p2,) = re.findall(r"### P2\n\n(.+?)\n\n###", details, flags=re.DOTALL)
     forms = [line.split(" | ")[:2] for line in of_p2.splitlines() if line.startswith(("| described", "| program"))]
-    assert forms == [["| described", "corrected"], ["| described", "sierra"]], "it is of one reading"
+    assert forms == [["| described", "corrected"], ["| described", "sierra"]], "it is of one set of rules"
     assert "Waits for runs of S1b" in details
     assert "| `S1a` | population_size 2, 8, 32, 128 | 2 of 192 | E1, E2, E3, P2, X2, X3 |" in page
     assert "Judged [on fewer values than the paper's](#what-is-left-out): E1, E2, E3, P2, R1" in page

@@ -30,7 +30,7 @@ VALUES = {
             "figures": [FIGURE],
             "models": [],
             "snapshot": {"address": picture_address(b"<svg/>"), "words": "the arena"},
-            "cells": {"header": [], "rows": []},
+            "conditions": {"header": [], "rows": []},
             "missing": [],
             "settings": "",
         }

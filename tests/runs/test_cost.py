@@ -7,7 +7,7 @@ import pytest
 
 from swarm_forage_env.runs import cost as calibration
 from swarm_forage_env.runs.cost import Cost, MeasuredCost, calibrate, kind_of
-from swarm_forage_env.studies.study import READING_NAMES, Axis
+from swarm_forage_env.studies.study import RULES_NAMES, Axis
 from tests.support.tiny_study import tiny_study
 
 STUDY = tiny_study(
@@ -65,7 +65,7 @@ def test_three_sizes_of_every_kind_are_measured(monkeypatch):
 def test_readings_and_walking_objects_are_kinds_of_their_own():
     """The authors' program and objects that walk are other code in every tick."""
     worlds = tiny_study(
-        axes=(Axis(name="walk_probability", values=(0.0, 0.001, 0.051)),), reference=None, readings=tuple(READING_NAMES)
+        axes=(Axis(name="walk_probability", values=(0.0, 0.001, 0.051)),), reference=None, rules=tuple(RULES_NAMES)
     )
     kinds = {cell: kind_of(worlds.specs_of(cell)[0]) for cell in worlds.cells if cell.policy == "random"}
     assert len(set(kinds.values())) == 4, "two readings, with objects that stay and objects that walk"

@@ -94,7 +94,7 @@ def test_runs_without_obstacles_keep_the_identity_of_before():
 def test_obstacles_are_an_axis_of_a_study(tmp_path):
     file = tmp_path / "walls.toml"
     file.write_text(
-        'name = "walls"\nscenario = "warehouse_small"\npolicies = ["crw"]\nreadings = ["described"]\n'
+        'name = "walls"\nscenario = "warehouse_small"\npolicies = ["crw"]\nrules = ["described"]\n'
         "[set]\nn_robots = 4\n[[axis]]\nfield = 'obstacles'\n"
         "values = [[], [[14.0, 4.0, 14.4, 12.0]], [[14.0, 4.0, 14.4, 12.0], [18.0, 7.5, 19.0, 8.5]]]\n"
         "[budget.smoke]\nseeds = 1\nhorizon_s = 400.0\n"

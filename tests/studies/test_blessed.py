@@ -12,7 +12,7 @@ from swarm_forage_env.studies.study_table import StudyTable, gather_study, read_
 
 BLESSED = Path(__file__).parent.parent / "support"
 NAMES = {"blessed": 8, "blessed_noise": 4}
-"""Study -> how many cells it has."""
+"""Study -> how many conditions it has."""
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -25,32 +25,32 @@ def test_the_file_holds_the_runs_that_its_study_describes(name):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize(("name", "n_cells"), NAMES.items())
-def test_controllers_do_what_they_did(tmp_path, name, n_cells):
+@pytest.mark.parametrize(("name", "n_places"), NAMES.items())
+def test_controllers_do_what_they_did(tmp_path, name, n_places):
     """Other versions of numpy change the last bits, a change of the code may, too; neither may change the science."""
     folder = StudyFolder(tmp_path)
     run_study(load_study(BLESSED / f"{name}.toml"), folder, jobs=1)
     found = diff_studies(read_study(BLESSED / f"{name}.parquet"), gather_study(folder))
-    assert (len(found.cells), found.lacking) == (n_cells, ())
+    assert (len(found.places), found.lacking) == (n_places, ())
     significant = [shift for shift in found.shifts if shift.is_significant]
     assert not found.differs, f"see tests/support/blessed.toml: {significant}"
 
 
 def changed(table, policy, column, factor):
-    """The table with each run of a cell in place of another, as if chance were new, and a column of a policy scaled."""
+    """The table with runs of a condition in place of each other, as by chance, and a column of a policy scaled."""
     seeds = {seed: table.spec.seeds[number - 1] for number, seed in enumerate(table.spec.seeds)}
-    cells = [number for number, cell in enumerate(table.spec.cells) if cell.policy == policy]
-    scaled = pl.when(pl.col("cell").is_in(cells)).then(factor).otherwise(1.0) * pl.col(column)
+    places = [number for number, place in enumerate(table.spec.places) if place.policy == policy]
+    scaled = pl.when(pl.col("cell").is_in(places)).then(factor).otherwise(1.0) * pl.col(column)
     frame = table.frame.with_columns(seed=pl.col("seed").replace_strict(seeds), **{column: scaled})
     return StudyTable(spec=table.spec, frame=frame.sort("cell", "seed", "interval"), versions=table.versions)
 
 
 def found_in(table, policy, column, factor):
-    """Readings in which a policy's column is said to differ, in shares of the readings that there are."""
+    """Rules in which a policy's column is said to differ, in shares of the rules that there are."""
     found = diff_studies(table, changed(table, policy, column, factor))
-    places = {shift.place[:2] for shift in found.shifts if shift.is_significant and shift.column == column}
+    places = {shift.words[:2] for shift in found.shifts if shift.is_significant and shift.column == column}
     assert {place[1] for place in places} <= {policy}, "no other policy is blamed"
-    return len(places) / len(table.spec.readings)
+    return len(places) / len(table.spec.rules)
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def found_in(table, policy, column, factor):
         *((policy, "performance", 0.7, 1.0) for policy in ("crw", "dpo", "stochm")),
         ("stochx", "performance", 0.3, 1.0),
         ("stochm", "cache_pickups", 0.0, 1.0),
-        ("stochx", "cache_pickups", 0.0, 0.5),  # in the program's reading it seldom uses one so early
+        ("stochx", "cache_pickups", 0.0, 0.5),  # in the program's rules it seldom uses one so early
     ],
 )
 def test_a_policy_that_lost_what_it_can_do_would_be_found(policy, column, factor, least):

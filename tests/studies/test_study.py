@@ -1,4 +1,4 @@
-"""Studies as data: cells, runs, references, identity."""
+"""Studies as data: conditions, runs, references, identity."""
 
 import json
 from dataclasses import replace
@@ -11,7 +11,7 @@ from swarm_forage_env.runs.policy_spec import policy_spec
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.scenarios.quirks import AUTHORS_PROGRAM, Quirks
 from swarm_forage_env.studies.ladders import BUDGETS, plan_worlds, study_values, wrappers_at
-from swarm_forage_env.studies.study import Axis, Cell, StudySpec
+from swarm_forage_env.studies.study import Axis, Place, StudySpec
 from swarm_forage_env.wrappers.noise import ActuatorNoiseConfig, SensorNoiseConfig
 from swarm_forage_env.wrappers.population import PopulationConfig
 from swarm_forage_env.wrappers.waveform import Waveform
@@ -21,50 +21,50 @@ CRW, STOCHM = policy_spec("crw"), policy_spec("stochm")
 
 def study(*axes, **changes):
     given = {"name": "mine", "scenario": "warehouse_small", "policies": (CRW,), "seeds": (0, 1), "horizon_s": 400.0,
-             "interval_s": 200.0, "readings": ("described",)}  # fmt: skip
+             "interval_s": 200.0, "rules": ("described",)}  # fmt: skip
     return StudySpec(axes=axes, **given | changes)
 
 
-def test_every_combination_is_a_cell_and_every_cell_has_all_seeds():
+def test_every_combination_is_a_place_and_every_place_has_all_seeds():
     spec = study(
         Axis(name="n_objects", values=(10, 20)),
         Axis(name="population_size", values=(1, 3)),
         policies=(CRW, STOCHM),
-        readings=("described", "program"),
+        rules=("described", "program"),
         reference=1,
     )
-    assert len(spec.cells) == 2 * 2 * 2 * 2
-    assert spec.cells[0] == Cell("described", "crw", (10, 1))
-    assert spec.cells[1] == Cell("described", "crw", (10, 3))
-    assert spec.cells[-1] == Cell("program", "stochm", (20, 3))
+    assert len(spec.places) == 2 * 2 * 2 * 2
+    assert spec.places[0] == Place("described", "crw", (10, 1))
+    assert spec.places[1] == Place("described", "crw", (10, 3))
+    assert spec.places[-1] == Place("program", "stochm", (20, 3))
     assert (spec.n_experiments, spec.n_runs, len(spec.plan.specs)) == (4, 32, 32)
     assert len({run.run_id for run in spec.plan.specs}) == 32
-    last = spec.specs_of(spec.cells[-1])
+    last = spec.specs_of(spec.places[-1])
     assert spec.plan.specs[-2:] == last
-    assert spec.condition(spec.cells[-1]) == spec.plan.conditions[-1]
+    assert spec.condition(spec.places[-1]) == spec.plan.conditions[-1]
     assert [run.seed for run in last] == [0, 1]
     world = last[0].scenario
     assert (world.robots.n_robots, world.objects.n_objects, world.caches) == (3, 20, "static")
     assert (world.quirks, world.horizon_s, world.interval_s) == (AUTHORS_PROGRAM, 400.0, 200.0)
-    assert spec.world(spec.cells[0]).scenario.quirks == Quirks()
+    assert spec.world(spec.places[0]).scenario.quirks == Quirks()
     assert spec.robot_ticks == sum(run.robot_ticks for run in spec.plan.specs) == 8 * 2 * (1 + 3) * 2000
 
 
-def test_the_reference_of_a_cell_differs_on_the_last_axis_only():
+def test_the_reference_of_a_place_differs_on_the_last_axis_only():
     spec = study(Axis(name="population_size", values=(2, 4)), Axis(name="throttle", values=(0.0, 0.2)), reference=0.0)
-    cell = Cell("described", "crw", (4, 0.2))
-    assert spec.reference_of(cell) == Cell("described", "crw", (4, 0.0))
-    assert spec.reference_of(cell) in spec.cells
-    assert replace(spec, reference=None).reference_of(cell) is None
+    place = Place("described", "crw", (4, 0.2))
+    assert spec.reference_of(place) == Place("described", "crw", (4, 0.0))
+    assert spec.reference_of(place) in spec.places
+    assert replace(spec, reference=None).reference_of(place) is None
 
 
 def test_fields_that_hold_lists_can_vary():
     spec = study(Axis(name="nest_size_m", values=("3.2,12.8", "3.2,6.4")))
-    sizes = [spec.world(cell).scenario.arena.nest_size_m for cell in spec.cells]
+    sizes = [spec.world(place).scenario.arena.nest_size_m for place in spec.places]
     assert sizes == [(3.2, 12.8), (3.2, 6.4)]
     assert StudySpec.from_mapping(json.loads(spec.to_json())) == spec
     spec = study(Axis(name="own_sensors", values=("none", "nest_distance,x")))
-    assert [spec.world(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance", "x")]
+    assert [spec.world(place).scenario.robots.own_sensors for place in spec.places] == [(), ("nest_distance", "x")]
 
 
 @pytest.mark.parametrize(
@@ -93,14 +93,14 @@ def test_the_runs_of_one_criterion_are_those_of_a_score(criterion):
 
 def test_sizes_of_search_and_rescue_have_the_arenas_of_its_series():
     spec = study(Axis(name="population_size", values=(1, 12, 115)), scenario="search_and_rescue")
-    worlds = [spec.world(cell).scenario for cell in spec.cells]
+    worlds = [spec.world(place).scenario for place in spec.places]
     assert [(w.arena.width_m, w.robots.n_robots, w.objects.n_objects) for w in worlds] == [
         (16.0, 1, 80), (16.0, 12, 80), (48.0, 115, 368)]  # fmt: skip
 
 
 def test_a_density_holds_for_all_sizes():
     spec = study(Axis(name="population_size", values=(1, 10, 40)), settings={"density": 0.1})
-    worlds = [spec.world(cell).scenario for cell in spec.cells]
+    worlds = [spec.world(place).scenario for place in spec.places]
     areas = [w.arena.width_m * w.arena.height_m for w in worlds]
     assert areas[0] == areas[1], "one robot has the smallest arena of the others"
     assert areas[1] == pytest.approx(100.0, rel=0.1)
@@ -132,7 +132,7 @@ def test_fields_of_wrappers_and_switches_of_the_scenario_are_axes_too():
         wrappers=(SensorNoiseConfig(sigma=0.01),),
         policies=(STOCHM,),
     )
-    last = spec.specs_of(spec.cells[-1])[0]
+    last = spec.specs_of(spec.places[-1])[0]
     assert last.scenario.quirks.integer_estimates
     assert last.scenario.caches == "dynamic", "the axis goes before what the policy states"
     assert last.wrappers == (SensorNoiseConfig(sigma=0.01, sigmas={"position": 0.1}),)
@@ -140,7 +140,7 @@ def test_fields_of_wrappers_and_switches_of_the_scenario_are_axes_too():
 
 def test_two_adversities_in_one_run_are_labelled_by_the_last():
     spec = study(Axis(name="throttle", values=(0.2,)), Axis(name="noise", values=(0.0, 0.02)))
-    calm, noisy = (spec.world(cell) for cell in spec.cells)
+    calm, noisy = (spec.world(place) for place in spec.places)
     assert (calm.criterion, calm.value, len(calm.wrappers)) == ("throttle", 0.2, 1)
     assert (noisy.criterion, noisy.value, len(noisy.wrappers)) == ("noise", 0.02, 3)
 
@@ -165,9 +165,9 @@ def test_a_study_survives_json_and_has_an_identity():
         ({"scenario": "warehouse_smal"}, "Did you mean 'warehouse_small'"),
         ({"settings": {"n_object": 3}}, "Did you mean 'n_objects'"),
         ({"settings": {"horizon_s": 3.0}}, "the budget of a study sets it"),
-        ({"settings": {"quirks": "DESCRIBED"}}, "the readings of a study set them"),
+        ({"settings": {"quirks": "DESCRIBED"}}, "the rules of a study set them"),
         ({"settings": {"n_objects": 100_000}}, "Expected at most"),
-        ({"readings": ("descibed",)}, "Did you mean 'described'"),
+        ({"rules": ("descibed",)}, "Did you mean 'described'"),
         ({"policies": (CRW, CRW)}, "Expected different policies"),
         ({"policies": ()}, "one or more policies"),
         ({"seeds": (1, 1)}, "Expected different seeds"),
@@ -216,7 +216,7 @@ def test_the_share_of_a_part_is_an_axis():
     mixed = policy_spec("mixed:ppo_warehouse_small=share,crw=rest", label="learned among crw")
     spec = study(Axis(name="share", values=(0.0, 0.25, 1.0)), policies=(mixed,), reference=0.0)
     assert StudySpec.from_mapping(json.loads(spec.to_json())) == spec
-    runs = [spec.specs_of(cell)[0] for cell in spec.cells]
+    runs = [spec.specs_of(place)[0] for place in spec.places]
     assert [run.parameters["share"] for run in runs] == [0.0, 0.25, 1.0]
     assert len({run.run_id for run in runs}) == 3
     assert {run.policy for run in runs} == {"mixed:ppo_warehouse_small=share,crw=rest"}

@@ -11,7 +11,7 @@ from swarm_forage_env.policies import pretrained
 from swarm_forage_env.scenarios.kinds import RobotKind
 from swarm_forage_env.studies import study_file
 from swarm_forage_env.studies.ladders import BUDGETS
-from swarm_forage_env.studies.study import Axis, Cell, StudySpec
+from swarm_forage_env.studies.study import Axis, Place, StudySpec
 from swarm_forage_env.studies.study_file import (
     budget_names,
     is_set_of_paper,
@@ -29,7 +29,7 @@ FILE = """
 name = "mine"
 scenario = "warehouse_small"
 policies = ["crw", { policy = "stochm", label = "without caches", caches = "none" }]
-readings = ["described"]
+rules = ["described"]
 
 [set]
 n_objects = 50
@@ -64,13 +64,13 @@ def written(tmp_path):
 
 
 def test_the_paper_ran_129024_times():
-    studies = {name: load_study(name, "paper", readings=["described"]) for name in set_names()}
+    studies = {name: load_study(name, "paper", rules=["described"]) for name in set_names()}
     assert {name: spec.n_experiments for name, spec in studies.items()} == EXPERIMENTS
     assert sum(spec.n_experiments for spec in studies.values()) == 168
     assert all([p.label for p in spec.policies] == ["crw", "dpo", "stochm", "stochx"] for spec in studies.values())
     assert sum(spec.n_runs for spec in studies.values()) == 168 * 4 * 192 == 129_024
     assert {spec.horizon_s for spec in studies.values()} == {BUDGETS["paper"].horizon_s}
-    ticks = {run.scenario.horizon_ticks for spec in studies.values() for run in spec.specs_of(spec.cells[0])}
+    ticks = {run.scenario.horizon_ticks for spec in studies.values() for run in spec.specs_of(spec.places[0])}
     assert ticks == {50_000}
 
 
@@ -88,30 +88,30 @@ def test_the_paper_ran_129024_times():
 )
 def test_the_worlds_of_the_sets(name, robots, objects, reference):
     spec = load_study(name, "paper")
-    worlds = [spec.world(cell).scenario for cell in spec.cells]
+    worlds = [spec.world(place).scenario for place in spec.places]
     assert {world.robots.n_robots for world in worlds} == robots
     assert {world.objects.n_objects for world in worlds} == objects
     assert {world.physics for world in worlds} == {"compiled"}
     assert spec.reference == reference
-    assert all(spec.reference_of(cell) in spec.cells for cell in spec.cells)
+    assert all(spec.reference_of(place) in spec.places for place in spec.places)
 
 
 def test_the_reference_of_wandering_objects_wanders_as_much():
     spec = load_study("S2a", "paper")
-    assert spec.reference_of(Cell("program", "dpo", (0.026, 819))) == Cell("program", "dpo", (0.026, 12))
+    assert spec.reference_of(Place("program", "dpo", (0.026, 819))) == Place("program", "dpo", (0.026, 12))
 
 
 @pytest.mark.parametrize("name", set_names())
 def test_every_set_has_three_budgets_and_both_readings(name):
     assert budget_names(name) == ("smoke", "reduced", "paper")
     smoke, reduced = (load_study(name, budget) for budget in ("smoke", "reduced"))
-    assert smoke.readings == reduced.readings == ("described", "program")
+    assert smoke.rules == reduced.rules == ("described", "program")
     assert smoke.robot_ticks < 50e6, "a minute or two of one core"
     paper = load_study(name, "paper")
-    assert set(reduced.cells) <= set(paper.cells)
-    cell = reduced.cells[-1]
-    of_cell = reduced.specs_of(cell)
-    assert of_cell == paper.specs_of(cell)[: len(of_cell)], "so that a reduced study can be continued"
+    assert set(reduced.places) <= set(paper.places)
+    place = reduced.places[-1]
+    of_place = reduced.specs_of(place)
+    assert of_place == paper.specs_of(place)[: len(of_place)], "so that a reduced study can be continued"
 
 
 def test_a_file_and_a_budget_make_a_study(written):
@@ -120,7 +120,7 @@ def test_a_file_and_a_budget_make_a_study(written):
     assert [(axis.name, axis.values) for axis in spec.axes] == [
         ("walk_probability", (0.01,)), ("noise", (0.0, 0.02, 0.04))]  # fmt: skip
     assert (spec.reference, spec.seeds, spec.horizon_s, spec.interval_s) == (0.0, (0, 1), 400.0, 200.0)
-    last = spec.specs_of(Cell("described", "without caches", (0.01, 0.04)))[1]
+    last = spec.specs_of(Place("described", "without caches", (0.01, 0.04)))[1]
     assert (last.policy, last.scenario.caches, last.seed) == ("stochm", "none", 1)
     assert last.scenario.objects.n_objects == 50
     assert [config.name for config in last.wrappers] == ["sensor_noise", "population", "actuator_noise"]
@@ -128,8 +128,8 @@ def test_a_file_and_a_budget_make_a_study(written):
 
 
 def test_seeds_and_readings_can_be_chosen(written):
-    spec = load_study(written(), seeds=3, readings=["program"])
-    assert (spec.seeds, spec.readings) == ((0, 1, 2), ("program",))
+    spec = load_study(written(), seeds=3, rules=["program"])
+    assert (spec.seeds, spec.rules) == ((0, 1, 2), ("program",))
     assert load_study(written(FILE.replace("seeds = 2", "seeds = [7, 9]"))).seeds == (7, 9)
 
 
@@ -208,8 +208,8 @@ def test_the_studies_of_the_page_are_some(written, tmp_path):
     assert budget_names(file) == ("first", "full", "paper")
     first, full = load_study(file, "first"), load_study(file, "full")
     assert (first.n_experiments, first.n_runs, full.n_runs) == (6, 48, 384)
-    assert first.reference_of(first.cells[0]) == Cell("described", "crw", (10, 0.1))
-    assert [cell.values for cell in load_study(written(of_shares)).cells] == [(0.0,), (0.1,), (0.2,), (0.5,), (1.0,)]
+    assert first.reference_of(first.places[0]) == Place("described", "crw", (10, 0.1))
+    assert [place.values for place in load_study(written(of_shares)).places] == [(0.0,), (0.1,), (0.2,), (0.5,), (1.0,)]
 
 
 def test_files_in_a_mixed_swarm_lie_beside_the_study(written, tmp_path):
@@ -222,7 +222,7 @@ def test_files_in_a_mixed_swarm_lie_beside_the_study(written, tmp_path):
 
 
 def test_a_set_of_the_paper_is_known_by_more_than_its_name():
-    some = load_study("S1a", "reduced", seeds=2, readings=("program",))
+    some = load_study("S1a", "reduced", seeds=2, rules=("program",))
     assert is_set_of_paper(some)
     assert is_set_of_paper(replace(some, seeds=(5, 9)))
     assert not is_set_of_paper(replace(some, settings={"n_objects": 20}))
@@ -241,26 +241,26 @@ def test_no_file_is_opened_to_know_a_set_of_the_paper(monkeypatch, tmp_path):
 def test_an_axis_of_lists(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(
-        'name = "mine"\nscenario = "warehouse_small"\npolicies = ["random"]\nreadings = ["described"]\n'
+        'name = "mine"\nscenario = "warehouse_small"\npolicies = ["random"]\nrules = ["described"]\n'
         '[[axis]]\nfield = "own_sensors"\nvalues = [[], ["nest_distance"], ["nest_distance", "x"]]\nreference = []\n'
         '[budget.few]\nseeds = 1\nvalues = { own_sensors = [["nest_distance"]] }\n'
     )
     spec = load_study(file)
     assert spec.axes[0].values == ("none", "nest_distance")
     assert spec.reference == "none"
-    assert [spec.world(cell).scenario.robots.own_sensors for cell in spec.cells] == [(), ("nest_distance",)]
+    assert [spec.world(place).scenario.robots.own_sensors for place in spec.places] == [(), ("nest_distance",)]
 
 
 def test_an_axis_of_kinds(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(
-        'name = "mine"\nscenario = "warehouse_small"\npolicies = ["random"]\nreadings = ["described"]\n'
+        'name = "mine"\nscenario = "warehouse_small"\npolicies = ["random"]\nrules = ["described"]\n'
         '[[axis]]\nfield = "robot_kinds"\nvalues = [[], [{name = "slow", share = 0.2, speed = 0.5}, {name = "rest"}]]\n'
         "reference = []\n[budget.few]\nseeds = 1\n"
     )
     spec = load_study(file)
     assert spec.axes[0].values == ("none", "slow:share=0.2,speed=0.5+rest")
-    kinds = [spec.world(cell).scenario.robots.robot_kinds for cell in spec.cells]
+    kinds = [spec.world(place).scenario.robots.robot_kinds for place in spec.places]
     assert kinds == [(), (RobotKind(name="slow", share=0.2, speed=0.5), RobotKind(name="rest"))]
 
 

@@ -63,7 +63,7 @@ def test_a_study_runs_once(tmp_path):
     assert (state.count(DONE), state.count(MISSING), state.count(FAILED)) == (16, 0, 0)
     assert state.records == {}, "they are in the folder alone"
     assert folder.study().to_mapping() == STUDY.to_mapping()
-    assert all(cell.is_complete for cell in folder.cell_states())
+    assert all(place.is_complete for place in folder.place_states())
     counting = Counting()
     assert run_study(STUDY, folder, executor=counting).count(DONE) == 16
     assert counting.tasks == []
@@ -82,9 +82,9 @@ def test_shards_are_disjoint_complete_and_equal(count):
 def test_shards_fill_one_folder(tmp_path):
     folder = StudyFolder(tmp_path)
     assert run_study(STUDY, folder, part=(1, 2), jobs=1).count(DONE) == 8
-    assert sum(cell.n_runs[MISSING] for cell in folder.cell_states()) == 8
+    assert sum(place.n_runs[MISSING] for place in folder.place_states()) == 8
     run_study(STUDY, folder, part=(2, 2), jobs=1)
-    assert all(cell.is_complete for cell in folder.cell_states())
+    assert all(place.is_complete for place in folder.place_states())
 
 
 @pytest.mark.parametrize("word", ["2", "a/b", "0/2", "3/2", "1/0", "1/2/3"])
@@ -94,7 +94,7 @@ def test_a_shard_that_cannot_be(word):
     assert parse_shard("2/8") == (2, 8)
 
 
-def test_seeds_of_a_cell_travel_together(tmp_path):
+def test_seeds_of_a_place_travel_together(tmp_path):
     counting = Counting()
     run_study(STUDY, StudyFolder(tmp_path), executor=counting)
     assert counting.tasks == [2] * 8
@@ -112,10 +112,10 @@ def test_more_seeds_and_readings_are_added(tmp_path):
     counting = Counting()
     run_study(replace(STUDY, seeds=(1,)), folder, executor=counting)
     assert sum(counting.tasks) == 8
-    run_study(replace(STUDY, seeds=(0,), readings=("program",)), folder, jobs=1)
+    run_study(replace(STUDY, seeds=(0,), rules=("program",)), folder, jobs=1)
     study = folder.study()
-    assert (study.seeds, study.readings) == ((0, 1), ("described", "program"))
-    assert sum(cell.n_runs[MISSING] for cell in folder.cell_states()) == 8, "the other seed of the second reading"
+    assert (study.seeds, study.rules) == ((0, 1), ("described", "program"))
+    assert sum(place.n_runs[MISSING] for place in folder.place_states()) == 8, "the other seed of the second rules"
 
 
 def test_another_study_in_the_folder_is_refused(tmp_path):
@@ -150,7 +150,7 @@ def test_a_damaged_file_is_found_told_and_run_again(tmp_path, capsys, damage):
     }
     assert changed[damage] != content
     one.write_bytes(changed[damage])
-    assert sum(cell.n_runs[MISSING] for cell in folder.cell_states()) == 1
+    assert sum(place.n_runs[MISSING] for place in folder.place_states()) == 1
     assert run_study(STUDY, folder, jobs=1, progress=True).count(DONE) == 16
     told = capsys.readouterr().err
     assert "15 of 16 runs are stored already." in told

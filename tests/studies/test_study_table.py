@@ -10,7 +10,7 @@ from swarm_forage_env.runs.record import RecordError, RunRecord
 from swarm_forage_env.runs.run import run_one
 from swarm_forage_env.runs.runner import longest_first, run_specs
 from swarm_forage_env.runs.store import FAILURES, MISSING
-from swarm_forage_env.studies.study import Axis, Cell
+from swarm_forage_env.studies.study import Axis, Place
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.studies.study_table import gather_study, read_study
 from tests.support.tiny_study import NOBODY, RANDOM, tiny_study
@@ -54,31 +54,31 @@ def test_every_interval_is_a_row_with_its_place(file):
     assert tuple(last[name] for name in columns) == place
 
 
-def test_a_cell_gives_the_curves_of_its_runs_and_of_its_reference(file):
+def test_a_place_gives_the_curves_of_its_runs_and_of_its_reference(file):
     table = read_study(file)
-    cell = Cell("described", "twin", (3, 0.02))
-    for one in (cell, table.spec.reference_of(cell)):
+    place = Place("described", "twin", (3, 0.02))
+    for one in (place, table.spec.reference_of(place)):
         seeds, curves = table.curves(one, "collected", "interference_fraction", "believed_interference_fraction")
         assert seeds == (0, 1)
         records = run_specs(STUDY.specs_of(one), jobs=1).records.values()
         for name, values in curves.items():
             np.testing.assert_array_equal(values, [record.columns()[name] for record in records])
-        assert ("believed_interference_fraction" in curves) == (one == cell), "only noisy runs have that column"
+        assert ("believed_interference_fraction" in curves) == (one == place), "only noisy runs have that column"
     with pytest.raises(KeyError):
-        table.curves(Cell("described", "nobody", (3, 0.02)), "collected")
+        table.curves(Place("described", "nobody", (3, 0.02)), "collected")
 
 
-def test_one_row_per_cell(file):
-    cells = read_study(file).cells()
-    assert len(cells) == 8
-    assert cells.filter(cells["is_reference"])["axis_noise"].to_list() == [0.0] * 4
-    assert cells["n_done"].to_list() == [2] * 8
-    assert cells["n_robots"].to_list() == [2, 2, 3, 3] * 2
+def test_one_row_per_place(file):
+    places = read_study(file).places()
+    assert len(places) == 8
+    assert places.filter(places["is_reference"])["axis_noise"].to_list() == [0.0] * 4
+    assert places["n_done"].to_list() == [2] * 8
+    assert places["n_robots"].to_list() == [2, 2, 3, 3] * 2
 
 
 def test_a_run_can_be_made_again_from_the_file(file):
     table = read_study(file)
-    rows = table.rows(Cell("described", "twin", (2, 0.02))).filter(pl.col("seed") == 1)
+    rows = table.rows(Place("described", "twin", (2, 0.02))).filter(pl.col("seed") == 1)
     again = run_one(table.spec_of(rows["run_id"][0]))
     assert again.interference_ticks.tolist() == rows["interference_ticks"].to_list()
     with pytest.raises(KeyError, match="no run 'beef'"):
@@ -89,24 +89,24 @@ def test_failed_and_missing_runs_are_rows(tmp_path):
     study = replace(STUDY, policies=(RANDOM, NOBODY))
     folder = StudyFolder(tmp_path / "mine")
     run_study(study, folder, jobs=1)
-    gone = study.specs_of(study.cells[0])[1]
+    gone = study.specs_of(study.places[0])[1]
     folder.store.path(gone.run_id).unlink()
     gather_study(folder).write(tmp_path / "mine.parquet")
     table = read_study(tmp_path / "mine.parquet")
-    assert [state.n_runs for state in table.cell_states()] == [
+    assert [state.n_runs for state in table.place_states()] == [
         {"done": 1, "failed": 0, "missing": 1},
         *[{"done": 2, "failed": 0, "missing": 0}] * 3,
         *[{"done": 0, "failed": 2, "missing": 0}] * 4,
     ]
-    (missing,) = table.rows(study.cells[0]).filter(pl.col("state") == MISSING).to_dicts()
+    (missing,) = table.rows(study.places[0]).filter(pl.col("state") == MISSING).to_dicts()
     assert (missing["run_id"], missing["seed"], missing["n_robots"], missing["interval"]) == (gone.run_id, 1, 2, None)
-    failed = table.rows(study.cells[-1]).row(0, named=True)
+    failed = table.rows(study.places[-1]).row(0, named=True)
     assert "nobody" in failed["error"]
     assert "Traceback" in failed["traceback"]
     assert failed["rerun"] == f"swarm-forage rerun runs/{FAILURES}/{failed['run_id']}.json"
     assert (folder.folder / failed["rerun"].split()[-1]).is_file()
-    assert table.curves(study.cells[-1], "collected") == ((), {})
-    assert table.curves(study.cells[0], "collected")[0] == (0,)
+    assert table.curves(study.places[-1], "collected") == ((), {})
+    assert table.curves(study.places[0], "collected")[0] == (0,)
 
 
 def test_a_study_without_any_run_has_a_table_too(tmp_path):
@@ -127,15 +127,15 @@ def test_the_order_of_the_runs_does_not_change_a_byte(folder, file, tmp_path):
 
 
 def test_what_performance_is_may_be_an_axis(tmp_path):
-    """Its cells share the stored runs, and read them in different ways."""
+    """Its conditions share the stored runs, and read them in different ways."""
     study = tiny_study(axes=(Axis(name="performance", values=("collected", "n_active")),), policies=(RANDOM,),
                        settings={"n_robots": 3, "n_objects": 20}, reference=None)  # fmt: skip
     folder = StudyFolder(tmp_path)
     run_study(study, folder, jobs=1)
     assert len(folder.store.run_ids()) == 2
     table = gather_study(folder)
-    assert [table.curves(cell, "performance")[1]["performance"].mean() for cell in study.cells] == [0.0, 3.0]
-    assert table.spec.reference_of(study.cells[0]) is None
+    assert [table.curves(place, "performance")[1]["performance"].mean() for place in study.places] == [0.0, 3.0]
+    assert table.spec.reference_of(study.places[0]) is None
 
 
 def test_files_that_are_no_study_are_refused(file, tmp_path, folder):

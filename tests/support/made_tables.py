@@ -25,7 +25,7 @@ def made_study(name="S1a", *axes, **changes):
         "policies": four_policies(),
         "axes": axes or (Axis(name="population_size", values=(1, 2, 4)),),
         "reference": None,
-        "readings": ("described",),
+        "rules": ("described",),
         "seeds": tuple(range(6)),
         "horizon_s": 10.0 * N_INTERVALS,
         "interval_s": 10.0,
@@ -33,32 +33,32 @@ def made_study(name="S1a", *axes, **changes):
     return StudySpec(**given | changes)
 
 
-def made_table(spec, performance, *, lost=(), adversity=lambda cell: 0.0):
+def made_table(spec, performance, *, lost=(), adversity=lambda place: 0.0):
     """A study's table.
 
     Args:
         spec: The study.
-        performance: Cell -> level of its performance; runs differ a little from it, equally in all cells.
-        lost: (cell, seed) of missing runs.
-        adversity: Cell -> conditions in the second half of a run.
+        performance: Place -> level of its performance; runs differ a little from it, equally in all conditions.
+        lost: (place, seed) of missing runs.
+        adversity: Place -> conditions in the second half of a run.
     """
     rows = []
-    for number, cell in enumerate(spec.cells):
+    for number, place in enumerate(spec.places):
         for seed in spec.seeds:
-            place = {"cell": number, "seed": seed, "run_id": f"{number}_{seed}"}
-            if (cell, seed) in lost:
-                rows.append({**place, "state": "missing"})
+            where = {"cell": number, "seed": seed, "run_id": f"{number}_{seed}"}
+            if (place, seed) in lost:
+                rows.append({**where, "state": "missing"})
                 continue
             noise = 0.02 * np.random.default_rng(seed).normal(size=N_INTERVALS)
             rows += [
                 {
-                    **place,
+                    **where,
                     "state": "done",
                     "interval": interval,
                     "t_end_s": spec.interval_s * (interval + 1),
-                    "performance": performance(cell) * (1.0 + noise[interval]),
+                    "performance": performance(place) * (1.0 + noise[interval]),
                     "interference_fraction": 0.1,
-                    "adversity": adversity(cell) if 2 * interval >= N_INTERVALS else 0.1,
+                    "adversity": adversity(place) if 2 * interval >= N_INTERVALS else 0.1,
                     "n_active": 4.0,
                 }
                 for interval in range(N_INTERVALS)

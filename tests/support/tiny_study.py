@@ -1,4 +1,4 @@
-"""A study of two policies, two axes and two readings whose runs take a moment."""
+"""A study of two policies, two axes and both rules whose runs take a moment."""
 
 from swarm_forage_env.runs.policy_spec import PolicySpec
 from swarm_forage_env.studies.study import Axis, StudySpec
@@ -17,7 +17,7 @@ def tiny_study(**changes):
         "policies": (RANDOM, TWIN),
         "axes": (Axis(name="population_size", values=(2, 3)), Axis(name="noise", values=(0.0, 0.02))),
         "reference": 0.0,
-        "readings": ("described",),
+        "rules": ("described",),
         "seeds": (0, 1),
         "horizon_s": 4.0,
         "interval_s": 2.0,

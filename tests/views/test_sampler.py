@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from swarm_forage_env._internal.fields import ConfigError
-from swarm_forage_env.contract.own import register_sensor
-from swarm_forage_env.scenarios.draws import Drawn
+from swarm_forage_env.contract.own_functions import register_sensor
+from swarm_forage_env.scenarios.distributions import Drawn
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.views.sampler import SampledWorld, ScenarioSampler
 from swarm_forage_env.wrappers.world import World

@@ -8,7 +8,7 @@ import pytest
 
 from swarm_forage_env import ConfigError, ForageEnv, load_policy, parallel_env, plan_run, run_one, scenario
 from swarm_forage_env.contract.codes import ObjectStatus
-from swarm_forage_env.contract.own import register_sensor
+from swarm_forage_env.contract.own_functions import register_sensor
 from swarm_forage_env.contract.policy import SwarmSpec
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface
 from swarm_forage_env.runs.run import build_env

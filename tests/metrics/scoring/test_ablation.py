@@ -38,19 +38,19 @@ def test_a_quirk_without_effect_is_run_once_and_one_with_effect_with_every_seed(
     # Nobody delivers in 40 s, so nobody leaves the nest after it; exploring starts in the first tick.
     assert len(list(tmp_path.rglob("*.parquet"))) == 4 + 2 * 1 + 2 * 2
     effects = {effect.switch[3:]: effect for effect in result.effects()}
-    assert effects.keys() == {(reading, quirk) for reading in ("DESCRIBED", "AUTHORS_PROGRAM") for quirk in quirks}
-    for reading in ("DESCRIBED", "AUTHORS_PROGRAM"):
-        assert effects[reading, "nest_left_at_random"].is_same
-        assert effects[reading, "nest_left_at_random"].interference.tolist() == [0.0]
-        assert not effects[reading, "explore_double_start"].is_same
-        assert len(effects[reading, "explore_double_start"].interference) == 2
+    assert effects.keys() == {(rules, quirk) for rules in ("DESCRIBED", "AUTHORS_PROGRAM") for quirk in quirks}
+    for rules in ("DESCRIBED", "AUTHORS_PROGRAM"):
+        assert effects[rules, "nest_left_at_random"].is_same
+        assert effects[rules, "nest_left_at_random"].interference.tolist() == [0.0]
+        assert not effects[rules, "explore_double_start"].is_same
+        assert len(effects[rules, "explore_double_start"].interference) == 2
     assert result.failures == ()
 
 
 def test_differences_are_those_of_the_runs_with_the_same_seed():
     world = scenario("warehouse_small", n_robots=20, n_objects=300, horizon_s=400.0)
     question = ablation_question([world], ["stochm"], quirks=["integer_estimates"], seeds=[0, 1])
-    effect = next(e for e in ask(question, jobs=1, progress=False).effects() if e.switch.reading == "DESCRIBED")
+    effect = next(e for e in ask(question, jobs=1, progress=False).effects() if e.switch.rules == "DESCRIBED")
     conditions = [question.conditions[effect.switch._replace(quirk=quirk)] for quirk in ("", "integer_estimates")]
     runs = [Plan(conditions=(condition,), seeds=(0, 1)).specs for condition in conditions]
     pairs = [[run_one(spec) for spec in specs] for specs in zip(*runs, strict=True)]

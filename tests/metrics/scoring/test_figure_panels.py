@@ -18,8 +18,8 @@ from tests.support.made_tables import FOUR, made_study, made_table
 SIMPLE_FIRST = {"crw": 10.0, "dpo": 11.0, "stochm": 5.0, "stochx": 4.0}
 
 
-def by_policy(cell):
-    return SIMPLE_FIRST[cell.policy] * cell.values[-1]
+def by_policy(place):
+    return SIMPLE_FIRST[place.policy] * place.values[-1]
 
 
 @pytest.fixture
@@ -38,11 +38,11 @@ def only(panels, measure, **where):
 
 def test_a_panel_has_a_row_per_level_and_a_column_per_seed(of_sizes):
     panel = only(study_panels(of_sizes).panels, "raw_performance")
-    assert (panel.study, panel.reading, panel.others, panel.experiment) == ("S1a", "described", {}, "S1a")
+    assert (panel.study, panel.rules, panel.others, panel.experiment) == ("S1a", "described", {}, "S1a")
     assert panel.x.tolist() == panel.levels.tolist() == [1.0, 2.0, 4.0]
     assert tuple(panel.scores) == FOUR
     assert panel.scores["dpo"].shape == (3, 6)
-    seeds, curves = of_sizes.curves(of_sizes.spec.cells[1], "performance")
+    seeds, curves = of_sizes.curves(of_sizes.spec.places[1], "performance")
     assert seeds == panel.seeds
     np.testing.assert_allclose(panel.scores["crw"][1], curves["performance"].sum(axis=1))
     assert panel.for_claims().scores["crw"].shape == (3, 6)
@@ -54,8 +54,8 @@ def test_measures_that_compare_sizes_leave_the_smallest_out(of_sizes):
 
 def test_a_missing_run_is_no_score():
     spec = made_study()
-    cell = spec.cells[2]  # four robots
-    panels = study_panels(made_table(spec, by_policy, lost={(cell, 3)})).panels
+    place = spec.places[2]  # four robots
+    panels = study_panels(made_table(spec, by_policy, lost={(place, 3)})).panels
     assert np.argwhere(np.isnan(only(panels, "raw_performance").scores["crw"])).tolist() == [[2, 3]]
     assert np.isfinite(only(panels, "raw_performance").scores["dpo"]).all()
 
@@ -74,7 +74,7 @@ def test_a_panel_per_value_of_the_first_axis():
 
 
 def test_spatial_emergence_has_a_panel_beside_robots_alone_and_one_beside_the_next_smaller_swarm():
-    table = made_table(made_study(), lambda cell: 10.0 * cell.values[-1] ** 2)
+    table = made_table(made_study(), lambda place: 10.0 * place.values[-1] ** 2)
     panels = [one for one in study_panels(table).panels if one.measure == "spatial_emergence"]
     assert [one.name for one in panels] == [
         PanelName("S1a", "spatial_emergence", "interactive"),
@@ -88,7 +88,7 @@ def test_spatial_emergence_has_a_panel_beside_robots_alone_and_one_beside_the_ne
 def test_throttles_are_placed_by_the_distance_of_conditions():
     axis = Axis(name="throttle", values=(0.0, 0.2, 0.4))
     spec = made_study("S1c", axis, reference=0.0, settings={"n_objects": 20, "n_robots": 4})
-    table = made_table(spec, lambda cell: 5.0 - cell.values[-1], adversity=lambda cell: 0.1 + cell.values[-1])
+    table = made_table(spec, lambda place: 5.0 - place.values[-1], adversity=lambda place: 0.1 + place.values[-1])
     panel = only(study_panels(table).panels, "reactivity")
     assert panel.x.tolist() == [0.2, 0.4]
     assert panel.levels.tolist() == pytest.approx([0.4, 0.8]), "two intervals, 0.2 and 0.4 from the ideal"
@@ -110,30 +110,30 @@ def test_a_measure_has_a_panel_in_each_variant_that_it_has(of_sizes):
 
 def test_every_experiment_of_the_claims_is_in_a_set():
     """By name, and by the value on the first axis where a set has two."""
-    specs = [load_study(name, "paper", readings=("described",)) for name in set_names()]
-    found = {experiment_of(spec.name, cell.values[:-1]) for spec in specs for cell in spec.cells}
+    specs = [load_study(name, "paper", rules=("described",)) for name in set_names()]
+    found = {experiment_of(spec.name, place.values[:-1]) for spec in specs for place in spec.places}
     assert found - {None} == set(EXPERIMENTS)
 
 
 def test_claims_are_answered_in_each_reading_and_variant():
-    spec = made_study(readings=("described", "program"))
+    spec = made_study(rules=("described", "program"))
     table = made_table(spec, by_policy)
     judged, waiting = judge_claims([table], [study_panels(table, VARIANTS)])
-    answers = {(one.claim.name, one.reading, one.variant): one.verdict.answer for one in judged}
+    answers = {(one.claim.name, one.rules, one.variant): one.verdict.answer for one in judged}
     assert {key[0] for key in answers} == {"V1", "V2", "P2", "E1", "E2", "E3"}
     assert answers["V1", "", "corrected"] == "supported"
-    for reading in spec.readings:
-        assert [key[2] for key in answers if key[:2] == ("P2", reading)] == ["corrected", "sierra"]
-        assert answers["P2", reading, "corrected"] == answers["P2", reading, "sierra"] == "supported"
-        assert [key[2] for key in answers if key[:2] == ("E3", reading)] == [*VARIANTS]
-    lacking = {one.claim.name: one.lacks for one in waiting if (one.reading, one.variant) == ("program", "corrected")}
+    for rules in spec.rules:
+        assert [key[2] for key in answers if key[:2] == ("P2", rules)] == ["corrected", "sierra"]
+        assert answers["P2", rules, "corrected"] == answers["P2", rules, "sierra"] == "supported"
+        assert [key[2] for key in answers if key[:2] == ("E3", rules)] == [*VARIANTS]
+    lacking = {one.claim.name: one.lacks for one in waiting if (one.rules, one.variant) == ("program", "corrected")}
     assert lacking["D2"] == (PanelName("S1h", "population_robustness"), PanelName("S1b", "task_emergence"))
     assert not {"V1", "V2", "P2"} & {one.claim.name for one in waiting}
 
 
 def test_the_opposite_order_contradicts():
     heights = dict(zip(SIMPLE_FIRST, reversed(SIMPLE_FIRST.values()), strict=True))
-    table = made_table(made_study(), lambda cell: heights[cell.policy])
+    table = made_table(made_study(), lambda place: heights[place.policy])
     judged, _ = judge_claims([table], [study_panels(table)], ("corrected",))
     assert {one.claim.name: one.verdict.answer for one in judged}["P2"] == "contradicted"
 

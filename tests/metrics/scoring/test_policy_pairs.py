@@ -15,7 +15,7 @@ HEIGHTS = dict(zip(FOUR, (4.0, 4.0, 6.0, 9.0), strict=True))
 
 def panels(measure, **lost):
     spec = made_study("S1a", Axis(name="population_size", values=(1, 2, 4)))
-    table = made_table(spec, lambda cell: HEIGHTS[cell.policy] * cell.values[-1], **lost)
+    table = made_table(spec, lambda place: HEIGHTS[place.policy] * place.values[-1], **lost)
     (figure,) = study_figures(study_panels(table, measures=(measure,)))
     return figure.panels
 
@@ -40,8 +40,8 @@ def test_lower_is_better_where_the_measure_says_so():
     spec = made_study("S1c", Axis(name="throttle", values=(0.0, 0.2, 0.4)), reference=0.0)
     table = made_table(
         spec,
-        lambda cell: 5.0 - (2.0 if cell.policy == "crw" and cell.values[-1] else 0.0),
-        adversity=lambda cell: 0.1 + cell.values[-1],
+        lambda place: 5.0 - (2.0 if place.policy == "crw" and place.values[-1] else 0.0),
+        adversity=lambda place: 0.1 + place.values[-1],
     )
     (figure,) = study_figures(study_panels(table, measures=("adaptability",)))
     first = policy_pairs(figure.panels).row(0, named=True)
@@ -51,7 +51,7 @@ def test_lower_is_better_where_the_measure_says_so():
 
 def test_a_policy_without_runs_is_left_open():
     spec = made_study("S1a", Axis(name="population_size", values=(1, 2, 4)))
-    lost = {(cell, seed) for cell in spec.cells if cell.policy == "dpo" for seed in spec.seeds}
+    lost = {(place, seed) for place in spec.places if place.policy == "dpo" for seed in spec.seeds}
     first = policy_pairs(panels("raw_performance", lost=lost)).row(0, named=True)
     assert (first["p_better"], first["n_levels"]) == (None, 0)
     assert first["lower"] == pytest.approx(None)
@@ -61,5 +61,5 @@ def test_a_single_policy_has_no_pairs():
     spec = made_study(
         "mine", Axis(name="population_size", values=(1, 2, 4)), policies=(PolicySpec(label="crw", policy="crw"),)
     )
-    (figure,) = study_figures(study_panels(made_table(spec, lambda cell: 5.0), measures=("raw_performance",)))
+    (figure,) = study_figures(study_panels(made_table(spec, lambda place: 5.0), measures=("raw_performance",)))
     assert policy_pairs(figure.panels).height == 0

@@ -59,18 +59,18 @@ def test_the_mean_field_is_of_deliveries_only():
 
 
 def test_too_few_sizes_have_no_laws():
-    assert model_figures(made_table(made_study(), lambda cell: 5.0)) == ()
+    assert model_figures(made_table(made_study(), lambda place: 5.0)) == ()
 
 
 def test_robots_at_work_stand_beside_the_queue():
     spec = made_study(
         "S1g", Axis(name="population_dynamics", values=(0.0, 1.0, 2.0)), policies=TWO, reference=0.0, seeds=(0, 1)
     )
-    (figure,) = model_figures(made_table(spec, lambda cell: 5.0))
+    (figure,) = model_figures(made_table(spec, lambda place: 5.0))
     assert figure.name == "S1g_population_described"
     assert [panel.words for panel in figure.panels] == ["level 1, crw, dpo", "level 2, crw, dpo"], "they share a panel"
-    cell = next(cell for cell in spec.cells if cell.values == (1.0,))
-    world, rates = spec.world(cell).scenario, spec.world(cell).population
+    place = next(place for place in spec.places if place.values == (1.0,))
+    world, rates = spec.world(place).scenario, spec.world(place).population
     per_s = PopulationRates(lambda_bd=rates.malfunction_per_tick / world.dt_s, mu_bd=rates.repair_per_tick / world.dt_s)
     panel = figure.panels[0]
     assert panel.expected[0].y == pytest.approx(robots_at_work(per_s, world.robots.n_robots, [10, 20, 30, 40]))

@@ -17,8 +17,8 @@ WALKING = Axis(name="walk_probability", values=(0.0, 0.3))
 SIZES = Axis(name="population_size", values=(2, 4, 8))
 
 
-def by_policy(cell):
-    return (4.0 + FOUR.index(cell.policy)) * (1.0 + float(cell.values[-1]))
+def by_policy(place):
+    return (4.0 + FOUR.index(place.policy)) * (1.0 + float(place.values[-1]))
 
 
 def figures(*axes, lost=(), name="S1a", **changes):
@@ -26,7 +26,7 @@ def figures(*axes, lost=(), name="S1a", **changes):
 
 
 def test_a_study_has_a_figure_per_measure_and_reading():
-    names = [figure.name for figure in figures(readings=("described", "program"))]
+    names = [figure.name for figure in figures(rules=("described", "program"))]
     assert names[:3] == [
         "S1a_raw_performance_described",
         "S1a_spatial_emergence_interactive_described",
@@ -37,7 +37,7 @@ def test_a_study_has_a_figure_per_measure_and_reading():
 
 def test_the_numbers_behind_a_figure():
     spec = made_study()
-    first = spec.cells[0]
+    first = spec.places[0]
     figure = figures(lost={(first, 2)})[0]
     frame = figure.to_frame()
     assert len(frame) == len(FOUR) * 3
@@ -57,7 +57,7 @@ def test_a_figure_is_drawn(tmp_path, band):
     draw_figure(figure, files, band=band)
     assert files[1].read_bytes().startswith(PNG)
     drawn = words_in(files[0])
-    title = "S1a: raw performance (higher is better), reading described"
+    title = "S1a: raw performance (higher is better), rules described"
     assert {"CRW", "DPO", "STOCHM", "STOCHX", "robots", "objects in 40 s", title} <= {*drawn}
     assert ("shaded: 95 % interval of the mean; dots: runs" in drawn) == (band == "ci")
     again = tmp_path / "again.svg"
@@ -81,7 +81,7 @@ def test_one_level_is_drawn(tmp_path):
 
 
 def few_figures(n_seeds, *, performance=by_policy, lost=(), levels=SIZES):
-    """The figure of performance of so many runs per cell."""
+    """The figure of performance of so many runs per condition."""
     spec = made_study("S1a", levels, seeds=tuple(range(n_seeds)))
     drawn = study_figures(study_panels(made_table(spec, performance, lost=lost)))
     return next(one for one in drawn if one.panels[0].measure == "raw_performance")
@@ -104,19 +104,21 @@ def test_fewer_than_four_runs_are_dots_and_a_mean_and_the_caption_says_why(tmp_p
     bands, alone = bands_of(monkeypatch, figure, tmp_path)
     assert all(np.isnan(edge).all() for band in bands for edge in band)
     assert all(low.size == 0 for low, _ in alone)
-    assert caption(figure, "ci") == "lines: means; dots: runs\nno bands: fewer than 4 runs of a cell tell too little"
+    assert (
+        caption(figure, "ci") == "lines: means; dots: runs\nno bands: fewer than 4 runs of a condition tell too little"
+    )
     bands, _ = bands_of(monkeypatch, few_figures(4), tmp_path)
     assert all(np.isfinite(edge).all() for band in bands for edge in band)
     assert caption(few_figures(4), "ci") == "shaded: 95 % interval of the mean; dots: runs"
 
 
 def test_a_band_with_no_neighbours_is_a_line(tmp_path, monkeypatch):
-    cells = made_study("S1a", SIZES, seeds=(0, 1, 2, 3)).cells
-    figure = few_figures(4, lost={(cell, 3) for cell in cells if cell.values[-1] != 4})
+    places = made_study("S1a", SIZES, seeds=(0, 1, 2, 3)).places
+    figure = few_figures(4, lost={(place, 3) for place in places if place.values[-1] != 4})
     bands, alone = bands_of(monkeypatch, figure, tmp_path)
     assert [np.isfinite(low).tolist() for low, _ in bands] == [[False, True, False]] * len(FOUR)
     assert [low.size for low, _ in alone] == [1] * len(FOUR)
-    assert caption(figure, "ci").endswith("no band: cells with fewer than 4 runs, which tell too little")
+    assert caption(figure, "ci").endswith("no band: conditions with fewer than 4 runs, which tell too little")
 
 
 def test_bands_stay_within_the_range_of_the_measure(tmp_path, monkeypatch):
@@ -171,9 +173,9 @@ def test_a_study_over_a_field_shows_performance():
 
 def test_words_on_the_last_axis_and_studies_without_runs_have_no_figure():
     words = made_study("mine", Axis(name="caches", values=("none", "static")), settings={"n_objects": 60})
-    assert study_figures(study_panels(made_table(words, lambda cell: 1.0))) == ()
+    assert study_figures(study_panels(made_table(words, lambda place: 1.0))) == ()
     spec = made_study()
-    assert figures(lost={(cell, seed) for cell in spec.cells for seed in spec.seeds}) == ()
+    assert figures(lost={(place, seed) for place in spec.places for seed in spec.seeds}) == ()
 
 
 def test_the_interval_of_two_runs_does_not_flatten_the_picture():

@@ -26,12 +26,12 @@ def made(tmp_path):
 def test_a_line_is_what_differs_on_the_last_axis(made):
     table = made(Axis(name="walk_probability", values=(0.0, 0.5)), Axis(name="noise", values=(0.0, 0.02, 0.03)))
     lines = study_lines(table)
-    assert [(line.reading, line.policy, line.others) for line in lines] == [
+    assert [(line.rules, line.policy, line.others) for line in lines] == [
         ("described", "random", {"walk_probability": 0.0}),
         ("described", "random", {"walk_probability": 0.5}),
     ]
     for line in lines:
-        assert [cell.values[-1] for cell in line.cells] == [0.0, 0.02, 0.03]
+        assert [place.values[-1] for place in line.places] == [0.0, 0.02, 0.03]
         pairs = line.curves.levels("noise")
         assert [(reference.criterion, level.value) for reference, level in pairs] == [("none", 0.02), ("none", 0.03)]
         scores, missing = score_study(line.curves, ["noise_robustness"])
@@ -64,7 +64,7 @@ def test_the_lowest_rates_may_be_the_reference(made):
 
 def test_lost_runs_are_counted_and_another_performance_is_read(made, tmp_path):
     table = made(Axis(name="noise", values=(0.0, 0.02)))
-    noisy = table.spec.cells[-1]
+    noisy = table.spec.places[-1]
     StudyFolder(tmp_path).store.path(table.spec.specs_of(noisy)[1].run_id).unlink()
     (line,) = study_lines(read_study(tmp_path), "n_active")
     reference, level = line.curves.experiments

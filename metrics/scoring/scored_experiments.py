@@ -26,8 +26,8 @@ class Uncomputable(Exception):  # noqa: N818 - not an error: the table notes it 
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScoreDraft:
-    """A score before its values are known."""
+class ScoredExperiments:
+    """The experiments that a score is made of, and what is known of it before its values."""
 
     measure: str
     at: str

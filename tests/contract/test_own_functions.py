@@ -21,8 +21,8 @@ from swarm_forage_env import (
     scenario,
     with_overrides,
 )
-from swarm_forage_env.contract import own
-from swarm_forage_env.contract.own import OwnFunctionError
+from swarm_forage_env.contract import own_functions as own
+from swarm_forage_env.contract.own_functions import OwnFunctionError
 from swarm_forage_env.policies.interface import InterfaceConfig, LearnerInterface, interface_from_mapping
 from swarm_forage_env.training.datasets.recording import plan_dataset
 from swarm_forage_env.training.plan import TrainingPlan

@@ -1,10 +1,10 @@
-"""What a mean hides: spread and breakdowns of the cells of a study."""
+"""What a mean hides: spread and breakdowns of the conditions of a study."""
 
 import numpy as np
 import polars as pl
 import pytest
 
-from metrics.scoring.cell_distributions import cell_distributions
+from metrics.scoring.place_distributions import place_distributions
 from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_table import StudyTable
 from tests.support.made_tables import FOUR, made_study, made_table
@@ -19,12 +19,12 @@ def studied(axis, curve_of, *, reference=None, n_seeds=4):
     rows = [
         {"cell": number, "seed": seed, "run_id": f"{number}_{seed}", "state": "done", "interval": interval}
         | {"performance": float(amount), "interference_fraction": 0.1, "n_active": 4.0}
-        for number, cell in enumerate(spec.cells)
+        for number, place in enumerate(spec.places)
         for seed in spec.seeds
-        for interval, amount in enumerate(curve_of(cell.values[-1], seed))
+        for interval, amount in enumerate(curve_of(place.values[-1], seed))
     ]
     table = StudyTable(spec=spec, frame=pl.DataFrame(rows, infer_schema_length=None), versions=())
-    return cell_distributions(table).filter(pl.col("policy") == FOUR[0])
+    return place_distributions(table).filter(pl.col("policy") == FOUR[0])
 
 
 def steady(level):
@@ -35,7 +35,7 @@ def jammed(level, at):
     return np.where(np.arange(N_INTERVALS) < at, level, 0.0)
 
 
-def test_breakdowns_are_told_against_the_undisturbed_cell():
+def test_breakdowns_are_told_against_the_undisturbed_place():
     def curve(value, seed):
         return jammed(PER_INTERVAL, 8) if value and seed else steady(PER_INTERVAL)
 
@@ -70,8 +70,8 @@ def test_what_cannot_be_told_is_empty(level, reference, why):
     assert rows["interquartile_mean"].to_list() == [N_INTERVALS * level] * 2
 
 
-def test_a_cell_without_runs_has_no_numbers():
+def test_a_place_without_runs_has_no_numbers():
     spec = made_study("mine", Axis(name="noise", values=(0.0, 0.02)))
-    lost = {(spec.cells[0], seed) for seed in spec.seeds}
-    first = cell_distributions(made_table(spec, lambda cell: 5.0, lost=lost)).row(0, named=True)
+    lost = {(spec.places[0], seed) for seed in spec.seeds}
+    first = place_distributions(made_table(spec, lambda place: 5.0, lost=lost)).row(0, named=True)
     assert (first["n_runs"], first["mean"], first["broken"]) == (0, None, None)

@@ -1,4 +1,4 @@
-"""What a mean hides: how the runs of each cell of a study spread, and how many of them broke down.
+"""What a mean hides: how the runs of each condition of a study spread, and how many of them broke down.
 
 Near its critical size a swarm has two phases, near the best or broken down, and the mean of both describes no run.
 """
@@ -27,18 +27,18 @@ _SEED = 1
 """Fixed, so that the same runs give the same table."""
 
 
-def cell_distributions(table: "StudyTable") -> "pl.DataFrame":
-    """Return one row per cell of a study: spread of its runs, breakdown probability and time to breakdown.
+def place_distributions(table: "StudyTable") -> "pl.DataFrame":
+    """Return one row per condition of a study: spread of its runs, breakdown probability and time to breakdown.
 
     Performance is summed over a run where it is a total, else its mean. Breakdowns are judged against the best swarm
-    where sizes vary, in cells of that size or larger, and else against the reference of the study; where there is no
-    reference, or it achieves less than `ENOUGH` in half of a run, they are empty.
+    where sizes vary, in conditions of that size or larger, and else against the reference of the study; where there is
+    none, or it achieves less than `ENOUGH` in half of a run, they are empty.
 
     Args:
         table: From `swarm_forage_env.read_study`.
 
     Returns:
-        Columns: the place of the cell; `n_runs`; `mean`, `lowest`, `highest`; `interquartile_mean` with its 95 %
+        Columns: the place of the condition; `n_runs`; `mean`, `lowest`, `highest`; `interquartile_mean` with its 95 %
         interval `iqm_lower`, `iqm_upper`; `broken`, the probability of a breakdown, with Wilson's interval
         `broken_lower`, `broken_upper`; `half_broken_s`, the time by which half of the runs broke down, infinite where
         fewer did. Empty where nothing can be said.
@@ -47,10 +47,10 @@ def cell_distributions(table: "StudyTable") -> "pl.DataFrame":
 
     rows: list[dict[str, Any]] = []
     for line in study_lines(table):
-        for place, (cell, runs) in enumerate(zip(line.cells, line.curves.experiments, strict=True)):
-            values = dict(zip((axis.name for axis in table.spec.axes), cell.values, strict=True))
-            where = {"reading": line.reading, "policy": line.policy, **values}
-            reference = _reference(table, line, place)
+        for at, (place, runs) in enumerate(zip(line.places, line.curves.experiments, strict=True)):
+            values = dict(zip((axis.name for axis in table.spec.axes), place.values, strict=True))
+            where = {"rules": line.rules, "policy": line.policy, **values}
+            reference = _reference(table, line, at)
             rows.append({**where, **_spread(line, runs), **_breakdowns(table, line, runs, reference)})
     return pl.DataFrame(rows, infer_schema_length=None).fill_nan(None)
 
@@ -60,7 +60,7 @@ def _totals(line: StudyLine, runs: RunCurves) -> FloatArray:
 
 
 def _spread(line: StudyLine, runs: RunCurves) -> dict[str, float | int]:
-    """Numbers about the runs of a cell."""
+    """Numbers about the runs of a condition."""
     names = ("mean", "lowest", "highest", "interquartile_mean", "iqm_lower", "iqm_upper")
     if not runs.seeds:
         return {"n_runs": 0, **dict.fromkeys(names, math.nan)}
@@ -70,15 +70,15 @@ def _spread(line: StudyLine, runs: RunCurves) -> dict[str, float | int]:
     return {"n_runs": len(runs.seeds), **dict(zip(names, map(float, numbers), strict=True))}
 
 
-def _reference(table: "StudyTable", line: StudyLine, place: int) -> RunCurves | None:
-    """The runs that those of a cell are held against; None if they cannot have broken down, or nobody can tell."""
-    experiments, cell = line.curves.experiments, line.cells[place]
+def _reference(table: "StudyTable", line: StudyLine, at: int) -> RunCurves | None:
+    """The runs that those of a condition are held against; None if they cannot have broken down, or nobody can tell."""
+    experiments, place = line.curves.experiments, line.places[at]
     if table.spec.axes and table.spec.axes[-1].name == SIZE:
         known = [runs for runs in experiments if runs.seeds]
         best = max(known, key=lambda runs: float(_totals(line, runs).mean()), default=None)
-        return best if best is not None and experiments[place].n_robots >= best.n_robots else None
-    reference = table.spec.reference_of(cell)
-    return None if reference is None else experiments[line.cells.index(reference)]
+        return best if best is not None and experiments[at].n_robots >= best.n_robots else None
+    reference = table.spec.reference_of(place)
+    return None if reference is None else experiments[line.places.index(reference)]
 
 
 def _breakdowns(table: "StudyTable", line: StudyLine, runs: RunCurves, reference: RunCurves | None) -> dict[str, float]:
