@@ -15,6 +15,15 @@ from .scoring import ScoreForms as ScoreForms
 from .scoring import Comparison as Comparison
 from .scoring import Performance as Performance
 
+# what studies say
+from .scoring import verdict as verdict
+from .scoring import diff as diff
+from .scoring import plot as plot
+from .scoring import report as report
+from .scoring import StudyVerdict as StudyVerdict
+from .scoring import StudyDiff as StudyDiff
+from .scoring import StudyReport as StudyReport
+
 # decisions: larger swarms, and which policy
 from .scoring import predict_policy as predict_policy
 from .scoring import predict_curves as predict_curves

@@ -20,15 +20,15 @@ from PIL import Image
 
 from metrics.claims import CLAIMS, INTUITIONS
 from metrics.claims.outcomes import Answer
-from metrics.scoring import Judged, StudyFigure, StudyPanels, Waiting, draw_figure, judge_claims, study_figures
+from metrics.scoring import Judged, StudyFigure, StudyPanels, Waiting, draw_figure, study_figures
 from metrics.scoring.model_plots import draw_models
 from metrics.scoring.place_distributions import place_distributions
 from metrics.scoring.study_models import model_figures
+from metrics.scoring.study_report import command_of
+from metrics.scoring.study_verdict import scored_studies, verdict_of, waiting_lines
 from metrics.scoring.verdicts import VARIANTS
 from swarm_forage_env import read_study
 from swarm_forage_env._internal.wording import counted, number, percent
-from swarm_forage_env.cli.study_page import command_of
-from swarm_forage_env.cli.study_verdict import scored_studies, waiting_lines
 from swarm_forage_env.runs.store import DONE
 from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_file import (
@@ -76,10 +76,9 @@ class Results(NamedTuple):
 def gathered(places: Sequence[Path]) -> Results:
     """Read, score and judge studies; the order is that of their names."""
     tables = sorted((read_study(place) for place in places), key=lambda table: table.spec.name)
-    scored = scored_studies(tables, VARIANTS)
-    return Results(
-        tables, scored, *judge_claims(tables, scored), *judge_claims(tables, scored, ("corrected",), INTUITIONS)
-    )
+    scored = scored_studies(tables, tell=lambda words: print(words, file=sys.stderr))
+    found = verdict_of(tables, scored)
+    return Results(tables, scored, found.judged, found.waiting, found.expected, found.expected_later)
 
 
 def rows(header: Sequence[str], lines: Sequence[Sequence[Any]], right: Sequence[int] = ()) -> str:

@@ -19,9 +19,12 @@ from .prediction import (
 )
 from .prediction_plots import draw_predictions
 from .question import Question, ask
-from .study_diff import StudyDiff, diff_studies
+from .study_diff import StudyDiff, diff
+from .study_pictures import PlottedStudy, plot
 from .study_plots import StudyFigure, draw_figure, draw_map, study_figures
+from .study_report import StudyReport, report
 from .study_tables import StudyLine, study_lines
+from .study_verdict import StudyVerdict, verdict
 from .summary import RunQuestion, RunSummary, run_question, summarize_runs
 from .table import Score, ScoreTable
 from .verdicts import Judged, Waiting, judge_claims
@@ -45,7 +48,10 @@ __all__ = [
     "draw_figure",
     "draw_map",
     "judge_claims",
-    "diff_studies",
+    "verdict",
+    "diff",
+    "plot",
+    "report",
     "draw_scores",
     "predict_policy",
     "predict_curves",
@@ -65,7 +71,10 @@ __all__ = [
     "StudyPanel",
     "StudyPanels",
     "StudyFigure",
+    "StudyVerdict",
     "StudyDiff",
+    "PlottedStudy",
+    "StudyReport",
     "Judged",
     "Waiting",
     "Performance",

@@ -71,7 +71,7 @@ class Switch(NamedTuple):
 
     @property
     def base(self) -> "Switch":
-        """The reading without a switched quirk."""
+        """The rules without a switched quirk."""
         return self._replace(quirk="")
 
 

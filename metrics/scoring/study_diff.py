@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from scipy.special import stdtr, stdtrit  # pyright: ignore[reportMissingTypeStubs]  (scipy ships none)
 
-from swarm_forage_env._internal.wording import plain
+from swarm_forage_env._internal.wording import aligned, counted, limits, number, percent, plain
+from swarm_forage_env.runs.answer import Answer, Sheet
 
 from ..checks import CurveError
 from ..curves import FloatArray
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from swarm_forage_env.studies.study import Place
     from swarm_forage_env.studies.study_table import StudyTable
 
+ROWS_SHOWN = 20
+"""Differences that are listed, and conditions that are not compared; `to_mapping` has all."""
 COLUMNS = ("performance", "interference_fraction", "n_carrying", "cache_pickups")
 """Columns that are compared by default: what is achieved, the time lost, and what robots do. Each run counts with the
 mean over its intervals (our choice: few, so that the correction for many tests stays small)."""
@@ -34,6 +37,13 @@ TEST = (
     "Holm's correction over all tests of conditions and lines together. Intervals are Student's, 95 %."
 )
 """How studies are compared, as a text for readers."""
+STATE_WORDS: "dict[State, str]" = {
+    "identical": "identical to the last bit",
+    "alike": "alike: other bits, no difference beyond chance",
+    "different": "different",
+    "open": "open: other bits, and too few runs to say more",
+}
+"""State of a condition -> what it says."""
 _LEVEL = 0.975
 """Quantile of the upper bound of a 95 % interval."""
 
@@ -110,9 +120,11 @@ class Lacking:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudyDiff:
+class StudyDiff(Answer):
     """How two studies differ."""
 
+    axes: tuple[str, ...]
+    """Names of what both vary."""
     places: tuple[PlaceDiff, ...]
     """Conditions that both have, with runs in both."""
     lines: tuple[Shift, ...]
@@ -140,6 +152,28 @@ class StudyDiff:
         """All tests, those of lines first."""
         return (*self.lines, *(shift for place in self.places for shift in place.shifts))
 
+    def sheets(self) -> Sequence[Sheet]:
+        """Return how many conditions differ, the tests that say so, and what was not compared."""
+        counts = [(str(self.count(state)), words) for state, words in STATE_WORDS.items() if self.count(state)]
+        notes = [f"  {row}" for row in aligned(counts)] if counts else []
+        notes += [f"not the same: {text}" for text in self.settings]
+        sheets = [Sheet(title=f"{counted(len(self.places), 'condition')} compared", notes=notes)]
+        where = ("rules", "policy", *self.axes)
+        of_places = [shift for place in self.places for shift in place.shifts if shift.is_significant]
+        if of_places:
+            header = (*where, "column", "A", "B", "B - A", "95 % interval", "runs", "p (Holm)")
+            rows = [_row(shift) for shift in sorted(of_places, key=lambda shift: shift.p)]
+            sheets.append(Sheet(header=header, rows=rows[:ROWS_SHOWN], notes=_more(len(rows))))
+        if self.lines:
+            title = "all conditions of a policy together, in shares of each condition's mean:"
+            header = ("rules", "policy", "column", "B - A", "95 % interval", "p (Holm)")
+            sheets.append(Sheet(title=title, header=header, rows=[_line_row(line) for line in self.lines]))
+        if self.lacking:
+            title = f"{counted(len(self.lacking), 'condition')} not compared:"
+            rows = [(*one.words, one.why) for one in self.lacking]
+            sheets.append(Sheet(title=title, header=(*where, "why"), rows=rows[:ROWS_SHOWN], notes=_more(len(rows))))
+        return [*sheets, *([Sheet(title=TEST)] if self.shifts else [])]
+
     def to_mapping(self) -> dict[str, Any]:
         """Return everything as plain values, ready for JSON."""
         return {
@@ -160,8 +194,24 @@ class StudyDiff:
         }
 
 
-def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[str] = COLUMNS) -> StudyDiff:
-    """Compare two studies condition by condition.
+def _row(shift: Shift) -> tuple[str, ...]:
+    runs = str(shift.n_first) if shift.n_first == shift.n_second else f"{shift.n_first}, {shift.n_second}"
+    means = (number(value) for value in (shift.first, shift.second, shift.difference))
+    return (*shift.words, shift.column, *means, limits(shift.lower, shift.upper), runs, f"{shift.p_holm:.2g}")
+
+
+def _line_row(shift: Shift) -> tuple[str, ...]:
+    mark = " *" if shift.is_significant else ""
+    between = f"{percent(shift.lower)} to {percent(shift.upper)}"
+    return (*shift.words, shift.column, percent(shift.difference), between, f"{shift.p_holm:.2g}{mark}")
+
+
+def _more(n_rows: int) -> list[str]:
+    return [f"and {n_rows - ROWS_SHOWN:,} more; --json has all"] if n_rows > ROWS_SHOWN else []
+
+
+def diff(first: "StudyTable", second: "StudyTable", columns: Sequence[str] = COLUMNS) -> StudyDiff:
+    """Say which conditions of two studies differ beyond chance.
 
     Conditions are those of the same rules, policy and values. Only finished runs count.
 
@@ -199,6 +249,7 @@ def diff_studies(first: "StudyTable", second: "StudyTable", columns: Sequence[st
     corrected = iter(holm(np.array([shift.p for shift in every])).tolist())
     lines = tuple(replace(line, p_holm=next(corrected)) for line in lines)
     return StudyDiff(
+        axes=tuple(axis.name for axis in first.spec.axes),
         places=tuple(
             PlaceDiff(
                 place=one.place,

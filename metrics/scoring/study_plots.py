@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from swarm_forage_env._internal.fields import known_name
 from swarm_forage_env._internal.wording import number
 from swarm_forage_env.rendering.figures import (
     SCREEN,
@@ -102,6 +103,12 @@ def study_figures(scored: StudyPanels) -> tuple[StudyFigure, ...]:
         if any(np.isfinite(scores).any() for scores in panel.scores.values()):
             groups.setdefault((panel.rules, panel.variant, panel.name._replace(experiment="")), []).append(panel)
     return tuple(StudyFigure(panels=tuple(panels)) for panels in groups.values())
+
+
+def checked_band(word: str) -> Band:
+    """Return a band by its name; raises ConfigError on an unknown one."""
+    known_name("band", word, _BANDS)
+    return "sd" if word == "sd" else "ci"
 
 
 def draw_figure(figure: StudyFigure, paths: Sequence[Path], *, band: Band = "ci", style: FigureStyle = SCREEN) -> None:

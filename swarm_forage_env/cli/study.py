@@ -23,18 +23,18 @@ def list_studies(
     budget: Annotated[str, typer.Option("--budget", help="smoke, reduced or paper.")] = "paper",
 ) -> None:
     """List the experiment sets of the paper: what they take, and what a budget leaves out."""
-    from swarm_forage_env.cli.study_report import table_of_sets
-    from swarm_forage_env.cli.terminal import output
+    from swarm_forage_env.cli.terminal import show_boxed
+    from swarm_forage_env.studies.description import paper_sets
 
-    output().print(table_of_sets(budget))
+    show_boxed(paper_sets(budget))
 
 
 def show(name: Name, budget: Budget = None, seeds: Seeds = None, rules: Rules = "file") -> None:
     """Show what a study varies, and how many runs each of its budgets makes."""
-    from swarm_forage_env.cli.study_report import described
+    from swarm_forage_env.studies.description import describe
     from swarm_forage_env.studies.study_file import budget_names
 
-    typer.echo(described(_chosen(name, budget, seeds, rules)))
+    typer.echo(describe(_chosen(name, budget, seeds, rules)))
     others = [other for other in budget_names(name) if other != budget]
     typer.echo(f"\nBudgets: {', '.join(budget_names(name))}" + ("" if budget or len(others) < 2 else "; see --budget"))
 
@@ -66,18 +66,18 @@ def run(  # long: one parameter per option
 
     Finished runs are kept: after Ctrl-C, or with more seeds, the same command does the rest.
     """
-    from swarm_forage_env.cli.study_report import plan_report, state_report
     from swarm_forage_env.cli.terminal import notes
     from swarm_forage_env.runs.cluster import cluster_executor
     from swarm_forage_env.runs.store import FAILED
     from swarm_forage_env.runs.workers import available_cores
+    from swarm_forage_env.studies.status import StudyOutcome, work_left
     from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard, run_study
 
     spec = _chosen(name, budget, seeds, rules)
     part = parse_shard(shard)
     folder = StudyFolder(out or Path("results", "studies", f"{spec.name}_{spec.budget}"))
     if dry_run:
-        typer.echo(plan_report(spec, folder, part, workers or available_cores()))
+        typer.echo(work_left(spec, folder, part=part, workers=workers or available_cores(), tell=notes().print))
         return
     try:
         with nullcontext() if cluster is None else cluster_executor(cluster, workers) as executor:
@@ -88,19 +88,19 @@ def run(  # long: one parameter per option
     if part == (1, 1):
         packed = _pack(folder.folder, None)
         notes().print(f"packed into {packed}")
-    typer.echo(state_report(state, folder))
+    typer.echo(StudyOutcome(outcomes=state, folder=folder))
     if state.count(FAILED):
         raise typer.Exit(EXIT_FAILURE)
 
 
 def status(place: Place, as_json: AsJson = False) -> None:
     """Show which runs of each condition are done, missing or failed; exit code 1 unless all are done."""
-    from swarm_forage_env.cli.study_report import status_json, status_report
+    from swarm_forage_env.studies.status import status as status_of
     from swarm_forage_env.studies.study_table import read_study
 
-    table = read_study(place)
-    typer.echo(status_json(table) if as_json else status_report(table))
-    if not all(state.is_complete for state in table.place_states()):
+    found = status_of(read_study(place))
+    typer.echo(found.json() if as_json else found)
+    if not found.is_complete:
         raise typer.Exit(EXIT_FAILURE)
 
 

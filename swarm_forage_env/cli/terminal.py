@@ -3,11 +3,16 @@
 Names of policies, files and scenarios are shown as they are: no console reads markup such as [red] in them.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from rich.console import Console
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from swarm_forage_env.runs.answer import Answer, Sheet
 
 _WIDTH_WITHOUT_TERMINAL = 140
 
@@ -46,3 +51,33 @@ def progress_bar(text: str, total: float | None = None) -> Iterator[Advance]:
             bar.update(task, completed=done, total=total)
 
         yield advance
+
+
+def show_boxed(answer: "Answer") -> None:
+    """Print the tables of an answer on stdout in frames, which wrap what is too long for the terminal."""
+    console = output()
+    for sheet in answer.sheets():
+        console.print(_boxed(sheet) if sheet.rows else sheet.text(), soft_wrap=not sheet.rows)
+
+
+def _boxed(sheet: "Sheet") -> "Table":
+    """A table in a frame: numbers to the right, a line above the row of all together."""
+    from rich.table import Table
+
+    table = Table(title=sheet.title or None, caption="\n".join(sheet.notes) or None, title_justify="left")
+    for name, *column in zip(sheet.header, *sheet.rows, strict=True):
+        table.add_column(name, justify="right" if _are_numbers(column) else "left")
+    for number, row in enumerate(sheet.rows, 1):
+        if number == len(sheet.rows) and row[0] == "all":
+            table.add_section()
+        table.add_row(*row)
+    return table
+
+
+def _are_numbers(column: Sequence[str]) -> bool:
+    """Whether texts are numbers and shares, apart from gaps."""
+    given = [text.removesuffix(" %").replace(",", "") for text in column if text not in ("", "-")]
+    try:
+        return bool([float(text) for text in given])
+    except ValueError:
+        return False

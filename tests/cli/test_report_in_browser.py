@@ -6,9 +6,7 @@ from functools import cache
 import pytest
 
 from metrics.claims import CLAIMS, INTUITIONS
-from metrics.scoring import judge_claims, study_panels
-from metrics.scoring.verdicts import VARIANTS
-from swarm_forage_env.cli.study_page import Verdicts, page_of
+from metrics.scoring import report
 from swarm_forage_env.studies.study import Axis
 from swarm_forage_env.studies.study_file import load_study
 from tests.support.browser import Browser, chromium
@@ -30,9 +28,7 @@ def in_order(name):
 def page(*specs):
     """The page about studies; several tests read the same one."""
     tables = [made_table(spec, by_policy) for spec in specs]
-    scored = [study_panels(table, VARIANTS) for table in tables]
-    expected = judge_claims(tables, scored, ("corrected",), INTUITIONS)
-    return page_of(tables, scored, Verdicts(*judge_claims(tables, scored), *expected), "ci")
+    return report(*tables).html()
 
 
 def page_of_two() -> str:

@@ -62,7 +62,7 @@ def test_a_study_is_shown(written):
     code, out, _ = written("study", "show", "S1g", "--budget", "smoke", "--rules", "program")
     assert code == 0
     assert "axis      population_dynamics: 1, 4, 8 (reference 1)" in out
-    assert "rules  program" in out
+    assert "rules     program" in out
     assert "runs      24 in 12 conditions, 6e+06 robot-ticks" in out
     assert "Budgets: tiny, paper" in written("study", "show", "mine.toml")[1]
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from metrics.scoring import diff_studies
-from swarm_forage_env.cli.study_diff import diff_report
+from metrics.scoring import diff
 from swarm_forage_env.studies.study import Axis
 from tests.support.made_tables import made_study, made_table
 from tests.support.pictures import words_in
@@ -147,8 +146,8 @@ def test_a_report_is_written(ran):
     assert "swarm-forage study run S1a.toml --budget tiny --seeds 2 --rules described" in page
     assert ran("study", "report", "done/S1a.parquet", "--out", "again.html")[0] == 0
     again = Path("again.html").read_text()
-    last_places = re.compile(r'<td class="number" data-value="[^"]*">[^<]*</td></tr>|<td>not kept</td></tr>')
-    assert last_places.sub("", again) == last_places.sub("", page)
+    last_cells = re.compile(r'<td class="number" data-value="[^"]*">[^<]*</td></tr>|<td>not kept</td></tr>')
+    assert last_cells.sub("", again) == last_cells.sub("", page)
     assert "<td>not kept</td>" in again, "a packed file does not say how long runs took"
 
 
@@ -205,7 +204,7 @@ def test_differences_are_listed_with_their_intervals():
     spec = made_study()
     before = made_table(spec, lambda place: 10.0 * place.values[-1])
     after = made_table(spec, lambda place: (15.0 if place.policy == "dpo" else 10.0) * place.values[-1])
-    report = diff_report(diff_studies(before, after, ("performance",)), ("rules", "policy", "population_size"))
+    report = str(diff(before, after, ("performance",)))
     assert "9  identical to the last bit" in report
     assert "3  different" in report
     assert re.search(
@@ -226,14 +225,11 @@ def test_places_that_one_study_lacks_are_listed(command):
         "  4  identical to the last bit",
         "",
         "4 conditions not compared:",
-        "rules    policy  noise       why",
+        "rules      policy  noise       why",
     ]
     assert "described  crw     0.00428571  the second study does not have it" in out
     many = made_study("S1a", Axis(name="noise", values=tuple(0.01 * i for i in range(7))))
-    report = diff_report(
-        diff_studies(made_table(many, lambda place: 10.0), made_table(part, lambda place: 10.0), ("performance",)),
-        ("rules", "policy", "noise"),
-    )
+    report = str(diff(made_table(many, lambda place: 10.0), made_table(part, lambda place: 10.0), ("performance",)))
     assert "24 conditions not compared" in report
     assert "and 4 more; --json has all" in report
 
@@ -249,8 +245,8 @@ def test_what_a_diff_refuses(ran):
     ("words", "place", "work"),
     [
         (("maps", "--out", "there"), "there/maps.png", "swarm_forage_env.inspect.study_maps.maps_of_places"),
-        (("report", "--out", "page.html"), "page.html", "metrics.scoring.figure_panels.study_panels"),
-        (("verdict", "--json", "all.json"), "all.json", "metrics.scoring.figure_panels.study_panels"),
+        (("report", "--out", "page.html"), "page.html", "metrics.scoring.study_verdict.study_panels"),
+        (("verdict", "--json", "all.json"), "all.json", "metrics.scoring.study_verdict.study_panels"),
     ],
     ids=lambda given: given[0] if isinstance(given, tuple) else "",
 )

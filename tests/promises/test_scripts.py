@@ -64,11 +64,11 @@ def test_two_versions_are_drawn_beside_each_other(run):
     assert Path("picture.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_results_say_which_sets_and_cells_they_are_of(run):
-    """One cell of S1a lacks one of its two runs, another both, and those of the other rules do; S1c is whole."""
+def test_results_say_which_sets_and_conditions_they_are_of(run):
+    """One condition of S1a lacks one of its two runs, another both, and those of the other rules do; S1c is whole."""
     pytest.importorskip("matplotlib", reason="needs the plots extra: matplotlib")
     spec = load_study("S1a", "smoke", rules=("described",))
-    lost = {(spec.cells[0], 1), (spec.cells[1], 0), (spec.cells[1], 1)}
+    lost = {(spec.places[0], 1), (spec.places[1], 0), (spec.places[1], 1)}
     made_table(spec, lambda cell: 10.0 * cell.values[0], lost=lost).write("S1a.parquet")
     whole = load_study("S1c", "smoke")
     made_table(whole, lambda cell: 10.0, adversity=lambda cell: cell.values[0]).write("S1c.parquet")
@@ -77,13 +77,13 @@ def test_results_say_which_sets_and_cells_they_are_of(run):
     assert code == 0
     page = Path("page/results.md").read_text(encoding="utf-8")
     n_planned = sum(load_study(name, "smoke").n_runs for name in set_names())
-    n_cells = len(spec.cells)
+    n_places = len(spec.places)
     assert page.splitlines()[2:5] == [
         f"**This page is of {spec.n_runs - 3 + whole.n_runs} of {n_planned} runs of the paper's sets at budget "
         "`smoke`.** Sets with all runs: S1c. Sets not run: S1b, S1d, S1e, S1f, S1g, S1h, S2a, S2b, S2c, S2d. Sets of "
         "which runs are still to be made:",
         "",
-        f"- S1a: {n_cells - 2} of {2 * n_cells} cells whole, with 2 runs each; 1 begun, {n_cells + 1} not run",
+        f"- S1a: {n_places - 2} of {2 * n_places} conditions whole, with 2 runs each; 1 begun, {n_places + 1} not run",
     ]
     pictures = {path.relative_to("page").as_posix() for path in Path("page").rglob("*.png")}
     assert pictures == set(re.findall(r"\]\((images/.+?)\)", page))
@@ -100,7 +100,7 @@ def test_results_say_which_sets_and_cells_they_are_of(run):
     assert "Waits for runs of S1b" in details
     assert "| `S1a` | population_size 2, 8, 32, 128 | 2 of 192 | E1, E2, E3, P2, X2, X3 |" in page
     assert "Judged [on fewer values than the paper's](#what-is-left-out): E1, E2, E3, P2, R1" in page
-    assert f"| `S1c` | {len(whole.cells)} | 0 | 0 | - |" in page, "four intervals are too short for breakdowns"
+    assert f"| `S1c` | {len(whole.places)} | 0 | 0 | - |" in page, "four intervals are too short for breakdowns"
 
 
 def test_laws_are_written_beside_the_runs_of_a_study(run):
@@ -117,7 +117,7 @@ def test_laws_are_written_beside_the_runs_of_a_study(run):
 
 def test_the_study_of_the_page_on_laws_is_one_that_the_model_holds_for():
     spec = load_study(ROOT / "docs/laws.toml")
-    assert [world.caches for world in (spec.specs_of(cell)[0].scenario for cell in spec.cells)] == ["none"] * 8
+    assert [world.caches for world in (spec.specs_of(place)[0].scenario for place in spec.places)] == ["none"] * 8
 
 
 def test_sketches_of_theory_are_those_of_the_docs(run):

@@ -18,23 +18,23 @@ STUDY = tiny_study(
 
 def test_costs_between_measured_sizes_are_in_proportion():
     cost = Cost(n_robots=np.array([2.0, 10.0]), start_s=np.array([0.0, 8.0]), tick_s=np.array([0.1, 0.9]))
-    cell = STUDY.cells[4]
-    (spec, _) = STUDY.specs_of(cell)
+    place = STUDY.places[4]
+    (spec, _) = STUDY.specs_of(place)
     assert (spec.scenario.robots.n_robots, spec.scenario.horizon_ticks) == (4, 20)
     assert cost.seconds(spec) == pytest.approx(2.0 + 0.3 * 20)
 
 
 def test_what_runs_took_tells_what_others_will_take():
     """Per robot-tick: of the same kind, else of the same policy, else of all."""
-    cell = {(cell.policy, *cell.values): STUDY.specs_of(cell)[0] for cell in STUDY.cells}
-    known, noisy, other = cell["random", 4, 0.0], cell["random", 8, 0.02], cell["twin", 16, 0.0]
+    spec_of = {(place.policy, *place.values): STUDY.specs_of(place)[0] for place in STUDY.places}
+    known, noisy, other = spec_of["random", 4, 0.0], spec_of["random", 8, 0.02], spec_of["twin", 16, 0.0]
     cost = MeasuredCost()
     assert cost.seconds([known]) is None
     cost.add(known, 4.0)
-    assert cost.seconds([known, cell["random", 16, 0.0]]) == pytest.approx(4.0 + 16.0)
+    assert cost.seconds([known, spec_of["random", 16, 0.0]]) == pytest.approx(4.0 + 16.0)
     assert cost.seconds([noisy]) == pytest.approx(8.0), "the policy took so long elsewhere"
     cost.add(noisy, 80.0)
-    assert cost.seconds([cell["random", 1, 0.02]]) == pytest.approx(10.0)
+    assert cost.seconds([spec_of["random", 1, 0.02]]) == pytest.approx(10.0)
     assert cost.seconds([known]) == pytest.approx(4.0), "without noise it is as quick as before"
     assert cost.seconds([other]) == pytest.approx(16 * 84.0 / 12), "static caches are new, the policy is not"
     assert cost.seconds([]) == 0.0
@@ -67,7 +67,7 @@ def test_readings_and_walking_objects_are_kinds_of_their_own():
     worlds = tiny_study(
         axes=(Axis(name="walk_probability", values=(0.0, 0.001, 0.051)),), reference=None, rules=tuple(RULES_NAMES)
     )
-    kinds = {cell: kind_of(worlds.specs_of(cell)[0]) for cell in worlds.cells if cell.policy == "random"}
+    kinds = {place: kind_of(worlds.specs_of(place)[0]) for place in worlds.places if place.policy == "random"}
     assert len(set(kinds.values())) == 4, "two readings, with objects that stay and objects that walk"
     assert all(
         (kinds[a] == kinds[b]) == (a.reading == b.reading and bool(a.values[0]) == bool(b.values[0]))

@@ -5,7 +5,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from metrics.scoring import diff_studies
+from metrics.scoring import diff
 from swarm_forage_env.studies.study_file import load_study
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
 from swarm_forage_env.studies.study_table import StudyTable, gather_study, read_study
@@ -30,7 +30,7 @@ def test_controllers_do_what_they_did(tmp_path, name, n_places):
     """Other versions of numpy change the last bits, a change of the code may, too; neither may change the science."""
     folder = StudyFolder(tmp_path)
     run_study(load_study(BLESSED / f"{name}.toml"), folder, jobs=1)
-    found = diff_studies(read_study(BLESSED / f"{name}.parquet"), gather_study(folder))
+    found = diff(read_study(BLESSED / f"{name}.parquet"), gather_study(folder))
     assert (len(found.places), found.lacking) == (n_places, ())
     significant = [shift for shift in found.shifts if shift.is_significant]
     assert not found.differs, f"see tests/support/blessed.toml: {significant}"
@@ -47,7 +47,7 @@ def changed(table, policy, column, factor):
 
 def found_in(table, policy, column, factor):
     """Rules in which a policy's column is said to differ, in shares of the rules that there are."""
-    found = diff_studies(table, changed(table, policy, column, factor))
+    found = diff(table, changed(table, policy, column, factor))
     places = {shift.words[:2] for shift in found.shifts if shift.is_significant and shift.column == column}
     assert {place[1] for place in places} <= {policy}, "no other policy is blamed"
     return len(places) / len(table.spec.rules)

@@ -26,8 +26,8 @@ def foraging_table(**settings):
         interval_s=HORIZON_S / N_INTERVALS,
     )
     rows = []
-    for number, cell in enumerate(spec.cells):
-        model = mean_field(RATES, cell.values[-1], HORIZON_S, n_points=80 * N_INTERVALS + 1)
+    for number, place in enumerate(spec.places):
+        model = mean_field(RATES, place.values[-1], HORIZON_S, n_points=80 * N_INTERVALS + 1)
         carrying = model.carrying + model.avoiding_carrying
         for seed in spec.seeds:
             for interval in range(N_INTERVALS):
@@ -38,6 +38,6 @@ def foraging_table(**settings):
                     {"cell": number, "seed": seed, "run_id": f"{number}_{seed}", "state": "done", "interval": interval}
                     | {"performance": delivered, "collected": delivered, "free_pickups": picked}
                     | {"n_carrying": carrying[span].mean(), "interference_fraction": model.interference[span].mean()}
-                    | {"n_active": float(cell.values[-1])}
+                    | {"n_active": float(place.values[-1])}
                 )
     return StudyTable(spec=spec, frame=pl.DataFrame(rows, infer_schema_length=None), versions=())

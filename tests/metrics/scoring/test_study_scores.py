@@ -204,7 +204,7 @@ def test_what_follows_from_rates_alone_has_no_number_of_runs():
     reference = rows(9, IDEAL, criterion="none", criterion_value=0.0)
     level = rows(9, IDEAL, criterion="population_dynamics", criterion_value=1.0, deaths_per_s=0.1)
     (score,) = scored(reference, level, measures=["availability"])
-    assert dict(zip(HEADER, score.places(), strict=True))["runs"] == "-"
+    assert dict(zip(HEADER, score.cells(), strict=True))["runs"] == "-"
 
 
 def test_availability_is_told_once_per_ratio_of_rates():
@@ -239,7 +239,7 @@ def test_lost_runs_are_counted_and_noted():
     assert tuple(score.per_seed) == (0, 2)
     assert (score.n_lost, score.is_partial) == (1, True)
     assert score.note.startswith("1 of 3 runs failed")
-    assert dict(zip(HEADER, score.places(), strict=True))["runs"] == "2 of 3"
+    assert dict(zip(HEADER, score.cells(), strict=True))["runs"] == "2 of 3"
 
 
 def test_runs_without_a_partner_are_counted_where_nobody_planned_them():
@@ -284,7 +284,7 @@ def test_where_performance_falls_spatial_emergence_is_marked_and_noted():
     assert falling.summary.mean == pytest.approx(2.24)
     assert (steady.is_doubtful, falling.is_doubtful) == (False, True)
     assert (steady.note, "read time_emergence beside it" in falling.note) == ("", True)
-    assert dict(zip(HEADER, falling.places(), strict=True))["value"] == "2.24 ?"
+    assert dict(zip(HEADER, falling.cells(), strict=True))["value"] == "2.24 ?"
     assert falling.to_mapping()["doubtful"] is True
     shown = str(ScoreTable(policy="mine", scenario="", scores=(steady, falling)))
     assert "spatial_emergence, N = 2 to 4: performance is lower than that of the next smaller swarm" in shown
@@ -310,10 +310,10 @@ def test_robot_time_and_the_parts_of_task_emergence_are_scored_beside_it():
     )
     assert not any(score.is_doubtful for score in found)
     # Over the 1.6 objects of the larger swarm; in brackets over the 16 of four robots as good as each of the two.
-    places = {
-        score.measure: dict(zip(HEADER, score.places(), strict=True))["relative"] for score in found if score.x == 4
+    cells = {
+        score.measure: dict(zip(HEADER, score.cells(), strict=True))["relative"] for score in found if score.x == 4
     }
-    assert places == {
+    assert cells == {
         "time_emergence": "",
         "task_emergence": "-900 % (-90 % per robot)",
         "interference_gain": "-300 % (-30 % per robot)",

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from swarm_forage_env.cli.study_page import command_of, version_names
+from metrics.scoring.study_report import command_of, version_names
 from swarm_forage_env.studies.study_file import load_study
 from swarm_forage_env.studies.study_folder import StudyFolder
 from tests.support.made_tables import made_study, made_table
