@@ -23,10 +23,9 @@ def list_studies(
     budget: Annotated[str, typer.Option("--budget", help="smoke, reduced or paper.")] = "paper",
 ) -> None:
     """List the experiment sets of the paper: what they take, and what a budget leaves out."""
-    from swarm_forage_env.cli.terminal import show_boxed
     from swarm_forage_env.studies.description import paper_sets
 
-    show_boxed(paper_sets(budget))
+    typer.echo(paper_sets(budget))
 
 
 def show(name: Name, budget: Budget = None, seeds: Seeds = None, rules: Rules = "file") -> None:

@@ -54,30 +54,28 @@ def progress_bar(text: str, total: float | None = None) -> Iterator[Advance]:
 
 
 def show_boxed(answer: "Answer") -> None:
-    """Print the tables of an answer on stdout in frames, which wrap what is too long for the terminal."""
+    """Print the tables of an answer on stdout in frames, in which long texts are wrapped."""
     console = output()
     for sheet in answer.sheets():
         console.print(_boxed(sheet) if sheet.rows else sheet.text(), soft_wrap=not sheet.rows)
 
 
 def _boxed(sheet: "Sheet") -> "Table":
-    """A table in a frame: numbers to the right, a line above the row of all together."""
+    """A table in a frame: numbers to the right."""
     from rich.table import Table
 
     table = Table(title=sheet.title or None, caption="\n".join(sheet.notes) or None, title_justify="left")
     for name, *column in zip(sheet.header, *sheet.rows, strict=True):
         table.add_column(name, justify="right" if _are_numbers(column) else "left")
-    for number, row in enumerate(sheet.rows, 1):
-        if number == len(sheet.rows) and row[0] == "all":
-            table.add_section()
+    for row in sheet.rows:
         table.add_row(*row)
     return table
 
 
 def _are_numbers(column: Sequence[str]) -> bool:
     """Whether texts are numbers and shares, apart from gaps."""
-    given = [text.removesuffix(" %").replace(",", "") for text in column if text not in ("", "-")]
+    given = [text.removesuffix(" %").replace(",", "") for text in column if text]
     try:
-        return bool([float(text) for text in given])
+        return bool([float(text) for text in given if text != "-"] or given)
     except ValueError:
         return False

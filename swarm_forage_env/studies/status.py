@@ -13,7 +13,7 @@ from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE, FAILED, MISSING, STATES
 from swarm_forage_env.studies.study import StudySpec
 from swarm_forage_env.studies.study_folder import StudyFolder, shard
-from swarm_forage_env.studies.study_table import StudyTable
+from swarm_forage_env.studies.study_table import LOSS_COLUMNS, StudyTable
 
 FAILURES_SHOWN = 10
 """Failed runs that are named; the packed file and `to_mapping` have all."""
@@ -67,8 +67,9 @@ class StudyStatus(Answer):
         }
 
     def _failures(self) -> list[dict[str, Any]]:
-        lost = self.table.frame.filter(self.table.frame["state"] == FAILED).rename({"reading": "rules"})
-        return lost.select("run_id", "rules", "policy", "seed", "error", "traceback", "rerun").to_dicts()
+        lost = self.table.frame.filter(self.table.frame["state"] == FAILED)
+        keys = {"run_id": "run_id", "rules": "reading"} | {name: name for name in ("policy", "seed", *LOSS_COLUMNS[1:])}
+        return [{key: row[name] for key, name in keys.items()} for row in lost.iter_rows(named=True)]
 
 
 def status(table: StudyTable) -> StudyStatus:

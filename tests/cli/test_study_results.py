@@ -162,7 +162,7 @@ def test_a_report_on_a_study_of_ones_own_has_no_claims(ran):
 
 def test_what_a_report_refuses(ran, monkeypatch):
     for words, message in (
-        (("done", "--out", "report.htm"), "ending in .html, got 'report.htm'"),
+        (("done", "--out", "report.htm"), "ending in .html, .md, .txt, .csv, .json, got 'report.htm'"),
         (("done", "done"), "Expected each study once, got S1a, S1a"),
         (("done", "--band", "cd"), "band 'cd'"),
     ):

@@ -62,7 +62,7 @@ def test_three_sizes_of_every_kind_are_measured(monkeypatch):
     assert len(told) == 12
 
 
-def test_readings_and_walking_objects_are_kinds_of_their_own():
+def test_rules_and_walking_objects_are_kinds_of_their_own():
     """The authors' program and objects that walk are other code in every tick."""
     worlds = tiny_study(
         axes=(Axis(name="walk_probability", values=(0.0, 0.001, 0.051)),), reference=None, rules=tuple(RULES_NAMES)
