@@ -54,6 +54,7 @@ FORMS = {
     "sierra": "The same, measured as in the authors' program",
 }
 """Variant of a measure -> the words above its picture."""
+NO_REPORT = f"No report without matplotlib and Jinja2: {install_command('plots')}."
 COST_HEADER = (
     "study",
     "budget",
@@ -80,7 +81,10 @@ class StudyReport(Answer):
         Raises:
             ImportError: Jinja2 is not installed.
         """
-        return build_report(self.page)
+        try:
+            return build_report(self.page)
+        except ImportError as error:
+            raise ImportError(NO_REPORT) from error
 
     def write(self, file: str | Path) -> None:
         """Write it in the form that the ending of the file names, `.html` among them; errors as in `Answer.write`."""
@@ -161,7 +165,7 @@ def report(*tables: "StudyTable", band: Band = "ci", tell: Callable[[str], None]
     try:
         return StudyReport(verdict=found, page=page_of(tables, scored, found, band, tell))
     except ImportError as error:
-        raise ImportError(f"No report without matplotlib and Jinja2: {install_command('plots')}.") from error
+        raise ImportError(NO_REPORT) from error
 
 
 def page_of(

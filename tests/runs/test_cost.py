@@ -68,9 +68,9 @@ def test_rules_and_walking_objects_are_kinds_of_their_own():
         axes=(Axis(name="walk_probability", values=(0.0, 0.001, 0.051)),), reference=None, rules=tuple(RULES_NAMES)
     )
     kinds = {place: kind_of(worlds.specs_of(place)[0]) for place in worlds.places if place.policy == "random"}
-    assert len(set(kinds.values())) == 4, "two readings, with objects that stay and objects that walk"
+    assert len(set(kinds.values())) == 4, "two sets of rules, with objects that stay and objects that walk"
     assert all(
-        (kinds[a] == kinds[b]) == (a.reading == b.reading and bool(a.values[0]) == bool(b.values[0]))
+        (kinds[a] == kinds[b]) == (a.rules == b.rules and bool(a.values[0]) == bool(b.values[0]))
         for a in kinds
         for b in kinds
     )
