@@ -50,7 +50,7 @@ def test_worlds_may_be_disturbed_and_performance_another(command):
     disturbed = ("--wrapper", "sensor_noise:sigma=0.01,groups=proximity", "--performance", "n_carrying")
     code, out, _ = command(*ABLATE, *words, *disturbed)
     assert code == 0
-    assert "**Both readings: robots carrying" in out
+    assert "**Both rules: robots carrying" in out
     assert "per 1,000 s" not in out
     assert "| `obstacle_behind_counts` |" in out
 
