@@ -94,11 +94,12 @@ def run(  # long: one parameter per option
 
 def status(place: Place, as_json: AsJson = False) -> None:
     """Show which runs of each condition are done, missing or failed; exit code 1 unless all are done."""
+    from swarm_forage_env.cli.printer import show as print_answer
     from swarm_forage_env.studies.status import status as status_of
     from swarm_forage_env.studies.study_table import read_study
 
     found = status_of(read_study(place))
-    typer.echo(found.json() if as_json else found)
+    print_answer(found, as_json=as_json)
     if not found.is_complete:
         raise typer.Exit(EXIT_FAILURE)
 

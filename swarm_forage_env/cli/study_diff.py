@@ -25,10 +25,11 @@ def diff(
     """
     from metrics import diff as diff_of
     from metrics.scoring.study_diff import COLUMNS
+    from swarm_forage_env.cli.printer import show
     from swarm_forage_env.studies.study_table import read_study
 
     names = COLUMNS if columns is None else tuple(name.strip() for name in columns.split(","))
     found = diff_of(read_study(first), read_study(second), names)
-    typer.echo(found.json() if as_json else found)
+    show(found, as_json=as_json)
     if found.differs:
         raise typer.Exit(EXIT_FAILURE)
