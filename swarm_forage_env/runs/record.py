@@ -91,9 +91,9 @@ class RunRecord:
 
     def __post_init__(self) -> None:
         n_intervals = len(self.interval)
-        for name, dtype in _COLUMN_DTYPES.items():
+        for name, dtype in COLUMN_DTYPES.items():
             object.__setattr__(self, name, _checked(name, getattr(self, name), dtype, n_intervals))
-        taken = sorted(set(self.contributed) & (set(_COLUMN_DTYPES) | set(_KEY_DTYPES)))
+        taken = sorted(set(self.contributed) & (set(COLUMN_DTYPES) | set(_KEY_DTYPES)))
         if taken:
             raise RecordError(f"Expected contributed columns with names of their own, got {', '.join(taken)}.")
         contributed = {
@@ -128,12 +128,12 @@ class RunRecord:
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return all (T,) columns by name, contributed ones last."""
-        return {name: getattr(self, name) for name in _COLUMN_DTYPES} | dict(self.contributed)
+        return {name: getattr(self, name) for name in COLUMN_DTYPES} | dict(self.contributed)
 
     @classmethod
     def column_names(cls) -> tuple[str, ...]:
         """Return the names of the columns that every record has, keys first, in their order."""
-        return (*_KEY_DTYPES, *_COLUMN_DTYPES)
+        return (*_KEY_DTYPES, *COLUMN_DTYPES)
 
     def rate_per_1000_s(self, column: str) -> float:
         """Return the sum of a column over the run, per 1,000 simulated seconds."""
@@ -246,12 +246,13 @@ _DTYPES: dict[Any, type] = {
 }
 _HINTS = get_type_hints(RunRecord)
 _KEY_DTYPES = {name: _DTYPES[_HINTS[name]] for name in KEY_COLUMNS}
-_COLUMN_DTYPES = {name: _DTYPES[_HINTS[name]] for name in INTERVAL_COLUMNS}
+COLUMN_DTYPES = {name: _DTYPES[_HINTS[name]] for name in INTERVAL_COLUMNS}
+"""Column of an interval -> type of its numbers."""
 
 
 def record_columns() -> Sheet:
     """Return the schema as a table: name, type, unit, meaning; contributed columns last."""
-    dtypes = _KEY_DTYPES | _COLUMN_DTYPES
+    dtypes = _KEY_DTYPES | COLUMN_DTYPES
     rows = [
         (name, dtypes[name].__name__, column.unit or "-", column.meaning)
         if name in dtypes
@@ -321,11 +322,11 @@ def _check_stamp(name: str, stamp: Mapping[str, str]) -> None:
 
 
 def _from_frame(frame: "pl.DataFrame", spec: str, provenance: dict[str, str]) -> RunRecord:
-    missing = [name for name in (*_KEY_DTYPES, *_COLUMN_DTYPES) if name not in frame.columns]
+    missing = [name for name in (*_KEY_DTYPES, *COLUMN_DTYPES) if name not in frame.columns]
     if missing:
         raise RecordError(f"it has no column {missing[0]}")
     first = frame.row(0, named=True)
     values: dict[str, Any] = {name: dtype(first[name]) for name, dtype in _KEY_DTYPES.items()}
-    values |= {name: frame[name].to_numpy() for name in _COLUMN_DTYPES}
+    values |= {name: frame[name].to_numpy() for name in COLUMN_DTYPES}
     contributed = {name: frame[name].to_numpy() for name in frame.columns if name not in values}
     return RunRecord(**values, contributed=contributed, spec=spec, provenance=provenance)

@@ -18,8 +18,8 @@ from swarm_forage_env.scenarios.config import whole_intervals
 from swarm_forage_env.scenarios.presets import scenario
 from swarm_forage_env.wrappers.world import World
 
-COUNTS = [name for name, dtype in recording._COLUMN_DTYPES.items() if dtype is np.int64]
-MEANS = [name for name, dtype in recording._COLUMN_DTYPES.items() if dtype is np.float64]
+COUNTS = [name for name, dtype in recording.COLUMN_DTYPES.items() if dtype is np.int64]
+MEANS = [name for name, dtype in recording.COLUMN_DTYPES.items() if dtype is np.float64]
 
 
 @pytest.fixture
@@ -254,7 +254,7 @@ def test_describe_names_the_run_and_its_numbers(record):
 
 def test_the_table_of_columns_lists_every_column_once(record):
     names = [line.split()[0] for line in record_columns().text().splitlines()[2:]]
-    assert names[: len(record.keys()) + len(recording._COLUMN_DTYPES)] == [*record.keys(), *recording._COLUMN_DTYPES]
+    assert names[: len(record.keys()) + len(recording.COLUMN_DTYPES)] == [*record.keys(), *recording.COLUMN_DTYPES]
     assert len(set(names)) == len(names)
 
 

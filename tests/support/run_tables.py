@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from swarm_forage_env.runs.record import _COLUMN_DTYPES, RunRecord
+from swarm_forage_env.runs.record import COLUMN_DTYPES, RunRecord
 from swarm_forage_env.runs.store import RunFailure
 from swarm_forage_env.runs.table import Table
 
@@ -11,7 +11,7 @@ def made_record(spec, total):
     """A record of a run whose performance, summed over its intervals, is `total`; all other columns are 0."""
     scenario = spec.scenario
     n_intervals = round(scenario.horizon_s / scenario.interval_s)
-    columns = {name: np.zeros(n_intervals, dtype) for name, dtype in _COLUMN_DTYPES.items()}
+    columns = {name: np.zeros(n_intervals, dtype) for name, dtype in COLUMN_DTYPES.items()}
     columns["interval"] = np.arange(n_intervals)
     columns["t_end_s"] = scenario.interval_s * np.arange(1.0, n_intervals + 1.0)
     columns["performance"] = np.full(n_intervals, total / n_intervals)
