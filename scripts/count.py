@@ -3,10 +3,10 @@
     scripts/count                     this checkout
     scripts/count ../before .         two checkouts side by side, then each folder by folder
 
-Python source is what lies in the packages and in scripts/, without tests. A line of code is one that is not blank and
-holds more than a comment or a docstring. An arrow is an import, wherever in a file it stands: from one file to another,
-or from one folder to another, each pair counted once. Only commands and options need the package to be imported, by
-this interpreter: where that fails they are a dash.
+Python source is what lies in the packages, with stubs, and in scripts/, without tests. A line of code is one that is
+not blank and holds more than a comment or a docstring. An arrow is an import, wherever in a file it stands: from one
+file to another, or from one folder to another, each pair counted once. Only commands and options, without hidden ones,
+need the package to be imported, by this interpreter: where that fails they are a dash.
 """
 
 import argparse
@@ -29,7 +29,8 @@ LONG, SHORT = (500, 300), (100, 50)
 COMMANDS = """
 def walk(command):
     for each in getattr(command, "commands", {}).values():
-        yield from walk(each) if hasattr(each, "commands") else [each]
+        if not each.hidden:
+            yield from walk(each) if hasattr(each, "commands") else [each]
 try:
     from swarm_forage_env.cli.commands import COMMANDS
 except ImportError:  # an earlier checkout
@@ -39,11 +40,12 @@ except ImportError:  # an earlier checkout
 else:
     from swarm_forage_env.cli.app import loaded
     commands = [loaded(each) for group in COMMANDS.values() for each in group if each.place]
-words = [option.opts[0] for command in commands for option in command.params]
+shown = [one for command in commands for one in command.params if not getattr(one, "hidden", False)]
+words = [option.opts[0] for option in shown]
 options = [word for word in words if word.startswith("-") and word != "--help"]
 print(len(commands), len(words), len(options), len(set(options)))
 """
-"""Prints how many commands, parameters, options and distinct names of options there are."""
+"""Prints how many commands, parameters, options and distinct names of options --help shows."""
 NO_CODE = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
 
 
@@ -177,7 +179,9 @@ class House:
 
 
 def _python_files(root: Path, folders: tuple[str, ...] | list[str]) -> list[Path]:
-    return [path for folder in folders for path in sorted((root / folder).rglob("*.py"))]
+    return [
+        path for folder in folders for path in sorted((root / folder).rglob("*.py*")) if path.suffix in (".py", ".pyi")
+    ]
 
 
 def totals(house: House) -> Mapping[str, str]:
