@@ -65,7 +65,7 @@ class Switch(NamedTuple):
     n_robots: int
     policy: str
     rules: str
-    """Key of `scenarios.quirks.RULES`."""
+    """Key of `swarm_forage_env.scenarios.quirks.RULES`."""
     quirk: str
     """The quirk that differs from the rules; empty = none."""
 
@@ -250,7 +250,7 @@ class AblationQuestion(Question[Ablation]):
         jobs: int | None = None,
         progress: bool = False,
     ) -> Table:
-        """Make the runs; arguments and errors as in `runs.runner.run_plan`.
+        """Make the runs; arguments and errors as in `swarm_forage_env.runs.runner.run_plan`.
 
         First both rules and the first seed of each quirk; then the other seeds of the quirks that changed something.
         """

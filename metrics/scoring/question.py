@@ -41,7 +41,7 @@ class Question(ABC, Generic[Found]):
         jobs: int | None = None,
         progress: bool = False,
     ) -> Table:
-        """Make the runs that the answer needs; arguments and errors as in `runs.runner.run_plan`."""
+        """Make the runs that the answer needs; arguments and errors as in `swarm_forage_env.runs.runner.run_plan`."""
         return run_plan(self.plan, store=store, executor=executor, jobs=jobs, progress=progress)
 
     @abstractmethod
