@@ -47,7 +47,6 @@ COMMANDS: dict[str, tuple[Command, ...]] = {
         Command("study pack", "Put all runs of a study into one file.", "study:pack"),
         Command("study verdict", "Hold the claims of the paper against runs.", "study_verdict:verdict"),
         Command("study plot", "Draw the figures of a study.", "study_plot:plot"),
-        Command("study maps", "Draw where things happened in some conditions.", "study_maps:maps"),
         Command("study report", "Write one page about studies.", "study_report:report"),
         Command("study diff", "Say which conditions of two studies differ.", "study_diff:diff"),
         Command("ablate", "Switch one quirk of the rules at a time.", "ablate:ablate"),

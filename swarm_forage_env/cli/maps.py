@@ -1,7 +1,7 @@
 """The command `maps`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,59 +14,103 @@ if TYPE_CHECKING:
 
     from swarm_forage_env.inspect.maps import ComparedMaps
     from swarm_forage_env.runs.spec import RunSpec
+    from swarm_forage_env.studies.study_table import StudyTable
 
+PICTURE_FILE = "maps.png"
 _OF_ALL = ("policies", "named_policies", "square", "per_robot", "own_scales", "picture")
 """Options that go with a page, too."""
-
-
-OwnScales: TypeAlias = Annotated[
-    bool, typer.Option("--own-scales", help="A scale of its own for each map; default one per column, to compare rows.")
-]
+_OF_STUDIES = (*_OF_ALL, "seeds", "conditions")
+"""Options that go with a study."""
 
 
 def maps(
     context: typer.Context,
     policies: PolicyOptions,
     described: WorldOptions,
-    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs per policy.")] = 1,
+    seeds: Annotated[
+        int | None, typer.Option("--seeds", min=1, help="Runs per row; default 1, of a study at most 4.")
+    ] = None,
+    conditions: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--condition",
+            metavar="KEY=VALUE,...",
+            help="Of a study only conditions with these values, e.g. policy=dpo,population_size=16; may be repeated.",
+        ),
+    ] = None,
     square: Annotated[float, typer.Option("--square", help="Side of the squares in m.")] = 0.4,
     per_robot: Annotated[
         bool, typer.Option("--per-robot", help="Divide by the swarm size, to compare swarms of several sizes.")
     ] = False,
-    own_scales: OwnScales = False,
+    own_scales: Annotated[
+        bool,
+        typer.Option("--own-scales", help="A scale of its own for each map; default one per column, to compare rows."),
+    ] = False,
     picture: Picture = None,
 ) -> None:
     """Draw where robots were, took and left objects, and got in each other's way.
 
-    Runs of policies are made for it. In their place you can name a page that 'swarm-forage replay' has written. One
-    row per policy or run of the page; then, for each after the first, what is more in it than in the first. The arrays
-    go to .npz files beside the picture.
+    Of policies in a scenario; or of a page that 'swarm-forage replay' has written; or of a study, its folder or packed
+    file. One row per policy, run of the page or condition of the study; then, for each after the first, what is more in
+    it than in the first. The arrays go to .npz files beside the picture. Stored runs hold no positions, so those of a
+    study are made again.
     """
-    from swarm_forage_env.inspect.maps import maps_of_page
-    from swarm_forage_env.rendering.figures import check_picture
-
     words = policies.names()
-    if Path(words[0]).suffix in (".html", ".parquet"):
+    place = Path(words[0])
+    if place.suffix == ".html":
         refuse_others(context, "a page", _OF_ALL, "which describe runs; leave them out, or name a policy")
-        page = Path(policies.one())
-        file = picture or page.with_suffix(".maps.png")
-        found = maps_of_page(page, side_m=square)
-        check_picture(file)
+        found, file = _of_page(Path(policies.one()), square), picture or place.with_suffix(".maps.png")
+        _check(file)
+    elif place.suffix == ".parquet" or place.is_dir():
+        refuse_others(context, "a study", _OF_STUDIES, "which describe other runs; leave them out, or name a policy")
+        study = _study(Path(policies.one()))
+        file = picture or Path("results", "maps", study.spec.name, PICTURE_FILE)
+        _check(file)
+        found = _of_study(study, conditions or (), seeds, square)
     else:
-        specs = _planned(words, described, seeds)
-        file = picture or Path("results", "maps", specs[0].scenario.name, "maps.png")
-        check_picture(file)
-        found = _made(specs, square)
-    write_maps(found.per_robot() if per_robot else found, file, own_scales=own_scales)
+        specs = _planned(words, described, seeds or 1)
+        file = picture or Path("results", "maps", specs[0].scenario.name, PICTURE_FILE)
+        _check(file)
+        found = _of_runs(specs, square)
+    try:
+        (found.per_robot() if per_robot else found).write(file, own_scales=own_scales)
+    except ImportError as error:
+        notes().print(str(error))
     typer.echo(f"wrote maps to {file} and .npz files beside it")
 
 
-def write_maps(found: "ComparedMaps", picture: Path, *, own_scales: bool) -> None:
-    """Write arrays and picture; without matplotlib, say so."""
-    try:
-        found.write(picture, own_scales=own_scales)
-    except ImportError as error:
-        notes().print(str(error))
+def _check(picture: Path) -> None:
+    from swarm_forage_env.rendering.figures import check_picture
+
+    check_picture(picture)
+
+
+def _of_page(page: Path, square: float) -> "ComparedMaps":
+    from swarm_forage_env.inspect.maps import maps_of_page
+
+    return maps_of_page(page, side_m=square)
+
+
+def _study(place: Path) -> "StudyTable":
+    from swarm_forage_env.studies.study_table import read_study
+
+    return read_study(place)
+
+
+def _of_study(table: "StudyTable", conditions: "Sequence[str]", seeds: int | None, square: float) -> "ComparedMaps":
+    """Make runs of a study again, and tell which came out different."""
+    from swarm_forage_env.inspect.maps import ComparedMaps
+    from swarm_forage_env.inspect.study_maps import choose_places, maps_of_places, robot_ticks
+
+    chosen = choose_places(table.spec, conditions)
+    with progress_bar("making the runs again", robot_ticks(table.spec, chosen, seeds)) as advance:
+        found, changed = maps_of_places(table, chosen, n_seeds=seeds, side_m=square, advance=advance)
+    if changed:
+        notes().print(
+            f"Runs that come out different from their records, which other versions made: {', '.join(changed)}; "
+            "the maps show them as they are now."
+        )
+    return ComparedMaps(maps=tuple(found))
 
 
 def _planned(words: "Sequence[str]", described: WorldOptions, seeds: int) -> "Sequence[RunSpec]":
@@ -75,7 +119,7 @@ def _planned(words: "Sequence[str]", described: WorldOptions, seeds: int) -> "Se
     return plan_runs(described, words, n_seeds=seeds, first_seed=0)
 
 
-def _made(specs: "Sequence[RunSpec]", square: float) -> "ComparedMaps":
+def _of_runs(specs: "Sequence[RunSpec]", square: float) -> "ComparedMaps":
     """Make the runs, and show how far they are."""
     from swarm_forage_env.inspect.maps import maps_of_runs
 

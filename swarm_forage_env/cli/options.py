@@ -81,7 +81,7 @@ Forms = Annotated[
     ),
 ]
 Band = Annotated[
-    bool, typer.Option("--band", help="Add the paper's bands, mean ± 2 standard deviations of single runs.")
+    bool, typer.Option("--band", help="Show the paper's bands, mean ± 2 standard deviations of single runs.")
 ]
 Budget = Annotated[str, typer.Option("--budget", help="quick, standard or paper: how long, how many runs and levels.")]
 ScoreSeeds = Annotated[int | None, typer.Option("--seeds", min=1, help="Runs per experiment; default the budget's.")]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, complain
+from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, Jobs, complain
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
 if TYPE_CHECKING:
@@ -20,20 +20,26 @@ Rules = Annotated[str, typer.Option("--rules", help="described, program (the aut
 
 
 def list_studies(
-    budget: Annotated[str, typer.Option("--budget", help="smoke, reduced or paper.")] = "paper",
+    budget: Annotated[str, typer.Option("--budget", help="smoke, reduced or paper.")] = "paper", as_json: AsJson = False
 ) -> None:
     """List the experiment sets of the paper: what they take, and what a budget leaves out."""
+    from swarm_forage_env.cli.printer import show as print_answer
     from swarm_forage_env.studies.description import paper_sets
 
-    typer.echo(paper_sets(budget))
+    print_answer(paper_sets(budget), as_json=as_json)
 
 
-def show(name: Name, budget: Budget = None, seeds: Seeds = None, rules: Rules = "file") -> None:
+def show(
+    name: Name, budget: Budget = None, seeds: Seeds = None, rules: Rules = "file", as_json: AsJson = False
+) -> None:
     """Show what a study varies, and how many runs each of its budgets makes."""
+    from swarm_forage_env.cli.printer import show as print_answer
     from swarm_forage_env.studies.description import describe
     from swarm_forage_env.studies.study_file import budget_names
 
-    typer.echo(describe(_chosen(name, budget, seeds, rules)))
+    print_answer(describe(_chosen(name, budget, seeds, rules)), as_json=as_json)
+    if as_json:
+        return
     others = [other for other in budget_names(name) if other != budget]
     typer.echo(f"\nBudgets: {', '.join(budget_names(name))}" + ("" if budget or len(others) < 2 else "; see --budget"))
 
@@ -45,18 +51,13 @@ def run(  # long: one parameter per option
     seeds: Seeds = None,
     rules: Rules = "file",
     shard: Annotated[str, typer.Option("--shard", metavar="I/N", help="Only the I-th of N equal parts.")] = "1/1",
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers",
-            min=1,
-            help="Processes, or jobs of slurm-jobs; default one per core that it may use; 1 = in this process.",
-        ),
-    ] = None,
+    jobs: Jobs = None,
     cluster: Annotated[
         str | None,
         typer.Option(
-            "--cluster", help="Run by Dask: local, slurm, slurm-jobs, or the address of a scheduler (docs/studies.md)."
+            "--cluster",
+            help="Run by Dask: local, slurm, slurm-jobs (--jobs of them), or the address of a scheduler "
+            "(docs/studies.md).",
         ),
     ] = None,
     dry_run: DryRun = False,
@@ -76,11 +77,11 @@ def run(  # long: one parameter per option
     part = parse_shard(shard)
     folder = StudyFolder(out or Path("results", "studies", f"{spec.name}_{spec.budget}"))
     if dry_run:
-        typer.echo(work_left(spec, folder, part=part, workers=workers or available_cores(), tell=notes().print))
+        typer.echo(work_left(spec, folder, part=part, workers=jobs or available_cores(), tell=notes().print))
         return
     try:
-        with nullcontext() if cluster is None else cluster_executor(cluster, workers) as executor:
-            state = run_study(spec, folder, part=part, jobs=workers, executor=executor, progress=True)
+        with nullcontext() if cluster is None else cluster_executor(cluster, jobs) as executor:
+            state = run_study(spec, folder, part=part, jobs=jobs, executor=executor, progress=True)
     except KeyboardInterrupt:
         words = f"Interrupted. Finished runs are kept in {folder.folder}; the same command does the rest."
         raise typer.Exit(complain(words, EXIT_INTERRUPTED)) from None
@@ -106,18 +107,18 @@ def status(place: Place, as_json: AsJson = False) -> None:
 
 def pack(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a study.")],
-    out: Annotated[Path | None, typer.Option("--out", help="File; default DIR/NAME.parquet.")] = None,
+    file: Annotated[Path | None, typer.Option("--file", help="Packed study; default DIR/NAME.parquet.")] = None,
 ) -> None:
     """Put all runs of a study into one file, which holds everything that is known of them."""
-    typer.echo(f"packed into {_pack(folder, out)}")
+    typer.echo(f"packed into {_pack(folder, file)}")
 
 
-def _pack(folder: Path, out: Path | None) -> Path:
+def _pack(folder: Path, chosen: Path | None) -> Path:
     from swarm_forage_env.studies.study_folder import StudyFolder
     from swarm_forage_env.studies.study_table import gather_study
 
     table = gather_study(StudyFolder(folder))
-    file = out or folder / f"{table.spec.name}.parquet"
+    file = chosen or folder / f"{table.spec.name}.parquet"
     file.parent.mkdir(parents=True, exist_ok=True)
     table.write(file)
     return file

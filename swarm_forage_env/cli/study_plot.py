@@ -5,15 +5,13 @@ from typing import Annotated
 
 import typer
 
-from swarm_forage_env.cli.options import Variants
+from swarm_forage_env.cli.options import Band, Variants
 
 
 def plot(
     place: Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Folder of a study, or its packed file.")],
     out: Annotated[Path | None, typer.Option("--out", help="Folder; default results/figures/NAME.")] = None,
-    band: Annotated[
-        str, typer.Option("--band", help="ci: 95 % interval of the mean; sd: mean ± 2 standard deviations of runs.")
-    ] = "ci",
+    band: Band = False,
     variants: Variants = "corrected",
     formats: Annotated[str, typer.Option("--format", help="svg, png, pdf; separated by commas.")] = "svg,png",
     width: Annotated[
@@ -31,18 +29,17 @@ def plot(
     policy is better how often.
     """
     from metrics import plot as plot_study
-    from metrics.scoring.study_plots import checked_band
     from swarm_forage_env.cli.scenario_options import split_names
     from swarm_forage_env.cli.score_options import score_forms
     from swarm_forage_env.rendering.figures import FigureStyle
     from swarm_forage_env.studies.study_table import read_study
 
-    drawn, forms = checked_band(band), score_forms(variants, "marginal")
+    forms = score_forms(variants, "marginal")
     table = read_study(place)
     plotted = plot_study(
         table,
         out or Path("results", "figures", table.spec.name),
-        band=drawn,
+        band="sd" if band else "ci",
         variants=forms.variants,
         formats=split_names(formats),
         style=FigureStyle(width_in=width, font_size=font_size, title=title),

@@ -186,7 +186,7 @@ def maps_of_page(page: str | Path, *, side_m: float = 2 * CELL_M) -> ComparedMap
     if file.suffix == ".parquet":
         raise ReplayError(
             f"Expected a page that 'swarm-forage replay' has written, got {file}; records of runs hold no positions. "
-            f"'swarm-forage replay {file}' makes the page of a run, and 'swarm-forage study maps' the maps of a study."
+            f"'swarm-forage replay {file}' makes the page of a run, and 'swarm-forage maps' takes studies, too."
         )
     return ComparedMaps(maps=tuple(floor_maps(replay, side_m=side_m) for replay in read_replays(file)))
 

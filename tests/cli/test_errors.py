@@ -61,8 +61,7 @@ def test_the_debug_variable_shows_the_traceback(command, monkeypatch):
             ("run", "--horizon", "long"),
             "Expected --horizon to be a number, got 'long'. It is: Simulated seconds",
         ),
-        (("study", "run", "S1a", "--jobs", "2"), "No such option: --jobs; for this command it is --workers."),
-        (("compare", "--workers", "2"), "No such option: --workers; for this command it is --jobs."),
+        (("study", "run", "S1a", "--workers", "2"), "No such option: --workers; for this command it is --jobs."),
         (("list", "--jobs", "2"), "No such option: --jobs"),
     ],
 )

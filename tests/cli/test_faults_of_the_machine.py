@@ -30,7 +30,7 @@ FILMED = ("--policy", "random", "--robots", "3")
         ("score", "--policy", "random", "--budget", "quick", "--jobs", "1"),
         ("compare", "--policy", "random,crw", "--budget", "quick", "--jobs", "1"),
         ("ablate", "--policy", "random", "--seeds", "2", "--jobs", "1"),
-        ("study", "run", "S1a", "--budget", "smoke", "--workers", "1"),
+        ("study", "run", "S1a", "--budget", "smoke", "--jobs", "1"),
         ("record", *FILMED),
         ("replay", "random", "--robots", "3"),
         pytest.param(("train", "--robots", "3", "--steps", "1", "--arenas", "1"), marks=needs_training),
@@ -59,7 +59,7 @@ def test_a_folder_in_the_place_of_the_file_is_told_before_anything_is_run(comman
     [
         (*RUN, "--out", "taken"),
         ("score", "--policy", "random", "--budget", "quick", "--jobs", "1", "--out", "taken"),
-        ("study", "run", "S1a", "--budget", "smoke", "--workers", "1", "--out", "taken"),
+        ("study", "run", "S1a", "--budget", "smoke", "--jobs", "1", "--out", "taken"),
     ],
     ids=lambda words: words[0],
 )

@@ -83,7 +83,7 @@ def test_an_option_takes_a_value_in_all_commands_or_in_none():
         for option in command.params:
             for word in option.opts:
                 found.setdefault(word, set()).add(bool(getattr(option, "is_flag", False)))
-    assert [word for word, flags in found.items() if len(flags) > 1 and word not in ("--json", "--band")] == []
+    assert [word for word, flags in found.items() if len(flags) > 1] == []
 
 
 @pytest.mark.parametrize("word", OPTIONS)

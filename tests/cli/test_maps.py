@@ -53,7 +53,7 @@ def test_maps_refuses_other_files(command):
         ("page.html", "Cannot read page.html: it is no replay page"),
         ("bytes.html", "Cannot read bytes.html: it is no text, so no replay page."),
         ("gone.html", "Cannot read gone.html: No such file"),
-        ("run.parquet", "records of runs hold no positions. 'swarm-forage replay run.parquet' makes the page"),
+        ("run.parquet", "Cannot read run.parquet: it is no Parquet file or a damaged one"),
     ):
         code, out, err = command("maps", name)
         assert (code, out) == (2, "")

@@ -29,7 +29,7 @@ seeds = 2
 horizon_s = 4.0
 interval_s = 2.0
 """
-RUN = ("study", "run", "mine.toml", "--workers", "1")
+RUN = ("study", "run", "mine.toml", "--jobs", "1")
 FOLDER = Path("results/studies/mine_tiny")
 
 
@@ -90,7 +90,7 @@ def test_shards_are_not_packed_until_asked(written):
     assert out.splitlines()[0] == "mine, budget tiny: 2 of 4 runs done, 2 missing"
     assert out.splitlines()[1] == "0 of 2 conditions complete"
     assert re.search(r"^described +random +2 +1 +0 +1$", out, re.MULTILINE)
-    code, out, _ = written("study", "pack", "here", "--out", "there/packed.parquet")
+    code, out, _ = written("study", "pack", "here", "--file", "there/packed.parquet")
     assert code == 0
     assert read_study("there/packed.parquet").spec.name == "mine"
     code, out, _ = written("study", "status", "there/packed.parquet", "--json")

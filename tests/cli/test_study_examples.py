@@ -33,7 +33,7 @@ def test_a_study_file_of_the_page_runs(command, name):
     code, out, err = command("study", "show", "mine.toml")
     assert code == 0, err
     assert name in out
-    code, out, err = command("study", "run", "mine.toml", "--budget", "short", "--workers", "1", "--out", "done")
+    code, out, err = command("study", "run", "mine.toml", "--budget", "short", "--jobs", "1", "--out", "done")
     assert code == 0, err
     table = read_study(Path("done"))
     assert all(state.is_complete for state in table.place_states())
@@ -59,7 +59,7 @@ def test_a_policy_of_ones_own_runs_in_a_study_by_its_name(tmp_path):
         'name = "mine"\nscenario = "warehouse_small"\npolicies = ["crw", "my_policy"]\nrules = ["described"]\n'
         '[[axis]]\nfield = "max_speed_mps"\nvalues = [0.05, 0.1]\n' + SHORT
     )
-    words = ("-m", "swarm_forage_env.cli", "study", "run", "mine.toml", "--workers", "1", "--out", "done")
+    words = ("-m", "swarm_forage_env.cli", "study", "run", "mine.toml", "--jobs", "1", "--out", "done")
     done = subprocess.run([sys.executable, *words], cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     assert "4 of 4 runs done" in done.stdout

@@ -61,7 +61,7 @@ ABLATE = (
     f"ablate --scenario warehouse_small --robots 4,6 --policy crw,stochm --seeds 2 {SMALL} {SECONDS} --jobs 1 "
     "--quirks explore_double_start,integer_estimates,dynamic_cache_merges_all"
 )
-STUDY = "study run S1a.toml --workers 1 --out done"
+STUDY = "study run S1a.toml --jobs 1 --out done"
 PLACES = "--condition policy=crw,population_size=2 --condition policy=dpo,population_size=4"
 BENCHMARK = "benchmark --policy crw --name again --trained-in nothing --jobs 1"
 
@@ -104,19 +104,19 @@ CASES = {
     "study_show.txt": "study show S1e --budget reduced",
     "study_show_own.txt": "study show S1a.toml",
     "study_run.txt": STUDY,
-    "study_run_failing.txt": "study run failing.toml --workers 1 --out failing",
+    "study_run_failing.txt": "study run failing.toml --jobs 1 --out failing",
     "study_status.txt": "study status done",
     "study_status.json": "study status done --json",
     "study_status_lost.txt": "study status lost.parquet",
     "study_status_failing.txt": "study status failing",
     "study_status_failing.json": "study status failing --json",
-    "study_pack.txt": "study pack done --out packed/S1a.parquet",
+    "study_pack.txt": "study pack done --file packed/S1a.parquet",
     "study_verdict.txt": "study verdict done",
-    "study_verdict_made.txt": "study verdict made.parquet noise.parquet --json verdict_made.json",
-    "study_plot.txt": "study plot done --out figures --band sd --variant corrected,sierra",
-    "study_maps.txt": f"study maps done {PLACES} --out maps",
-    "study_report.txt": "study report packed.parquet --out report.html",
-    "study_report_made.txt": "study report made.parquet noise.parquet --out report_made.html",
+    "study_verdict_made.txt": "study verdict made.parquet noise.parquet --file verdict_made.json",
+    "study_plot.txt": "study plot done --out figures --band --variant corrected,sierra",
+    "maps_of_study.txt": f"maps done {PLACES} --picture maps/maps.png",
+    "study_report.txt": "study report packed.parquet --file report.html",
+    "study_report_made.txt": "study report made.parquet noise.parquet --file report_made.html",
     "study_diff_same.txt": "study diff done packed.parquet",
     "study_diff.txt": "study diff made.parquet later.parquet --columns performance",
     "study_diff.json": "study diff made.parquet later.parquet --columns performance --json",

@@ -164,7 +164,7 @@ def console(tmp_path, here, marker):
         (("list",), "numba"),
         (("run", "--policy", "random", *SHORT, "--seeds", "2", "--jobs", "2"), "matplotlib"),
         (("record", "--policy", "random", *SHORT[:4], "--seconds", "2", "--file", "film.mp4"), "imageio_ffmpeg"),
-        (("study", "run", "tiny.toml", "--cluster", "local", "--workers", "1"), "distributed"),
+        (("study", "run", "tiny.toml", "--cluster", "local", "--jobs", "1"), "distributed"),
     ],
 )
 def test_no_file_is_read_because_of_its_name(console, here, marker, words, needed):

@@ -247,7 +247,7 @@ def test_ten_kills_of_the_command_and_its_workers_change_nothing(tmp_path):
     study = load_study(tmp_path / "tiny.toml")
     straight, broken = StudyFolder(tmp_path / "straight"), StudyFolder(tmp_path / "broken")
     run_study(study, straight, jobs=1)
-    words = ("study", "run", "tiny.toml", "--workers", "2", "--out", "broken")
+    words = ("study", "run", "tiny.toml", "--jobs", "2", "--out", "broken")
     for n_before in range(N_KILLS):
         n_kept = len(broken.store.run_ids())
         started = subprocess.Popen([sys.executable, "-m", "swarm_forage_env.cli", *words], cwd=tmp_path,

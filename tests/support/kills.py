@@ -101,7 +101,7 @@ COMMANDS = {
          "--horizon", "200", "--jobs", "2", *SMALL, "--out", "out"),
         shows=str,
     ),
-    "study": Command(("study", "run", "tiny.toml", "--workers", "2", "--out", "out")),
+    "study": Command(("study", "run", "tiny.toml", "--jobs", "2", "--out", "out")),
     # One evaluation, at the end: what is killed before begins anew, and what is killed there goes on there. So weights
     # must be the same. With Ctrl-C and SIGTERM a checkpoint is kept on the way, from which arenas start anew.
     "train": Command(
