@@ -428,7 +428,7 @@ def test_the_columns_of_records_are_listed(command):
         (("run", "--density", "5%", "--set", "width_m=64"), "either density, which chooses the arena, or width_m"),
         (("run", "--caches", "foo"), "Expected caches to be one of none, static, dynamic, got 'foo'"),
         (("run", "--set", "n_robot=5"), "Unknown scenario field 'n_robot'. Did you mean 'n_robots'?"),
-        (("run", "--set", "quirks=PROGRAM"), "Unknown reading 'PROGRAM'. Did you mean 'AUTHORS_PROGRAM'?"),
+        (("run", "--set", "quirks=PROGRAM"), "Unknown rules 'PROGRAM'. Did you mean 'AUTHORS_PROGRAM'?"),
         (("run", "--set", "n_robots"), "Expected --set key=value, got 'n_robots'"),
         (("run", "--set", "n_robots=x"), "Expected n_robots to be a whole number, got 'x'"),
         (("run", "--set", "dt_s=fast"), "Expected dt_s to be a number, got 'fast'"),
