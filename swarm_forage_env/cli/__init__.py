@@ -3,6 +3,7 @@
 Signals are heard before anything is imported that takes time.
 """
 
+import atexit
 import os
 import sys
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ def main() -> None:
     """Run the command line and exit, in a process that does nothing else."""
     try:
         signals.hear()
+        atexit.register(signals.ignore)  # what is registered first is done last
         # Or processes that start would look for Python's own modules in the current folder first (SECURITY.md).
         os.environ["PYTHONSAFEPATH"] = "1"
         code = answer(sys.argv[1:])

@@ -34,8 +34,8 @@ def hear() -> None:
     """
     for number in _HEARD:
         signal.signal(number, _interrupt)
-    sys.excepthook = _silent_of_interrupts(sys.excepthook)
-    sys.unraisablehook = _silent_of_interrupts(sys.unraisablehook)
+    sys.excepthook = _silent_once_interrupted(sys.excepthook)
+    sys.unraisablehook = _silent_once_interrupted(sys.unraisablehook)
 
 
 def _interrupt(number: int, _: object = None) -> None:
@@ -55,11 +55,11 @@ def _interrupt_again(*_: object) -> None:
         _interrupt(came[-1])
 
 
-def _silent_of_interrupts(show: Callable[..., None]) -> Callable[..., None]:
-    """Return a hook of `sys` that shows all other errors."""
+def _silent_once_interrupted(show: Callable[..., None]) -> Callable[..., None]:
+    """Return a hook of `sys` that shows errors until an interrupt comes: it may leave things half made."""
 
     def hook(*told: Any) -> None:
-        if not issubclass(getattr(told[0], "exc_type", told[0]), KeyboardInterrupt):
+        if not came:
             show(*told)
 
     return hook
@@ -76,3 +76,9 @@ def end_at_once(code: int) -> None:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
     for number in _HEARD:
         signal.signal(number, lambda *_: os._exit(code))
+
+
+def ignore() -> None:
+    """Ignore signals: Python, when it ends, takes away handlers of ours, and the system would end it as interrupted."""
+    for number in _HEARD:
+        signal.signal(number, signal.SIG_IGN)

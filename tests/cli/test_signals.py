@@ -71,6 +71,22 @@ def test_what_an_interrupt_breaks_is_no_error_of_ours(monkeypatch, capsys):
     assert capsys.readouterr().err == TOLD
 
 
+class HalfMade:
+    def __del__(self):
+        raise AttributeError("something that it never had")
+
+
+def test_what_an_interrupt_leaves_half_made_goes_without_a_word(monkeypatch):
+    shown = []
+    monkeypatch.setattr(sys, "unraisablehook", shown.append)
+    with heard():
+        HalfMade()
+        with suppress(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+        HalfMade()
+    assert len(shown) == 1
+
+
 def test_whoever_keeps_something_is_left_in_peace():
     with heard():
         try:
