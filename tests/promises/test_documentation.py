@@ -10,6 +10,7 @@ import pytest
 
 from scripts import update_docs
 from scripts.update_docs import FIVE
+from swarm_forage_env.runs import workers
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("**/*.md"))]
@@ -34,7 +35,8 @@ def run_all(blocks, page):
 )
 def test_python_examples_run(page, tmp_path, monkeypatch):
     """The examples of a page run one after the other, as a user would type them, without any extra."""
-    monkeypatch.setattr("swarm_forage_env.runs.workers.available_cores", lambda: 1)  # a process takes longer to start
+    # Processes take longer to start than these runs.
+    monkeypatch.setattr(workers, "_run_in_pool", lambda todo, _: workers._run_here(todo))
     monkeypatch.chdir(tmp_path)
     run_all([block for needs, block in examples(page) if not needs], page)
 
