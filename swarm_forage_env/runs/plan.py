@@ -34,7 +34,7 @@ class Plan:
     """Runs that belong together.
 
     Raises:
-        ConfigError: no conditions or seeds, or equal seeds. `specs` refuses conditions that describe no run.
+        ConfigError: no conditions or seeds, equal seeds, or conditions that describe no run.
     """
 
     conditions: tuple[Condition, ...]

@@ -211,8 +211,7 @@ class StudySpec:
                         f"Expected only mixed swarms with a part that the axis {SHARE} sets, such as "
                         f"mixed:dpo={SHARE},crw=rest, got {policy.label}. At the share 0 or 1 they have one part."
                     )
-        for place in self.places:
-            self.specs_of(place)  # refuses what scenarios, wrappers and runs refuse
+        _ = self.plan  # refuses what scenarios, wrappers and runs refuse
 
     @cached_property
     def places(self) -> tuple[Place, ...]:
