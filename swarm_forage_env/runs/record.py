@@ -228,7 +228,7 @@ class RunRecord:
             raise RecordError(f"Cannot read {name}: it is no Parquet file or a damaged one ({error}).") from error
         version, spec, provenance, digest = (stamp[key] for key in _FILE_KEYS)
         try:
-            record = _from_frame(frame, spec, parse_json(provenance))
+            record = record_of(frame, spec, parse_json(provenance))
         except (pl.exceptions.PolarsError, LookupError, OverflowError, RecursionError, TypeError, ValueError) as error:
             raise RecordError(f"Cannot read {name}: its content does not match schema {version} ({error}).") from error
         if _digest(record, provenance) != digest:
@@ -321,7 +321,12 @@ def _check_stamp(name: str, stamp: Mapping[str, str]) -> None:
         )
 
 
-def _from_frame(frame: "pl.DataFrame", spec: str, provenance: dict[str, str]) -> RunRecord:
+def record_of(frame: "pl.DataFrame", spec: str, provenance: Mapping[str, str]) -> RunRecord:
+    """Build a record back from `RunRecord.to_frame`.
+
+    Raises:
+        RecordError: a column is missing, or holds what no record may.
+    """
     missing = [name for name in (*_KEY_DTYPES, *COLUMN_DTYPES) if name not in frame.columns]
     if missing:
         raise RecordError(f"it has no column {missing[0]}")

@@ -5,6 +5,7 @@ seeds, curves = table.curves(condition, "performance", "interference_fraction") 
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -67,8 +68,9 @@ class Table:
             {name: np.stack([one[name] for one in found]).astype(np.float64) for name in names},
         )
 
+    @cached_property
     def frame(self) -> "pl.DataFrame":
-        """Return all records below each other, one row per interval, with the name of the world and the policy."""
+        """All records below each other, one row per interval, with the name of the world and the policy."""
         import polars as pl
 
         return pl.concat(list(self._frames()), how="diagonal") if self.records else pl.DataFrame()

@@ -1,4 +1,6 @@
-"""StudyTable: all runs of a study in one table, and the Parquet file that holds it.
+"""StudyTable: the table of a study's runs, as rows, and the Parquet file that holds it.
+
+It is a `Table` like that of any plan; its conditions also have addresses, and its records are read when asked for.
 
 One row per interval of a run, in the order of the study's conditions, seeds and intervals. A run that failed or is
 missing is one row without an interval, so that no run is a silent hole. The file needs nothing beside it: its metadata
@@ -9,21 +11,22 @@ same bytes, in whatever order and on however many machines they were made.
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache, cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from swarm_forage_env._internal.files import replacing
 from swarm_forage_env._internal.parsing import parse_json
-from swarm_forage_env.contract.types import FloatArray
-from swarm_forage_env.runs.record import PACKAGES, RecordError, RunRecord
+from swarm_forage_env.runs.plan import Condition, Plan
+from swarm_forage_env.runs.record import COLUMN_DTYPES, PACKAGES, RecordError, RunRecord, record_of
 from swarm_forage_env.runs.spec import RunSpec
-from swarm_forage_env.runs.store import DONE, FAILED, FAILURES, MISSING, RunStore, read_failure
+from swarm_forage_env.runs.store import DONE, FAILED, FAILURES, MISSING, RunFailure, RunStore, read_failure
+from swarm_forage_env.runs.table import Curves, Table
 from swarm_forage_env.studies.study import Place, StudySpec
 from swarm_forage_env.studies.study_folder import PlaceState, StudyFolder, place_state
 
@@ -39,16 +42,16 @@ LOSS_COLUMNS = ("state", "error", "traceback", "rerun")
 that makes the run again, given in the folder of the study."""
 _PREFIX = "swarm_forage_env.study."
 _FILE_KEYS = tuple(_PREFIX + name for name in ("table_version", "study", "versions", "digest"))
-_NOT_KEPT = ("controller",)
-"""Columns of records that are left out: the policy stands in a column of its own, under its label."""
+_NOT_KEPT = "controller"
+"""Column of records that is left out: the policy stands in a column of its own, under its label."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class StudyTable:
-    """All runs of a study."""
+class StudyTable(Table):
+    """The runs of a study."""
 
     spec: StudySpec
-    frame: "pl.DataFrame"
+    frame: "pl.DataFrame" = field()  # pyright: ignore[reportIncompatibleVariableOverride] - here it is given
     """Columns: `study`, `cell` (index in `spec.places`), `reading` (the rules), `policy`, one `AXIS` column per axis;
     those of `RunRecord`, null where a run has no such column; `LOSS_COLUMNS`."""
     versions: tuple[Mapping[str, str], ...]
@@ -56,6 +59,17 @@ class StudyTable:
     wall_time_s: float | None = None
     """How long all finished runs took together, by the clock. None where it is not known: a file leaves it out, so that
     the same runs make the same bytes."""
+    plan: Plan = field(init=False)
+    records: Mapping[str, RunRecord] = field(init=False)
+    failures: Mapping[str, RunFailure] = field(init=False)
+
+    def __post_init__(self) -> None:
+        for name, value in (
+            ("plan", self.spec.plan),
+            ("records", _InState(self, DONE, self._record)),
+            ("failures", _InState(self, FAILED, self._failure)),
+        ):
+            object.__setattr__(self, name, value)
 
     def rows(self, place: Place) -> "pl.DataFrame":
         """Return the rows of a condition, those of failed and missing runs included.
@@ -66,12 +80,12 @@ class StudyTable:
         start, stop = self._spans[place]
         return self.frame[start:stop]
 
-    def curves(self, place: Place, *columns: str) -> tuple[tuple[int, ...], dict[str, FloatArray]]:
+    def curves(self, condition: Condition | Place, *columns: str) -> Curves:
         """Return the finished runs of a condition as arrays.
 
         Args:
-            place: Which one; that of its reference is `spec.reference_of(place)`.
-            columns: Columns of records; those that the condition's runs do not have are left out.
+            condition: One of the plan, or its place; that of its reference is `spec.reference_of(place)`.
+            columns: Columns of records; those that the condition's runs do not have are left out. Default all.
 
         Returns:
             The seeds of the R runs, rising, and for each column its values in T intervals, (R, T).
@@ -79,10 +93,13 @@ class StudyTable:
         Raises:
             KeyError: the study has no such condition.
         """
-        rows = self.rows(place)
+        if isinstance(condition, Condition):
+            return super().curves(condition, *columns)
+        rows = self.rows(condition)
         rows = rows.filter(rows["state"] == DONE)
         seeds = tuple(int(seed) for seed in rows["seed"].unique(maintain_order=True))
-        present = [name for name in columns if name in rows.columns and rows[name].null_count() == 0]
+        names = columns or COLUMN_DTYPES
+        present = [name for name in names if name in rows.columns and rows[name].null_count() == 0]
         curves = {name: rows[name].to_numpy().astype(np.float64).reshape(len(seeds), -1) for name in present if seeds}
         return seeds, curves
 
@@ -92,10 +109,9 @@ class StudyTable:
         Raises:
             KeyError: the study has no such run.
         """
-        rows = self.frame.filter(self.frame["run_id"] == run_id)
-        if not len(rows):
+        if run_id not in self._of_run:
             raise KeyError(f"Study {self.spec.name} has no run {run_id!r}.")
-        first = rows.row(0, named=True)
+        first = self._rows_of(run_id).row(0, named=True)
         specs = self.spec.specs_of(self.spec.places[first["cell"]])
         return next(spec for spec in specs if spec.seed == first["seed"])
 
@@ -139,6 +155,60 @@ class StudyTable:
         numbers = np.arange(len(self.spec.places) + 1)
         ends = np.searchsorted(self.frame["cell"].to_numpy(), numbers).tolist()
         return {place: (ends[number], ends[number + 1]) for number, place in enumerate(self.spec.places)}
+
+    @cached_property
+    def _of_run(self) -> dict[str, tuple[int, int]]:
+        """First row of each run, and how many it has; runs that several conditions share count in the first."""
+        runs = self.frame["run_id"].rle().struct
+        lengths = runs.field("len").to_numpy()
+        starts = (np.cumsum(lengths) - lengths).tolist()
+        found: dict[str, tuple[int, int]] = {}
+        for run_id, start, length in zip(runs.field("value"), starts, lengths.tolist(), strict=True):
+            found.setdefault(run_id, (start, length))
+        return found
+
+    def _rows_of(self, run_id: str) -> "pl.DataFrame":
+        return self.frame.slice(*self._of_run[run_id])
+
+    def _record(self, run_id: str) -> RunRecord:
+        """The record of a finished run; versions that all runs share are its provenance, other ones are not known."""
+        import polars as pl
+
+        rows, spec = self._rows_of(run_id), self.spec_of(run_id)
+        here = {"study", "cell", "reading", "policy", *LOSS_COLUMNS, *(AXIS + axis.name for axis in self.spec.axes)}
+        kept = [name for name in rows.columns if name not in here and not rows[name].null_count()]
+        made = self.versions[0] if len(self.versions) == 1 else {}
+        return record_of(rows.select(pl.lit(spec.policy).alias(_NOT_KEPT), *kept), spec.to_json(), made)
+
+    def _failure(self, run_id: str) -> RunFailure:
+        row = self._rows_of(run_id).row(0, named=True)
+        return RunFailure(spec=self.spec_of(run_id), error=row["error"], traceback=row["traceback"])
+
+
+_T = TypeVar("_T")
+
+
+class _InState(Mapping[str, _T]):
+    """The runs of a table that are in one state: run_id -> what is read of it when it is asked for."""
+
+    def __init__(self, table: StudyTable, state: str, read: Callable[[str], _T]) -> None:
+        self._table, self._state, self._read = table, state, cache(read)
+
+    @cached_property
+    def _run_ids(self) -> dict[str, None]:
+        frame = self._table.frame
+        return dict.fromkeys(frame.filter(frame["state"] == self._state)["run_id"])
+
+    def __getitem__(self, run_id: str) -> _T:
+        if run_id not in self._run_ids:
+            raise KeyError(run_id)
+        return self._read(run_id)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._run_ids)
+
+    def __len__(self) -> int:
+        return len(self._run_ids)
 
 
 def place_columns(spec: StudySpec, place: Place) -> dict[str, Any]:
@@ -263,7 +333,7 @@ def _frame(records: Sequence[RunRecord]) -> "pl.DataFrame":
 
     if not records:
         return pl.DataFrame()
-    frame = pl.concat([record.to_frame() for record in records]).drop(*_NOT_KEPT)
+    frame = pl.concat([record.to_frame() for record in records]).drop(_NOT_KEPT)
     return frame.with_columns(pl.lit(DONE).alias("state"))
 
 

@@ -72,13 +72,13 @@ def test_runs_that_are_missing_are_left_out(table):
 
 
 def test_the_frame_has_all_records_with_their_place(table):
-    frame = table.frame()
+    frame = table.frame
     assert frame.columns[:2] == ["policy", "world"]
     assert len(frame) == 4 * 2
     assert frame["world"].unique(maintain_order=True).to_list() == [QUIET.name, NOISY.name]
     assert frame["seed"].to_list() == [1, 1, 0, 0] * 2
     assert frame["believed_interference_fraction"].null_count() == 4
-    assert Table(plan=PLAN, records={}).frame().is_empty()
+    assert Table(plan=PLAN, records={}).frame.is_empty()
 
 
 def test_worlds_that_differ_in_performance_alone_share_runs_and_read_them_their_own_way(table):

@@ -6,9 +6,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarm_forage_env.runs.record import RecordError, RunRecord
+from swarm_forage_env.runs.record import RecordError, RunRecord, software_versions
 from swarm_forage_env.runs.run import run_one
-from swarm_forage_env.runs.runner import longest_first, run_specs
+from swarm_forage_env.runs.runner import longest_first, run_plan, run_specs
 from swarm_forage_env.runs.store import FAILURES, MISSING
 from swarm_forage_env.studies.study import Axis, Place
 from swarm_forage_env.studies.study_folder import StudyFolder, run_study
@@ -66,6 +66,26 @@ def test_a_place_gives_the_curves_of_its_runs_and_of_its_reference(file):
         assert ("believed_interference_fraction" in curves) == (one == place), "only noisy runs have that column"
     with pytest.raises(KeyError):
         table.curves(Place("described", "nobody", (3, 0.02)), "collected")
+
+
+def test_it_is_the_table_of_a_plan(file):
+    """Whatever is asked of the runs of a plan can be asked of a study, too."""
+    table = read_study(file)
+    fresh = run_plan(STUDY.plan, jobs=1)
+    assert len(table.records) == len(fresh.records) == 16
+    for condition, place in zip(table.plan.conditions, STUDY.places, strict=True):
+        for mine, other in zip(table.of(condition), fresh.of(condition), strict=True):
+            assert mine.same_results(other)
+            assert mine.spec == other.spec
+            assert mine.made_by(software_versions())
+        seeds, curves = table.curves(condition, "collected")
+        assert (seeds, curves["collected"].tolist()) == (
+            table.curves(place)[0],
+            table.curves(place)[1]["collected"].tolist(),
+        )
+        assert table.failures_of(condition) == ()
+    with pytest.raises(KeyError):
+        table.records["beef"]
 
 
 def test_one_row_per_place(file):
