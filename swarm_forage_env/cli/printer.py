@@ -4,12 +4,10 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from metrics.checks import CurveError
-from metrics.scoring.question import Question
 from swarm_forage_env._internal.fields import ConfigError
 from swarm_forage_env._internal.printable import printable
 from swarm_forage_env._internal.wording import counted
@@ -18,9 +16,11 @@ from swarm_forage_env.cli.option_groups import RunOptions
 from swarm_forage_env.cli.options import EXIT_FAILURE, complain, no_picture
 from swarm_forage_env.cli.terminal import notes
 from swarm_forage_env.runs.answer import Answer
-from swarm_forage_env.runs.plan_summary import summarize_plan
-from swarm_forage_env.runs.store import RunStore
-from swarm_forage_env.runs.table import Table
+
+if TYPE_CHECKING:
+    from metrics.scoring.question import Question
+    from swarm_forage_env.runs.store import RunStore
+    from swarm_forage_env.runs.table import Table
 
 FAILURES_SHOWN = 10
 """Failed runs for which the command that makes them again is told; the folder has all."""
@@ -40,7 +40,7 @@ def refusing() -> Iterator[None]:
 
 
 def ask_and_show(
-    question: Question[Any],
+    question: "Question[Any]",
     folder: Path,
     options: RunOptions,
     *,
@@ -59,6 +59,10 @@ def ask_and_show(
     Raises:
         typer.Exit: Ctrl-C; runs have failed, or too many for an answer.
     """
+    from metrics.checks import CurveError
+    from swarm_forage_env.runs.plan_summary import summarize_plan
+    from swarm_forage_env.runs.store import RunStore
+
     aside = notes()
     for remark in question.remarks:
         aside.print(remark)
@@ -116,7 +120,7 @@ def _drawn(answer: Answer, picture: Path) -> Path | None:
     return None
 
 
-def _tell_of_records(table: Table, store: RunStore) -> None:
+def _tell_of_records(table: "Table", store: "RunStore") -> None:
     """Say on stderr where the records are, and how failed runs are made again."""
     if table.records:
         typer.echo(f"{counted(len(table.records), 'record')} in {store.folder}", err=True)

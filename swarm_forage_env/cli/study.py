@@ -10,7 +10,9 @@ from swarm_forage_env.cli.options import EXIT_FAILURE, AsJson, DryRun, Jobs, com
 from swarm_forage_env.cli.signals import EXIT_INTERRUPTED
 
 if TYPE_CHECKING:
+    from swarm_forage_env.runs.plan_summary import PlanSummary
     from swarm_forage_env.studies.study import StudySpec
+    from swarm_forage_env.studies.study_folder import StudyFolder
 
 Name = Annotated[str, typer.Argument(metavar="NAME|FILE", help="A set of the paper (S1a to S2d), or a study file.")]
 Place = Annotated[Path, typer.Argument(metavar="DIR|FILE", help="Folder of a study, or its packed file.")]
@@ -69,15 +71,14 @@ def run(  # long: one parameter per option
     from swarm_forage_env.cli.terminal import notes
     from swarm_forage_env.runs.cluster import cluster_executor
     from swarm_forage_env.runs.store import FAILED
-    from swarm_forage_env.runs.workers import available_cores
-    from swarm_forage_env.studies.status import StudyOutcome, work_left
+    from swarm_forage_env.studies.status import StudyOutcome
     from swarm_forage_env.studies.study_folder import StudyFolder, parse_shard, run_study
 
     spec = _chosen(name, budget, seeds, rules)
     part = parse_shard(shard)
     folder = StudyFolder(out or Path("results", "studies", f"{spec.name}_{spec.budget}"))
     if dry_run:
-        typer.echo(work_left(spec, folder, part=part, workers=jobs or available_cores(), tell=notes().print))
+        typer.echo(_summary(spec, folder, part, jobs))
         return
     try:
         with nullcontext() if cluster is None else cluster_executor(cluster, jobs) as executor:
@@ -91,6 +92,18 @@ def run(  # long: one parameter per option
     typer.echo(StudyOutcome(outcomes=state, folder=folder))
     if state.count(FAILED):
         raise typer.Exit(EXIT_FAILURE)
+
+
+def _summary(spec: "StudySpec", folder: "StudyFolder", part: tuple[int, int], jobs: int | None) -> "PlanSummary":
+    """Say what is left to run, and how long it takes."""
+    from swarm_forage_env.cli.terminal import notes
+    from swarm_forage_env.runs.plan_summary import summarize_plan
+    from swarm_forage_env.studies.study_folder import shard
+
+    index, count = part
+    name = f"{spec.name}, budget {spec.budget}" + (f", shard {index} of {count}" if count > 1 else "")
+    only, out = shard(spec.plan.specs, index, count), folder.store.folder
+    return summarize_plan(spec.plan, name=name, only=only, out=out, jobs=jobs, tell=notes().print)
 
 
 def status(place: Place, as_json: AsJson = False) -> None:

@@ -10,6 +10,7 @@ benchmark and the evaluations of a training each write a plan; `runs.runner` mak
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 from swarm_forage_env._internal.fields import ConfigError, several, whole
@@ -48,8 +49,7 @@ class Plan:
             whole("a seed", seed, at_least=0)
         if len(set(self.seeds)) < len(self.seeds):
             raise ConfigError(f"Expected different seeds, got {', '.join(map(str, self.seeds))}.")
-        for condition in self.conditions:
-            self._first_of(condition)  # refuses what runs refuse
+        _ = self._firsts  # refuses what runs refuse
 
     @classmethod
     def product(cls, policies: Iterable[PolicySpec], worlds: Sequence[World], seeds: Sequence[int]) -> "Plan":
@@ -68,19 +68,28 @@ class Plan:
         return tuple(condition for condition in self.conditions if condition.policy.label == label)
 
     def specs_of(self, condition: Condition) -> tuple[RunSpec, ...]:
-        """Return the runs of a condition, one per seed."""
-        first = self._first_of(condition)
+        """Return the runs of a condition, one per seed.
+
+        Raises:
+            KeyError: the plan has no such condition.
+        """
+        first = self._firsts[condition]
         return tuple(replace(first, seed=seed) for seed in self.seeds)
 
-    def _first_of(self, condition: Condition) -> RunSpec:
-        """The run of a condition with the first seed."""
-        policy, world = condition
-        return RunSpec(
-            world=world.with_caches(policy.caches),
-            policy=policy.policy,
-            parameters=policy.parameters,
-            seed=self.seeds[0],
-        )
+    @cached_property
+    def _firsts(self) -> dict[Condition, RunSpec]:
+        """The run of each condition with the first seed."""
+        worlds: dict[tuple[World, str | None], World] = {}  # policies share them, and each costs many checks
+        found: dict[Condition, RunSpec] = {}
+        for condition in self.conditions:
+            policy, world = condition
+            asked = (world, policy.caches)
+            if asked not in worlds:
+                worlds[asked] = world.with_caches(policy.caches)
+            found[condition] = RunSpec(
+                world=worlds[asked], policy=policy.policy, parameters=policy.parameters, seed=self.seeds[0]
+            )
+        return found
 
     @property
     def specs(self) -> tuple[RunSpec, ...]:
@@ -90,4 +99,4 @@ class Plan:
     @property
     def robot_ticks(self) -> int:
         """Robots times ticks of all runs."""
-        return sum(self._first_of(condition).robot_ticks for condition in self.conditions) * len(self.seeds)
+        return sum(self._firsts[condition].robot_ticks for condition in self.conditions) * len(self.seeds)

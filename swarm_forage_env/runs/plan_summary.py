@@ -5,9 +5,10 @@ print(summarize_plan(plan, out="results/warehouse_small"))
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,15 @@ from swarm_forage_env.policies.registry import file_of, is_policy_file, local_po
 from swarm_forage_env.policies.trust import only_looks_at
 from swarm_forage_env.runs.answer import Answer, Sheet
 from swarm_forage_env.runs.cost import Cost, Kind, calibrate, kind_of
-from swarm_forage_env.runs.plan import Plan
+from swarm_forage_env.runs.plan import Condition, Plan
 from swarm_forage_env.runs.progress import duration
 from swarm_forage_env.runs.spec import RunSpec
 from swarm_forage_env.runs.store import DONE, RunStore
 from swarm_forage_env.runs.workers import processes_of
 from swarm_forage_env.wrappers.world import World
 
+WORLDS_SHOWN = 60
+"""Worlds that the text names; `to_mapping` has all."""
 _WORLDS_HEADER = ("scenario", "varied", "value", "robots", "objects", "seconds", "runs", "to do")
 _POLICIES_HEADER = ("policy", "caches", "runs", "to do", "robot-ticks", "core-hours")
 _NOT_MEASURED = (
@@ -35,7 +38,10 @@ _NOT_MEASURED = (
 class PlanSummary(Answer):
     """The runs of a plan: which are stored, and what the others take."""
 
-    plan: Plan
+    name: str
+    """What stands before the numbers, empty where a plan has no name."""
+    runs: Mapping[Condition, Mapping[str, RunSpec]]
+    """Each condition with its runs by their ids."""
     stored: frozenset[str]
     """Ids of the runs that are stored already."""
     costs: Mapping[Kind, Cost]
@@ -45,17 +51,22 @@ class PlanSummary(Answer):
     folder: Path | None = None
     """Where records go, None where they are not stored."""
 
-    @property
+    @cached_property
+    def planned(self) -> dict[str, RunSpec]:
+        """All runs by their ids, each once."""
+        return {run_id: spec for specs in self.runs.values() for run_id, spec in specs.items()}
+
+    @cached_property
     def todo(self) -> tuple[RunSpec, ...]:
         """The runs that are not stored, each once."""
-        return tuple({spec.run_id: spec for spec in self.plan.specs if spec.run_id not in self.stored}.values())
+        return tuple(spec for run_id, spec in self.planned.items() if run_id not in self.stored)
 
     def seconds(self, spec: RunSpec) -> float:
         """Return the processor seconds of a run; NaN if it was not measured."""
         cost = self.costs.get(kind_of(spec))
         return math.nan if cost is None else cost.seconds(spec)
 
-    @property
+    @cached_property
     def _measured_s(self) -> list[float]:
         return [seconds for seconds in map(self.seconds, self.todo) if not math.isnan(seconds)]
 
@@ -72,59 +83,56 @@ class PlanSummary(Answer):
 
     def sheets(self) -> tuple[Sheet, ...]:
         """Return the worlds, and the policies with what their runs take."""
-        n_runs = len({spec.run_id for spec in self.plan.specs})
         where = "" if self.folder is None else f", records go to {self.folder}"
-        title = f"{counted(n_runs, 'run')}, {len(self.todo):,} to do{where}"
+        named = f"{self.name}: " if self.name else ""
+        title = f"{named}{counted(len(self.planned), 'run')}, {len(self.todo):,} to do{where}"
         measured = self._measured_s
         about = f"about {duration(self.wall_s)} on {counted(self.processes, 'core')} as fast as this one is now, "
         notes = [f"{about}and some seconds to start"] if measured else []
         notes += [_NOT_MEASURED] if len(measured) < len(self.todo) else []
+        worlds = self._world_rows()
+        more = [f"and {len(worlds) - WORLDS_SHOWN} more worlds"] if len(worlds) > WORLDS_SHOWN else []
         return (
-            Sheet(title=title, header=_WORLDS_HEADER, rows=self._world_rows()),
-            Sheet(
-                header=_POLICIES_HEADER,
-                rows=self._policy_rows(),
-                notes=notes,
-            ),
+            Sheet(title=title, header=_WORLDS_HEADER, rows=worlds[:WORLDS_SHOWN], notes=more),
+            Sheet(header=_POLICIES_HEADER, rows=self._policy_rows(), notes=notes),
         )
 
     def _world_rows(self) -> list[tuple[str, ...]]:
         n_runs: Counter[tuple[str, ...]] = Counter()
         n_todo: Counter[tuple[str, ...]] = Counter()
-        for condition in self.plan.conditions:
+        for condition, specs in self.runs.items():
             row = _world_cells(condition.world)
-            specs = self.plan.specs_of(condition)
             n_runs[row] += len(specs)
-            n_todo[row] += sum(spec.run_id not in self.stored for spec in specs)
+            n_todo[row] += len(specs.keys() - self.stored)
         return [(*row, f"{n_runs[row]:,}", f"{n_todo[row]:,}") for row in n_runs]
 
     def _policy_rows(self) -> list[tuple[str, ...]]:
-        rows: dict[str, list[RunSpec]] = {}
-        for condition in self.plan.conditions:
-            rows.setdefault(condition.policy.label, []).extend(self.plan.specs_of(condition))
+        rows: dict[str, dict[str, RunSpec]] = {}
+        for condition, specs in self.runs.items():
+            rows.setdefault(condition.policy.label, {}).update(specs)
         if len(rows) > 1:
-            rows["all"] = [*self.plan.specs]
+            rows["all"] = self.planned
         return [self._policy_row(label, specs) for label, specs in rows.items()]
 
-    def _policy_row(self, label: str, specs: Sequence[RunSpec]) -> tuple[str, ...]:
-        planned = {spec.run_id: spec for spec in specs}
+    def _policy_row(self, label: str, planned: Mapping[str, RunSpec]) -> tuple[str, ...]:
         todo = [spec for run_id, spec in planned.items() if run_id not in self.stored]
         robot_ticks = sum(spec.robot_ticks for spec in todo)
         seconds = [each for each in map(self.seconds, todo) if not math.isnan(each)]
         hours = sum(seconds) / 3600.0 if seconds or not todo else math.nan
-        caches = ", ".join(dict.fromkeys(spec.scenario.caches for spec in specs))
+        caches = ", ".join(dict.fromkeys(spec.scenario.caches for spec in planned.values()))
         return label, caches, f"{len(planned):,}", f"{len(todo):,}", f"{robot_ticks:.3g}", _hours_text(hours)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return all runs with their specifications, and the estimate."""
         return {
-            "policies": [policy.label for policy in self.plan.policies],
+            "policies": list(dict.fromkeys(condition.policy.label for condition in self.runs)),
             "out": None if self.folder is None else str(self.folder),
             "core_hours": self.core_hours,
             "estimated_wall_s": self.wall_s,
             "runs": [
-                {"run_id": spec.run_id, "stored": spec.run_id in self.stored, "spec": spec.to_mapping()}
-                for spec in self.plan.specs
+                {"run_id": run_id, "stored": run_id in self.stored, "spec": spec.to_mapping()}
+                for specs in self.runs.values()
+                for run_id, spec in specs.items()
             ],
         }
 
@@ -132,6 +140,8 @@ class PlanSummary(Answer):
 def summarize_plan(
     plan: Plan,
     *,
+    name: str = "",
+    only: Iterable[RunSpec] | None = None,
     out: str | Path | None = None,
     jobs: int | None = None,
     tell: Callable[[str], None] | None = None,
@@ -140,21 +150,30 @@ def summarize_plan(
 
     Args:
         plan: The runs.
+        name: What stands before the numbers.
+        only: Those of its runs that are meant, such as the shard of a study; default all.
         out: Folder for run records; runs that it holds are not repeated.
         jobs: Processes that are to make the runs; default one per core.
         tell: Gets a line about each measured swarm before it is measured.
     """
+    meant = None if only is None else {spec.run_id for spec in only}
+    runs: dict[Condition, dict[str, RunSpec]] = {}
+    for condition in plan.conditions:
+        by_id = {spec.run_id: spec for spec in plan.specs_of(condition)}
+        runs[condition] = {run_id: spec for run_id, spec in by_id.items() if meant is None or run_id in meant}
+    planned = {run_id: spec for specs in runs.values() for run_id, spec in specs.items()}
     store = None if out is None else RunStore(out)
-    states = {} if store is None else store.look_up(plan.specs, keep=False).states
+    states = {} if store is None else store.look_up(planned.values(), keep=False).states
     stored = frozenset(run_id for run_id, state in states.items() if state == DONE)
-    todo = {spec.run_id: spec for spec in plan.specs if spec.run_id not in stored}
+    todo = [spec for run_id, spec in planned.items() if run_id not in stored]
     with ExitStack() as here:
         for policy in plan.policies:
             if policy.factory is not None:
                 here.enter_context(local_policy(policy.label, policy.factory))
-        costs = _measured(todo.values(), tell)
+        costs = _measured(todo, tell)
     return PlanSummary(
-        plan=plan,
+        name=name,
+        runs=runs,
         stored=stored,
         costs=costs,
         processes=processes_of(len(todo), jobs),

@@ -258,22 +258,12 @@ class StudySpec:
 
     def condition(self, place: Place) -> Condition:
         """Return what is run in a condition."""
-        policy, world = self._policies[place.policy], self.world(place)
-        shares = {axis.name: value for axis, value in zip(self.axes, place.values, strict=True) if axis.name == SHARE}
-        has_caches = "caches" in (*self.settings, *(axis.name for axis in self.axes))
-        return Condition(
-            replace(
-                policy,
-                parameters={**policy.parameters, **shares},
-                caches=None if has_caches else policy.caches,
-            ),
-            world,
-        )
+        return self._conditions[place]
 
     @cached_property
     def plan(self) -> Plan:
         """All runs, in the order of the conditions."""
-        return Plan(conditions=tuple(map(self.condition, self.places)), seeds=self.seeds)
+        return Plan(conditions=tuple(self._conditions.values()), seeds=self.seeds)
 
     def specs_of(self, place: Place) -> tuple[RunSpec, ...]:
         """Return the runs of a condition, one per seed."""
@@ -353,6 +343,22 @@ class StudySpec:
     @cached_property
     def _policies(self) -> dict[str, PolicySpec]:
         return {policy.label: policy for policy in self.policies}
+
+    @cached_property
+    def _conditions(self) -> dict[Place, Condition]:
+        has_caches = "caches" in (*self.settings, *(axis.name for axis in self.axes))
+        found: dict[Place, Condition] = {}
+        for place in self.places:
+            policy = self._policies[place.policy]
+            shares = {
+                axis.name: value for axis, value in zip(self.axes, place.values, strict=True) if axis.name == SHARE
+            }
+            if shares:
+                policy = replace(policy, parameters={**policy.parameters, **shares})
+            if has_caches:
+                policy = replace(policy, caches=None)
+            found[place] = Condition(policy, self.world(place))
+        return found
 
     @cached_property
     def _worlds(self) -> dict[tuple[str, tuple[Value, ...]], World]:

@@ -119,14 +119,14 @@ def test_a_dry_run_measures_and_runs_nothing(written, monkeypatch):
     monkeypatch.setattr(calibration, "MEASURE_S", 0.001)
     code, out, err = written(*RUN, "--dry-run")
     assert code == 0
-    assert "mine, budget tiny: 8 of 8 runs to do" in out
-    assert re.search(r"^random +8 +400 +\S+$", out, re.MULTILINE)
-    assert re.search(r"^all +8 +400 +\S+$", out, re.MULTILINE)
+    assert f"mine, budget tiny: 8 runs, 8 to do, records go to {FOLDER / 'runs'}" in out
+    assert re.search(r"^random +\S+ +8 +8 +400 +\S+$", out, re.MULTILINE)
     assert re.search(r"about \d+ s on 1 core", out)
     assert "measuring random, N = 2" in err
     assert not FOLDER.exists()
     written(*RUN)
-    assert "0 of 8 runs to do" in written(*RUN, "--dry-run")[1]
+    assert "8 runs, 0 to do" in written(*RUN, "--dry-run")[1]
+    assert "shard 1 of 2: 4 runs, 0 to do" in written(*RUN, "--dry-run", "--shard", "1/2")[1]
 
 
 def test_an_interrupt_keeps_what_is_done(written, monkeypatch):
