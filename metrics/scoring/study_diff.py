@@ -73,8 +73,17 @@ class Shift:
     is_paired: bool
     p: float
     """Two-sided; NaN where there are too few runs."""
+    variance: float
+    """Of the difference."""
+    freedom: float
+    """Degrees of freedom of the variance."""
     p_holm: float = math.nan
     """After Holm's correction over all tests of the two studies."""
+
+    @property
+    def scale(self) -> float:
+        """Mean of both studies; what a line is measured in shares of."""
+        return 0.5 * (self.first + self.second)
 
     @property
     def is_significant(self) -> bool:
@@ -102,11 +111,21 @@ class PlaceDiff:
     place: "Place"
     words: tuple[str, ...]
     """Rules, policy and the value on each axis, as they are shown."""
-    state: State
     n_identical: int
     """Runs of the same seed with the same numbers in all columns of both studies."""
+    is_same: bool
+    """Whether all runs on both sides are the same to the last bit."""
     shifts: tuple[Shift, ...]
     """One per column that was tested; none for an identical condition."""
+
+    @property
+    def state(self) -> State:
+        """What it says."""
+        if self.is_same:
+            return "identical"
+        if all(math.isnan(shift.p) for shift in self.shifts):
+            return "open"
+        return "different" if any(shift.is_significant for shift in self.shifts) else "alike"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,65 +249,33 @@ def diff(first: "StudyTable", second: "StudyTable", columns: Sequence[str] = COL
         raise CurveError(
             f"Expected columns that both studies have, got {unknown[0]!r}; see 'swarm-forage list columns'."
         )
-    places: list[_Compared] = []
+    places: list[PlaceDiff] = []
     lacking: list[Lacking] = []
-    shown = first.spec.place_words(second.spec)
-    for place, words in shown.items():
+    for place, words in first.spec.place_words(second.spec).items():
         why = _why_not(place, first, second)
         if why:
             lacking.append(Lacking(place=place, words=words, why=why))
             continue
         n_identical, is_same = _identical(place, first, second)
         tests = [] if is_same else [_tested(place, words, column, first, second) for column in columns]
-        found = [test for test in tests if test is not None]
-        places.append(_Compared(place=place, n_identical=n_identical, is_same=is_same, tests=found))
+        shifts = tuple(test for test in tests if test is not None)
+        places.append(PlaceDiff(place=place, words=words, n_identical=n_identical, is_same=is_same, shifts=shifts))
     if not places:
         raise CurveError("Expected two studies with finished runs of the same conditions, got none that both have.")
     lines = _lines(places, columns)
-    every = [*lines, *(shift for one in places for shift, _ in one.tests)]
-    corrected = iter(holm(np.array([shift.p for shift in every])).tolist())
-    lines = tuple(replace(line, p_holm=next(corrected)) for line in lines)
+    every = [*lines, *(shift for one in places for shift in one.shifts)]
+    p_values = iter(holm(np.array([shift.p for shift in every])).tolist())
+
+    def corrected(shifts: tuple[Shift, ...]) -> tuple[Shift, ...]:
+        return tuple(replace(shift, p_holm=next(p_values)) for shift in shifts)
+
     return StudyDiff(
         axes=tuple(axis.name for axis in first.spec.axes),
-        places=tuple(
-            PlaceDiff(
-                place=one.place,
-                words=shown[one.place],
-                state=_state(shifts, is_same=one.is_same),
-                n_identical=one.n_identical,
-                shifts=shifts,
-            )
-            for one in places
-            for shifts in (tuple(replace(shift, p_holm=next(corrected)) for shift, _ in one.tests),)
-        ),
-        lines=lines,
+        lines=corrected(lines),  # before the places, as in `every`
+        places=tuple(replace(one, shifts=corrected(one.shifts)) for one in places),
         lacking=tuple(lacking),
         settings=_settings(first, second),
     )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Sample:
-    """The runs of a condition in one column, for the test of a line."""
-
-    scale: float
-    """Mean of both studies; what a line is measured in shares of."""
-    variance: float
-    """Of the mean difference."""
-    freedom: float
-    """Degrees of freedom of the variance."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Compared:
-    """A condition of both studies with its tests, before the correction."""
-
-    place: "Place"
-    n_identical: int
-    is_same: bool
-    """Whether all runs on both sides are the same to the last bit."""
-    tests: list[tuple[Shift, _Sample]]
-    """Of the columns that the runs have; none if they are the same."""
 
 
 def _check_alike(first: "StudyTable", second: "StudyTable") -> None:
@@ -330,7 +317,7 @@ def _identical(place: "Place", first: "StudyTable", second: "StudyTable") -> tup
 
 def _tested(
     place: "Place", words: tuple[str, ...], column: str, first: "StudyTable", second: "StudyTable"
-) -> "tuple[Shift, _Sample] | None":
+) -> Shift | None:
     """The test of one column; None where runs of this condition do not have it."""
     (seeds, mine), (others, theirs) = (table.curves(place, column) for table in (first, second))
     if column not in mine or column not in theirs:
@@ -340,7 +327,7 @@ def _tested(
     difference = float((b - a).mean()) if is_paired else float(b.mean() - a.mean())
     variance, freedom = _variance_of_difference(a, b, is_paired=is_paired)
     p, half = _test(difference, variance, freedom, scale=float(np.abs([*a, *b]).max()), n_runs=len({*seeds, *others}))
-    shift = Shift(
+    return Shift(
         column=column,
         words=words,
         first=float(a.mean()),
@@ -352,8 +339,9 @@ def _tested(
         n_second=b.size,
         is_paired=is_paired,
         p=p,
+        variance=variance,
+        freedom=freedom,
     )
-    return shift, _Sample(scale=0.5 * (shift.first + shift.second), variance=variance, freedom=freedom)
 
 
 def _variance_of_difference(a: FloatArray, b: FloatArray, *, is_paired: bool) -> tuple[float, float]:
@@ -387,9 +375,9 @@ def _test(difference: float, variance: float, freedom: float, *, scale: float, n
     return 2.0 * float(stdtr(freedom, -abs(difference) / error)), float(stdtrit(freedom, _LEVEL)) * error
 
 
-def _lines(places: Sequence[_Compared], columns: Sequence[str]) -> tuple[Shift, ...]:
+def _lines(places: Sequence[PlaceDiff], columns: Sequence[str]) -> tuple[Shift, ...]:
     """One test per policy, rules and column over all conditions that can be tested; identical ones count with 0."""
-    groups: dict[tuple[str, str], list[_Compared]] = {}
+    groups: dict[tuple[str, str], list[PlaceDiff]] = {}
     for one in places:
         groups.setdefault((one.place.rules, one.place.policy), []).append(one)
     lines = [
@@ -401,21 +389,21 @@ def _lines(places: Sequence[_Compared], columns: Sequence[str]) -> tuple[Shift, 
     return tuple(lines)
 
 
-def _line(words: tuple[str, str], column: str, together: Sequence[_Compared]) -> Shift | None:
+def _line(words: tuple[str, str], column: str, together: Sequence[PlaceDiff]) -> Shift | None:
     """The mean difference over conditions, in shares of each condition's mean; None where none can be tested.
 
     Conditions that nobody can test, those of one run or of mean 0, say nothing and are left out.
     """
-    found = [test for one in together for test in one.tests if test[0].column == column]
-    usable = [(shift, sample) for shift, sample in found if sample.variance >= 0.0 and sample.scale > 0.0]
+    found = [shift for one in together for shift in one.shifts if shift.column == column]
+    usable = [shift for shift in found if shift.variance >= 0.0 and shift.scale > 0.0]
     n_places = len(usable) + sum(one.is_same for one in together)
     if not usable or n_places < 2:
         return None
-    difference = sum(shift.difference / sample.scale for shift, sample in usable) / n_places
+    difference = sum(shift.difference / shift.scale for shift in usable) / n_places
     variance, freedom = _sum_of_variances(
-        [(sample.variance / (sample.scale * n_places) ** 2, sample.freedom) for _, sample in usable]
+        [(shift.variance / (shift.scale * n_places) ** 2, shift.freedom) for shift in usable]
     )
-    n_first, n_second = (sum(getattr(shift, name) for shift, _ in usable) for name in ("n_first", "n_second"))
+    n_first, n_second = (sum(getattr(shift, name) for shift in usable) for name in ("n_first", "n_second"))
     p, half = _test(difference, variance, freedom, scale=1.0, n_runs=max(n_first, n_second))
     return Shift(
         column=column,
@@ -427,17 +415,11 @@ def _line(words: tuple[str, str], column: str, together: Sequence[_Compared]) ->
         upper=difference + half,
         n_first=n_first,
         n_second=n_second,
-        is_paired=all(shift.is_paired for shift, _ in usable),
+        is_paired=all(shift.is_paired for shift in usable),
         p=p,
+        variance=variance,
+        freedom=freedom,
     )
-
-
-def _state(shifts: tuple[Shift, ...], *, is_same: bool) -> State:
-    if is_same:
-        return "identical"
-    if all(math.isnan(shift.p) for shift in shifts):
-        return "open"
-    return "different" if any(shift.is_significant for shift in shifts) else "alike"
 
 
 def _settings(first: "StudyTable", second: "StudyTable") -> tuple[str, ...]:
